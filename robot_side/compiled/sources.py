@@ -19,7 +19,7 @@ _COMPILERS = ("kernel.py", "numba_inside.py")
 def sources(function: Callable[..., Any]) -> frozenset[Path]:
     """Find the source files of `function` and of every function of ours that it names, directly or through others.
 
-    Where they lie does not matter. A module that is named as a whole counts, too.
+    Where they lie does not matter. A module that is named as a whole counts with all that it names.
     """
     here = Path(__file__).parent
     return frozenset(here / name for name in _COMPILERS) | {
@@ -60,10 +60,13 @@ def _parts(function: Callable[..., Any]) -> set[Any]:
             found.add(part)
             if isinstance(part, FunctionType):
                 waiting += [named for _, value in _named(part) if (named := _ours(value, part)) is not None]
+            elif isinstance(part, ModuleType):
+                named_there = (_ours(value, part) for value in vars(part).values())
+                waiting += [named for named in named_there if named is not None]
     return found
 
 
-def _ours(value: object, user: FunctionType) -> Any:
+def _ours(value: object, user: FunctionType | ModuleType) -> Any:
     """The function, class or module of ours behind a value that `user` names; None where there is none."""
     if isinstance(value, ModuleType):
         return value if value.__name__.partition(".")[0] in _OURS else None
@@ -72,7 +75,8 @@ def _ours(value: object, user: FunctionType) -> Any:
         return inspect.unwrap(cast(Callable[..., Any], value))
     if not isinstance(value, FunctionType | type):
         return None
-    return value if value.__module__ == user.__module__ or value.__module__.partition(".")[0] in _OURS else None
+    of_user = user.__name__ if isinstance(user, ModuleType) else user.__module__
+    return value if value.__module__ == of_user or value.__module__.partition(".")[0] in _OURS else None
 
 
 def _named(function: FunctionType) -> Iterator[tuple[str, object]]:

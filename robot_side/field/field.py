@@ -8,7 +8,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray, require_finite
 from robot_side.arm.port import GripperPose
 from robot_side.field.look import look
-from robot_side.field.scratch import Scratch
+from robot_side.field.scratch import Error, Scratch
 from robot_side.surroundings.scene_table import SceneTable
 
 _STILL: FloatArray = np.empty(0)
@@ -21,13 +21,17 @@ class Along:
     direction: FloatArray
     """û (3,), unit, in the world frame"""
     mean_m: float
-    """û·(μ_ee - μ_c) + μ_δ"""
+    """û·(μ_ee - μ_c)"""
     variance_m2: float
-    """σ_c² + σ_δ²"""
+    """σ_c²"""
     quantile: float
     """Φ⁻¹(P)"""
     reach_m: float
     """How far ahead is looked."""
+    mean_along_m: float = 0.0
+    """μ_δ"""
+    variance_along_m2: float = 0.0
+    """σ_δ²"""
     early_m: FloatArray | None = None
     """(k,) by how much each object's ways are shorter, as it comes towards the gripper; None: all stand still"""
 
@@ -87,19 +91,20 @@ class Ahead:
         found = look(
             *(np.ascontiguousarray(pose.sphere_centers_m), pose.sphere_radii_m, pose.sphere_on_finger),
             *(pose.tool_position_m, np.ascontiguousarray(pose.tool_jacobian), self._encoder_variance),
-            *(along.direction, along.mean_m, along.variance_m2, along.quantile, widest_m, along.reach_m),
+            *(along.direction, along.mean_m, along.variance_m2, along.mean_along_m, along.variance_along_m2),
+            *(along.quantile, widest_m, along.reach_m),
             *(classes, early_m, scene.bundle, scratch.bundle),
         )
         if not found:
             _refuse(pose, along)
-        return Field(scratch.distances_m.copy(), float(scratch.largest_m[0]), scratch.counts.copy())
+        return Field(scratch.distances_m.copy(), float(scratch.along_m[Error.LARGEST]), scratch.counts.copy())
 
 
 def _refuse(pose: GripperPose, along: Along) -> NoReturn:
     """Raise the ValueError that says what is not finite."""
     for name in ("tool_position_m", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
         require_finite(f"pose.{name}", getattr(pose, name))
-    for name in ("direction", "mean_m", "variance_m2", "quantile", "reach_m"):
+    for name in ("direction", "mean_m", "variance_m2", "mean_along_m", "variance_along_m2", "quantile", "reach_m"):
         require_finite(f"along.{name}", getattr(along, name))
     if along.early_m is not None:
         require_finite("along.early_m", along.early_m)

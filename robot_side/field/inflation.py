@@ -1,12 +1,17 @@
-"""D_σ of each of the gripper's spheres along a direction (eq. 3-7, 9, 10)."""
+"""D_σ of each of the gripper's spheres along a direction (eq. 3-7, 9, 10), and how much of it inflates the sphere.
+
+What camera and arm miss lies in any direction: it inflates. What the prediction of the delay misses lies along the
+motion: it shortens the ways (docs/feel.md).
+"""
 
 import math
+from typing import NamedTuple
 
 from common.arrays import BoolArray, FloatArray
 from robot_side.compiled.kernel import NUMBER, compiled, inlined, input_array, output_array
 from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
 from robot_side.enlargement.distance import statistical_distance
-from robot_side.field.scratch import CLUSTER, ScratchColumns
+from robot_side.field.scratch import CLUSTER, Error, ScratchColumns
 
 Spread = tuple[float, Vector, Vector, Vector]
 """A quadratic form: its value at the tool, the factors of x, y and z, of their squares, and of yz, zx and xy."""
@@ -41,6 +46,31 @@ def variance_at(spread: Spread, arm: Vector) -> float:
     return 0.0 if variance < 0.0 else variance
 
 
+class Missed(NamedTuple):
+    """What may be wrong along a direction, without the joints' part (eq. 9-10)."""
+
+    mean: float
+    """û·(μ_ee - μ_c) in m"""
+    variance: float
+    """σ_c² in m²"""
+    mean_along: float
+    """μ_δ in m"""
+    variance_along: float
+    """σ_δ² in m²"""
+    quantile: float
+    """Φ⁻¹(P)"""
+
+
+@inlined
+def inflation_and_distance(missed: Missed, kinematic: float) -> tuple[float, float]:
+    """Work out what camera and arm may miss at P, and D_σ, of a point whose joints' variance (m²) this is."""
+    both = kinematic + missed.variance
+    inflation = statistical_distance(missed.mean, both, missed.quantile)
+    return inflation, statistical_distance(
+        missed.mean + missed.mean_along, both + missed.variance_along, missed.quantile
+    )
+
+
 @inlined
 def inflate(
     centers: FloatArray,
@@ -50,30 +80,31 @@ def inflate(
     jacobian: FloatArray,
     encoder_variance: FloatArray,
     along: Vector,
-    mean: float,
-    variance: float,
-    quantile: float,
+    missed: Missed,
     scratch: ScratchColumns,
 ) -> bool:
-    """Fill the scratch's spheres, D_σ and clusters; False for what is not finite.
+    """Fill the scratch's spheres, inflations, D_σ, errors along the direction, clusters; False for what is not finite.
 
-    centers (m, 3), radii (m,), on_finger (m,). D_σ has two columns: at P, and expected (P = 0.5).
+    centers (m, 3), radii (m,), on_finger (m,).
     """
-    spheres, sigmas, check = scratch.spheres, scratch.sigma_m, 0.0
+    spheres, errors, check = scratch.spheres, scratch.along_m, missed.mean + missed.mean_along
     spread = spread_along(jacobian, encoder_variance, along)
-    scratch.largest_m[0] = 0.0
+    errors[:] = 0.0
+    check += missed.variance + missed.variance_along + missed.quantile
+    errors[Error.EXPECTED] = max(0.0, missed.mean + missed.mean_along)
     for i in range(radii.size):
         arm = subtract(load(centers, i), tool)
         kinematic = variance_at(spread, arm)
-        found = statistical_distance(mean, kinematic + variance, quantile)
+        inflation, whole = inflation_and_distance(missed, kinematic)
         spheres[i, 0], spheres[i, 1], spheres[i, 2], spheres[i, 3] = *load(centers, i), radii[i]
-        sigmas[i, 0], sigmas[i, 1] = found, max(0.0, mean)
+        scratch.inflation_m[i, 0], scratch.sigma_m[i, 0] = inflation, whole
         scratch.on_finger[i] = on_finger[i]
-        scratch.largest_m[0] = max(scratch.largest_m[0], found)
+        errors[Error.LARGEST] = max(errors[Error.LARGEST], whole)
+        errors[Error.ALONG] = max(errors[Error.ALONG], whole - inflation)
         # A maximum may hide NaN; a sum does not.
-        check += found + mean + kinematic + variance + quantile + arm[0] + arm[1] + arm[2] + radii[i]
+        check += whole + inflation + kinematic + arm[0] + arm[1] + arm[2] + radii[i]
     for first in range(0, radii.size, CLUSTER):
-        middle, radius = around_spheres(spheres, sigmas, first, min(first + CLUSTER, radii.size))
+        middle, radius = around_spheres(spheres, scratch.inflation_m, first, min(first + CLUSTER, radii.size))
         cluster = scratch.clusters[first // CLUSTER]
         cluster[0], cluster[1], cluster[2], cluster[3] = *middle, radius
     return math.isfinite(check)
@@ -92,8 +123,8 @@ def around_spheres(spheres: FloatArray, inflated: FloatArray, first: int, end: i
 
 
 @compiled(
-    *(input_array(2), input_array(1), input_array(2), input_array(1), input_array(1), NUMBER, NUMBER, NUMBER),
-    *(output_array(1), output_array(1)),
+    *(input_array(2), input_array(1), input_array(2), input_array(1), input_array(1)),
+    *(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, output_array(1), output_array(1)),
 )
 def explain_inflation(
     centers: FloatArray,
@@ -103,6 +134,8 @@ def explain_inflation(
     direction: FloatArray,
     mean: float,
     variance: float,
+    mean_along: float,
+    variance_along: float,
     quantile: float,
     kinematic_variance: FloatArray,
     distances: FloatArray,
@@ -112,4 +145,5 @@ def explain_inflation(
     spread, origin = spread_along(jacobian, encoder_variance, along), load(tool.reshape(1, 3), 0)
     for i in range(distances.size):
         kinematic_variance[i] = variance_at(spread, subtract(load(centers, i), origin))
-        distances[i] = statistical_distance(mean, kinematic_variance[i] + variance, quantile)
+        missed = Missed(mean, variance, mean_along, variance_along, quantile)
+        _, distances[i] = inflation_and_distance(missed, kinematic_variance[i])

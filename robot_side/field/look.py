@@ -22,13 +22,13 @@ from robot_side.compiled.kernel import (
     input_indices,
 )
 from robot_side.compiled.vectors import Vector, load
-from robot_side.field.inflation import around_spheres, inflate
+from robot_side.field.inflation import Missed, around_spheres, inflate
 from robot_side.field.nearest_first import drop_first, push
 from robot_side.field.object_class import PASSED_OVER
 from robot_side.field.pairs import enter, pairs_of
 from robot_side.field.profile import follow
 from robot_side.field.samples import Profile
-from robot_side.field.scratch import CLUSTER, SCRATCH, STRENGTHS, Bundles, Count, ScratchColumns
+from robot_side.field.scratch import CLUSTER, SCRATCH, STRENGTHS, Bundles, Count, Error, ScratchColumns
 from robot_side.surroundings.any_kind import contact
 from robot_side.surroundings.bounds import passes
 from robot_side.surroundings.kinds.layout import HALF_SPACE, MESH
@@ -171,7 +171,7 @@ def _key(bound: float, early: float, rough: bool) -> float:
 
 LOOK: Final = (
     *(input_array(2), input_array(1), input_flags(), input_array(1), input_array(2), input_array(1), input_array(1)),
-    *(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, input_indices(), input_array(1), BUNDLE, BUNDLE),
+    *(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, input_indices(), input_array(1), BUNDLE, BUNDLE),
 )
 """What `look` takes, for who calls it by its address."""
 
@@ -187,6 +187,8 @@ def look(
     direction: FloatArray,
     mean: float,
     variance: float,
+    mean_along: float,
+    variance_along: float,
     quantile: float,
     widest: float,
     reach: float,
@@ -198,8 +200,8 @@ def look(
     """Fill the scratch's distances; False for spheres, or errors, that are not finite: they would compare as far away.
 
     centers (m, 3), radii (m,), on_finger (m,): of the gripper's spheres. tool (3,), jacobian (6, n),
-    encoder_variance (n,), direction: the unit û (3,). mean, variance: of eq. 10 along û, without the joints' part;
-    quantile: Φ⁻¹(P). widest: half the gap between the fingers, the most by which a finger's sphere is inflated towards
+    encoder_variance (n,), direction: the unit û (3,). mean, variance, mean_along, variance_along, quantile: those of
+    `Missed`. widest: half the gap between the fingers, the most by which a finger's sphere is inflated towards
     the target (§3.4). classes (k,): of the objects (`object_class`). early (k,): their strengths begin sooner by this,
     as they come nearer; empty where all stand still.
     """
@@ -207,32 +209,34 @@ def look(
     along, margin, spheres = load(direction.reshape(1, 3), 0), MARGIN_M, radii.size
     scratch.distances_m[:], scratch.counts[:] = math.inf, 0
     origin = load(tool.reshape(1, 3), 0)
-    finite = inflate(
-        centers, radii, on_finger, origin, jacobian, encoder_variance, along, mean, variance, quantile, scratch
-    )
+    missed = Missed(mean, variance, mean_along, variance_along, quantile)
+    finite = inflate(centers, radii, on_finger, origin, jacobian, encoder_variance, along, missed, scratch)
     if not (finite and math.isfinite(reach)):
         return False
-    middle, size = around_spheres(scratch.spheres, scratch.sigma_m, 0, spheres)
-    count, place, farthest, keys, things = 0, -1, reach + margin, scratch.bounds_m, scratch.objects
+    middle, size = around_spheres(scratch.spheres, scratch.inflation_m, 0, spheres)
+    shorter = scratch.along_m[Error.ALONG]
+    count, place, farthest, keys, things = 0, -1, reach + margin + shorter, scratch.bounds_m, scratch.objects
     moves = early.size > 0
     for thing in range(early.size):
         if not math.isfinite(early[thing]):
             return False
-        farthest = max(farthest, reach + margin + early[thing])
+        farthest = max(farthest, reach + margin + shorter + early[thing])
     while True:
         place = next_object(scene, place + 1, middle, along, farthest, size)
         if place >= scene.object_order.size:
             break
         thing = scene.object_order[place]
         if classes[thing] != PASSED_OVER:
-            first, end, sooner = scene.first_rows[thing], scene.first_rows[thing + 1], early[thing] if moves else 0.0
+            first, end, sooner = scene.first_rows[thing], scene.first_rows[thing + 1], shorter
+            sooner += early[thing] if moves else 0.0
             rows, nearest = _near_rows(bundles, first, end, middle, size, along, reach + margin + sooner)
             if rows > 0:
                 count = push(keys, things, count, nearest - sooner if nearest > 0.0 else -math.inf, thing)
     while count > 0 and keys[0] < _last_to_count(scratch, margin):
         thing = things[0]
         count = drop_first(keys, things, count)
-        first, end, sooner = scene.first_rows[thing], scene.first_rows[thing + 1], early[thing] if moves else 0.0
+        first, end, sooner = scene.first_rows[thing], scene.first_rows[thing + 1], shorter
+        sooner += early[thing] if moves else 0.0
         rows, _ = _near_rows(bundles, first, end, middle, size, along, reach + margin + sooner)
         _look_at(bundles, spheres, rows, thing, classes[thing], sooner, along, widest, reach)
     for kind in range(2):

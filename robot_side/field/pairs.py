@@ -6,7 +6,7 @@ from typing import Any, Final
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, load
 from robot_side.field.object_class import TARGET, TOUCHABLE
-from robot_side.field.scratch import SCRATCH, Bundles, Count
+from robot_side.field.scratch import SCRATCH, Bundles, Count, Error
 from robot_side.surroundings.bounds import passes
 from robot_side.surroundings.kinds.layout import HALF_SPACE, Contact
 from robot_side.surroundings.scene_columns import SCENE, contact_with
@@ -51,14 +51,15 @@ def _pair(
 ) -> Any:
     """Write the pair of a sphere and an object; where they do not touch within the reach, its contact is infinite."""
     scratch = scratch_at(bundles.scratch)
-    pair, inflated = scratch.pairs[place], scratch.sigma_m[i, 0]
+    pair, inflated = scratch.pairs[place], scratch.inflation_m[i, 0]
     if object_class == TARGET and scratch.on_finger[i] and inflated > widest:
         inflated = widest
         scratch.counts[Count.LIMITED] += 1 if not uninflated else 0
     sooner = inflated if uninflated else 0.0
     pair.sphere, pair.object, pair.radius = i, thing, scratch.spheres[i, 3] + inflated - sooner
     pair.lead, pair.touchable = early + sooner, object_class in (TOUCHABLE, TARGET)
-    pair.expected = inflated - min(scratch.sigma_m[i, 1], inflated) if pair.touchable else 0.0
+    whole = inflated + scratch.along_m[Error.ALONG]
+    pair.expected = max(whole - scratch.along_m[Error.EXPECTED], 0.0) if pair.touchable else 0.0
     pair.contact, pair.closing = _meet_sphere(bundles, i, rows, pair.radius, along, reach + sooner, clear)
     pair.overlaps = pair.contact == 0.0
     return pair

@@ -24,8 +24,8 @@ PAIR: Final = np.dtype(
 )
 """One gripper sphere and one object. radius: inflated, unless the sphere counts uninflated. contact: the distance at
 which it first touches, 0 where it overlaps (`overlaps`). closing: û·n of the plane in which it does so; 0 for a mesh.
-lead: strengths begin sooner by this, as the object comes nearer, and by D_σ of an uninflated sphere. expected:
-D_σ(P) - D_σ(0.5) of an object that is to be touched (`touchable`), else 0."""
+lead: strengths begin sooner by this, by the errors along the motion, as the object comes nearer, and by the inflation
+of an uninflated sphere. expected: D_σ(P) - D_σ(0.5) of an object that is to be touched (`touchable`), else 0."""
 
 ENTRY: Final = np.dtype(
     [
@@ -52,6 +52,17 @@ class Count(IntEnum):
     """Spheres whose D_σ was limited to half the gap between the fingers (§3.4)"""
 
 
+class Error(IntEnum):
+    """Errors along the direction of a look, in m."""
+
+    LARGEST = 0
+    """The largest D_σ"""
+    ALONG = 1
+    """The most of D_σ that does not inflate: ways are shorter by this"""
+    EXPECTED = 2
+    """D_σ at P = 0.5"""
+
+
 class Bundles(NamedTuple):
     """A scene and the scratch by their bundles.
 
@@ -67,6 +78,7 @@ class ScratchColumns(NamedTuple):
 
     spheres: FloatArray
     on_finger: BoolArray
+    inflation_m: FloatArray
     sigma_m: FloatArray
     clusters: FloatArray
     keys_m: FloatArray
@@ -79,14 +91,14 @@ class ScratchColumns(NamedTuple):
     samples: FloatArray
     push: FloatArray
     distances_m: FloatArray
-    largest_m: FloatArray
+    along_m: FloatArray
     counts: IntArray
 
 
 SCRATCH: Final = Declared(
     ScratchColumns,
-    *(rows(4), FLAGS, rows(2), rows(4), NUMBERS, INDICES, records(PAIR), INDICES, NUMBERS, INDICES, records(ENTRY)),
-    *(rows(2), NUMBERS, rows(STRENGTHS), NUMBERS, INDICES),
+    *(rows(4), FLAGS, rows(1), rows(1), rows(4), NUMBERS, INDICES, records(PAIR), INDICES, NUMBERS, INDICES),
+    *(records(ENTRY), rows(2), NUMBERS, rows(STRENGTHS), NUMBERS, INDICES),
 )
 
 
@@ -97,8 +109,10 @@ class Scratch:
         self.spheres: FloatArray = np.zeros((spheres, 4))
         """Centres and radii"""
         self.on_finger: BoolArray = np.zeros(spheres, dtype=np.bool_)
-        self.sigma_m: FloatArray = np.zeros((spheres, 2))
-        """D_σ at P, and expected (P = 0.5)"""
+        self.inflation_m: FloatArray = np.zeros((spheres, 1))
+        """By what camera and arm may miss, at P"""
+        self.sigma_m: FloatArray = np.zeros((spheres, 1))
+        """D_σ at P, with what the prediction may miss"""
         self.clusters: FloatArray = np.zeros((spheres // CLUSTER + 1, 4))
         """A sphere around each cluster of inflated ones"""
         self.keys_m: FloatArray = np.zeros(2 * spheres + len(self.clusters))
@@ -118,8 +132,8 @@ class Scratch:
         """dV/dcentre of the newest overlap"""
         self.distances_m: FloatArray = np.zeros((2, STRENGTHS))
         """At which the strengths begin, fast and slow"""
-        self.largest_m: FloatArray = np.zeros(1)
-        """The largest D_σ"""
+        self.along_m: FloatArray = np.zeros(len(Error))
+        """At the places of `Error`"""
         self.counts: IntArray = np.zeros(len(Count), dtype=np.int64)
         self.bundle = SCRATCH.bundle(self)
 

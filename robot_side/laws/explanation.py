@@ -1,5 +1,6 @@
 """What the enlargement is made of and what overlaps, for people who look; worked out only when asked for."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -41,8 +42,6 @@ def enlargement_terms(
     situation: Situation,
     along: Along,
     encoder_sigma_rad: FloatArray,
-    camera_sd_m: float,
-    prediction_sd_m: float,
     displacement_m: float,
 ) -> tuple[EnlargementTerms, FloatArray]:
     """What eq. 8-10 are made of for the sphere with the largest D_σ; and D_σ of all (m,). encoder_sigma_rad (n,)."""
@@ -50,16 +49,16 @@ def enlargement_terms(
     kinematic_m2, sigma_m = np.empty(count), np.empty(count)
     explain_inflation(
         *(np.ascontiguousarray(pose.sphere_centers_m), pose.tool_position_m, np.ascontiguousarray(pose.tool_jacobian)),
-        *(encoder_sigma_rad**2, along.direction, along.mean_m, along.variance_m2, along.quantile),
-        *(kinematic_m2, sigma_m),
+        *(encoder_sigma_rad**2, along.direction, along.mean_m, along.variance_m2),
+        *(along.mean_along_m, along.variance_along_m2, along.quantile, kinematic_m2, sigma_m),
     )
     largest = int(sigma_m.argmax())
     terms = EnlargementTerms(
         sigma_m=float(sigma_m[largest]),
-        mean_m=float(along.mean_m),
+        mean_m=float(along.mean_m + along.mean_along_m),
         kinematic_sd_m=float(np.sqrt(kinematic_m2[largest])),
-        camera_sd_m=camera_sd_m,
-        prediction_sd_m=float(prediction_sd_m),
+        camera_sd_m=math.sqrt(along.variance_m2),
+        prediction_sd_m=math.sqrt(along.variance_along_m2),
         quantile=along.quantile,
         loop_age_s=float(situation.loop_age_s),
         displacement_m=float(displacement_m),

@@ -12,14 +12,14 @@ from robot_side.compiled.calls import call_at_address
 from robot_side.compiled.kernel import NUMBER, TRUTH, building_block, inlined
 from robot_side.compiled.vectors import Vector, dot, load
 from robot_side.field.look import LOOK
-from robot_side.field.scratch import SCRATCH, Count
+from robot_side.field.scratch import SCRATCH, Count, Error
 from robot_side.field.total_overlap import SUM_OVERLAPS
 from robot_side.laws.felt import MOST_M
 from robot_side.laws.memory import Kernel, Total, memory_at
+from robot_side.laws.path import go_to
 from robot_side.laws.prospect import FIND_PROSPECT, stopping
 from robot_side.laws.recent_looks import keep, longest_waiting
 from robot_side.laws.sensed import L2, R2
-from robot_side.laws.sideways import move
 
 OVERLAP_PERIOD_S: Final = 0.02
 """The overlap at δ is a figure that people read."""
@@ -81,18 +81,19 @@ def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool
     """Look along one side from one place, and keep what was seen; False for what is not finite."""
     memory = memory_at(bundle)
     state, prospect, count = memory.state[0], memory.prospect[0], moment.radii.size
-    after = memory.moments_s[place - 1] if place > 0 else 0.0
-    move(bundle, moment.tool, moment.rotation, moment.centers, after)
+    gone = go_to(bundle, moment.tool, moment.rotation, moment.centers, side, place, moment.speed, moment.loop_age)
     where = memory.rotation, moment.jacobian, moment.right, moment.up, moment.loop_age, moment.by_operator
-    if not _find_prospect(memory.kernels[Kernel.PROSPECT], (bundle, side, *where)):
+    if not _find_prospect(memory.kernels[Kernel.PROSPECT], (bundle, side, *where, gone)):
         return False
     _fill_early(bundle, moment.velocities, stopping(prospect.speed, prospect.acceleration, moment.loop_age))
     classes = moment.closing if place > 0 and state.moves_fingers == 1 else moment.classes
     gripper = memory.centers_m[:count], moment.radii, moment.on_finger, memory.tool_m, moment.jacobian
-    errors = memory.encoder_variance, memory.direction, prospect.mean, prospect.variance, memory.settings[0].quantile
+    settings = memory.settings[0]
+    errors = memory.encoder_variance, memory.direction, prospect.mean, settings.camera_variance
+    along = prospect.mean_along, prospect.variance_along, settings.quantile
     early = memory.early_m[: moment.velocities.shape[0]]
     around = moment.widest, prospect.reach, classes, early, moment.scene, moment.scratch
-    if not _look(memory.kernels[Kernel.LOOK], (*gripper, *errors, *around)):
+    if not _look(memory.kernels[Kernel.LOOK], (*gripper, *errors, *along, *around)):
         return False
     scratch, totals = scratch_at(moment.scratch), memory.totals
     for counted in range(scratch.counts.size):
@@ -108,11 +109,11 @@ def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool
         state.overlap = _sum_overlaps(
             memory.kernels[Kernel.OVERLAPS], (*spheres, classes, moment.scene, memory.push, memory.nothing)
         )
-    keep(bundle, side, place, moment.now, load(memory.tool_m.reshape(1, 3), 0), scratch.distances_m)
+    keep(bundle, side, place, moment.now, moment.tool, scratch.distances_m)
     if place == 0:
         newest = memory.newest[side]
         newest.reach, newest.speed, newest.acceleration = prospect.reach, prospect.speed, prospect.acceleration
-        newest.sigma, newest.overlap = scratch.largest_m[0], state.overlap if leads else 0.0
+        newest.sigma, newest.overlap = scratch.along_m[Error.LARGEST], state.overlap if leads else 0.0
     return True
 
 

@@ -12,8 +12,10 @@ from robot_side.compiled.columns import INDICES, NUMBERS, Declared, records, row
 from robot_side.field.scratch import STRENGTHS, Count
 
 SIDES: Final = 3
-MOST_PLACES: Final = 8
-"""Places besides the gripper's own from which a side is looked at."""
+EVEN_PLACES: Final = 8
+"""Places along the path, evenly in time, from which a side is looked at at most;"""
+MOST_PLACES: Final = EVEN_PLACES + 2
+"""and with one before and one after that of the shortest way: in between something may be nearer."""
 ROOM: Final = 12 * (1 + MOST_PLACES)
 """Looks of one side: a place is looked from a hundred times a second at most."""
 FINGER_POSES: Final = 8
@@ -71,10 +73,12 @@ SETTINGS: Final = np.dtype(
 PROSPECT: Final = np.dtype(
     [
         ("direction", np.float64, (3,)),
-        *((name, np.float64) for name in ("mean", "variance", "prediction_sd", "reach", "speed", "acceleration")),
+        *((name, np.float64) for name in ("mean", "mean_along", "variance_along", "speed", "acceleration")),
+        *((name, np.float64) for name in ("reach", "gone", "stretch")),
     ]
 )
-"""How to look along one side: û, μ and σ² of eq. 10 without the joints' part, σ_δ, how far, the arm's v_max and a."""
+"""How to look along one side: û, û·(μ_ee - μ_c), μ_δ and σ_δ² of eq. 10, the arm's v_max and a; how far, the way that
+is gone before, and by how much the path is longer than its chord."""
 
 
 class MemoryColumns(NamedTuple):
@@ -85,6 +89,7 @@ class MemoryColumns(NamedTuple):
     counts: IntArray
     newest: np.ndarray
     looked_s: FloatArray
+    nearest_m: FloatArray
     places: IntArray
     moments_s: FloatArray
     velocity: FloatArray
@@ -93,6 +98,7 @@ class MemoryColumns(NamedTuple):
     finger_poses_m: FloatArray
     tool_m: FloatArray
     rotation: FloatArray
+    chord: FloatArray
     centers_m: FloatArray
     early_m: FloatArray
     prospect: np.ndarray
@@ -113,9 +119,10 @@ class MemoryColumns(NamedTuple):
 
 MEMORY: Final = Declared(
     MemoryColumns,
-    *(records(STATE), records(SEEN), INDICES, records(NEWEST), rows(1 + MOST_PLACES), INDICES, NUMBERS, rows(3)),
-    *(rows(3), NUMBERS, rows(3), NUMBERS, rows(3), rows(3), NUMBERS, records(PROSPECT), NUMBERS, NUMBERS, NUMBERS),
-    *(NUMBERS, NUMBERS, records(SETTINGS), rows(3), rows(3), NUMBERS, NUMBERS, NUMBERS, INDICES, INDICES),
+    *(records(STATE), records(SEEN), INDICES, records(NEWEST), rows(1 + MOST_PLACES), rows(1 + MOST_PLACES), INDICES),
+    *(NUMBERS, rows(3), rows(3), NUMBERS, rows(3), NUMBERS, rows(3), NUMBERS, rows(3), NUMBERS, records(PROSPECT)),
+    *(NUMBERS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, records(SETTINGS), rows(3), rows(3), NUMBERS, NUMBERS, NUMBERS),
+    *(INDICES, INDICES),
 )
 
 memory_at = MEMORY.at
@@ -142,16 +149,20 @@ class Memory:
         self.newest: np.ndarray = np.zeros(SIDES, dtype=NEWEST)
         self.looked_s: FloatArray = np.full((SIDES, 1 + MOST_PLACES), -np.inf)
         """By side and place: when it was last looked from there, minus infinity where it never was."""
+        self.nearest_m: FloatArray = np.full((SIDES, 1 + MOST_PLACES), np.inf)
+        """By side and place: the way of full strength that was found there last"""
         self.places: IntArray = np.zeros(SIDES, dtype=np.int64)
         """From how many places each side is looked at. Place 0 is where the gripper is."""
-        self.moments_s: FloatArray = np.zeros(MOST_PLACES)
-        """After which the gripper will be at the other places"""
+        self.moments_s: FloatArray = np.zeros(EVEN_PLACES)
+        """After which the gripper will be at the even places"""
         self.velocity: FloatArray = np.zeros((2, 3))
         """Linear and angular, of the tool, without that along its approach axis"""
         self.finger_poses_s: FloatArray = np.zeros(FINGER_POSES)
         self.tool_m: FloatArray = np.zeros(3)
         self.rotation: FloatArray = np.zeros((3, 3))
         """Of the tool at the place that is looked from"""
+        self.chord: FloatArray = np.zeros(3)
+        """Where the trigger leads on to from there, by 1 m of its way"""
         self.prospect: np.ndarray = np.zeros(1, dtype=PROSPECT)
         self.direction: FloatArray = np.zeros(3)
         self.able: FloatArray = np.zeros(FOUND + limits.velocity_rad_s.size)

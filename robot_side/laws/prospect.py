@@ -9,6 +9,7 @@ from robot_side.arm.ability import ABILITY
 from robot_side.compiled.calls import call_at_address
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, compiled, inlined, input_array
+from robot_side.compiled.vectors import load, norm
 from robot_side.enlargement.prediction_errors import prediction_error
 from robot_side.laws.memory import Kernel, memory_at
 from robot_side.laws.sensed import R2, STICK
@@ -16,7 +17,7 @@ from robot_side.laws.sensed import R2, STICK
 BEYOND_M: Final = 0.05
 """The distance looked beyond what a reaction, the loop age and braking take, as the loop age varies."""
 FIELD_PERIOD_S: Final = 0.01
-"""A controller is written to no more often. From where the gripper is yet to come, it is looked half as often."""
+"""A controller is written to no more often. From where the gripper is yet to come, it is looked a third as often."""
 
 _find_ability = call_at_address(TRUTH, ABILITY)
 _prediction_error = inlined(prediction_error)
@@ -37,7 +38,7 @@ def horizon_m(speed: float, acceleration: float, loop_age: float) -> float:
     return speed * (loop_age + HORIZON_S) + speed * speed / (2.0 * acceleration) + BEYOND_M
 
 
-FIND_PROSPECT: Final = (BUNDLE, COUNT, input_array(2), input_array(2), NUMBER, NUMBER, NUMBER, TRUTH)
+FIND_PROSPECT: Final = (BUNDLE, COUNT, input_array(2), input_array(2), NUMBER, NUMBER, NUMBER, TRUTH, NUMBER)
 """What `find_prospect` takes, for who calls it by its address."""
 
 
@@ -51,19 +52,22 @@ def find_prospect(
     up: float,
     loop_age: float,
     by_operator: bool,
+    gone: float,
 ) -> bool:
     """Fill the memory's prospect and direction for one side; False for a Jacobian by which nothing can be resolved.
 
     bundle: the memory's. rotation (3, 3), jacobian (6, n): of the tool at the place that is looked from. right, up: the
-    stick's deflection. by_operator: the operator side predicts what is under way.
+    stick's deflection. by_operator: the operator side predicts what is under way. gone: the way (m) before the place,
+    from which the memory's chord leads on.
     """
     memory = memory_at(bundle)
     settings, found, able = memory.settings[0], memory.prospect[0], memory.able
+    length = norm(load(memory.chord.reshape(1, 3), 0))
     for axis in range(3):
-        x, y, z = rotation[axis, 0], rotation[axis, 1], rotation[axis, 2]
-        memory.direction[axis] = z if side == R2 else -z
+        ahead = memory.chord[axis] / length
+        memory.direction[axis] = ahead if side == R2 else -ahead
         if side == STICK:
-            memory.direction[axis] = (right * x - up * y) / math.hypot(right, up)
+            memory.direction[axis] = (right * rotation[axis, 0] - up * rotation[axis, 1]) / math.hypot(right, up)
         found.direction[axis] = memory.direction[axis]
     full_speed = settings.stick_speed if side == STICK else settings.trigger_speed
     given = jacobian, memory.direction, full_speed, memory.limits_rad_s, memory.accelerations_rad_s2, able
@@ -75,8 +79,9 @@ def find_prospect(
     if side != STICK:
         rows = memory.missed_by_operator if by_operator else memory.missed_by_robot
         mean, sd = _prediction_error(rows, loop_age, found.speed)
+    found.mean, found.mean_along, found.variance_along = 0.0, mean, sd * sd
     for axis in range(3):
-        mean += found.direction[axis] * settings.mean[axis]
-    found.mean, found.prediction_sd, found.variance = mean, sd, settings.camera_variance + sd * sd
-    found.reach = horizon_m(found.speed, found.acceleration, loop_age) + 2.0 * FIELD_PERIOD_S * full_speed
+        found.mean += found.direction[axis] * settings.mean[axis]
+    farthest = horizon_m(found.speed, found.acceleration, loop_age) + 2.0 * FIELD_PERIOD_S * full_speed
+    found.gone, found.stretch, found.reach = gone, 1.0 / length, max(farthest - gone, 0.0) * length
     return True

@@ -22,7 +22,7 @@ def look_from(bundle: IntArray, side: int, places: int) -> None:
     memory = memory_at(bundle)
     first, kept = ROOM * side, 0
     for place in range(memory.places[side], places):
-        memory.looked_s[side, place] = -math.inf
+        memory.looked_s[side, place], memory.nearest_m[side, place] = -math.inf, math.inf
     if places < memory.places[side]:
         for k in range(first, first + memory.counts[side]):
             if memory.seen[k].place < places:
@@ -36,13 +36,13 @@ def look_from(bundle: IntArray, side: int, places: int) -> None:
 def longest_waiting(bundle: IntArray, now: float) -> tuple[float, int, int]:
     """How many periods the side and place that has waited longest has waited, with these two.
 
-    A place that the gripper is yet to come to has twice the period.
+    A place that the gripper is yet to come to has three times the period.
     """
     memory = memory_at(bundle)
     most, of_side, of_place = -math.inf, 0, 0
     for side in range(SIDES):
         for place in range(memory.places[side]):
-            period = 2.0 * FIELD_PERIOD_S if place > 0 else FIELD_PERIOD_S
+            period = 3.0 * FIELD_PERIOD_S if place > 0 else FIELD_PERIOD_S
             waited = (now - memory.looked_s[side, place]) / period
             if waited > most:
                 most, of_side, of_place = waited, side, place
@@ -62,7 +62,7 @@ def longest_ago(bundle: IntArray) -> float:
 
 @inlined
 def keep(bundle: IntArray, side: int, place: int, now: float, tool: Vector, ways: FloatArray) -> None:
-    """Take in a look along the memory's direction with the tool there; ways (2, 8), fast and slow.
+    """Take in a look along the memory's prospect, asked with the tool there; ways (2, 8) from its place, fast and slow.
 
     What was seen from the same place is forgotten if it is too old or was along another direction. Where there is no
     room for more, the oldest goes.
@@ -80,10 +80,11 @@ def keep(bundle: IntArray, side: int, place: int, now: float, tool: Vector, ways
             kept += 1
     row = oldest if kept == ROOM else first + kept
     memory.counts[side], memory.looked_s[side, place] = min(kept + 1, ROOM), now
-    new = seen[row]
+    new, prospect = seen[row], memory.prospect[0]
     new.place, new.at, new.began = place, now, dot(along, tool)
     for axis in range(3):
         new.direction[axis] = along[axis]
     for kind in range(2):
         for strength in range(STRENGTHS):
-            new.ways[kind, strength] = ways[kind, strength]
+            new.ways[kind, strength] = prospect.gone + prospect.stretch * ways[kind, strength]
+    memory.nearest_m[side, place] = new.ways[0, STRENGTHS - 1]

@@ -21,12 +21,13 @@ from robot_side.compiled.kernel import (
 )
 from robot_side.compiled.vectors import Vector, add, dot, load, scale, subtract
 from robot_side.laws.felt import feel
+from robot_side.laws.fingers import measure_fingers
 from robot_side.laws.looking import ROUNDING_S, Moment, look_at_due
 from robot_side.laws.memory import Kernel, memory_at
+from robot_side.laws.path import plan_places
 from robot_side.laws.prospect import FIELD_PERIOD_S, FIND_PROSPECT, stopping
 from robot_side.laws.recent_looks import longest_ago, look_from
 from robot_side.laws.sensed import ENLARGEMENT, L2, OVERLAP, R2, STICK
-from robot_side.laws.sideways import measure_fingers, plan_moments
 
 _find_prospect = call_at_address(TRUTH, FIND_PROSPECT)
 
@@ -48,14 +49,15 @@ def _measure(bundle: IntArray, moment: Moment, velocity: Vector, turning: Vector
     state, across = memory.state[0], subtract(velocity, scale(moment.speed, moment.approach))
     for axis in range(3):
         memory.velocity[0, axis], memory.velocity[1, axis] = across[axis], turning[axis]
+        memory.chord[axis] = moment.approach[axis]
     measure_fingers(bundle, moment.centers, moment.tool, moment.rotation, moment.now, changed)
     state.spheres = moment.radii.size
     where = moment.rotation, moment.jacobian, 0.0, 0.0, moment.loop_age, moment.by_operator
-    if not _find_prospect(memory.kernels[Kernel.PROSPECT], (bundle, R2, *where)):
+    if not _find_prospect(memory.kernels[Kernel.PROSPECT], (bundle, R2, *where, 0.0)):
         return False
     able = memory.prospect[0]
     until = stopping(able.speed, able.acceleration, moment.loop_age)
-    plan_moments(bundle, moment.centers, moment.tool, moment.approach, until, until * able.speed)
+    plan_places(bundle, moment.centers, moment.tool, moment.approach, until, until * able.speed)
     state.measured = moment.now
     return True
 
@@ -118,7 +120,7 @@ def sense(
                 return False
             at_most = 0
         for side in (R2, L2):
-            look_from(bundle, side, 1 + state.moments)
+            look_from(bundle, side, 1 + state.moments + (2 if state.moments > 0 else 0))
         look_from(bundle, STICK, 1 if deflected else 0)
         if not look_at_due(bundle, moment, at_most):
             return False

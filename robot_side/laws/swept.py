@@ -37,10 +37,10 @@ from robot_side.laws.explanation import (
 from robot_side.laws.felt import room_to_feel
 from robot_side.laws.law import Situation
 from robot_side.laws.memory import Memory, Total
+from robot_side.laws.path import go_to_place
 from robot_side.laws.prospect import find_prospect, stopping_s
 from robot_side.laws.sense import sense
 from robot_side.laws.sensed import L2, NUMBERS, R2, Sensed
-from robot_side.laws.sideways import go_to_place
 from robot_side.surroundings.perceived import Role
 from robot_side.surroundings.scene_table import SceneTable
 from robot_side.surroundings.surroundings import Surroundings
@@ -55,8 +55,6 @@ class Asked(NamedTuple):
     classes: IntArray
     along: Along
     widest_m: float
-    prediction_sd_m: float
-    """σ_δ of the errors"""
 
 
 class SweptLaw:
@@ -120,10 +118,8 @@ class SweptLaw:
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
         """What D_σ is made of along one trigger, and what overlaps at the robot side's δ; in the ticks' thread."""
         felt, side = (sensed.l2, L2) if trigger == "l2" else (sensed.r2, R2)
-        asked, camera_sd_m = self.asked(side, situation), self._uncertainty.camera_sd_m
-        terms, sigma_m = enlargement_terms(
-            *(situation, asked.along, self.encoder_sigma_rad, camera_sd_m, asked.prediction_sd_m, felt.displacement_m)
-        )
+        asked = self.asked(side, situation)
+        terms, sigma_m = enlargement_terms(situation, asked.along, self.encoder_sigma_rad, felt.displacement_m)
         spheres = moved_and_inflated(situation.pose, felt.displacement_m * asked.along.direction, sigma_m)
         found = overlaps_by_object(spheres, self.surroundings.see(situation.objects), asked.classes)
         return TriggerExplained(terms, found)
@@ -133,9 +129,11 @@ class SweptLaw:
         pose, memory, (right, up) = situation.pose, self.memory, situation.lateral
         self._make_room(pose, self.surroundings.see(situation.objects))
         by_operator, age_s = situation.compensation == "operator", situation.loop_age_s
-        go_to_place(memory.bundle, pose.tool_position_m, pose.tool_rotation, pose.sphere_centers_m, place)
+        speed_m_s = pose.tool_rotation[:, 2] @ (pose.tool_jacobian[:3] @ situation.joint_velocities_rad_s)
+        where = pose.tool_position_m, pose.tool_rotation, pose.sphere_centers_m
+        gone_m = go_to_place(memory.bundle, *where, side, place, speed_m_s, age_s)
         motion = memory.rotation, pose.tool_jacobian, right, up, age_s, by_operator
-        if not find_prospect(memory.bundle, side, *motion):
+        if not find_prospect(memory.bundle, side, *motion, gone_m):
             self._refuse(situation)
         found, early_m, velocities = memory.prospect[0], None, situation.objects.velocities_m_s
         if velocities is not None:
@@ -144,9 +142,11 @@ class SweptLaw:
         along = Along(
             direction=found["direction"].copy(),
             mean_m=float(found["mean"]),
-            variance_m2=float(found["variance"]),
+            variance_m2=self._uncertainty.camera_sd_m**2,
             quantile=self._uncertainty.quantile,
             reach_m=float(found["reach"]),
+            mean_along_m=float(found["mean_along"]),
+            variance_along_m2=float(found["variance_along"]),
             early_m=early_m,
         )
         there = replace(
@@ -157,7 +157,7 @@ class SweptLaw:
         )
         _, classes, closing = self._classes_of(situation)
         closes = place > 0 and bool(memory.state["moves_fingers"][0])
-        return Asked(there, closing if closes else classes, along, _widest_m(situation), float(found["prediction_sd"]))
+        return Asked(there, closing if closes else classes, along, _widest_m(situation))
 
     def _make_room(self, pose: GripperPose, scene: SceneTable) -> None:
         spheres = len(pose.sphere_radii_m)

@@ -31,8 +31,8 @@ _TRAVEL = TriggerTravel()
 _LONGEST_RETURN = 4.0
 """Upper bound in the finger's time constants; from full travel to the dead zone it takes 3."""
 _COASTING_STEPS = 100
-_LOOKED_S = 0.03
-"""Time within which ways from every place aside are computed: each at least every 20 ms."""
+_LOOKED_S = 0.04
+"""Time within which ways from every place aside are computed: each at least every 30 ms."""
 
 
 class Replay:

@@ -58,7 +58,7 @@ def compare(looks: Iterable[tuple[Asked, PerceivedObjects]], encoder_sigma_rad: 
     """Look, and define what should be found."""
     ahead = Ahead(encoder_sigma_rad)
     off_m, grazes, sigma_off_m = [np.zeros(0)], [np.zeros(0, dtype=np.bool_)], [0.0]
-    for (pose, classes, along, widest_m, _), objects in looks:
+    for (pose, classes, along, widest_m), objects in looks:
         found = ahead.look(pose, scene_table(objects), classes, along, widest_m)
         defined = defined_ways(pose, objects, classes, along, widest_m, encoder_sigma_rad)
         judged = defined.judge(found.ways_m, along.reach_m)

@@ -77,7 +77,7 @@ class _Pairs(NamedTuple):
     radii_m: FloatArray
     thing: IntArray
     sooner_m: FloatArray
-    """The ways are shorter by this: as the object comes nearer, and by D_σ for a bare sphere."""
+    """The ways are shorter by this: errors along û, how far the object comes nearer, the inflation of a bare one."""
     later_m: FloatArray
     """They are longer by this in the slow list, where the object is to be touched."""
     touchable: BoolArray
@@ -102,12 +102,13 @@ class _Pairs(NamedTuple):
         return self.bound_m - MARGIN_M - self.sooner_m
 
 
-def statistical_m(pose: GripperPose, along: Along, encoder_sigma_rad: FloatArray) -> tuple[FloatArray, float]:
-    """Return D_σ of each sphere (m,) along û, and where it is expected (P = 0.5): eq. 5, 9 and 10."""
+def statistical_m(pose: GripperPose, along: Along, encoder_sigma_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return by how much each sphere (m,) is inflated, and D_σ of each along û: eq. 5, 9 and 10."""
     leaning = np.einsum("a,man->mn", along.direction, pose.sphere_jacobians)
-    spread = np.sqrt(leaning**2 @ encoder_sigma_rad**2 + along.variance_m2)
-    sigma_m: FloatArray = np.maximum(0.0, along.mean_m + along.quantile * spread)
-    return sigma_m, max(0.0, along.mean_m)
+    variance = leaning**2 @ encoder_sigma_rad**2 + along.variance_m2
+    inflated_m = np.maximum(0.0, along.mean_m + along.quantile * np.sqrt(variance))
+    spread = np.sqrt(variance + along.variance_along_m2)
+    return inflated_m, np.maximum(0.0, along.mean_m + along.mean_along_m + along.quantile * spread)
 
 
 def defined_ways(
@@ -119,18 +120,19 @@ def defined_ways(
     encoder_sigma_rad: FloatArray,
 ) -> Defined:
     """Find what `Ahead.look` should; the arguments are its own."""
-    sigma_m, expected_m = statistical_m(pose, along, encoder_sigma_rad)
+    alone_m, sigma_m = statistical_m(pose, along, encoder_sigma_rad)
+    along_m, expected_m = max(0.0, (sigma_m - alone_m).max()), max(0.0, along.mean_m + along.mean_along_m)
     solids = Solids(objects)
     sphere, thing = np.nonzero(np.broadcast_to(classes != PASSED_OVER, (len(sigma_m), len(classes))))
     held_back = pose.sphere_on_finger[sphere] & (classes[thing] == TARGET)
-    inflated_m = np.where(held_back, np.minimum(sigma_m[sphere], widest_m), sigma_m[sphere])
-    early_m = np.zeros(len(thing)) if along.early_m is None else along.early_m[thing]
+    inflated_m = np.where(held_back, np.minimum(alone_m[sphere], widest_m), alone_m[sphere])
+    early_m = along_m + (np.zeros(len(thing)) if along.early_m is None else along.early_m[thing])
     swollen = _Pairs(
         centers_m=pose.sphere_centers_m[sphere],
         radii_m=pose.sphere_radii_m[sphere] + inflated_m,
         thing=thing,
         sooner_m=early_m,
-        later_m=inflated_m - np.minimum(expected_m, inflated_m),
+        later_m=np.maximum(inflated_m + along_m - expected_m, 0.0),
         touchable=np.isin(classes[thing], (TOUCHABLE, TARGET)),
         bound_m=np.zeros(len(thing)),
         before_m3=np.zeros(len(thing)),

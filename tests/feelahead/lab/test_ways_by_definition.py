@@ -53,30 +53,31 @@ def on_a_grid(
     pose: GripperPose, objects: PerceivedObjects, classes: IntArray, ahead: Along, widest_m: float
 ) -> FloatArray:
     """The ways (2, 8), each sphere and object by itself, nothing passed over."""
-    sigma_m, expected_m = statistical_m(pose, ahead, ENCODER_SIGMA_RAD)
+    alone_m, sigma_m = statistical_m(pose, ahead, ENCODER_SIGMA_RAD)
+    along_m, expected_m = max(0.0, (sigma_m - alone_m).max()), max(0.0, ahead.mean_m + ahead.mean_along_m)
     solids, ways_m = Solids(objects), np.full((2, 8), np.inf)
     for thing, object_class in enumerate(classes):
-        early_m = 0.0 if ahead.early_m is None else ahead.early_m[thing]
+        early_m = along_m + (0.0 if ahead.early_m is None else ahead.early_m[thing])
         for i, center in enumerate(pose.sphere_centers_m if object_class != PASSED_OVER else ()):
-            inflated_m = min(sigma_m[i], widest_m if object_class == TARGET and pose.sphere_on_finger[i] else np.inf)
+            inflated_m = min(alone_m[i], widest_m if object_class == TARGET and pose.sphere_on_finger[i] else np.inf)
             for radius, sooner_m in (
                 (pose.sphere_radii_m[i] + inflated_m, early_m),
                 (pose.sphere_radii_m[i], early_m + inflated_m),
             ):
-                along_m = np.arange(0.0, REACH_M + 2 * MARGIN_M + sooner_m, STEP_M)
-                many = np.full(len(along_m), radius), np.full(len(along_m), thing)
-                volumes, gradients = solids.overlap(center + along_m[:, None] * ahead.direction, *many)
+                grid_m = np.arange(0.0, REACH_M + 2 * MARGIN_M + sooner_m, STEP_M)
+                many = np.full(len(grid_m), radius), np.full(len(grid_m), thing)
+                volumes, gradients = solids.overlap(center + grid_m[:, None] * ahead.direction, *many)
                 risen = np.maximum.accumulate(np.maximum(volumes - volumes[0], 0.0))
                 free = int(np.argmax(risen > 4e-9 * radius**3))
                 if free:
-                    full = min(free + round(MARGIN_M / STEP_M), len(along_m) - 1)
+                    full = min(free + round(MARGIN_M / STEP_M), len(grid_m) - 1)
                     least = min(np.pi * radius * 0.0005**2, 0.5 * solids.volumes_m3[thing])
                     strengths = risen / max(risen[full], MARGIN_M * np.linalg.norm(gradients[0]), least)
                     places = np.searchsorted(strengths, DUE)
-                    own_m = np.append(along_m, np.inf)[places] - MARGIN_M - sooner_m
+                    own_m = np.append(grid_m, np.inf)[places] - MARGIN_M - sooner_m
                     ways_m[0] = np.minimum(ways_m[0], own_m)
                     if object_class in (TARGET, TOUCHABLE):
-                        own_m = own_m + inflated_m - min(expected_m, inflated_m)
+                        own_m = own_m + max(inflated_m + along_m - expected_m, 0.0)
                         own_m[4:] = np.inf
                     ways_m[1] = np.minimum(ways_m[1], own_m)
                 if volumes[0] == 0.0:
@@ -94,7 +95,8 @@ def test_any_look_is_defined_as_on_a_grid(seed: int) -> None:
     direction, things = AHEAD + 0.4 * rng.normal(size=3), len(objects.names)
     early_m = rng.uniform(0.0, 0.02, things) if rng.random() < 0.5 else None
     mean_m, direction = float(rng.uniform(-0.004, 0.006)), direction / np.linalg.norm(direction)
-    ahead = Along(direction, mean_m, 0.002**2, 2.326, REACH_M, early_m)
+    missed = float(rng.uniform(-0.002, 0.002)), float(rng.uniform(0.0, 0.002)) ** 2
+    ahead = Along(direction, mean_m, 0.002**2, 2.326, REACH_M, *missed, early_m)
     classes = rng.choice([OBSTACLE, OBSTACLE, TOUCHABLE, TARGET, PASSED_OVER], things).astype(np.int64)
     widest_m = float(rng.choice([0.002, 0.01, np.inf]))
     expected_m = on_a_grid(pose, objects, classes, ahead, widest_m)

@@ -8,7 +8,7 @@ from robot_side.arm.port import GripperPose
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, compiled, input_array, output_array
 from robot_side.compiled.vectors import load
-from robot_side.laws import felt, recent_looks, sideways
+from robot_side.laws import felt, fingers, path, recent_looks
 from robot_side.laws.memory import Memory
 
 
@@ -16,12 +16,15 @@ def memory(spheres: int = 0) -> Memory:
     """One as at the start, with room for a gripper of so many spheres."""
     made = Memory(JointLimits(np.ones(6), np.ones(6)), np.zeros(6), [np.zeros((0, 3))] * 2)
     made.make_room(max(spheres, 1), 1)
+    made.prospect["stretch"] = 1.0
     return made
 
 
-def moved(kept: Memory, pose: GripperPose, after_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def moved(
+    kept: Memory, pose: GripperPose, after_s: float, ahead_m: float = 0.0
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The tool's position (3,) and rotation (3, 3), and the spheres' centres (m, 3), then."""
-    _move(kept.bundle, pose.tool_position_m, pose.tool_rotation, pose.sphere_centers_m, after_s)
+    _move(kept.bundle, pose.tool_position_m, pose.tool_rotation, pose.sphere_centers_m, after_s, ahead_m)
     return kept.tool_m.copy(), kept.rotation.copy(), kept.centers_m[: len(pose.sphere_centers_m)].copy()
 
 
@@ -43,9 +46,11 @@ def fingers_m_s(kept: Memory, pose: GripperPose, now_s: float, *, changed: bool 
     return kept.own_m_s.copy()
 
 
-@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), NUMBER)
-def _move(bundle: IntArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray, after: float) -> None:
-    sideways.move(bundle, load(tool.reshape(1, 3), 0), rotation, centers, after)
+@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), NUMBER, NUMBER)
+def _move(
+    bundle: IntArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray, after: float, ahead: float
+) -> None:
+    path.move(bundle, load(tool.reshape(1, 3), 0), rotation, centers, after, ahead)
 
 
 @compiled(BUNDLE, input_array(1), input_array(2), input_array(2), NUMBER, NUMBER)
@@ -53,20 +58,20 @@ def _plan(
     bundle: IntArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray, until: float, ahead: float
 ) -> None:
     approach = rotation[0, 2], rotation[1, 2], rotation[2, 2]
-    sideways.plan_moments(bundle, centers, load(tool.reshape(1, 3), 0), approach, until, ahead)
+    path.plan_places(bundle, centers, load(tool.reshape(1, 3), 0), approach, until, ahead)
 
 
 @compiled(BUNDLE, input_array(1), input_array(2), input_array(2), NUMBER, returns=NUMBER)
 def _farthest(bundle: IntArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray, ahead: float) -> float:
     farther = ahead * rotation[0, 2], ahead * rotation[1, 2], ahead * rotation[2, 2]
-    return sideways.fastest_m_s(bundle, centers, load(tool.reshape(1, 3), 0), farther)
+    return path.fastest_m_s(bundle, centers, load(tool.reshape(1, 3), 0), farther)
 
 
 @compiled(BUNDLE, input_array(2), input_array(1), input_array(2), NUMBER, TRUTH)
 def _measure(
     bundle: IntArray, centers: FloatArray, tool: FloatArray, rotation: FloatArray, now: float, changed: bool
 ) -> None:
-    sideways.measure_fingers(bundle, centers, load(tool.reshape(1, 3), 0), rotation, now, changed)
+    fingers.measure_fingers(bundle, centers, load(tool.reshape(1, 3), 0), rotation, now, changed)
 
 
 @compiled(BUNDLE, COUNT, COUNT)

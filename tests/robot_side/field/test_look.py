@@ -15,7 +15,7 @@ from robot_side.arm.port import GripperPose
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
 from robot_side.field.field import Ahead, Along
-from robot_side.field.scratch import Count
+from robot_side.field.scratch import Count, Error
 from tests.helpers.field.fields import AHEAD, RADIUS_M, along, ball_pose, look
 from tests.helpers.gripper_poses import free_pose, gripper_pose
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
@@ -36,9 +36,9 @@ def any_pose(rng: np.random.Generator, spheres: int, joints: int) -> GripperPose
 
 
 def sigmas(by: Ahead, pose: GripperPose, looked: Along) -> FloatArray:
-    """D_σ at P and as expected (m, 2)."""
+    """By how much each sphere is inflated, and D_σ (m, 2)."""
     look(pose, EMPTY, looked, by=by)
-    return by.scratch.sigma_m[: len(pose.sphere_radii_m)].copy()
+    return np.hstack([by.scratch.inflation_m, by.scratch.sigma_m])[: len(pose.sphere_radii_m)]
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)
@@ -57,12 +57,20 @@ def test_the_enlargement_is_eq_10_for_each_sphere(
     direction = rng.normal(size=3)
     direction /= np.linalg.norm(direction)
     quantile, variance = NormalDist().inv_cdf(p), float(rng.uniform(0.0, 1e-4))
-    found = sigmas(Ahead(encoder_sigma), pose, Along(direction, mean_m, variance, quantile, 0.1))
+    mean_along_m, variance_along = float(rng.uniform(-0.01, 0.01)), float(rng.uniform(0.0, 1e-4))
+    known = Along(direction, mean_m, variance, quantile, 0.1, mean_along_m, variance_along)
+    by = Ahead(encoder_sigma)
+    found = sigmas(by, pose, known)
     covariances = position_covariance(pose.sphere_jacobians, encoder_sigma)
     of_joints = directional_variance(covariances, np.tile(direction, (spheres, 1)))
-    expected = np.maximum(0.0, mean_m + quantile * np.sqrt(of_joints + variance))
-    np.testing.assert_allclose(found[:, 0], expected, rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(found[:, 1], max(0.0, mean_m), rtol=1e-15)
+    alone = np.maximum(0.0, mean_m + quantile * np.sqrt(of_joints + variance))
+    whole = np.maximum(0.0, mean_m + mean_along_m + quantile * np.sqrt(of_joints + variance + variance_along))
+    np.testing.assert_allclose(found[:, 0], alone, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(found[:, 1], whole, rtol=1e-12, atol=1e-15)
+    along_m = by.scratch.along_m
+    assert along_m[Error.LARGEST] == found[:, 1].max()
+    assert along_m[Error.ALONG] == max(0.0, (found[:, 1] - found[:, 0]).max())
+    assert along_m[Error.EXPECTED] == pytest.approx(max(0.0, mean_m + mean_along_m), rel=1e-15)
 
 
 def test_the_largest_of_the_enlargements_is_told() -> None:
@@ -130,7 +138,9 @@ def test_a_pose_that_is_not_finite_is_named_and_never_silently_far_away(name: st
         look(dataclasses.replace(pose, **{name: values}), objects, along())
 
 
-@pytest.mark.parametrize("name", ["direction", "mean_m", "variance_m2", "quantile", "reach_m"])
+@pytest.mark.parametrize(
+    "name", ["direction", "mean_m", "variance_m2", "mean_along_m", "variance_along_m2", "quantile", "reach_m"]
+)
 def test_a_direction_that_is_not_finite_is_named(name: str) -> None:
     bad: Any = np.full(3, math.nan) if name == "direction" else math.nan
     with pytest.raises(ValueError, match=f"along.{name} holds NaN or infinity"):

@@ -1,0 +1,159 @@
+"""The gripper's path until the arm stands: a screw motion by trigger, sticks and fingers, and samples along it.
+
+Sticks move and turn the tool in its own frame. A tool whose point moves with v, and which turns with ω, has after t
+turned by θ = |ω| t, and its point has gone
+
+    t V v,    V = 1 + (1 - cos θ)/θ [a] + (1 - sin θ/θ) [a]²,    a = ω/|ω|
+
+(exponential map of SE(3)). The trigger moves it along the approach axis z, and so from a place to the next along the
+chord V z, which points along z turned by θ/2. What is under way by then is gone already: the way at a place begins
+there.
+"""
+
+import math
+from typing import Final
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.columns import BUNDLE
+from robot_side.compiled.kernel import COUNT, NUMBER, compiled, inlined, input_array
+from robot_side.compiled.vectors import Vector, add, cross, load, norm, scale, subtract, unit
+from robot_side.laws.memory import EVEN_PLACES, memory_at
+from robot_side.laws.sensed import L2
+
+SPACING_M: Final = 0.015
+"""No sphere gets farther between two places: less than an inflated fingertip's sphere is wide. A gripper that would
+need more places than the most has them farther apart."""
+_LEAST_M: Final = 0.003
+"""Smaller motions are ignored."""
+
+
+@inlined
+def fastest_m_s(bundle: IntArray, centers: FloatArray, tool: Vector, ahead: Vector) -> float:
+    """|v + ω × r + its own| of the fastest sphere, or of one farther on by `ahead`, in m/s; NaN for what is none."""
+    memory = memory_at(bundle)
+    velocity, turning = load(memory.velocity, 0), load(memory.velocity, 1)
+    fastest, check = 0.0, 0.0
+    for i in range(centers.shape[0]):
+        lever, alone = subtract(load(centers, i), tool), add(velocity, load(memory.own_m_s, i))
+        near, far = norm(add(alone, cross(turning, lever))), norm(add(alone, cross(turning, add(lever, ahead))))
+        fastest = max(fastest, near, far)
+        # A maximum may hide what is no number.
+        check += near + far
+    return fastest if math.isfinite(check) else math.nan
+
+
+@inlined
+def plan_places(
+    bundle: IntArray, centers: FloatArray, tool: Vector, approach: Vector, until: float, ahead: float
+) -> None:
+    """Decide after which times to look from the path: evenly, the last at `until`; never where the gripper stays.
+
+    ahead: so far ahead (m) it is to be looked as finely as near the gripper, which counts while it turns.
+    """
+    memory = memory_at(bundle)
+    state, farthest = memory.state[0], until * fastest_m_s(bundle, centers, tool, scale(ahead, approach))
+    state.moments = 0
+    if farthest >= _LEAST_M and math.isfinite(farthest):
+        state.moments = min(math.ceil(farthest / SPACING_M), EVEN_PLACES)
+    for number in range(state.moments):
+        memory.moments_s[number] = until * (number + 1) / state.moments
+
+
+@inlined
+def time_of_place(bundle: IntArray, side: int, place: int) -> float:
+    """Find the time at which the gripper will be at a place: the last two lie half a step beside the shortest way."""
+    memory = memory_at(bundle)
+    even = memory.state[0].moments
+    if place <= even:
+        after: float = memory.moments_s[place - 1] if place > 0 else 0.0
+        return after
+    nearest = 0
+    for one in range(1, even + 1):
+        if memory.nearest_m[side, one] < memory.nearest_m[side, nearest]:
+            nearest = one
+    half_steps = 2.0 * nearest + (1.0 if place == even + 1 else -1.0)
+    between: float = 0.5 * memory.moments_s[0] * min(max(half_steps, 1.0), 2.0 * even - 1.0)
+    return between
+
+
+@inlined
+def _along_screw(vector: Vector, axis: Vector, across: float, twice: float) -> Vector:
+    """Work out v + across · a × v + twice · a × (a × v), which both a rotation and V are (Rodrigues)."""
+    turned = cross(axis, vector)
+    return add(vector, add(scale(across, turned), scale(twice, cross(axis, turned))))
+
+
+@inlined
+def move(
+    bundle: IntArray,
+    origin: Vector,
+    rotation: FloatArray,
+    centers: FloatArray,
+    after: float,
+    ahead: float,
+) -> None:
+    """Put the tool and its spheres where they will be after that time, and find the chord that leads on from there.
+
+    origin, rotation (3, 3), centers (m, 3): where they are; after 0 s, exactly these. ahead: what the trigger moves it
+    by then, along the approach axis (m).
+    """
+    memory = memory_at(bundle)
+    turning, stays = load(memory.velocity, 1), after == 0.0
+    axis, angle = unit(turning), after * norm(turning)
+    sine, versine = math.sin(angle), 2.0 * math.sin(0.5 * angle) ** 2
+    across, twice = (versine / angle, 1.0 - sine / angle) if angle > 1e-9 else (0.5 * angle, 0.0)
+    chord = _along_screw((rotation[0, 2], rotation[1, 2], rotation[2, 2]), axis, across, twice)
+    moved = origin
+    if not stays:
+        sideways = _along_screw(scale(after, load(memory.velocity, 0)), axis, across, twice)
+        moved = add(origin, add(sideways, scale(ahead, chord)))
+    for k in range(3):
+        memory.tool_m[k], memory.chord[k] = moved[k], chord[k]
+        column = _along_screw((rotation[0, k], rotation[1, k], rotation[2, k]), axis, sine, versine)
+        for row in range(3):
+            memory.rotation[row, k] = column[row]
+    for i in range(centers.shape[0]):
+        center = load(centers, i)
+        if not stays:
+            lever = subtract(add(center, scale(after, load(memory.own_m_s, i))), origin)
+            center = add(moved, _along_screw(lever, axis, sine, versine))
+        for row in range(3):
+            memory.centers_m[i, row] = center[row]
+
+
+@inlined
+def go_to(
+    bundle: IntArray,
+    tool: Vector,
+    rotation: FloatArray,
+    centers: FloatArray,
+    side: int,
+    place: int,
+    speed: float,
+    loop_age: float,
+) -> float:
+    """Move to a place that is looked from along one side, 0 for where the gripper is; the way (m) gone by then.
+
+    speed: along the approach axis. What is under way goes on for the loop age. A place stands for the path from half a
+    step before it on.
+    """
+    after = time_of_place(bundle, side, place)
+    forth, since = 1.0 if side != L2 else -1.0, max(after - 0.5 * memory_at(bundle).moments_s[0], 0.0)
+    gone: float = max(forth * speed, 0.0) * min(since, loop_age)
+    move(bundle, tool, rotation, centers, after, forth * gone)
+    return gone
+
+
+@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), COUNT, COUNT, NUMBER, NUMBER, returns=NUMBER)
+def go_to_place(
+    bundle: IntArray,
+    tool: FloatArray,
+    rotation: FloatArray,
+    centers: FloatArray,
+    side: int,
+    place: int,
+    speed: float,
+    loop_age: float,
+) -> float:
+    """Move as `go_to` does, for people who look; bundle: the memory's; tool (3,)."""
+    return go_to(bundle, load(tool.reshape(1, 3), 0), rotation, centers, side, place, speed, loop_age)
