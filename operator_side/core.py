@@ -266,6 +266,7 @@ class OperatorSide:
             "R2": right,
             "L2_pulled": left_pulled,
             "R2_pulled": right_pulled,
+            "stands": None if self.stiffness is None else self.stiffness.stands,
             "haptics": self._haptics_enabled,
             "feel": self.haptics.status() if sight is Sight.SEEING else sight,
             "release_first": sight is Sight.WAITING,

@@ -21,6 +21,7 @@ from robot_side.arm.joint_estimate import JointEstimate
 from robot_side.arm.port import Arm, ArmState, GripperKinematics, GripperPose
 from robot_side.arm.speed_assist import assisted
 from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.arm.touching_down import TouchingDown, carried_n
 from robot_side.figures import RunFigures
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.held_object import HeldObject, grip, gripped_object, with_held
@@ -94,7 +95,8 @@ class RobotSide:
         self._assists = assists
         self._joints = JointEstimate()
         self._still: FloatArray = np.zeros(arm.joint_count)
-        self._told_m_s = 0.0
+        self._told_m_s = self._rises_m_s = 0.0
+        self._touching_down = TouchingDown()
         self._held_covers = held_covers
         self._start_s: float | None = None
         self._held: HeldObject | None = None
@@ -144,6 +146,7 @@ class RobotSide:
         self._follow_target(objects, pose)
         self._follow_grip(objects, pose, state)
         whole = pose if self._held is None else with_held(pose, self._held)
+        self._follow_stand(pose, state)
         permission = self.session.permission(now_s)
         self._move(permission, pose, state, now_s)
         command = permission.command
@@ -190,24 +193,33 @@ class RobotSide:
         if state.gripper_holding:
             self._held_s = state.time_s
         if self._held is not None and state.time_s - self._held_s > _LET_GO_S:
-            self._held = None
+            self._held, self._touching_down = None, TouchingDown()
         elif self._held is None and state.gripper_holding:
             index = gripped_object(self._surroundings.see(objects), pose.tool_position_m, state.gripper_opening_m)
             if index is not None:
                 self._held = grip(objects, index, pose, self._held_covers)
 
+    def _follow_stand(self, pose: GripperPose, state: ArmState) -> None:
+        """Notice when what is held comes to stand."""
+        if self._held is not None:
+            carried = carried_n(pose.tool_jacobian, state.joint_loads_nm)
+            height_m = float(pose.tool_position_m[2])
+            self._touching_down.update(carried, height_m, self._rises_m_s, state.time_s)
+
     def _move(self, permission: Permission, pose: GripperPose, state: ArmState, now_s: float) -> None:
         """Pass the operator's motion on to the arm; without permission nothing is commanded, and it stops."""
         command = permission.command
-        if command is None:
-            self._told_m_s = 0.0
+        if command is None or self._touching_down.gives_way:
+            self._told_m_s = self._rises_m_s = 0.0
             # No longer valid: a command that runs out between two physics steps would let a load sink, each time anew.
             self._arm.command(self._still, state.time_s)
             self._arm.command_gripper(0.0, now_s)
             return
         if self._assists and self.newest is not None:
             command = assisted(command, self.newest[0].l2, self.newest[0].r2)
-        velocity, self._told_m_s = commanded(command, pose, state.joint_positions_rad, self._limits, self._motion)
+        where = pose, state.joint_positions_rad, self._limits, self._motion
+        velocity, self._told_m_s = commanded(command, *where, stands=self._touching_down.stands)
+        self._rises_m_s = float(pose.tool_jacobian[2] @ velocity)
         self._arm.command(velocity, permission.valid_until_s)
         self._arm.command_gripper(command.gripper, permission.valid_until_s)
 
@@ -234,16 +246,17 @@ class RobotSide:
         sensed: Sensed,
         now_s: float,
     ) -> list[Outgoing]:
-        session, told_m_s = self.session, self._told_m_s
+        session, told_m_s, stands = self.session, self._told_m_s, self._touching_down.stands
+        felt = sensed, told_m_s, permission.state
         outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]
         if session.owner_peer is not None and self.felt.due(
-            sensed, told_m_s, permission.state, permission.command, now_s
+            sensed, told_m_s, permission.state, permission.command, now_s, stands=stands
         ):
             self.stiffness_sent += 1
-            outgoing += [stiffness_message(one, sensed, told_m_s, permission.state) for one in session.owners(now_s)]
+            outgoing += [stiffness_message(one, *felt, stands=stands) for one in session.owners(now_s)]
         if now_s >= self._next_observers_s:
             self._next_observers_s = now_s + OBSERVER_PERIOD_S
-            outgoing += [stiffness_message(one, sensed, told_m_s, permission.state) for one in session.observers(now_s)]
+            outgoing += [stiffness_message(one, *felt, stands=stands) for one in session.observers(now_s)]
         holding = self._held is not None
         if self._seen.may_be_due((session.lease.token, permission.state, self._target, holding), now_s):
             target = None if self._target is None else (situation.objects.names[self._target], self._target_m)
@@ -279,6 +292,7 @@ class RobotSide:
                 "R2": sensed.r2.stiffness,
                 "enlargement_mm": 1e3 * sensed.enlargement_m,
                 "holding": "nothing" if self._held is None else self._held.name[:SHOWN_NAME],
+                "stands": self._touching_down.stands,
                 "nearest": None if apart.nearest is None else apart.nearest[:SHOWN_NAME],
                 "nearest_mm": scaled(apart.nearest_m, 1e3),
                 "target": None if target is None else objects.names[target][:SHOWN_NAME],

@@ -33,7 +33,9 @@ class Outgoing(NamedTuple):
     """Over every connection of `peer`, as something that must arrive soon; else over the next in turn."""
 
 
-def stiffness_message(receiver: Receiver, sensed: Sensed, told_m_s: float, state: MotionState) -> Outgoing:
+def stiffness_message(
+    receiver: Receiver, sensed: Sensed, told_m_s: float, state: MotionState, *, stands: bool = False
+) -> Outgoing:
     """What `receiver` is to feel. told_m_s: what the arm is told, along the direction in which R2 advances."""
     update = StiffnessUpdate(
         receiver.header,
@@ -44,6 +46,7 @@ def stiffness_message(receiver: Receiver, sensed: Sensed, told_m_s: float, state
         rumble=sensed.rumble,
         state=state,
         told_m_s=min(max(told_m_s, -_FASTEST_M_S), _FASTEST_M_S),
+        stands=stands,
     )
     return Outgoing("haptics", receiver.peer, encode(update), receiver.everywhere)
 

@@ -47,6 +47,7 @@ _HALF_A_TICK_S: Final = 0.5e-3
 _EIGHTHS: Final = 8.0
 _STATES: Final[dict[MotionState, int]] = {state: number for number, state in enumerate(get_args(MotionState))}
 _ARMED: Final = _STATES["armed"]
+_STANDS: Final = len(_STATES)
 _BELIEF: Final = np.dtype(
     [
         *((name, np.float64) for name in ("sent", "now", "way", "speed", "target", "told")),
@@ -54,7 +55,8 @@ _BELIEF: Final = np.dtype(
     ]
 )
 """The receiver's belief. sent, now: times (s). way, speed, target: along R2, since the message, by commands.
-told: the arm's commanded speed in the message (m/s). known: a message has been sent. obeyed: the newest command."""
+told: the arm's commanded speed in the message (m/s). known: a message has been sent. state: that of motion, and _STANDS
+more where what is held stands. obeyed: the newest command."""
 
 _follow = inlined(follow)
 
@@ -75,19 +77,27 @@ class StiffnessDeadband:
         self._belief: np.ndarray = np.zeros(1, dtype=_BELIEF)
 
     def due(
-        self, sensed: Sensed, told_m_s: float, state: MotionState, command: MotionCommand | None, now_s: float
+        self,
+        sensed: Sensed,
+        told_m_s: float,
+        state: MotionState,
+        command: MotionCommand | None,
+        now_s: float,
+        *,
+        stands: bool = False,
     ) -> bool:
         """Decide if this leaves at `now_s`; then the receiver is taken to know it.
 
         told_m_s: the speed that the arm is commanded from this tick on, along the direction in which R2 advances, by
-        `command`; None: nothing moves.
+        `command`; None: nothing moves. stands: what is held does.
         """
         obeyed, travel, by_operator = 0, 0.0, True
         if command is not None:
             obeyed, travel = command.header.sequence, command.r2 - command.l2
             by_operator = command.compensation == "operator"
         due: bool = _due(
-            *(self._belief, self._sent, sensed.numbers, told_m_s, _STATES[state], obeyed, travel, by_operator),
+            *(self._belief, self._sent, sensed.numbers, told_m_s),
+            *(_STATES[state] + _STANDS * stands, obeyed, travel, by_operator),
             *(self.interval_s, self._full_rate, now_s),
         )
         return due
@@ -122,7 +132,7 @@ def _matters(
     since = now - belief.sent + _HALF_A_TICK_S
     if state != belief.state or since >= KEEP_ALIVE_S:
         return True
-    if state != _ARMED or since < interval:  # not armed: triggers are released
+    if state % _STANDS != _ARMED or since < interval:  # not armed: triggers are released
         return False
     if numbers[RUMBLE] > sent[RUMBLE]:
         return True

@@ -1,6 +1,7 @@
 """What the robot side's core gets beside payloads, as bytes and back: arm states and frames of perceived objects.
 
-    state   time f64, n u16, positions n f64, velocities n f64, f u16, fingers f f64, opening f64, holding u8
+    state   time f64, n u16, positions n f64, velocities n f64, f u16, fingers f f64, opening f64, holding u8,
+            loads n f64 or nothing
     frame   time f64, whole u8, then for each array of ARRAYS: tag u8, rows u32, and by the tag
               0   nothing: as in the frame before        1   rows x width values
               2   count u32, count row numbers u32, count x width values: these rows, the others as before
@@ -47,6 +48,7 @@ def pack_state(state: ArmState) -> bytes:
             struct.pack("<H", len(fingers)),
             fingers.tobytes(),
             struct.pack("<dB", state.gripper_opening_m, state.gripper_holding),
+            b"" if state.joint_loads_nm is None else state.joint_loads_nm.tobytes(),
         )
     )
 
@@ -67,7 +69,9 @@ def unpack_state(content: bytes) -> ArmState:
     position += 2
     finger_positions = values(fingers)
     opening_m, holding = struct.unpack_from("<dB", content, position)
-    return ArmState(time_s, positions, velocities, finger_positions, opening_m, bool(holding))
+    position += 9
+    loads = values(joints) if len(content) > position else None
+    return ArmState(time_s, positions, velocities, finger_positions, opening_m, bool(holding), loads)
 
 
 class FramePacker:

@@ -71,7 +71,8 @@ def _facts(view: LiveView) -> list[_Fact]:
 
 def _target(view: LiveView) -> str:
     if view.holding is not None:
-        return f"holding {view.holding}" if cell_len(view.holding) <= _LONGEST_NAME else "holding"
+        name = f" {view.holding}" if cell_len(view.holding) <= _LONGEST_NAME else ""
+        return f"holding{name}{', it stands' if view.stands else ''}"
     if view.has_target is False:
         return "no target"
     if view.target_mm is None and view.target_centre_mm is not None:

@@ -41,6 +41,7 @@ class _State:
     r2: Resistance = Resistance.NONE
     touched: str | None = None
     holding: str | None = None
+    stands: bool = False
 
 
 class Story:
@@ -88,6 +89,7 @@ def _next_state(before: _State, view: LiveView) -> _State:
         r2=next_resistance(before.r2, view.r2.resists or 0.0),
         touched=touched,
         holding=view.holding,
+        stands=view.stands,
     )
 
 
@@ -106,6 +108,8 @@ def _news(told: _State, state: _State, view: LiveView, peaks: Mapping[str, float
         news.append("touches nothing" if state.touched is None else f"touches {state.touched}, as perceived")
     if state.holding != told.holding:
         news.append(f"lets go of {told.holding}" if state.holding is None else f"holds {state.holding}")
+    if state.stands and not told.stands:
+        news.append("what is held stands")
     return news
 
 

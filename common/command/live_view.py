@@ -66,6 +66,8 @@ class LiveView:
     """From the point between the fingertips to the target's centre, as perceived."""
     holding: str | None = None
     """The object between the fingers."""
+    stands: bool = False
+    """Whether that stands on something."""
 
 
 def live_view(values: Mapping[str, Value]) -> LiveView:
@@ -98,6 +100,7 @@ def live_view(values: Mapping[str, Value]) -> LiveView:
         target_mm=number(values.get("target_mm")),
         target_centre_mm=number(values.get("target_centre_mm")),
         holding=None if holding == "nothing" else holding,
+        stands=values.get("stands") is True,
     )
 
 

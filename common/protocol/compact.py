@@ -43,11 +43,13 @@ _PAST: Final = -(2**15)
 """Stands for a way so far behind that 16 bits do not hold it."""
 _PAST_M: Final = -100.0
 _STATES: Final[tuple[MotionState, ...]] = get_args(MotionState)
+_STANDS = 4
 _HOLDING, _PLACED = 4, 8
 _LARGEST_SINGLE: Final = (2.0 - 2.0**-23) * 2.0**127
 
 _STIFFNESS: Final = struct.Struct("<32h10fiBB")
-"""Ways of L2, fast and slow, and of R2; v_max, a, δ, s of each; v; told, NaN for none; horizon; rumble; state."""
+"""Ways of L2, fast and slow, and of R2; v_max, a, δ, s of each; v; told, NaN for none; horizon; rumble; state, and
+a bit for what stands."""
 _TELEMETRY: Final = struct.Struct("<14fB")
 """Position, target, up; speed, opening, enlargement, L2, R2; state, and bits for holding and a known target."""
 
@@ -99,15 +101,16 @@ def _pack_stiffness(update: StiffnessUpdate) -> bytes:
         math.nan if told_m_s is None else told_m_s,
         math.floor(horizon_m * _STEPS),
         math.ceil(8.0 * update.rumble),
-        _STATES.index(update.state),
+        _STATES.index(update.state) + _STANDS * update.stands,
     )
 
 
 def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
     content = _STIFFNESS.unpack(message.field)
-    speed_m_s, told_m_s, horizon, rumble, state = content[40:]
-    if state >= len(_STATES):
-        raise ValueError(f"state = {state}; valid: 0 to {len(_STATES) - 1}")
+    speed_m_s, told_m_s, horizon, rumble, bits = content[40:]
+    state = bits % _STANDS
+    if state >= len(_STATES) or bits >= 2 * _STANDS:
+        raise ValueError(f"bits = {bits}; valid: a state of 0 to {len(_STATES) - 1}, and one more bit")
     horizon_m = horizon * STEP_M
     return StiffnessUpdate(
         message.header,
@@ -118,6 +121,7 @@ def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
         rumble / 8.0,
         _STATES[state],
         told_m_s if told_m_s == told_m_s else None,  # noqa: PLR0124  # faster than a call
+        bool(bits & _STANDS),
     )
 
 

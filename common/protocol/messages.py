@@ -259,6 +259,8 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
     told_m_s: float | None = None
     """The speed along that direction that the newest command gets, once joints' limits, discarded and stopped commands
     are through; None where nobody knows: that command is then taken to be followed."""
+    stands: bool = False
+    """What is held stands on something: nothing moves it farther down."""
 
     def __post_init__(self) -> None:
         _in_range("speed_m_s", -_FARTHEST_M, _FARTHEST_M, self.speed_m_s)

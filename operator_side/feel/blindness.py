@@ -15,7 +15,7 @@ SIGNAL_S: Final = 3.0
 """The motors say it for so long; the light until the field is back."""
 _PERIOD_S: Final = 1.0
 _PULSES_S: Final = ((0.0, 0.12), (0.24, 0.36))
-"""Two short pulses in each period, of both motors: nothing else moves the right one."""
+"""Two short pulses in each period, of both motors: nothing else moves both alike."""
 _PULSE: Final = Rumble(left=0.7, right=0.7)
 
 

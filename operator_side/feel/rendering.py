@@ -16,6 +16,7 @@ from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT, M
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble
 from operator_side.feel.commands_under_way import Displacement
+from operator_side.feel.stand_pulse import StandPulse
 from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 
@@ -102,7 +103,7 @@ class RenderedTrigger:
 
 
 class TriggerRendering:
-    """Both triggers, and the motors for danger where the stick leads."""
+    """Both triggers, and the motors for danger where the stick leads, and for what has come to stand."""
 
     def __init__(
         self, settings: RenderingSettings, calibration: TravelCalibration, *, swap_sides: bool = False
@@ -111,6 +112,7 @@ class TriggerRendering:
         self.l2 = RenderedTrigger(settings, calibration.l2)
         self.r2 = RenderedTrigger(settings, calibration.r2)
         self._swap_sides = swap_sides
+        self._stand = StandPulse()
 
     def render(
         self, felt: StiffnessUpdate | None, pulled: tuple[float, float], known: Displacement | None, now_s: float
@@ -131,7 +133,7 @@ class TriggerRendering:
             advancing.render(felt.r2, felt.horizon_m, pulled[0], forth, now_s),
         )
         l2, r2 = reversed(effects) if self._swap_sides else effects
-        return OutputReport(l2=l2, r2=r2, rumble=Rumble(left=felt.rumble))
+        return OutputReport(l2=l2, r2=r2, rumble=Rumble(felt.rumble, self._stand.right(felt.stands, now_s)))
 
     def zones(self) -> dict[str, Any]:
         """The run's figures of the controller's own triggers."""

@@ -4,8 +4,8 @@ They see only what the screen shows, `visual_reaction_s` after it was shown, and
 act only through the controller: a finger pushes with a force, and how far the trigger yields is up to its spring and
 its effect. So haptics act on this person mechanically and at once: where the trigger stiffens, the same force travels
 less, and they never push harder for it. What they feel, a trigger that yields less than usual and rumble, they may
-also believe, and go on gently from a reaction later. Figures: the operator's table of facts (McRuer's crossover
-model; reaction times).
+also believe, and go on gently from a reaction later; or let go, where a pulse says that what they hold stands.
+Figures: the operator's table of facts (McRuer's crossover model; reaction times).
 
     wait ─▶ arm ─▶ advance ─▶ close ─▶ lift ─▶ carry ─▶ lower ─▶ release ─▶ withdraw ─▶ done
                      ▲          │ nothing held
@@ -86,14 +86,14 @@ class SimulatedOperator:
         self._settings = settings
         self._generator = np.random.default_rng(np.random.SeedSequence([seed, 0x0B5E]))
         feeling = np.random.default_rng(np.random.SeedSequence([seed, 0xFEE1]))
-        self._stiff, self._rumble = Cue(settings, feeling), Cue(settings, feeling)
+        self._stiff, self._rumble, self._pulse = (Cue(settings, feeling) for _ in range(3))
         self._fingers = Fingers(device, calibration or TravelCalibration(), swap_sides=swap_sides)
         self._seen: deque[tuple[float, Telemetry]] = deque()
         self._view: Telemetry | None = None
         self._since_s: float | None = None
         self._attempt = 0
         self._depth_error_m = 0.0
-        self._gently_along = self._gently_across = False
+        self._gently_along = self._gently_across = self._stands = False
         self._from: Vector3 = (0.0, 0.0, 0.0)
         self._gripped_height_m = 0.0
         self._holding_s = 0.0
@@ -137,11 +137,13 @@ class SimulatedOperator:
             self._moves.break_off(now_s)
         self._gently_along |= stiff
         self._gently_across |= rumbles
+        seeing = self._device.output.lightbar != WARNING_LIGHT
+        self._stands |= self._pulse.acted_on(now_s, seeing and self._device.rumble.right > 0.0)
 
     def _enter(self, phase: Phase, now_s: float) -> None:
         self.phase = phase
         self._since_s = now_s
-        self._gently_along = self._gently_across = False
+        self._gently_along = self._gently_across = self._stands = False
         self._moves.forget()
         self._nearing, self._sinking = NoNearer(now_s), SinksNoMore()
 
@@ -251,11 +253,11 @@ class SimulatedOperator:
         self._go((speed * back[0], speed * back[1], speed * back[2]), {Button.CROSS})
 
     def _lower(self, look: Glance) -> None:
-        """Down to where it should stand, gently near there and once that is felt, until it sinks no more."""
+        """Down to where it should stand, gently near there and once that is felt, until it is felt or seen to stand."""
         if self._dropped(look):
             return
         height_m = look.view.tool_position_m[2]
-        if self._sinking.see(height_m, GENTLY_M_S, look):
+        if self._sinking.see(height_m, GENTLY_M_S, look) or self._stands:
             self._from = look.view.tool_position_m
             self._enter("release", look.now_s)
         left_m = height_m - self._gripped_height_m + self._depth_error_m

@@ -97,7 +97,9 @@ def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
     grown = f"enlargement {_figure(number(facts.status.get('enlargement_mm')))} mm   rumble {_figure(facts.rumble)}"
     return [
         *(*lines, _named(round_trip=round_trip, field_age=field_age, loop_age=loop_age)),
-        _named(nearest=nearest, target=target, holding=view.holding or "nothing"),
+        _named(
+            nearest=nearest, target=target, holding=f"{view.holding or 'nothing'}{', it stands' if view.stands else ''}"
+        ),
         _line(grown, asked, "" if view.haptics else "   haptics off"),
     ]
 

@@ -10,7 +10,7 @@ from robot_side.arm.ability import JointLimits
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import refuse, resolve
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_motion
-from robot_side.compiled.kernel import NUMBER, compiled, input_array, output_array
+from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, output_array
 from robot_side.compiled.stack import on_stack
 
 _AT_END_RAD = 0.002
@@ -24,11 +24,14 @@ def commanded(
     joint_positions_rad: FloatArray,
     limits: JointLimits,
     settings: ToolMotionSettings,
+    *,
+    stands: bool = False,
 ) -> tuple[FloatArray, float]:
     """The velocities (n,) in rad/s to command the joints at these positions (n,), by `joint_velocities`.
 
     And the speed along the approach axis (m/s) that the arm is thereby told: of joints at their ends, which go no
-    farther, nothing comes. ValueError for a pose that is not finite: nothing must move by it.
+    farther, nothing comes. stands: nothing moves the tool downwards. ValueError for a pose that is not finite: nothing
+    must move by it.
     """
     linear, angular = tool_motion(command, settings)
     velocity = np.empty(joint_positions_rad.size)
@@ -37,6 +40,7 @@ def commanded(
         *(pose.tool_rotation, pose.tool_jacobian, joint_positions_rad, limits.velocity_rad_s, lower, upper),
         *linear,
         *angular,
+        stands,
         velocity,
     )
     if math.isnan(told_m_s):
@@ -49,7 +53,7 @@ def commanded(
 
 @compiled(
     *(input_array(2), input_array(2), input_array(1), input_array(1), input_array(1), input_array(1)),
-    *(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, output_array(1)),
+    *(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, TRUTH, output_array(1)),
     returns=NUMBER,
 )
 def _command_loop(
@@ -65,6 +69,7 @@ def _command_loop(
     about_right: float,
     about_down: float,
     about_ahead: float,
+    stands: bool,
     velocity: FloatArray,
 ) -> float:
     """Fill `velocity`; the speed along the approach axis, NaN where an argument is none."""
@@ -75,6 +80,8 @@ def _command_loop(
         x, y, z = rotation[row, 0], rotation[row, 1], rotation[row, 2]
         twist[row] = x * right + y * down + z * ahead
         twist[3 + row] = x * about_right + y * about_down + z * about_ahead
+    if stands and twist[2] < 0.0:  # NaN stays
+        twist[2] = 0.0
     if not resolve(jacobian, twist, limits, velocity):
         return math.nan
     told = 0.0

@@ -50,6 +50,7 @@ class JointEstimate:
             fingers,
             measured.gripper_opening_m,
             measured.gripper_holding,
+            measured.joint_loads_nm,
         )
         return self._last
 

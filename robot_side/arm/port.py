@@ -25,6 +25,9 @@ class ArmState:
     """The free gap between the fingers; 0 without a gripper."""
     gripper_holding: bool
     """The fingers were told to close and something between them stopped them."""
+    joint_loads_nm: FloatArray | None = None
+    """(n,) what the drives give beyond what moves and holds the arm itself: what it carries, less what bears it; N for
+    a prismatic joint. None from an arm that does not know."""
 
 
 class Arm(Protocol):

@@ -69,6 +69,7 @@ class MujocoArm:
         mujoco.mj_forward(model, data)
         # MuJoCo's arrays stay where they are as long as the state lives: asking for one costs more than a step's use.
         self._unstable = data.warning.number[_UNSTABLE]
+        self._borne_nm = data.qfrc_constraint
         gripper = self._gripper
         measured = int(robot.gripper_actuators[0]) if gripper is not None else 0
         self._plant = Plant(
@@ -190,6 +191,7 @@ class MujocoArm:
             finger_positions=fingers,
             gripper_opening_m=0.0 if gripper is None else gripper.opening_m,
             gripper_holding=gripper is not None and gripper.holding,
+            joint_loads_nm=-self._borne_nm[plant.velocities],
         )
 
     def _require_stable(self) -> None:

@@ -23,11 +23,18 @@ def field(fast_m: Ways, slow_m: Ways | None = None, **changes: Any) -> TriggerFi
 
 
 def felt(
-    header: Header, *, l2: int = 0, r2: int = 0, rumble: float = 0.0, state: MotionState = "armed"
+    header: Header,
+    *,
+    l2: int = 0,
+    r2: int = 0,
+    rumble: float = 0.0,
+    state: MotionState = "armed",
+    stands: bool = False,
 ) -> StiffnessUpdate:
     """The same strength in every zone of each trigger, 0 to 8, whatever the hands and the arm do."""
     return StiffnessUpdate(
-        header, uniform_field(l2), uniform_field(r2), speed_m_s=0.0, horizon_m=FAR_M, rumble=rumble, state=state
+        *(header, uniform_field(l2), uniform_field(r2), 0.0, FAR_M, rumble, state),
+        stands=stands,
     )
 
 

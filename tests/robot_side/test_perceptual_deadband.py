@@ -57,7 +57,9 @@ class Run:
         header = Header(1, 1 + round(1e3 * self.now_s), self.now_s)
         command = MotionCommand(header, max(0.0, -travel), max(0.0, travel), run=True, compensation=compensation)
         now = how.get("now") or sensed(self.left_m, self.speed_m_s)
-        due = self.deadband.due(now, how.get("made_of_it_m_s", told_m_s), state, command, self.now_s)
+        due = self.deadband.due(
+            now, how.get("made_of_it_m_s", told_m_s), state, command, self.now_s, stands=how.get("stands", False)
+        )
         if due:
             self.sent_s.append(self.now_s)
             self.believed_m, self.moved_m, self.believed_m_s = self.left_m, 0.0, self.speed_m_s
@@ -152,6 +154,16 @@ def test_a_state_and_a_rumble_that_rises_are_said_at_once_and_one_that_falls_lat
     while not run.tick(now=rumbling):
         pass
     assert run.since_s == pytest.approx(WRITE_S)
+
+
+def test_that_something_stands_is_said_at_once_and_so_is_its_end() -> None:
+    run = Run(0.3)
+    run.tick()
+    assert run.tick(stands=True)
+    assert not run.tick(stands=True)
+    assert run.tick()
+    run.tick(stands=True)
+    assert run.tick(stands=True, now=sensed(0.3, rumble=0.5))
 
 
 def test_while_nothing_is_felt_only_the_state_and_the_keep_alive_count() -> None:

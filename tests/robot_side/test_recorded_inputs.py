@@ -55,15 +55,18 @@ def test_every_array_of_a_frame_is_recorded() -> None:
     st.lists(ANY_FLOAT, max_size=3),
     ANY_FLOAT.filter(lambda value: value == value),  # noqa: PLR0124
     st.booleans(),
+    st.booleans(),
 )
 def test_a_state_comes_back_bit_for_bit(
-    joints: list[float], fingers: list[float], time_s: float, holding: bool
+    joints: list[float], fingers: list[float], time_s: float, holding: bool, measures: bool
 ) -> None:
     values = np.array(joints)
-    state = ArmState(time_s, values, -values, np.array(fingers), 0.1, holding)
+    state = ArmState(
+        time_s, values, -values, np.array(fingers), 0.1, holding, 2.0 * values if joints and measures else None
+    )
     found = unpack_state(pack_state(state))
     assert (found.time_s, found.gripper_opening_m, found.gripper_holding) == (time_s, 0.1, holding)
-    for name in ("joint_positions_rad", "joint_velocities_rad_s", "finger_positions"):
+    for name in ("joint_positions_rad", "joint_velocities_rad_s", "finger_positions", "joint_loads_nm"):
         assert same_bits(getattr(found, name), getattr(state, name))
 
 

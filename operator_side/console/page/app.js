@@ -105,7 +105,7 @@ function showFacts(message) {
   text("delay", `${ms(facts.to_robot.mean_ms)} / ${ms(facts.to_operator.mean_ms)} ms`, facts.field_age_ms > 200);
   showLink(status);
   text("target", status.target ?? "none");
-  text("holding", status.holding);
+  text("holding", status.stands ? `${status.holding}, it stands` : status.holding);
   const fingers = { l2: message.fingers[0], r2: message.fingers[1] };
   for (const side of ["l2", "r2"]) triggers[side].show(facts[side], fingers[side], facts.advancing === side.toUpperCase());
   charts.delay.add(clock.nowMs, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);

@@ -40,6 +40,7 @@ views = st.builds(
     target_mm=distances_mm,
     target_centre_mm=distances_mm,
     holding=names,
+    stands=st.booleans(),
 )
 
 
@@ -104,6 +105,7 @@ def test_without_haptics_nothing_resists() -> None:
     ("changed", "expected"),
     [
         ({"holding": "carton"}, "holding carton"),
+        ({"holding": "carton", "stands": True}, "holding carton, it stands"),
         ({"holding": "an object with a long name"}, "  holding  "),
         ({"target": None, "target_mm": None}, "no target"),
         ({"target_mm": None, "target_centre_mm": 1234.0}, "target centre 1.2m"),
@@ -165,6 +167,7 @@ def test_a_run_reads_as_a_story() -> None:
         near,
         replace(near, nearest_mm=-0.5, target_mm=-0.5, r2=TriggerView(0.5, 1.0)),
         replace(near, r2=TriggerView(0.5, 0.5), phase="lifting", holding="carton"),
+        replace(near, r2=TriggerView(0.5, 0.5), phase="lowering", holding="carton", stands=True),
         replace(ADVANCING, phase="LINK LOST", reason="nothing heard", alarm=True, linked=False, armed=False),
     )
     assert lines == [
@@ -174,7 +177,8 @@ def test_a_run_reads_as_a_story() -> None:
         "   3.0 s  R2 stiffens to 30 %  (R2 pulled 50 %, nearest 10 mm, target 10 mm)",
         "   4.0 s  R2 resists fully; touches carton, as perceived  (R2 pulled 50 %, nearest 0 mm, target 0 mm)",
         "   5.0 s  lifting; R2 eases to 50 %; touches nothing; holds carton  (R2 pulled 50 %, nearest 10 mm)",
-        "   6.0 s  LINK LOST: nothing heard; R2 yields freely, after up to 100 %; lets go of carton",
+        "   6.0 s  lowering; what is held stands  (R2 pulled 50 %, nearest 10 mm)",
+        "   7.0 s  LINK LOST: nothing heard; R2 yields freely, after up to 100 %; lets go of carton",
     ]
 
 

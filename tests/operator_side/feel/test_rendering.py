@@ -54,6 +54,22 @@ def test_a_release_does_not_fall() -> None:
     assert rendering.render(felt(HEADER), LET_GO, None, 1.0) == RELEASED
 
 
+def test_what_comes_to_stand_is_said_by_one_short_pulse_of_the_right_motor() -> None:
+    rendering = TriggerRendering(USUAL, TravelCalibration())
+
+    def motors(stands: bool, now_s: float, rumble: float = 0.0) -> Rumble | None:
+        return rendering.render(felt(HEADER, stands=stands, rumble=rumble), LET_GO, None, now_s).rumble
+
+    assert motors(False, 1.0) == Rumble()
+    assert motors(True, 1.001) == Rumble(0.0, 0.7)
+    assert motors(True, 1.08, rumble=0.5) == Rumble(0.5, 0.7)
+    assert motors(True, 1.082) == motors(True, 9.0) == motors(False, 9.001) == Rumble()
+    assert motors(True, 9.002) == Rumble(0.0, 0.7)
+    assert rendering.render(None, LET_GO, None, 9.01) == RELEASED
+    # What still stands when the field is back is no news.
+    assert motors(True, 20.0) == Rumble()
+
+
 @given(st.lists(st.tuples(st.integers(0, 8), st.floats(0.0, 0.2)), max_size=30), st.integers(0, 8))
 def test_after_any_past_it_is_never_weaker_than_asked_for_and_soon_no_stronger(
     past: list[tuple[int, float]], last: int

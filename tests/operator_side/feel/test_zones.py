@@ -1,5 +1,7 @@
 """The ten zones: exact where worked out by hand, and monotone wherever a finger or the arm may be."""
 
+from typing import Any
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -105,7 +107,7 @@ def test_slow_zones_take_the_slow_ways(full_speed_m_s: float, slow_zones: int) -
     assert strengths == (0,) * slow_zones + (8,) * (10 - slow_zones)
 
 
-def update(**changes: float) -> StiffnessUpdate:
+def update(**changes: Any) -> StiffnessUpdate:
     l2, r2 = field(ways(1.0), displacement_m=-0.02), field(ways(1.0), displacement_m=0.03)
     return StiffnessUpdate(Header(1, 1, 0.0), l2, r2, horizon_m=1.0, rumble=0.0, state="armed", **changes)
 

@@ -8,7 +8,7 @@ import pytest
 from common.protocol.messages import Telemetry, Vector3
 from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
-from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, OutputReport, Rumble
+from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, Color, OutputReport, Rumble
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.simulated_person.person import FULL_STICK_M_S, FULL_TRIGGER_M_S, GENTLY_M_S
 from operator_side.simulated_person.settings import PersonSettings
@@ -249,6 +249,24 @@ def test_who_notices_and_believes_a_stiffer_trigger_eases_off_a_reaction_later(
     if eased:
         assert 0.15 < eased[0] - felt_s < 0.5
         assert desk.hands[-1].r2_n == pytest.approx(habitual_force_n(GENTLY_M_S / FULL_TRIGGER_M_S))
+
+
+PULSE = OutputReport(rumble=Rumble(left=1.0, right=0.7))
+
+
+@pytest.mark.parametrize(("trust", "light"), [(1.0, USUAL_LIGHT), (0.0, USUAL_LIGHT), (1.0, WARNING_LIGHT)])
+def test_who_feels_the_pulse_of_what_stands_lets_go_a_reaction_later(trust: float, light: Color) -> None:
+    desk = carried(dataclasses.replace(CLEAR_SIGHTED, trust=trust))
+    desk.watch(at_height(UP_AT_M), 0.5)
+    desk.tell(dataclasses.replace(PULSE, lightbar=light))
+    seen = desk.watch(at_height(UP_AT_M), 0.08)
+    desk.tell(OutputReport(rumble=Rumble()))
+    seen += desk.watch(at_height(UP_AT_M), 0.5)
+    let_go = [step * TICK_S for step, hands in enumerate(seen) if Button.SQUARE in hands.buttons]
+    assert bool(let_go) is (trust == 1.0 and light == USUAL_LIGHT)
+    if let_go:
+        assert 0.15 < let_go[0] < 0.5
+        assert seen[-1].left == (0.0, 0.0)
 
 
 def test_a_target_that_comes_no_nearer_is_taken_for_as_near_as_it_gets() -> None:

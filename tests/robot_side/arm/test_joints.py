@@ -210,6 +210,11 @@ def test_it_is_the_twist_resolved_and_what_joints_at_their_ends_let_through(
     np.testing.assert_allclose(velocity, expected, rtol=1e-12, atol=1e-12)
     assert told == pytest.approx(told_m_s, abs=1e-12)
 
+    stands, told = commanded(hands, pose_with(jacobian, rotation), positions, limits, SETTINGS, stands=True)
+    linear[2] = max(0.0, linear[2])
+    expected = joint_velocities(jacobian, np.concatenate([linear, angular]), limits.velocity_rad_s)
+    np.testing.assert_allclose(stands, expected, rtol=1e-12, atol=1e-12)
+
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_a_pose_that_is_not_finite_moves_nothing(bad: float) -> None:
