@@ -256,7 +256,7 @@ class OperatorSide:
         pulled = (None, None) if intent is None else (intent.l2, intent.r2)
         order = -1 if self._swap_sides else 1
         (left, right), (left_pulled, right_pulled) = felt[::order], pulled[::order]
-        state = None if self.stiffness is None else self.stiffness.state
+        state, stands = (None, None) if self.stiffness is None else (self.stiffness.state, self.stiffness.stands)
         values: dict[str, float | str | bool | None] = {
             "link": self._link_status(now_s),
             "state": state,
@@ -266,13 +266,12 @@ class OperatorSide:
             "R2": right,
             "L2_pulled": left_pulled,
             "R2_pulled": right_pulled,
-            "stands": None if self.stiffness is None else self.stiffness.stands,
             "haptics": self._haptics_enabled,
             "feel": self.haptics.status() if sight is Sight.SEEING else sight,
             "release_first": sight is Sight.WAITING,
             "delay_ms": None if mean_s is None else 1e3 * mean_s,
         }
-        values |= self._standing.link_values(now_s)
+        values |= self._standing.link_values(now_s) | {"stands": stands}
         if screen is not None and values["link"] == LINK_UP:
             centre_m = screen.target_in_tool_m
             values |= {

@@ -5,7 +5,7 @@ arm ─▶ kinematics ─▶ law: what is ahead ─▶ stiffness fields, telemet
 """
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -22,7 +22,7 @@ from robot_side.arm.port import Arm, ArmState, GripperKinematics, GripperPose
 from robot_side.arm.speed_assist import assisted
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.arm.touching_down import TouchingDown, carried_n
-from robot_side.figures import RunFigures
+from robot_side.figures import Observer, RunFigures
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.held_object import HeldObject, grip, gripped_object, with_held
 from robot_side.gripper.perceived_distances import perceived_distances
@@ -42,18 +42,6 @@ OBSERVER_PERIOD_S = 0.02
 TRUTH_PERIOD_S = 0.01
 _LET_GO_S = 0.1
 """Fingers that move for a moment, as they follow a slipping object, still hold it."""
-
-
-class Observer(Protocol):
-    """Sees what really happens, where there is a simulation to see it in."""
-
-    def observe(self, figures: RunFigures, now_s: float) -> None:
-        """Tell `figures` the true distances and contacts."""
-        ...
-
-    def watch(self, figures: RunFigures, since_start_s: float) -> None:
-        """In every turn: tell `figures` the first contact."""
-        ...
 
 
 class RobotSide:
@@ -246,17 +234,15 @@ class RobotSide:
         sensed: Sensed,
         now_s: float,
     ) -> list[Outgoing]:
-        session, told_m_s, stands = self.session, self._told_m_s, self._touching_down.stands
-        felt = sensed, told_m_s, permission.state
+        session = self.session
+        felt = sensed, self._told_m_s, permission.state, self._touching_down.stands
         outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]
-        if session.owner_peer is not None and self.felt.due(
-            sensed, told_m_s, permission.state, permission.command, now_s, stands=stands
-        ):
+        if session.owner_peer is not None and self.felt.due(*felt, permission.command, now_s):
             self.stiffness_sent += 1
-            outgoing += [stiffness_message(one, *felt, stands=stands) for one in session.owners(now_s)]
+            outgoing += [stiffness_message(one, *felt) for one in session.owners(now_s)]
         if now_s >= self._next_observers_s:
             self._next_observers_s = now_s + OBSERVER_PERIOD_S
-            outgoing += [stiffness_message(one, *felt, stands=stands) for one in session.observers(now_s)]
+            outgoing += [stiffness_message(one, *felt) for one in session.observers(now_s)]
         holding = self._held is not None
         if self._seen.may_be_due((session.lease.token, permission.state, self._target, holding), now_s):
             target = None if self._target is None else (situation.objects.names[self._target], self._target_m)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -157,6 +157,18 @@ class RunFigures:
                 "min_obstacle_distance_mm": scaled(self._min_obstacle_distance_m, 1e3),
             },
         }
+
+
+class Observer(Protocol):
+    """Sees what really happens, where there is a simulation to see it in."""
+
+    def observe(self, figures: RunFigures, now_s: float) -> None:
+        """Tell `figures` the true distances and contacts."""
+        ...
+
+    def watch(self, figures: RunFigures, since_start_s: float) -> None:
+        """In every turn: tell `figures` the first contact."""
+        ...
 
 
 def _smaller(one: float | None, other: float | None) -> float | None:

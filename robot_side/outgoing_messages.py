@@ -34,9 +34,12 @@ class Outgoing(NamedTuple):
 
 
 def stiffness_message(
-    receiver: Receiver, sensed: Sensed, told_m_s: float, state: MotionState, *, stands: bool = False
+    receiver: Receiver, sensed: Sensed, told_m_s: float, state: MotionState, stands: bool = False
 ) -> Outgoing:
-    """What `receiver` is to feel. told_m_s: what the arm is told, along the direction in which R2 advances."""
+    """What `receiver` is to feel. told_m_s: what the arm is told, along the direction in which R2 advances.
+
+    stands: what is held does.
+    """
     update = StiffnessUpdate(
         receiver.header,
         l2=sensed.l2,

@@ -81,10 +81,9 @@ class StiffnessDeadband:
         sensed: Sensed,
         told_m_s: float,
         state: MotionState,
+        stands: bool,
         command: MotionCommand | None,
         now_s: float,
-        *,
-        stands: bool = False,
     ) -> bool:
         """Decide if this leaves at `now_s`; then the receiver is taken to know it.
 

@@ -1,4 +1,4 @@
-"""One short pulse says that what is held has come to stand."""
+"""Say by one short pulse that a held object has come to stand."""
 
 import math
 from typing import Final
@@ -8,14 +8,14 @@ _STRENGTH: Final = 0.7
 
 
 class StandPulse:
-    """Of the right motor alone: danger is the left one's, and without sight both say so."""
+    """Pulse of the right motor alone: the left one says danger, and both say that the field is lost."""
 
     def __init__(self) -> None:
         self._stands = False
         self._ends_s = -math.inf
 
     def right(self, stands: bool, now_s: float) -> float:
-        """What the right motor does at `now_s`, 0 to 1, by the newest field."""
+        """Drive of the right motor at `now_s`, 0 to 1; stands: as the newest field says."""
         if stands and not self._stands:
             self._ends_s = now_s + PULSE_S
         self._stands = stands

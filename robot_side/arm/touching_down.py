@@ -1,10 +1,10 @@
-"""What is held comes to stand on something: noticed by what the arm no longer carries.
+"""Notice when a held object comes to stand on something: the arm carries less of its weight than before.
 
     carried ─▶ stands ─▶ carried
-            │         └ the tool has risen by 3 mm, or nothing is held any more
-            └ the tool is told to sink, and something bears more than 5 N and half of what it carried
+            │         └ the tool has risen by 3 mm, or the object is let go
+            └ the tool is commanded to sink, and the load has fallen by more than 5 N and half of the weight
 
-Its motion downwards ends there, and what the drives have wound up by then is let go.
+The robot side then ends motion downwards, and releases what the drives have wound up.
 """
 
 import math
@@ -16,28 +16,29 @@ from common.arrays import FloatArray
 from robot_side.arm.resolved_rate import joint_velocities
 
 _BORNE_N: Final = 5.0
-"""Above what a joint's torque is wrong by within a second."""
+"""More than the error of a measured load changes by in a second."""
 _BORNE_SHARE: Final = 0.5
-"""Of what is carried: arms that begin to sink do it with less than half of gravity's acceleration."""
+"""Share of the weight. A tool that begins to sink accelerates by less than half of gravity, so that it carries more."""
 _HARDLY: Final = 0.25
 _STALLED_S: Final = 0.15
-"""Without known loads: for so long the tool has hardly sunk, a quarter of what it was told. Arms take less to begin."""
+"""Without measured loads: a tool that sinks at less than a quarter of its commanded speed for this time stands. An arm
+needs less time to begin to move."""
 _SINKS_M_S: Final = 1e-3
 _LEAVES_M: Final = 3e-3
 _GIVES_WAY_S: Final = 0.01
-"""So long the arm is told to halt where it is measured: in simulations a step of the physics lies in it."""
+"""For this time the arm halts where it is measured. It is longer than a step of the physics or of a controller."""
 _NOISE_S: Final = 0.01
 _USUAL_S: Final = 1.0
-"""Time constants of what is carried now, and usually: the latter follows a lift, and a model that is a little wrong."""
+"""Time constants of the present load and of the usual one, which follows a lift and errors of the arm's model."""
 _SPEED_S: Final = 0.03
-"""And of the speed."""
+"""Time constant of the measured speed."""
 _UP: Final = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
 def carried_n(tool_jacobian: FloatArray, joint_loads_nm: FloatArray | None) -> float | None:
-    """The force upwards that drives with these loads (n,) give at the tool: the work that a rise by one metre takes.
+    """Force upwards, in N, that drives with these loads (n,) exert at the tool, by virtual work; None without loads.
 
-    tool_jacobian (6, n), linear rows first. None where the loads are not known.
+    tool_jacobian (6, n), linear rows first.
     """
     if joint_loads_nm is None:
         return None
@@ -45,7 +46,7 @@ def carried_n(tool_jacobian: FloatArray, joint_loads_nm: FloatArray | None) -> f
 
 
 class TouchingDown:
-    """One thing from when it is gripped until it is let go."""
+    """State of one object, from grip to release."""
 
     def __init__(self) -> None:
         self.stands = False
@@ -59,9 +60,9 @@ class TouchingDown:
         return self.stands and self._time_s - self._since_s < _GIVES_WAY_S
 
     def update(self, carried_n: float | None, height_m: float, told_m_s: float, time_s: float) -> None:
-        """Take in what was measured at `time_s`: what the arm carries, None where unknown, and the tool's height.
+        """Take in the load, None where unknown, and the tool's height, as measured at `time_s`.
 
-        told_m_s: the speed upwards that it was told until now.
+        told_m_s: the tool's commanded speed upwards until then.
         """
         passed_s, sunk_m = time_s - self._time_s, self._height_m - height_m
         if passed_s <= 0.0:
@@ -70,6 +71,7 @@ class TouchingDown:
         if self.stands:
             self._height_m = min(self._height_m, height_m)
             self.stands = height_m - self._height_m < _LEAVES_M
+            self._carried_n = self._usual_n  # for when it is lifted
             return
         self._height_m = height_m
         if first:

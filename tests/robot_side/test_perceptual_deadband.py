@@ -57,9 +57,8 @@ class Run:
         header = Header(1, 1 + round(1e3 * self.now_s), self.now_s)
         command = MotionCommand(header, max(0.0, -travel), max(0.0, travel), run=True, compensation=compensation)
         now = how.get("now") or sensed(self.left_m, self.speed_m_s)
-        due = self.deadband.due(
-            now, how.get("made_of_it_m_s", told_m_s), state, command, self.now_s, stands=how.get("stands", False)
-        )
+        felt = now, how.get("made_of_it_m_s", told_m_s), state, how.get("stands", False)
+        due = self.deadband.due(*felt, command, self.now_s)
         if due:
             self.sent_s.append(self.now_s)
             self.believed_m, self.moved_m, self.believed_m_s = self.left_m, 0.0, self.speed_m_s
@@ -149,7 +148,7 @@ def test_a_state_and_a_rumble_that_rises_are_said_at_once_and_one_that_falls_lat
     assert run.tick()
     rumbling = sensed(0.3, rumble=0.5)
     assert run.tick(now=rumbling)
-    assert run.deadband.due(rumbling, 0.0, "armed", None, run.now_s + 0.009) is False
+    assert run.deadband.due(rumbling, 0.0, "armed", False, None, run.now_s + 0.009) is False
     assert run.tick(now=sensed(0.3, rumble=0.625))
     while not run.tick(now=rumbling):
         pass

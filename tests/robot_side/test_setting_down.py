@@ -1,4 +1,4 @@
-"""What is held comes to stand, with the simulated arm: motion into it ends, and nothing springs when it is let go."""
+"""A held object comes to stand, with the simulated arm: motion downwards ends, and its release moves nothing."""
 
 from dataclasses import replace
 from typing import Any
@@ -52,7 +52,7 @@ class Placing(Bench):
 
     @property
     def pressed_n(self) -> float:
-        """On the table."""
+        """Force on the table."""
         assert self.robot.newest is not None
         carried = carried_n(self.robot.newest[1].pose.tool_jacobian, self.simulated.state(self.now_s).joint_loads_nm)
         assert carried is not None
