@@ -207,7 +207,7 @@ class RobotSide:
             command = assisted(command, self.newest[0].l2, self.newest[0].r2)
         where = pose, state.joint_positions_rad, self._limits, self._motion
         velocity, self._told_m_s = commanded(command, *where, stands=self._touching_down.stands)
-        self._rises_m_s = float(pose.tool_jacobian[2] @ velocity)
+        self._rises_m_s = 0.0 if self._held is None else float(pose.tool_jacobian[2] @ velocity)
         self._arm.command(velocity, permission.valid_until_s)
         self._arm.command_gripper(command.gripper, permission.valid_until_s)
 
