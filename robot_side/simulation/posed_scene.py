@@ -1,10 +1,10 @@
 """The true gripper among the true objects, put where one likes: for experiments that look at a motion afterwards."""
 
-from typing import Final
+import math
+from typing import NamedTuple
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
 from robot_side.simulation.ground_truth import least_distance
@@ -12,8 +12,14 @@ from robot_side.simulation.scene import Scene
 from robot_side.simulation.true_contact import free_way
 from robot_side.surroundings.perceived import PerceivedObjects
 
-_LEAST_STEP_M = 0.001
-STANDS: Final[FloatArray] = np.zeros(3)
+
+class ToolPath(NamedTuple):
+    """Poses of the tool, so near to each other that nothing is met between two of them alone."""
+
+    positions_m: FloatArray
+    """(k, 3)"""
+    rotations: FloatArray
+    """(k, 3, 3) from the tool frame"""
 
 
 class PosedScene:
@@ -56,32 +62,24 @@ class PosedScene:
         self._data.geom_xpos[self._gripper] = self._at_rest_m
         return way_m
 
-    def stays_clear(
-        self, ahead_m: float, margin_m: float, across_m: FloatArray = STANDS, turned_rad: FloatArray = STANDS
-    ) -> bool:
-        """Whether the gripper stays `margin_m` off everything, on a way of `ahead_m` along its approach axis.
-
-        Meanwhile it drifts by `across_m` (3,), and turns evenly about the tool by a rotation vector `turned_rad` (3,).
-        """
+    def stays_clear(self, path: ToolPath, margin_m: float) -> bool:
+        """Whether the gripper stays `margin_m` off everything on a path that begins at the present pose."""
         data, gripper = self._data, self._gripper
-        tool_m, axis = data.site_xpos[self.scene.robot.site].copy(), self.approach_axis()
-        lever, turns = self._at_rest_m - tool_m, data.geom_xmat[gripper].reshape(-1, 3, 3).copy()
-        turned = float(np.linalg.norm(turned_rad))
-        # No part of the gripper goes farther than this.
-        farthest_m = ahead_m + float(np.linalg.norm(across_m)) + turned * (float(np.abs(lever).max()) * 2.0 + ahead_m)
-        share, clear = 0.0, True
-        while True:
-            gap_m = self.gap_m(margin_m + farthest_m + _LEAST_STEP_M)
-            if gap_m < margin_m:
-                clear = False
-                break
-            if share >= 1.0 or farthest_m == 0.0:
-                break
-            share = min(share + max(gap_m - margin_m, _LEAST_STEP_M) / farthest_m, 1.0)
-            half, whole = (Rotation.from_rotvec(part * share * turned_rad).as_matrix() for part in (0.5, 1.0))
-            moved_m = share * (ahead_m * (half @ axis) + across_m)
-            data.geom_xpos[gripper] = tool_m + moved_m + lever @ whole.T
-            data.geom_xmat[gripper] = (whole @ turns).reshape(-1, 9)
+        turns = data.geom_xmat[gripper].reshape(-1, 3, 3).copy()
+        turned = path.rotations @ path.rotations[0].T
+        lever = self._at_rest_m - path.positions_m[0]
+        reach_m = float((np.linalg.norm(lever, axis=1) + self.scene.model.geom_rbound[gripper]).max())
+        # No part of the gripper goes farther than this from one pose to the next: |ΔR x| <= ‖ΔR‖ |x| / √2.
+        steps_m = np.linalg.norm(np.diff(path.positions_m, axis=0), axis=1)
+        steps_m += np.linalg.norm(np.diff(turned, axis=0), axis=(1, 2)) * (reach_m / math.sqrt(2.0))
+        gone_m = np.concatenate([[0.0], np.cumsum(steps_m)])
+        number, clear = 0, True
+        while clear and number < len(gone_m):
+            data.geom_xpos[gripper] = path.positions_m[number] + lever @ turned[number].T
+            data.geom_xmat[gripper] = (turned[number] @ turns).reshape(-1, 9)
+            spare_m = self.gap_m(margin_m + float(gone_m[-1] - gone_m[number])) - margin_m
+            clear = spare_m >= 0.0
+            number = max(number + 1, int(np.searchsorted(gone_m, gone_m[number] + spare_m, side="right")))
         data.geom_xpos[gripper], data.geom_xmat[gripper] = self._at_rest_m, turns.reshape(-1, 9)
         return clear
 

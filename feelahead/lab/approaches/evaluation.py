@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import count
 from typing import Final
 
 import numpy as np
@@ -39,8 +40,6 @@ LINKS: Final = {
     "200 ms, 5 % lost": "delay 200ms 10ms distribution normal loss 5%",
 }
 """Each way."""
-_ALARM_APPROACHES: Final = 10
-"""False alarms are looked for in this many approaches where a contact is ahead, in all where none is."""
 _RESAMPLED: Final = 2000
 _LEAST_APPROACHES: Final = 10
 """A bootstrap over fewer says nothing: two that agree would make an interval of no width."""
@@ -87,6 +86,8 @@ class Pulls:
     spoil: Spoil = "nothing"
     full_rate: bool = True
     """Of the stiffness, as record_approach's."""
+    judged_s: float = 60.0
+    """Time in which R2 is pulled, of each cell, that is judged for false alarms at least."""
 
 
 @dataclass
@@ -120,6 +121,12 @@ class _Staged:
         """Collisions that some release avoids, with the last moment for it."""
         return tuple((one, one.last_release_s) for one in self.collisions if one.last_release_s is not None)
 
+    @property
+    def knowable(self) -> tuple[tuple[Collision, float], ...]:
+        """Those of them that are judged after the sticks have moved: nobody can know the others."""
+        moved_s = self.replay.sticks_moved_s
+        return tuple((one, last_s) for one, last_s in self.avoidable if last_s - REACTION_S >= moved_s)
+
     def draw(self, shift_m: FloatArray, cell: Placed, number: int) -> Draw:
         """Move the objects by shift_m (3,), seen with the camera's `number`-th error."""
         record, names = self.replay.record, tuple(thing.name for thing in self.posed.scene.objects)
@@ -146,7 +153,7 @@ def evaluate(pulls: Pulls, seed: int) -> Iterator[Row]:
             for name in pulls.laws:
                 counts, law = _Counts(), Judged(name, probability, pulls.spoil)
                 _count_covered(counts, law, cell, staged)
-                _count_alarms(counts, law, cell, staged)
+                _count_alarms(counts, law, cell, staged, pulls.judged_s)
                 row: Row = {"cell": cell.key(pulls.pull, pulls.link), "scene": cell.shown}
                 row |= {"camera_mm": cell.camera_mm, "encoder_factor": cell.encoder_factor}
                 yield row | {"law": name, "probability": probability} | _figures(counts, staged, probability)
@@ -173,14 +180,14 @@ def _stage(cell: Placed, replay: Replay, places: int) -> _Staged:
 
 def _count_covered(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[_Staged]) -> None:
     """Judge at least 10 / (1 - P) draws, the same number for each approach that has a contact to avoid."""
-    useful = [one for one in staged if one.avoidable]
+    useful = [one for one in staged if one.knowable]
     least = math.ceil(draws_needed(law.probability) / max(1, len(useful)))
     for one in useful:
         # Every place as often as any other, at each P.
-        each = len(one.avoidable) * math.ceil(least / len(one.avoidable))
+        each = len(one.knowable) * math.ceil(least / len(one.knowable))
         hits = 0
         for number in range(each):
-            collision, last_release_s = one.avoidable[number % len(one.avoidable)]
+            collision, last_release_s = one.knowable[number % len(one.knowable)]
             draw = one.draw(collision.shift_m, cell, number)
             strength = stood(law, draw, last_release_s)
             covered = strength == MAX_STRENGTH
@@ -189,26 +196,36 @@ def _count_covered(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[
                 counts.reported += 1
                 counts.reported_hits += covered
             counts.strength += strength
-            if number < len(one.avoidable):
+            if number < len(one.knowable):
                 late_s = 0.0 if covered else lateness_s(law, draw, last_release_s, collision.touch_s)
                 counts.late_s.append(late_s)
         counts.hits.append(hits)
         counts.draws.append(each)
 
 
-def _count_alarms(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[_Staged]) -> None:
-    passed = cell.scene in PASSED
-    for one in staged if passed else staged[:_ALARM_APPROACHES]:
-        places = [(at.shift_m, at.touch_s) for at in one.collisions[:1]]
-        if passed:
-            # A drift or a turn may touch what a straight approach passes.
-            touch_s = first_touch_s(one.replay, one.posed, np.zeros(3))
-            places = [(np.zeros(3), one.replay.end_s if touch_s is None else touch_s)]
-        for shift_m, until_s in places:
-            alarms = false_alarms(law, one.draw(shift_m, cell, 0), one.posed, shift_m, until_s)
-            counts.alarms += alarms.number
-            counts.alarm_s += alarms.alarm_s
-            counts.judged_s += alarms.judged_s
+def _count_alarms(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[_Staged], least_s: float) -> None:
+    """Judge a draw of each approach in turn, then of each in its next place, until `least_s` are judged."""
+    places = [(one, found) for one in staged if (found := _places(cell, one))]
+    for number in count():
+        before_s = counts.judged_s
+        for one, found in places:
+            if counts.judged_s < least_s:
+                shift_m, until_s = found[number % len(found)]
+                alarms = false_alarms(law, one.draw(shift_m, cell, number), one.posed, shift_m, until_s)
+                counts.alarms += alarms.number
+                counts.alarm_s += alarms.alarm_s
+                counts.judged_s += alarms.judged_s
+        if counts.judged_s == before_s:
+            break
+
+
+def _places(cell: Placed, one: _Staged) -> list[tuple[FloatArray, float]]:
+    """List where the objects stand (3,) in one approach, and when it touches them or ends."""
+    if cell.scene not in PASSED:
+        return [(at.shift_m, at.touch_s) for at in one.collisions]
+    # A drift or a turn may touch what a straight approach passes.
+    touch_s = first_touch_s(one.replay, one.posed, np.zeros(3))
+    return [(np.zeros(3), one.replay.end_s if touch_s is None else touch_s)]
 
 
 def draws_needed(probability: float) -> int:
@@ -237,8 +254,9 @@ def _figures(counts: _Counts, staged: Sequence[_Staged], probability: float) -> 
     holds: the interval's lower end is at least P - 0.1 (1 - P), over 10 approaches or more. late_ms: the median over
     the places in which full strength stands before the touch; never: the share of the others. reported: draws in which
     the operator side has a report of the drift or turn, if any, 0.25 s before the last moment; reported_coverage is of
-    these alone. mean_strength: in the zone that the finger reaches, at that time. unavoidable: places in which no
-    release avoids the contact. alarm_share: of the time in which R2 was pulled, judged_s.
+    these alone. mean_strength: in the zone that the finger reaches, at that time. Places without draws: unavoidable, as
+    no release avoids the contact, and unknowable, as the sticks have not moved by then. alarm_share: of the time in
+    which R2 was pulled, judged_s.
     """
     draws, covered = sum(counts.draws), len(counts.hits) > 0
     low, high = interval(counts.hits, counts.draws) if covered else (None, None)
@@ -259,6 +277,9 @@ def _figures(counts: _Counts, staged: Sequence[_Staged], probability: float) -> 
         "places": sum(len(one.collisions) for one in staged),
         "not_found": sum(one.sought - len(one.collisions) for one in staged),
         "unavoidable": sum(len(one.collisions) - len(one.avoidable) for one in staged),
+        "unknowable": sum(len(one.avoidable) - len(one.knowable) for one in staged),
+        "alarms": counts.alarms,
+        "alarm_s": counts.alarm_s,
         "alarms_per_min": 60.0 * counts.alarms / counts.judged_s if counts.judged_s else None,
         "alarm_share": counts.alarm_s / counts.judged_s if counts.judged_s else None,
         "judged_s": counts.judged_s,

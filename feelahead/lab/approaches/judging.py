@@ -1,23 +1,24 @@
 """Criteria of coverage: full strength in time, its lateness, and false alarms."""
 
 import math
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.special import ndtri
 
 from common.arrays import FloatArray
-from common.reaction import HORIZON_S, REACTION_S
+from common.reaction import REACTION_S
 from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.meeting import shifted
-from feelahead.lab.approaches.replay import Replay
+from feelahead.lab.approaches.stopping_path import stopping_path
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.hands.travel_calibration import TriggerTravel
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
-from robot_side.simulation.posed_scene import PosedScene
+from robot_side.simulation.posed_scene import PosedScene, ToolPath
 
 ALARM_STRENGTH: Final = 4
 CLEAR_M: Final = 0.015
@@ -25,8 +26,6 @@ CLEAR_M: Final = 0.015
 ALARM_STEP_S: Final = 0.02
 _LATE_STEP_S: Final = 0.01
 _R2 = 1
-_ASIDE = 1e-3
-"""Motion aside below this, in metres and radians, counts as none."""
 _TRAVEL = TriggerTravel()
 
 
@@ -73,9 +72,8 @@ class Alarms(NamedTuple):
 def false_alarms(law: Judged, draw: Draw, posed: PosedScene, shift_m: FloatArray, until_s: float) -> Alarms:
     """Judge every 20 ms from the pull's beginning until `until_s`, before the contact if there is one.
 
-    An alarm is false while the zone's stopping path from the true pose stays D_σ(P) + 15 mm clear: what is under way,
-    then the zone's speed for 0.3 s, then braking. It must do so whether drift, turning and the objects' own motion go
-    on meanwhile, by half, or end.
+    An alarm is false while the zone's stopping path from the true pose stays D_σ(P) + 15 mm clear. It must do so
+    whether the sticks that are commanded, and the objects' own motion, go on meanwhile, by half, or end.
     """
     replay = draw.replay
     record = replay.record
@@ -94,30 +92,20 @@ def false_alarms(law: Judged, draw: Draw, posed: PosedScene, shift_m: FloatArray
             there_m = shifted(shift_m, replay, draw.speed_m_s, time_s)
             posed.put(joints, record.finger_positions[record.pose_row(time_s)], there_m)
             margin_m = statistical_distance_m(draw, time_s, law.probability) + CLEAR_M
-            alarmed[number] = _stays_clear(draw, posed, time_s, zone, margin_m)
+            alarmed[number] = all(posed.stays_clear(path, margin_m) for path in _paths(draw, time_s, zone))
     starts = int(np.count_nonzero(alarmed & ~np.concatenate([[False], alarmed[:-1]])))
     return Alarms(starts, ALARM_STEP_S * float(alarmed.sum()), ALARM_STEP_S * float(pulled.sum()))
 
 
-def _stays_clear(draw: Draw, posed: PosedScene, time_s: float, zone: int, margin_m: float) -> bool:
-    """Tell whether all stopping paths from the pose in `posed` stay clear."""
+def _paths(draw: Draw, time_s: float, zone: int) -> Iterator[ToolPath]:
+    """Lay out the stopping paths, in the objects' own frame: what moves aside ends, goes on by half, or goes on."""
     replay = draw.replay
-    ahead_m = stopping_path_m(replay, time_s, zone)
-    speed = zone_speed_m_s(zone)
-    arrives_s = min(replay.record.arrives_s(time_s), replay.end_s)
-    lasts_s = arrives_s - time_s + HORIZON_S + speed / replay.deceleration_m_s2(time_s)
-    drift, turning = replay.aside(time_s)
-    across_m, turned_rad = (drift - draw.speed_m_s * replay.axis) * lasts_s, turning * lasts_s
-    moves = float(np.linalg.norm(across_m)) + float(np.linalg.norm(turned_rad)) > _ASIDE
-    shares = (0.0, 0.5, 1.0) if moves else (0.0,)
-    return all(posed.stays_clear(ahead_m, margin_m, share * across_m, share * turned_rad) for share in shares)
-
-
-def stopping_path_m(replay: Replay, time_s: float, zone: int) -> float:
-    """Work out how far the gripper goes if the finger stays in `zone` for 0.3 s and then lets go."""
-    speed = zone_speed_m_s(zone)
-    braking_m = speed * speed / (2.0 * replay.deceleration_m_s2(time_s))
-    return max(0.0, replay.under_way_m(time_s)) + speed * HORIZON_S + braking_m
+    moves = draw.speed_m_s != 0.0 or replay.sticks_at(time_s).any()
+    for share in (0.0, 0.5, 1.0) if moves else (0.0,):
+        since_s, path = stopping_path(replay, time_s, zone_speed_m_s(zone), share)
+        yield path._replace(
+            positions_m=path.positions_m - share * draw.speed_m_s * since_s[:, None] * replay.axis,
+        )
 
 
 def statistical_distance_m(draw: Draw, time_s: float, probability: float) -> float:

@@ -60,6 +60,10 @@ class RecordedApproach:
     """(c,) every 4 ms: when a command was sent"""
     command: FloatArray
     """(c,) calibrated travel of R2 less that of L2, in that command"""
+    lateral: FloatArray
+    """(c, 2) the stick that moves across, right and up, in that command"""
+    turning: FloatArray
+    """(c, 2) the stick that turns"""
 
     def pose_row(self, time_s: float) -> int:
         """Find the newest row of the poses at `time_s`; the first row before that."""
@@ -135,7 +139,8 @@ class _Notes:
         row["seen_sent_s"] = math.nan if seen is None else seen.header.sent_s
         self._ticks.append(row | {"travel": run.device.travel})
         if number % round(MOTION_PERIOD_S / TICK_S) == 0 and (intent := run.operator.intent) is not None:
-            self._commands.append({"command_time_s": now_s, "command": intent.r2 - intent.l2})
+            row = {"command_time_s": now_s, "command": intent.r2 - intent.l2}
+            self._commands.append(row | {"lateral": intent.lateral, "turning": intent.turning})
         if number % round(POSE_S / TICK_S) == 0:
             row = {"pose_time_s": now_s, "loop_age_s": run.robot.loop_age_s(now_s)}
             row["joint_positions_rad"] = data.qpos[robot.arm_positions].copy()

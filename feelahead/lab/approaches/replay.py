@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from common.arrays import FloatArray
+from common.protocol.messages import Header, MotionCommand
 from feelahead.lab.approaches.recording import POSE_S, TICK_S, RecordedApproach
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import FINGER_TIME_CONSTANT_S
@@ -13,15 +14,13 @@ from operator_side.feel.commands_under_way import CommandsUnderWay
 from operator_side.hands.travel_calibration import TriggerTravel
 from robot_side.arm.joint_estimate import JointEstimate
 from robot_side.arm.port import ArmState, GripperPose
-from robot_side.arm.resolved_rate import joint_velocities
-from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.arm.tool_motion import ToolMotionSettings, tool_motion
 from robot_side.settings import EncoderSettings
 from robot_side.simulation.encoders import Encoder
 from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene
 
-_SLOW_M_S = 0.01
 _WHOLE_S = 1000.0
 """A window longer than any record."""
 _ASKED_M_S = 0.05
@@ -61,8 +60,8 @@ class Replay:
             ]
         )
         """(k,) û·v of the true tool"""
-        self._jacobians = [pose.tool_jacobian for pose in true]
-        self._axes = [pose.tool_rotation[:, 2] for pose in true]
+        self.true = true
+        """The true gripper, for each row of the poses"""
         self.end_s = self._end_s()
         """The end of the record, or the time at which the arm reaches the edge of its reach."""
 
@@ -143,8 +142,8 @@ class Replay:
     def aside(self, time_s: float) -> tuple[FloatArray, FloatArray]:
         """Return the true tool's velocity (3,) across its approach axis and its turning (3,); world frame."""
         row = self.record.pose_row(time_s)
-        twist = self._jacobians[row] @ self.record.joint_velocities_rad_s[row]
-        axis = self._axes[row]
+        twist = self.true[row].tool_jacobian @ self.record.joint_velocities_rad_s[row]
+        axis = self.true[row].tool_rotation[:, 2]
         return twist[:3] - (twist[:3] @ axis) * axis, twist[3:]
 
     def knows_aside(self, time_s: float) -> bool:
@@ -162,19 +161,25 @@ class Replay:
                 return float(time_s) + _LOOKED_S
         return -math.inf
 
-    def under_way_m(self, time_s: float) -> float:
-        """Measure how far the true tool goes along the axis until the command sent at `time_s` arrives."""
-        arrives_s = min(self.record.arrives_s(time_s), self.end_s)
-        times = self.record.pose_time_s
-        return float(np.interp(arrives_s, times, self.along_m) - np.interp(time_s, times, self.along_m))
+    def pose_at(self, time_s: float) -> GripperPose:
+        """Return the true gripper at `time_s`."""
+        joints_rad, velocities_rad_s = self.joints_at(time_s)
+        return self._kinematics.pose(self._state(self.record.pose_row(time_s), time_s, joints_rad, velocities_rad_s))
 
-    def deceleration_m_s2(self, time_s: float) -> float:
-        """Work out the deceleration along the approach axis that the joints' limits give in the pose at `time_s`."""
-        row = self.record.pose_row(time_s)
-        along = np.concatenate([_SLOW_M_S * self._axes[row], np.zeros(3)])
-        unlimited = np.full(self._jacobians[row].shape[1], np.inf)
-        fastest = float(np.abs(joint_velocities(self._jacobians[row], along, unlimited)).max())
-        return MotionLimits().acceleration_rad_s2 * _SLOW_M_S / fastest
+    def sticks_at(self, time_s: float) -> FloatArray:
+        """Return the twist (6,) that the newest command's sticks ask for, in the tool frame, linear part first."""
+        record = self.record
+        row = max(int(np.searchsorted(record.command_time_s, time_s + 1e-9)) - 1, 0)
+        lateral, turning = ((float(stick[row][0]), float(stick[row][1])) for stick in (record.lateral, record.turning))
+        command = MotionCommand(Header(epoch=1, sequence=row, sent_s=0.0), 0.0, 0.0, lateral, turning)
+        return np.concatenate(tool_motion(command, self.motion))
+
+    @cached_property
+    def sticks_moved_s(self) -> float:
+        """Time of the first command that asks for a motion aside; before all times where none does."""
+        record = self.record
+        moved = record.lateral.any(axis=1) | record.turning.any(axis=1)
+        return float(record.command_time_s[np.argmax(moved)]) if moved.any() else -math.inf
 
     def _end_s(self) -> float:
         record = self.record

@@ -3,6 +3,7 @@
 feelahead bench coverage --quick --laws swept none
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +32,8 @@ _NOT_STILL: Final = ("moving", "fleeing", "place_held", "terrain_ahead")
 """Left to `try approach`: objects that move by themselves or with the gripper, and a hill."""
 QUICK_SIZES: Final = (10, 4)
 """Approaches of each motion, and places of the objects for each."""
+QUICK_JUDGED_S, JUDGED_S = 60.0, 600.0
+"""Time that is judged for false alarms at least, over all cells of one kind of motion."""
 _MARKS: Final = ("o", "s", "^", "D")
 _CELL: Final = ("scene", "pull", "link", "camera_mm", "encoder_factor", "probability")
 _Probability = Annotated[float, Meta(gt=0.0, le=0.9999)]
@@ -43,9 +46,9 @@ class CoverageSettings(Sweep):
 
     Covered: 0.25 s before the last moment at which letting go avoids the contact, full strength stood in the zone that
     the finger reaches until then. False alarm: strength of 4 or more under the finger, while that zone's stopping path
-    from the true pose stays D_σ(P) + 15 mm clear. Slowdown: the time to a goal in the free over that without haptics.
-    Pulls are recorded open loop over the emulated link, and judged for every scene, camera draw, law and P. --quick: a
-    few cells in three minutes, instead of all in two hours.
+    from the true pose stays D_σ(P) + 15 mm clear, whether sticks go on or end. Slowdown: the time to a goal in the free
+    over that without haptics. Pulls are recorded open loop over the emulated link, and judged for every scene, camera
+    draw, law and P. --quick: a few cells in three minutes, instead of all in two hours.
     """
 
     laws: tuple[Law, ...] = LAWS
@@ -78,9 +81,14 @@ class CoverageSettings(Sweep):
         sizes = QUICK_SIZES if self.quick else (25, 8)
         probabilities = (0.5, 0.9) if self.quick else (0.5, 0.9, 0.99, 0.999)
         chosen = tuple(sorted(set(self.probabilities))) or probabilities
+        judged_s = QUICK_JUDGED_S if self.quick else JUDGED_S
+        of_kind = Counter((pull, link) for (pull, link, _), cells in found.items() for _ in cells)
         motions = [
-            Pulls(*motion, tuple(cells), sizes, chosen, self.laws, self.spoil, self.full_rate)
-            for motion, cells in found.items()
+            Pulls(
+                *(pull, link, home, tuple(cells), sizes, chosen, self.laws, self.spoil, self.full_rate),
+                judged_s=judged_s / of_kind[pull, link],
+            )
+            for (pull, link, home), cells in found.items()
         ]
         return sorted(motions, key=lambda pulls: -len(pulls.cells))
 
@@ -147,7 +155,8 @@ def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
         found, settings.laws, "covered: full strength stood in time, share [95 %], * where it holds", _covered
     )
     yield _by_cell(found, settings.laws, "false alarms a minute (share of the time in which R2 is pulled)", _alarms)
-    yield "n: draws (approaches). apart: places in which no release avoids the contact / that were not found"
+    yield "n: draws (approaches). apart: places in which no release avoids the contact / that are judged before the"
+    yield "sticks have moved, so that nobody can know / that were not found"
     yield from (by_pull(found, law) for law in settings.laws)
     yield "once reported: draws in which the operator side had a report of the drift or turn in time"
     yield by_law(table, settings.laws)
@@ -164,7 +173,10 @@ def _by_cell(found: Table, laws: Sequence[str], title: str, entry: Callable[[Row
         some, entries = of_cell.rows[0], [entry(row) for law in laws for row in of_cell.where(law=law)]
         if any(entries):
             camera = f"{camera_mm:g} mm{f', encoders x{encoders:g}' if encoders != 1.0 else ''}"
-            count = f"{some['draws']} ({some['approaches']})", f"{some['unavoidable']} / {some['not_found']}"
+            count = (
+                f"{some['draws']} ({some['approaches']})",
+                " / ".join(str(some[name]) for name in ("unavoidable", "unknowable", "not_found")),
+            )
             rows.append((scene, pull, link, camera, probability, *count, some["judged_s"] / 60.0, *entries))
     return shown(title, ("scene", "pull", "link", "camera", "P", "n", "apart", "minutes", *laws), rows)
 
@@ -177,7 +189,7 @@ def _covered(row: Row) -> str:
 
 def _alarms(row: Row) -> str:
     rate = row["alarms_per_min"]
-    return "" if rate is None else f"{rate:.1f} ({100 * row['alarm_share']:.0f} %)"
+    return "" if rate is None else f"{rate:.1f} ({100 * row['alarm_share']:.1f} %)"
 
 
 def by_pull(found: Table, law: str) -> Shown:
@@ -189,10 +201,12 @@ def by_pull(found: Table, law: str) -> Shown:
         known, pulled = rows.values("coverage"), rows.values("alarms_per_min")
         least = _where(rows, "coverage", min(known), ".3f") if known else ""
         most = _where(rows, "alarms_per_min", max(pulled), ".1f") if pulled else ""
-        means = mean(rows, "coverage"), least, mean(rows, "reported_coverage"), mean(rows, "alarms_per_min", ".1f")
-        entries.append((*map(str, key), f"{sum(rows.values('holds'))} of {len(known)}", *means, most))
+        means = mean(rows, "coverage"), least, mean(rows, "reported_coverage"), *pooled_alarms(rows), most
+        minutes = f"{sum(rows.values('judged_s')) / 60.0:.1f}"
+        entries.append((*map(str, key), f"{sum(rows.values('holds'))} of {len(known)}", *means, minutes))
     headings = ("pull", "link", "P", "cells that hold", "covered", "least", "covered, once reported")
-    return shown(f"{law}, by pull and link", (*headings, "false alarms a minute", "most"), entries)
+    alarms = ("false alarms a minute", "share", "most a minute", "minutes judged")
+    return shown(f"{law}, by pull and link", (*headings, *alarms), entries)
 
 
 def _where(rows: Table, name: str, value: float, form: str) -> str:
@@ -203,11 +217,11 @@ def by_law(table: Table, laws: Sequence[str]) -> Shown:
     """Make a row for each law and P, over all cells, with the cost in time."""
     found, raced = judged(table), Table(row for row in table if "slowdown" in row)
     figures = {"coverage": ".3f", "mean_strength": ".2f", "late_ms": ".0f", "never": ".0%"}
-    figures |= {"alarms_per_min": ".1f", "alarm_share": ".0%"}
     entries = [
         (
             *(law, f"{probability:g}", f"{sum(rows.values('holds'))} of {len(rows.values('coverage'))}"),
             *(mean(rows, name, form) for name, form in figures.items()),
+            *pooled_alarms(rows),
             *(_slowdown(row) for scene in RACED for row in raced.where(law=law, scene=scene)),
         )
         for law in laws
@@ -215,7 +229,7 @@ def by_law(table: Table, laws: Sequence[str]) -> Shown:
     ]
     headings = ("law", "P", "cells that hold", "covered", "strength that stood", "too late by, ms", "never")
     slow = (f"slowdown, {scene}" for scene in RACED if len(raced))
-    title = "the laws side by side, means over the cells; slowdown at 200 ms (arrived)"
+    title = "the laws side by side, means over the cells, alarms over all their time; slowdown at 200 ms (arrived)"
     return shown(title, (*headings, "false alarms a minute", "share", *slow), entries)
 
 
@@ -229,6 +243,12 @@ def mean(rows: Table, name: str, form: str = ".3f") -> str:
     return format(sum(values) / len(values), form) if values else ""
 
 
+def pooled_alarms(rows: Table) -> tuple[str, str]:
+    """Return false alarms a minute, and their share of the time, over all that was judged; empty without any."""
+    number, alarm_s, judged_s = (sum(rows.values(name)) for name in ("alarms", "alarm_s", "judged_s"))
+    return (f"{60.0 * number / judged_s:.2f}", f"{alarm_s / judged_s:.2%}") if judged_s else ("", "")
+
+
 def draw(settings: CoverageSettings, table: Table, path: Path) -> None:
     """Draw coverage against false alarms: a point for each law and P, means over the cells."""
     table = judged(table)
@@ -239,7 +259,7 @@ def draw(settings: CoverageSettings, table: Table, path: Path) -> None:
             points = []
             for probability, mark in marks.items():
                 rows = table.where(law=law, probability=probability)
-                alarms, covered = mean(rows, "alarms_per_min", ".17g"), mean(rows, "coverage", ".17g")
+                (alarms, _), covered = pooled_alarms(rows), mean(rows, "coverage", ".17g")
                 if alarms and covered:
                     points.append((float(alarms), float(covered)))
                     axes.plot(*points[-1], mark, color=LAW_COLOURS[law], alpha=0.8)

@@ -155,6 +155,8 @@ def recorded(travels: FloatArray, there_ms: int, back_ms: int, quantile_s: float
         travel=np.zeros((len(ticks), 2)),
         command_time_s=sent_s,
         command=travels,
+        lateral=np.zeros((len(travels), 2)),
+        turning=np.zeros((len(travels), 2)),
     )
 
 

@@ -1,4 +1,4 @@
-"""Recorded approaches: what each side knew when, on a link without jitter, through a wall."""
+"""Recorded approaches: what each side knew when, what the arm did, and what it would have done from then on."""
 
 import functools
 import math
@@ -7,9 +7,15 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from feelahead.lab.approaches.pulls import make_pull
+from common.reaction import HORIZON_S
+from feelahead.lab.approaches.evaluation import LINKS
+from feelahead.lab.approaches.frozen import SITE, frozen_scene
+from feelahead.lab.approaches.pulls import PullKind, make_pull
 from feelahead.lab.approaches.recording import POSE_S, TICK_S, RecordedApproach, record_approach
+from feelahead.lab.approaches.replay import Replay
+from feelahead.lab.approaches.stopping_path import stopping_path
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
+from robot_side.settings import EncoderSettings
 from robot_side.simulation.posed_scene import PosedScene
 from robot_side.simulation.scene import load_scene
 from tests.helpers.repository import DATA
@@ -108,3 +114,73 @@ def test_a_seed_gives_the_same_record_and_another_one_another() -> None:
     # Jitter lets no newer command wait for an older one.
     sent_s = first.applied_sent_s[~np.isnan(first.applied_sent_s)]
     assert (np.diff(sent_s) >= 0.0).all()
+
+
+# From a moment on until the arm stands
+
+STARTS_S, GOES_S = 0.02, 0.8
+"""Moments of a pull over 200 ms: as the first command arrives, and when the arm goes evenly."""
+
+
+@functools.cache
+def replayed(pull: PullKind) -> Replay:
+    record = record_approach(pull, LINKS["200 ms"], SEED, duration_s=2.0)
+    return Replay(record, load_scene(frozen_scene("empty"), SITE), EncoderSettings(), SEED)
+
+
+def commanded_m_s(replay: Replay) -> float:
+    return replay.motion.trigger_speed_m_s * float(replay.record.command[-1])
+
+
+@recordings
+@pytest.mark.parametrize("pull", ["steady", "drift", "yaw"])
+@pytest.mark.parametrize("since_s", [STARTS_S, GOES_S])
+def test_until_it_brakes_it_goes_as_the_arm_went_with_these_commands(pull: PullKind, since_s: float) -> None:
+    replay = replayed(pull)
+    record, time_s = replay.record, replay.record.began_s + since_s
+    times_s, path = stopping_path(replay, time_s, commanded_m_s(replay))
+    goes = times_s <= record.arrives_s(time_s) - time_s + HORIZON_S
+    true = [replay.pose_at(float(time_s + then_s)) for then_s in times_s[goes]]
+    off_m = np.linalg.norm(path.positions_m[goes] - [pose.tool_position_m for pose in true], axis=1)
+    # The finger itself needs 0.1 s until it pulls as it will.
+    assert off_m.max() < (0.003 if since_s == STARTS_S else 0.0001)
+    turned = path.rotations[goes] @ np.swapaxes([pose.tool_rotation for pose in true], 1, 2)
+    assert np.arccos(np.clip((np.trace(turned, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)).max() < 0.01
+
+
+@recordings
+def test_an_arm_that_goes_brakes_from_the_zones_speed_and_one_that_starts_has_to_reach_it_first() -> None:
+    replay, ends_m = replayed("steady"), []
+    speed_m_s = commanded_m_s(replay)
+    for since_s in (0.0, GOES_S):
+        time_s = replay.record.began_s + since_s
+        arrives_s = replay.record.arrives_s(time_s)
+        path = stopping_path(replay, time_s, speed_m_s)[1]
+        reached_m = replay.pose_at(arrives_s).tool_position_m
+        ends_m.append(float((path.positions_m[-1] - reached_m) @ replay.axis) - speed_m_s * HORIZON_S)
+    starts_m, goes_m = ends_m
+    # At 3 m/s²: u²/2a more than u h, or, from rest, just u h.
+    assert goes_m == pytest.approx(speed_m_s**2 / 6.0, rel=0.2)
+    assert starts_m == pytest.approx(0.0, abs=0.001)
+
+
+@recordings
+@pytest.mark.parametrize(("pull", "direction", "fastest"), [("drift", 0, 0.1), ("yaw", 4, 0.5)])
+def test_sticks_end_go_on_by_half_or_go_on_until_it_stands(pull: PullKind, direction: int, fastest: float) -> None:
+    replay = replayed(pull)
+    began_s = replay.record.began_s
+    assert replay.sticks_moved_s == pytest.approx(began_s, abs=0.01)
+    assert not replay.sticks_at(began_s - 0.1).any()
+    # So early no part of the arm has moved, and no report could say so.
+    time_s = began_s + STARTS_S
+    assert np.abs(replay.sticks_at(time_s)) == pytest.approx(fastest * np.eye(6)[direction], abs=1e-3)
+    side, aside = np.sign(replay.sticks_at(time_s)[direction]), []
+    for share in (0.0, 0.5, 1.0):
+        since_s, path = stopping_path(replay, time_s, 0.1, share)
+        before, after = path.rotations[0], path.rotations[-1]
+        goes_m = before.T @ (path.positions_m[-1] - path.positions_m[0])
+        aside.append(side * (goes_m[0] if pull == "drift" else np.cross(before[:, 2], after[:, 2]) @ before[:, 1]))
+    going_on = fastest * (since_s[-1] - (replay.record.arrives_s(time_s) - time_s))
+    # It has to start, and the finger may be let go earlier than the stick.
+    assert 0.0 <= aside[0] < 0.1 * going_on < 0.45 * going_on < aside[1] < 0.6 * going_on
+    assert 0.8 * going_on < aside[2] < 1.05 * going_on

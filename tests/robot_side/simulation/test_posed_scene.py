@@ -5,10 +5,11 @@ import math
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
 from robot_side.simulation.camera import MujocoCamera
-from robot_side.simulation.posed_scene import PosedScene
+from robot_side.simulation.posed_scene import PosedScene, ToolPath
 from robot_side.simulation.scene import load_scene
 from robot_side.simulation.true_contact import TrueContact
 from tests.helpers.repository import DATA
@@ -47,6 +48,16 @@ def beside() -> Posed:
     return Posed("wall_beside")
 
 
+def path(ahead_m: float, across_m: float = 0.0, turned_rad: float = 0.0) -> ToolPath:
+    """From the home pose evenly along x and y, or along an arc that turns about the vertical; 3 mm a step."""
+    share = np.linspace(0.0, 1.0, 1 + math.ceil(ahead_m / 0.003))[:, None]
+    half = 0.5 * share * turned_rad
+    moved_m = share * ahead_m * np.sinc(half / math.pi) * np.hstack([np.cos(half), np.sin(half), 0.0 * half])
+    turns = Rotation.from_rotvec(share * [0.0, 0.0, turned_rad]).as_matrix()
+    home = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    return ToolPath(np.array([0.55, 0.0, 0.2]) + moved_m + share * [0.0, across_m, 0.0], turns @ home)
+
+
 def test_before_a_wall_gap_and_way_are_the_distance(wall: Posed) -> None:
     for shift_m in (0.0, -0.1, 0.02):
         put = wall.at(shift_m, 0.05, -0.03)  # along the wall nothing changes
@@ -78,22 +89,22 @@ def test_an_inclined_wall_is_nearer_than_the_way_to_it() -> None:
 def test_before_a_wall_it_stays_clear_up_to_the_margin(
     wall: Posed, ahead_m: float, margin_m: float, *, clear: bool
 ) -> None:
-    assert wall.at().stays_clear(ahead_m, margin_m) is clear
+    assert wall.at().stays_clear(path(ahead_m), margin_m) is clear
 
 
 def test_a_drift_towards_a_wall_beside_is_not_clear_and_one_away_is(beside: Posed) -> None:
     for across_m, clear in ((-0.02, True), (0.02, True), (0.026, False), (-0.026, True)):
-        assert beside.at().stays_clear(0.35, 0.0, np.array([0.0, across_m, 0.0])) is clear
+        assert beside.at().stays_clear(path(0.35, across_m), 0.0) is clear
     # It is as far off in the end, but for the rotation about the way, as along its own axis.
-    assert not beside.at().stays_clear(0.35, 0.006, np.array([0.0, 0.02, 0.0]))
+    assert not beside.at().stays_clear(path(0.35, 0.02), 0.006)
 
 
 def test_a_turn_goes_along_an_arc(wall: Posed, beside: Posed) -> None:
     """About the tool's point, which goes on where it points: towards a wall beside, by half the angle at first."""
     for turned, clear in ((0.4, False), (-0.4, True), (0.02, True)):
-        assert beside.at().stays_clear(0.2, 0.0, turned_rad=np.array([0.0, 0.0, turned])) is clear
+        assert beside.at().stays_clear(path(0.2, 0.0, turned), 0.0) is clear
     before = wall.at().gap_m()
-    assert wall.at().stays_clear(0.3, 0.0, turned_rad=np.array([0.0, 0.5, 0.3]))
+    assert wall.at().stays_clear(path(0.3, 0.0, 0.3), 0.0)
     assert wall.posed.gap_m() == before
 
 
