@@ -135,6 +135,8 @@ def assemble(
         settings.motion,
         surroundings,
     )
+    if isinstance(law, SweptLaw):
+        law.ask_around(asked=True)
     core = side(
         arm if watch is None else watch(arm),
         kinematics,

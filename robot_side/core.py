@@ -30,7 +30,7 @@ from robot_side.laws.law import Law, Situation
 from robot_side.laws.sensed import Sensed
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
-from robot_side.outgoing_messages import SHOWN_NAME, Outgoing, stiffness_message, telemetry
+from robot_side.outgoing_messages import SHOWN_NAME, AroundNow, Outgoing, stiffness_message, telemetry
 from robot_side.perceptual_deadband import StiffnessDeadband, TelemetryDeadband
 from robot_side.placing import scaled
 from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects, Role
@@ -98,6 +98,7 @@ class RobotSide:
         self._loop_age_s = RunningStatistics(seed)
         self.felt = StiffnessDeadband(full_rate=full_rate)
         """When a stiffness leaves"""
+        self._around = AroundNow()
         self._seen = TelemetryDeadband()
 
     @property
@@ -121,6 +122,7 @@ class RobotSide:
         if self.session.take_owner_changed():
             self._loop_age.reset()
             self.felt.forget()
+            self._around = AroundNow()
         if (age_s := self.session.loop_age_s(now_s)) is not None:
             # In every tick, so that a link that falls silent ages, too (eq. 8).
             delay_s = self._loop_age.update(age_s, now_s)
@@ -227,19 +229,15 @@ class RobotSide:
             self._observer.observe(self.figures, now_s)
 
     def _outgoing(
-        self,
-        permission: Permission,
-        situation: Situation,
-        state: ArmState,
-        sensed: Sensed,
-        now_s: float,
+        self, permission: Permission, situation: Situation, state: ArmState, sensed: Sensed, now_s: float
     ) -> list[Outgoing]:
         session = self.session
         felt = sensed, self._told_m_s, permission.state, self._touching_down.stands
         outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]
         if session.owner_peer is not None and self.felt.due(*felt, permission.command, now_s):
             self.stiffness_sent += 1
-            outgoing += [stiffness_message(one, *felt) for one in session.owners(now_s)]
+            around = self._around.due(self._law, situation.pose, now_s)
+            outgoing += [stiffness_message(one, *felt, around) for one in session.owners(now_s)]
         if now_s >= self._next_observers_s:
             self._next_observers_s = now_s + OBSERVER_PERIOD_S
             outgoing += [stiffness_message(one, *felt) for one in session.observers(now_s)]

@@ -1,14 +1,17 @@
 """What leaves the robot side: stiffness for those who feel, telemetry for those who look."""
 
+import math
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from common.arrays import FloatArray
+from common.protocol.around import Around
 from common.protocol.codec import encode
 from common.protocol.messages import Header, MotionState, StiffnessUpdate, Telemetry
 from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC
 from robot_side.arm.port import ArmState, GripperPose
+from robot_side.laws.law import Law
 from robot_side.laws.sensed import L2, R2, Sensed
 from robot_side.operators.operator_session import Receiver
 
@@ -18,6 +21,11 @@ TOPICS: Final[dict[OutgoingStream, bytes]] = {"telemetry": b"telemetry", "video"
 
 SHOWN_NAME = 100
 """Characters of an object's name that are sent and shown; a message has a limit."""
+_AROUND_S: Final = 0.05
+_AROUND_AGAIN_S: Final = 0.4
+"""A lost one is missed for no longer."""
+_AROUND_M: Final = 1e-3
+"""Ways that differ by less are the same: they are sent in steps of 2 mm."""
 _NO_HEADER = Header(0, 0, 0.0)
 _FASTEST_M_S, _LARGEST_M = 100.0, 100.0
 """A simulation about to become unstable shows wild figures, and must get as far as saying so."""
@@ -33,12 +41,36 @@ class Outgoing(NamedTuple):
     """Over every connection of `peer`, as something that must arrive soon; else over the next in turn."""
 
 
+class AroundNow:
+    """When ways from around the gripper go along: 20 times a second as they change, and else twice."""
+
+    def __init__(self) -> None:
+        self._sent: Around | None = None
+        self._sent_s = -math.inf
+
+    def due(self, law: Law, pose: GripperPose, now_s: float) -> Around | None:
+        """The ways, if they are due."""
+        if now_s - self._sent_s < _AROUND_S:
+            return None
+        around = law.around(pose)
+        known = self._sent is not None and around is not None and not around.differs(self._sent, _AROUND_M)
+        if around is None or (known and now_s - self._sent_s < _AROUND_AGAIN_S):
+            return None
+        self._sent, self._sent_s = around, now_s
+        return around
+
+
 def stiffness_message(
-    receiver: Receiver, sensed: Sensed, told_m_s: float, state: MotionState, stands: bool = False
+    receiver: Receiver,
+    sensed: Sensed,
+    told_m_s: float,
+    state: MotionState,
+    stands: bool = False,
+    around: Around | None = None,
 ) -> Outgoing:
     """What `receiver` is to feel. told_m_s: what the arm is told, along the direction in which R2 advances.
 
-    stands: what is held does.
+    stands: what is held does. around: in messages in which it is due.
     """
     update = StiffnessUpdate(
         receiver.header,
@@ -50,6 +82,7 @@ def stiffness_message(
         state=state,
         told_m_s=min(max(told_m_s, -_FASTEST_M_S), _FASTEST_M_S),
         stands=stands,
+        around=around,
     )
     return Outgoing("haptics", receiver.peer, encode(update), receiver.everywhere)
 

@@ -31,4 +31,4 @@ class TimedLaw:
 
     def __init__(self, law: Law, stages: Stages) -> None:
         self.sense = stages.timed("sensing", law.sense)
-        self.summary = law.summary
+        self.around, self.summary = law.around, law.summary

@@ -15,6 +15,7 @@ import msgspec
 from msgspec import Meta
 
 from common.limits import Finite, Share, check_limits
+from common.protocol.around import Around
 from common.protocol.session import SessionState
 
 Vector2 = tuple[float, float]
@@ -261,6 +262,8 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
     are through; None where nobody knows: that command is then taken to be followed."""
     stands: bool = False
     """What is held stands on something: nothing moves it farther down."""
+    around: Around | None = None
+    """Where sticks may lead; in a few messages only, and the newest holds."""
 
     def __post_init__(self) -> None:
         _in_range("speed_m_s", -_FARTHEST_M, _FARTHEST_M, self.speed_m_s)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from common.emulation.clauses import LinkModel
+from common.protocol.around import Around
 from common.protocol.uniform_field import uniform_field
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.lab.table import Row
@@ -12,6 +13,7 @@ from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.person import SimulatedOperator
 from operator_side.simulated_person.settings import PersonSettings
+from robot_side.arm.port import GripperPose
 from robot_side.laws.law import Law, Situation
 from robot_side.laws.sensed import Sensed
 from robot_side.main import TICK_PERIOD_S
@@ -59,6 +61,11 @@ class _Silent:
         del situation, now_s
         free = uniform_field(0)
         return Sensed.of(free, free)
+
+    def around(self, pose: GripperPose) -> Around | None:
+        """Nothing around."""
+        del pose
+        return None
 
     def summary(self) -> dict[str, int]:
         """No work at all."""

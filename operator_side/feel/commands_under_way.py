@@ -10,6 +10,9 @@ from collections import deque
 from itertools import pairwise
 from typing import Final, NamedTuple
 
+import numpy as np
+
+from common.arrays import FloatArray
 from common.following import follow
 
 MAX_DELAY_S: Final = 2.0
@@ -20,6 +23,9 @@ _CLOCK_RATES_S: Final = 0.001
 """By so much two clocks that run at slightly different rates may make `held` too long."""
 
 
+_NOWHERE: Final[FloatArray] = np.zeros((0, 4))
+
+
 class Displacement(NamedTuple):
     """What the commands under way will have done, along the direction in which R2 advances."""
 
@@ -27,6 +33,34 @@ class Displacement(NamedTuple):
     """δ, signed: from where the gripper was in the report to where it is when a command sent now is followed."""
     speed_m_s: float
     """w, signed: its speed then."""
+
+
+Sticks = tuple[float, float, float, float]
+"""Deflections: across, right and up, and turning, right and up; -1 to 1 each"""
+AT_REST: Final[Sticks] = (0.0, 0.0, 0.0, 0.0)
+
+
+class Command(NamedTuple):
+    """What was sent, and when."""
+
+    sent_s: float
+    travel: float
+    sticks: Sticks = AT_REST
+
+
+class Course(NamedTuple):
+    """The gripper's way by the commands under way, point by point."""
+
+    ways_m: list[float]
+    """(k,) signed, along the direction in which R2 advances, from where the gripper was in the report"""
+    speed_m_s: float
+    """w: the speed at the end, so signed"""
+    aside_s: FloatArray
+    """(k, 4) how long each stick, fully deflected, would take to where it has led by then"""
+
+    def turned_back(self) -> "Course":
+        """The same along the direction in which L2 retreats."""
+        return Course([-way_m for way_m in self.ways_m], -self.speed_m_s, self.aside_s)
 
 
 class CommandsUnderWay:
@@ -61,13 +95,13 @@ class CommandsUnderWay:
         if not (math.isfinite(window_s) and window_s > 0.0):
             raise ValueError(f"window_s = {window_s}; valid: a finite time above 0 s")
         self._window_s = window_s
-        self._sent: deque[tuple[float, float]] = deque(maxlen=_MOST_COMMANDS)
+        self._sent: deque[Command] = deque(maxlen=_MOST_COMMANDS)
 
     def __len__(self) -> int:
         """How many commands are remembered."""
         return len(self._sent)
 
-    def sent(self, now_s: float, travel: float) -> None:
+    def sent(self, now_s: float, travel: float, sticks: Sticks = AT_REST) -> None:
         """A command left at `now_s`, the stamp in its header: calibrated travel of R2 less that of L2, -1 to 1.
 
         It counts until the next one; who stops commanding says so by a travel of 0. ValueError for a travel out of
@@ -75,13 +109,17 @@ class CommandsUnderWay:
         """
         if not -1.0 <= travel <= 1.0:
             raise ValueError(f"travel = {travel}; valid: -1 to 1")
-        last_s = self._sent[-1][0] if self._sent else -math.inf
+        last_s = self._sent[-1].sent_s if self._sent else -math.inf
         if not (math.isfinite(now_s) and now_s >= last_s):
             raise ValueError(f"now_s = {now_s}; valid: a finite time, not before the last command's, {last_s}")
         # The newest one from before the window stays: it is what counted as the window began.
-        while len(self._sent) > 1 and self._sent[1][0] <= now_s - self._window_s:
+        while len(self._sent) > 1 and self._sent[1].sent_s <= now_s - self._window_s:
             self._sent.popleft()
-        self._sent.append((now_s, travel))
+        self._sent.append(Command(now_s, travel, sticks))
+
+    def sticks_at(self, now_s: float) -> Sticks:
+        """Find how they were commanded last at `now_s`."""
+        return next((one.sticks for one in reversed(self._sent) if one.sent_s <= now_s), AT_REST)
 
     def displacement(
         self,
@@ -102,6 +140,27 @@ class CommandsUnderWay:
         window or the first command, or that says what cannot be. ValueError for a speed or an acceleration that is
         none.
         """
+        course = self.course(
+            now_s, echo_sent_s, echo_held_s, speed_m_s, full_speed_m_s, acceleration_m_s2, told_m_s, aside=False
+        )
+        return None if course is None else Displacement(course.ways_m[-1], course.speed_m_s)
+
+    def course(
+        self,
+        now_s: float,
+        echo_sent_s: float | None,
+        echo_held_s: float | None,
+        speed_m_s: float,
+        full_speed_m_s: float,
+        acceleration_m_s2: float,
+        told_m_s: float | None = None,
+        *,
+        aside: bool = True,
+    ) -> Course | None:
+        """Follow the commands to the time at which one sent at `now_s` is followed; see `displacement`.
+
+        aside: the sticks, too, which the tool is taken to follow at once; None where they rest all the time.
+        """
         if not math.isfinite(speed_m_s):
             raise ValueError(f"speed_m_s = {speed_m_s}; valid: finite")
         if not (math.isfinite(full_speed_m_s) and full_speed_m_s > 0.0):
@@ -110,27 +169,35 @@ class CommandsUnderWay:
             raise ValueError(f"acceleration_m_s2 = {acceleration_m_s2}; valid: above 0")
         if echo_sent_s is None or echo_held_s is None:
             return None
-        if not (self._sent and max(now_s - self._window_s, self._sent[0][0]) <= echo_sent_s <= now_s):
+        if not (self._sent and max(now_s - self._window_s, self._sent[0].sent_s) <= echo_sent_s <= now_s):
             return None
         if not 0.0 <= echo_held_s <= now_s - echo_sent_s + _CLOCK_RATES_S:
             return None
-        way_m, speed = 0.0, speed_m_s
-        for number, (duration_s, travel) in enumerate(self._from_echo_on(echo_sent_s, echo_held_s, now_s)):
-            target = told_m_s if number == 0 and told_m_s is not None else travel * full_speed_m_s
-            way_m, speed = follow(way_m, speed, target, acceleration_m_s2, duration_s)
-        return Displacement(way_m, speed)
+        counting = self._from_echo_on(echo_sent_s, echo_held_s, now_s)
+        if aside and all(one.sticks == AT_REST for one in counting[:-1]):
+            return None
+        ways_m, speed = [0.0], speed_m_s
+        for number, (one, following) in enumerate(pairwise(counting)):
+            target = told_m_s if number == 0 and told_m_s is not None else one.travel * full_speed_m_s
+            way_m, speed = follow(ways_m[-1], speed, target, acceleration_m_s2, following.sent_s - one.sent_s)
+            ways_m.append(way_m)
+        return Course(ways_m, speed, _integrated(counting) if aside else _NOWHERE)
 
-    def _from_echo_on(self, echo_sent_s: float, echo_held_s: float, now_s: float) -> list[tuple[float, float]]:
-        """(duration, travel) of every command that counts between e and now, the oldest first."""
+    def _from_echo_on(self, echo_sent_s: float, echo_held_s: float, now_s: float) -> list[Command]:
+        """Every command that counts between e and now, the oldest first, and the end of it."""
         newest_first = []
-        for sent_s, travel in reversed(self._sent):
-            if sent_s <= now_s:
-                newest_first.append((sent_s, travel))
-            if sent_s <= echo_sent_s:
+        for one in reversed(self._sent):
+            if one.sent_s <= now_s:
+                newest_first.append(one)
+            if one.sent_s <= echo_sent_s:
                 break
         followed, *under_way = reversed(newest_first)
-        since_s = min(echo_sent_s + echo_held_s, under_way[0][0] if under_way else now_s)
-        return [
-            (until_s - sent_s, travel)
-            for (sent_s, travel), (until_s, _) in pairwise([(since_s, followed[1]), *under_way, (now_s, 0.0)])
-        ]
+        since_s = min(echo_sent_s + echo_held_s, under_way[0].sent_s if under_way else now_s)
+        return [followed._replace(sent_s=since_s), *under_way, Command(now_s, 0.0)]
+
+
+def _integrated(commands: list[Command]) -> FloatArray:
+    """Integrate the sticks (k, 4) from the first command to each."""
+    durations_s = np.diff([one.sent_s for one in commands])
+    steps = durations_s[:, None] * np.array([one.sticks for one in commands[:-1]])
+    return np.concatenate([np.zeros((1, 4)), np.cumsum(steps, axis=0)])

@@ -1,16 +1,20 @@
 """From what the robot side reports and what our hands commanded to what is written to the controller."""
 
 import dataclasses
-from typing import Any
+from typing import Any, Final
 
 from common.protocol.messages import Compensation, MotionCommand, StiffnessUpdate
 from operator_side.dualsense.reports.output_report import RELEASED, OutputReport
 from operator_side.feel.blindness import Blindness
 from operator_side.feel.commands_under_way import CommandsUnderWay, Displacement
+from operator_side.feel.path_ahead import Aside
 from operator_side.feel.rendering import RenderingSettings, TriggerRendering
 from operator_side.feel.write_bound import WriteBound
 from operator_side.feel.zones import moving_along, needed_m
 from operator_side.hands.travel_calibration import TravelCalibration
+
+MAP_EXPIRES_S: Final = 1.0
+"""A map that is this much older than the newest field says nothing any more: it is repeated twice in that time."""
 
 
 class Haptics:
@@ -37,6 +41,7 @@ class Haptics:
         self._written: OutputReport | None = RELEASED
         self._commands = CommandsUnderWay()
         self._commanding = False
+        self._mapped: StiffnessUpdate | None = None
         self.calibrate(calibration)
 
     def calibrate(self, calibration: TravelCalibration) -> None:
@@ -53,7 +58,8 @@ class Haptics:
         Without the run button nothing moves. Whether the arm is armed does not matter: what is felt begins with a
         report that says so, and all that was under way then is followed.
         """
-        self._commands.sent(command.header.sent_s, command.r2 - command.l2 if command.run else 0.0)
+        travel, sticks = command.r2 - command.l2, (*command.lateral, *command.turning)
+        self._commands.sent(command.header.sent_s, *((travel, sticks) if command.run else (0.0,)))
         self._commanding = True
 
     def silent(self, now_s: float, *, owns: bool) -> None:
@@ -76,9 +82,9 @@ class Haptics:
         """
         if not self._enabled:
             return None
-        known = None if felt is None else self._displacement(felt, now_s)
+        known, aside = (None, None) if felt is None else (self._displacement(felt, now_s), self._aside(felt, now_s))
         self.without_history += felt is not None and known is None and self._compensation == "operator"
-        wanted = self.rendering.render(felt, pulled, known, now_s)
+        wanted = self.rendering.render(felt, pulled, known, now_s, aside)
         if blindness.light is not None:
             rumble = blindness.rumble(now_s) if felt is None else wanted.rumble
             wanted = dataclasses.replace(wanted, rumble=rumble, lightbar=blindness.light)
@@ -95,14 +101,28 @@ class Haptics:
         if self._compensation == "robot":
             return None
         header, along = felt.header, felt.r2
-        return self._commands.displacement(
-            now_s,
-            header.echo_sent_s,
-            header.echo_held_s,
-            felt.speed_m_s,
-            along.full_speed_m_s,
-            along.acceleration_m_s2,
-            felt.told_m_s,
+        echo = header.echo_sent_s, header.echo_held_s
+        able = along.full_speed_m_s, along.acceleration_m_s2
+        return self._commands.displacement(now_s, *echo, felt.speed_m_s, *able, felt.told_m_s)
+
+    def _aside(self, felt: StiffnessUpdate, now_s: float) -> Aside | None:
+        """Where our sticks lead, among what the newest map knows; None while they rest, or without a map."""
+        if felt.around is not None:
+            self._mapped = felt
+        mapped = self._mapped
+        if mapped is None or self._compensation == "robot":
+            return None
+        header, along = mapped.header, mapped.r2
+        if header.epoch != felt.header.epoch or felt.header.sent_s - header.sent_s > MAP_EXPIRES_S:
+            self._mapped = None
+            return None
+        echo = header.echo_sent_s, header.echo_held_s
+        able = along.full_speed_m_s, along.acceleration_m_s2
+        course = self._commands.course(now_s, *echo, mapped.speed_m_s, *able, mapped.told_m_s)
+        return (
+            None
+            if course is None or mapped.around is None
+            else Aside(mapped.around, course, self._commands.sticks_at(now_s))
         )
 
     def needed_m(self, felt: StiffnessUpdate, pulled: tuple[float, float], now_s: float) -> tuple[float, float]:

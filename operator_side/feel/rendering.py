@@ -16,6 +16,7 @@ from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT, M
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble
 from operator_side.feel.commands_under_way import Displacement
+from operator_side.feel.path_ahead import Aside, first_full_zone
 from operator_side.feel.stand_pulse import StandPulse
 from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
@@ -51,12 +52,23 @@ class RenderedTrigger:
         self._effect: TriggerEffect = Off()
 
     def render(
-        self, field: TriggerField, horizon_m: float, other_travel: float, moving: Displacement, now_s: float
+        self,
+        field: TriggerField,
+        horizon_m: float,
+        other_travel: float,
+        moving: Displacement,
+        now_s: float,
+        aside: Aside | None = None,
+        *,
+        forth: bool = True,
     ) -> TriggerEffect:
-        """The effect at `now_s`; the other arguments are `zone_strengths`'."""
+        """The effect at `now_s`; the others: of `zone_strengths`, and of `first_full_zone` while sticks lead aside."""
         zones = zone_strengths(
             field, horizon_m, self._travels, other_travel, moving, horizon_s=self._settings.horizon_s
         )
+        if aside is not None:
+            where = field, self._travels, other_travel, self._settings.horizon_s
+            zones = zones.full_from(first_full_zone(aside, *where, forth=forth))
         self.beyond_horizon += zones.beyond_horizon
         if zones is FREE and not any(self._levels):
             self._last_s = now_s
@@ -115,12 +127,17 @@ class TriggerRendering:
         self._stand = StandPulse()
 
     def render(
-        self, felt: StiffnessUpdate | None, pulled: tuple[float, float], known: Displacement | None, now_s: float
+        self,
+        felt: StiffnessUpdate | None,
+        pulled: tuple[float, float],
+        known: Displacement | None,
+        now_s: float,
+        aside: Aside | None = None,
     ) -> OutputReport:
         """What both triggers and the motors have to do at `now_s`; all off, at once, for None.
 
         pulled: present calibrated travel of the trigger that retreats and of the one that advances. known: δ and w by
-        our own commands under way; None where the robot side's are to be taken.
+        our own commands under way; None where the robot side's are to be taken. aside: where our sticks lead.
         """
         if felt is None:
             self.l2.release()
@@ -129,8 +146,8 @@ class TriggerRendering:
         retreating, advancing = (self.r2, self.l2) if self._swap_sides else (self.l2, self.r2)
         back, forth = moving_along(felt, known)
         effects = (
-            retreating.render(felt.l2, felt.horizon_m, pulled[1], back, now_s),
-            advancing.render(felt.r2, felt.horizon_m, pulled[0], forth, now_s),
+            retreating.render(felt.l2, felt.horizon_m, pulled[1], back, now_s, aside, forth=False),
+            advancing.render(felt.r2, felt.horizon_m, pulled[0], forth, now_s, aside),
         )
         l2, r2 = reversed(effects) if self._swap_sides else effects
         return OutputReport(l2=l2, r2=r2, rumble=Rumble(felt.rumble, self._stand.right(felt.stands, now_s)))

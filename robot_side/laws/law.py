@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from common.arrays import FloatArray
+from common.protocol.around import Around
 from common.protocol.messages import Compensation, Vector2
 from robot_side.arm.port import GripperPose
 from robot_side.laws.sensed import Sensed
@@ -41,6 +42,10 @@ class Law(Protocol):
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
         """Work out one tick."""
+        ...
+
+    def around(self, pose: GripperPose) -> Around | None:
+        """Ways from around the gripper, for an operator side that traces its sticks; None for none."""
         ...
 
     def summary(self) -> dict[str, int]:

@@ -5,6 +5,7 @@ or closed its fingers to. A look takes one tick. A tick has one look, two while 
 are due after 5 periods, or where a place is new.
 """
 
+import math
 from typing import Final, NamedTuple
 
 from common.arrays import BoolArray, FloatArray, IntArray
@@ -14,6 +15,7 @@ from robot_side.compiled.vectors import Vector, dot, load
 from robot_side.field.look import LOOK
 from robot_side.field.scratch import SCRATCH, Count, Error
 from robot_side.field.total_overlap import SUM_OVERLAPS
+from robot_side.laws.around import FIRST_PROBE, go_to_probe, keep_probe, probe_waiting
 from robot_side.laws.felt import MOST_M
 from robot_side.laws.memory import Kernel, Total, memory_at
 from robot_side.laws.path import go_to
@@ -81,7 +83,12 @@ def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool
     """Look along one side from one place, and keep what was seen; False for what is not finite."""
     memory = memory_at(bundle)
     state, prospect, count = memory.state[0], memory.prospect[0], moment.radii.size
-    gone = go_to(bundle, moment.tool, moment.rotation, moment.centers, side, place, moment.speed, moment.loop_age)
+    there = moment.tool, moment.rotation, moment.centers, side
+    probe = place - FIRST_PROBE
+    if probe >= 0:
+        gone = go_to_probe(bundle, *there, probe, moment.speed, moment.loop_age)
+    else:
+        gone = go_to(bundle, *there, place, moment.speed, moment.loop_age)
     where = memory.rotation, moment.jacobian, moment.right, moment.up, moment.loop_age, moment.by_operator
     if not _find_prospect(memory.kernels[Kernel.PROSPECT], (bundle, side, *where, gone)):
         return False
@@ -100,6 +107,9 @@ def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool
         totals[counted] += scratch.counts[counted]
     totals[Total.LOOKS] += 1
     totals[Total.WITH_NOTHING_NEAR] += 1 if scratch.counts[Count.PAIRS] == 0 else 0
+    if probe >= 0:
+        keep_probe(bundle, side, probe, moment.now, moment.tool, scratch.distances_m)
+        return True
     leads = place == 0 and side == (R2 if moment.speed >= 0.0 else L2)
     if leads and moment.now >= state.next_overlap:
         state.next_overlap = moment.now + OVERLAP_PERIOD_S - ROUNDING_S
@@ -117,10 +127,18 @@ def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool
     return True
 
 
+@building_block
+def _longest_waiting(bundle: IntArray, moment: Moment) -> tuple[float, int, int]:
+    """How many periods the side and place, or the probe, that has waited longest has waited, with these two."""
+    waited, side, place = longest_waiting(bundle, moment.now)
+    longer, of_side, of_place = probe_waiting(bundle, moment.now, moment.speed, moment.by_operator)
+    return (longer, of_side, of_place) if longer > waited else (waited, side, place)
+
+
 @inlined
 def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
     """Look at what has waited longest; at more than `at_most` fields where they have waited too long."""
-    waited, side, place = longest_waiting(bundle, moment.now)
+    waited, side, place = _longest_waiting(bundle, moment)
     if waited >= _FAR_BEHIND:
         at_most = _ALL
     elif waited >= _OVERDUE:
@@ -129,5 +147,6 @@ def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
         if not _look_along(bundle, moment, side, place):
             return False
         at_most -= 1
-        waited, side, place = longest_waiting(bundle, moment.now)
+        waited, side, place = _longest_waiting(bundle, moment)
+    memory_at(bundle).state[0].next = moment.now if waited >= 1.0 - _ROUNDING else math.inf
     return True

@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from common.protocol.around import PROBES
 from robot_side.arm.ability import FOUND, JointLimits
 from robot_side.compiled.columns import INDICES, NUMBERS, Declared, records, rows
 from robot_side.field.scratch import STRENGTHS, Count
@@ -42,12 +43,13 @@ class Total(IntEnum):
 STATE: Final = np.dtype(
     [
         *((name, np.int64) for name in ("spheres", "moments", "finger_poses", "moves_fingers")),
-        *((name, np.float64) for name in ("measured", "next", "next_overlap", "overlap")),
+        *((name, np.float64) for name in ("measured", "next", "next_overlap", "overlap", "moved", "until")),
     ]
 )
 """spheres: how many the gripper had, -1 before the first tick. moments: how many places besides the gripper's own are
 looked from. finger_poses: how many are kept. measured, next, next_overlap: when the motion was measured, when something
-is due again at the earliest, when the overlap at δ is (s). overlap: that one (m³)."""
+is due again at the earliest, when the overlap at δ is (s). overlap: that one (m³). moved: when anything moved last.
+until: T, the time until the arm stands (s)."""
 SEEN: Final = np.dtype(
     [
         ("place", np.int64),
@@ -58,18 +60,20 @@ SEEN: Final = np.dtype(
     ]
 )
 """One look: when, from which place, the ways that it found, fast and slow. began: where the tool was along it (m)."""
+AROUND: Final = np.dtype(
+    [("at", np.float64), ("direction", np.float64, (3,)), ("began", np.float64), ("ways", np.float64, (2,))]
+)
+"""The newest look from a probe (`around`): when, and the ways of full strength. direction, began: as those of SEEN."""
 NEWEST: Final = np.dtype([(name, np.float64) for name in ("reach", "speed", "acceleration", "sigma", "overlap")])
 """Of the newest look from where the gripper is: how far it looked, what the arm can do there, D_σ, and Σ V_ij (m³)."""
 SETTINGS: Final = np.dtype(
     [
-        *(
-            (name, np.float64)
-            for name in ("trigger_speed", "stick_speed", "touch_speed", "camera_variance", "quantile")
-        ),
+        *((name, np.float64) for name in ("trigger_speed", "stick_speed", "turn_speed", "touch_speed")),
+        *((name, np.float64) for name in ("camera_variance", "quantile", "around")),
         ("mean", np.float64, (3,)),
     ]
 )
-"""Speeds in m/s; σ_c² (m²), Φ⁻¹(P), and μ_ee - μ_c (m) of eq. 10."""
+"""Speeds in m/s and rad/s; σ_c² (m²), Φ⁻¹(P), and μ_ee - μ_c (m) of eq. 10. around: 0 where nobody asks for that."""
 PROSPECT: Final = np.dtype(
     [
         ("direction", np.float64, (3,)),
@@ -86,6 +90,7 @@ class MemoryColumns(NamedTuple):
 
     state: np.ndarray
     seen: np.ndarray
+    around: np.ndarray
     counts: IntArray
     newest: np.ndarray
     looked_s: FloatArray
@@ -119,10 +124,10 @@ class MemoryColumns(NamedTuple):
 
 MEMORY: Final = Declared(
     MemoryColumns,
-    *(records(STATE), records(SEEN), INDICES, records(NEWEST), rows(1 + MOST_PLACES), rows(1 + MOST_PLACES), INDICES),
-    *(NUMBERS, rows(3), rows(3), NUMBERS, rows(3), NUMBERS, rows(3), NUMBERS, rows(3), NUMBERS, records(PROSPECT)),
-    *(NUMBERS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, records(SETTINGS), rows(3), rows(3), NUMBERS, NUMBERS, NUMBERS),
-    *(INDICES, INDICES),
+    *(records(STATE), records(SEEN), records(AROUND), INDICES, records(NEWEST), rows(1 + MOST_PLACES)),
+    *(rows(1 + MOST_PLACES), INDICES, NUMBERS, rows(3), rows(3), NUMBERS, rows(3), NUMBERS, rows(3), NUMBERS, rows(3)),
+    *(NUMBERS, records(PROSPECT), NUMBERS, NUMBERS, NUMBERS, NUMBERS, NUMBERS, records(SETTINGS), rows(3), rows(3)),
+    *(NUMBERS, NUMBERS, NUMBERS, INDICES, INDICES),
 )
 
 memory_at = MEMORY.at
@@ -140,10 +145,13 @@ class Memory:
         """missed: rows (k, 3) of loop age, μ_δ, σ_δ, for the operator side's prediction and for the robot side's."""
         self.state: np.ndarray = np.zeros(1, dtype=STATE)
         self.state["spheres"] = -1
-        for name in ("measured", "next", "next_overlap"):
+        for name in ("measured", "next", "next_overlap", "moved"):
             self.state[name] = -np.inf
         self.seen: np.ndarray = np.zeros(SIDES * ROOM, dtype=SEEN)
         """Those of one side together, from `ROOM` times the side on"""
+        self.around: np.ndarray = np.zeros(2 * PROBES, dtype=AROUND)
+        """Those of one side together"""
+        self.around["at"] = -np.inf
         self.counts: IntArray = np.zeros(SIDES, dtype=np.int64)
         """How many there are of each side"""
         self.newest: np.ndarray = np.zeros(SIDES, dtype=NEWEST)
@@ -169,11 +177,12 @@ class Memory:
         """Speed and acceleration there, by how much the motion is off, and the joints' rates"""
         self.displacement_m: FloatArray = np.zeros(3)
         """δ of the overlap that is looked at"""
-        self.push: FloatArray = np.zeros(3)
-        self.nothing: FloatArray = np.zeros(0)
+        self.push, self.nothing = np.zeros(3), np.zeros(0)
         self.settings: np.ndarray = np.zeros(1, dtype=SETTINGS)
-        self.missed_by_operator, self.missed_by_robot = map(_floats, missed)
-        self.limits_rad_s, self.accelerations_rad_s2 = map(_floats, (limits.velocity_rad_s, limits.acceleration_rad_s2))
+        able = limits.velocity_rad_s, limits.acceleration_rad_s2
+        self.missed_by_operator, self.missed_by_robot, self.limits_rad_s, self.accelerations_rad_s2 = map(
+            _floats, (*missed, *able)
+        )
         self.encoder_variance = _floats(encoder_sigma_rad) ** 2
         self.kernels: IntArray = np.zeros(len(Kernel), dtype=np.int64)
         """Their addresses"""

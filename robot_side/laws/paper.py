@@ -10,9 +10,11 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from common.protocol.around import Around
 from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
 from common.protocol.view_messages import EnlargementTerms
 from robot_side.arm.ability import JointLimits, along_approach
+from robot_side.arm.port import GripperPose
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.distance import Uncertainty, plain_enlargements_m
 from robot_side.enlargement.kinematic_error import position_covariance
@@ -58,6 +60,11 @@ class PaperLaw:
     def expect(self, probability: float) -> None:
         """P of eq. 10 from now on; ConfigurationError outside (0, 1)."""
         self._uncertainty = replace(self._uncertainty, probability=probability)
+
+    def around(self, pose: GripperPose) -> Around | None:
+        """Nothing: the plain law has no ways."""
+        del pose
+        return None
 
     def summary(self) -> dict[str, int]:
         """How much work there was, over the run."""

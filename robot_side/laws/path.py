@@ -1,13 +1,12 @@
 """The gripper's path until the arm stands: a screw motion by trigger, sticks and fingers, and samples along it.
 
-Sticks move and turn the tool in its own frame. A tool whose point moves with v, and which turns with ω, has after t
-turned by θ = |ω| t, and its point has gone
+Sticks move and turn the tool in its own frame. Its point moves with v, and it turns with ω. After t it has turned by
+θ = |ω| t, and its point has gone
 
     t V v,    V = 1 + (1 - cos θ)/θ [a] + (1 - sin θ/θ) [a]²,    a = ω/|ω|
 
-(exponential map of SE(3)). The trigger moves it along the approach axis z, and so from a place to the next along the
-chord V z, which points along z turned by θ/2. What is under way by then is gone already: the way at a place begins
-there.
+(exponential map of SE(3)). The trigger moves it along the approach axis z, and so along the chord V z by then. That
+points along z turned by θ/2. What is under way by then is gone already: the way at a place begins there.
 """
 
 import math
@@ -89,23 +88,25 @@ def move(
     origin: Vector,
     rotation: FloatArray,
     centers: FloatArray,
+    linear: Vector,
+    turning: Vector,
     after: float,
     ahead: float,
 ) -> None:
     """Put the tool and its spheres where they will be after that time, and find the chord that leads on from there.
 
-    origin, rotation (3, 3), centers (m, 3): where they are; after 0 s, exactly these. ahead: what the trigger moves it
+    origin, rotation (3, 3), centers (m, 3): where they are; after 0 s, exactly these. linear, turning: the velocity of
+    the tool, but for the trigger's, and its turning. ahead: what the trigger moves it
     by then, along the approach axis (m).
     """
     memory = memory_at(bundle)
-    turning, stays = load(memory.velocity, 1), after == 0.0
-    axis, angle = unit(turning), after * norm(turning)
+    stays, axis, angle = after == 0.0, unit(turning), after * norm(turning)
     sine, versine = math.sin(angle), 2.0 * math.sin(0.5 * angle) ** 2
     across, twice = (versine / angle, 1.0 - sine / angle) if angle > 1e-9 else (0.5 * angle, 0.0)
     chord = _along_screw((rotation[0, 2], rotation[1, 2], rotation[2, 2]), axis, across, twice)
     moved = origin
     if not stays:
-        sideways = _along_screw(scale(after, load(memory.velocity, 0)), axis, across, twice)
+        sideways = _along_screw(scale(after, linear), axis, across, twice)
         moved = add(origin, add(sideways, scale(ahead, chord)))
     for k in range(3):
         memory.tool_m[k], memory.chord[k] = moved[k], chord[k]
@@ -137,10 +138,11 @@ def go_to(
     speed: along the approach axis. What is under way goes on for the loop age. A place stands for the path from half a
     step before it on.
     """
-    after = time_of_place(bundle, side, place)
-    forth, since = 1.0 if side != L2 else -1.0, max(after - 0.5 * memory_at(bundle).moments_s[0], 0.0)
+    memory, after = memory_at(bundle), time_of_place(bundle, side, place)
+    forth, since = 1.0 if side != L2 else -1.0, max(after - 0.5 * memory.moments_s[0], 0.0)
     gone: float = max(forth * speed, 0.0) * min(since, loop_age)
-    move(bundle, tool, rotation, centers, after, forth * gone)
+    velocity = load(memory.velocity, 0), load(memory.velocity, 1)
+    move(bundle, tool, rotation, centers, *velocity, after, forth * gone)
     return gone
 
 

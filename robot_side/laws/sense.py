@@ -20,6 +20,7 @@ from robot_side.compiled.kernel import (
     output_array,
 )
 from robot_side.compiled.vectors import Vector, add, dot, load, scale, subtract
+from robot_side.laws.around import follow_motion
 from robot_side.laws.felt import feel
 from robot_side.laws.fingers import measure_fingers
 from robot_side.laws.looking import ROUNDING_S, Moment, look_at_due
@@ -47,8 +48,11 @@ def _measure(bundle: IntArray, moment: Moment, velocity: Vector, turning: Vector
     """Measure what moves the gripper besides the triggers; False for a Jacobian by which nothing can be resolved."""
     memory = memory_at(bundle)
     state, across = memory.state[0], subtract(velocity, scale(moment.speed, moment.approach))
+    # What sticks do the operator side traces, from around the gripper.
+    traced = memory.settings[0].around != 0.0 and moment.by_operator
     for axis in range(3):
-        memory.velocity[0, axis], memory.velocity[1, axis] = across[axis], turning[axis]
+        memory.velocity[0, axis] = 0.0 if traced else across[axis]
+        memory.velocity[1, axis] = 0.0 if traced else turning[axis]
         memory.chord[axis] = moment.approach[axis]
     measure_fingers(bundle, moment.centers, moment.tool, moment.rotation, moment.now, changed)
     state.spheres = moment.radii.size
@@ -57,6 +61,7 @@ def _measure(bundle: IntArray, moment: Moment, velocity: Vector, turning: Vector
         return False
     able = memory.prospect[0]
     until = stopping(able.speed, able.acceleration, moment.loop_age)
+    follow_motion(bundle, velocity, turning, changed, until, moment.now)
     plan_places(bundle, moment.centers, moment.tool, moment.approach, until, until * able.speed)
     state.measured = moment.now
     return True
@@ -124,6 +129,6 @@ def sense(
         look_from(bundle, STICK, 1 if deflected else 0)
         if not look_at_due(bundle, moment, at_most):
             return False
-        state.next = min(state.measured, longest_ago(bundle)) + FIELD_PERIOD_S - ROUNDING_S
+        state.next = min(state.next, min(state.measured, longest_ago(bundle)) + FIELD_PERIOD_S - ROUNDING_S)
     feel(bundle, tool, approach, velocity, loop_age, is_known, math.hypot(right, up), felt)
     return math.isfinite(felt[ENLARGEMENT] + felt[OVERLAP])

@@ -4,9 +4,10 @@ Fields are worked out in turns, one in a tick: R2, L2, and along the stick while
 are shortened by what the tool has moved along, which is exact for a translation. The shortest of the last 0.1 s hold:
 where the gripper just passes something, encoder noise alone can flip no strength to full.
 
-While the gripper drifts, turns, or moves its fingers, R2 and L2 are looked along from where that will have brought it,
-too, at several moments until a command that is sent now has stopped it: the shortest ways hold. What comes towards the
-gripper by itself shortens its ways by what it covers in that time.
+While the gripper drifts, turns, or moves its fingers, R2 and L2 are looked along from places on its path, too, until a
+command that is sent now has stopped it: the shortest ways hold (`path`). An operator side that traces its own sticks
+gets ways from around the gripper in their stead (`around`). What comes towards the gripper by itself shortens its ways
+by what it covers in that time.
 """
 
 import math
@@ -16,6 +17,7 @@ from typing import Final, NamedTuple, NoReturn
 import numpy as np
 
 from common.arrays import FloatArray, IntArray, require_finite
+from common.protocol.around import PROBES, Around
 from common.touch_speed import touch_speed_m_s
 from robot_side.arm.ability import JointLimits, find_ability
 from robot_side.arm.port import GripperPose
@@ -27,6 +29,7 @@ from robot_side.field.look import look
 from robot_side.field.object_class import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
 from robot_side.field.scratch import Count, Scratch
 from robot_side.field.total_overlap import sum_overlaps
+from robot_side.laws.around import STILL_M_S, ways_around
 from robot_side.laws.explanation import (
     Trigger,
     TriggerExplained,
@@ -34,7 +37,7 @@ from robot_side.laws.explanation import (
     moved_and_inflated,
     overlaps_by_object,
 )
-from robot_side.laws.felt import room_to_feel
+from robot_side.laws.felt import MOST_M, room_to_feel
 from robot_side.laws.law import Situation
 from robot_side.laws.memory import Memory, Total
 from robot_side.laws.path import go_to_place
@@ -77,12 +80,14 @@ class SweptLaw:
         self.memory = Memory(limits, encoder_sigma_rad, missed)
         settings = self.memory.settings[0]
         settings["trigger_speed"], settings["stick_speed"] = motion.trigger_speed_m_s, motion.stick_speed_m_s
+        settings["turn_speed"] = motion.turn_speed_rad_s
         settings["touch_speed"] = touch_speed_m_s(motion.trigger_speed_m_s)
         settings["camera_variance"], settings["mean"] = uncertainty.camera_sd_m**2, uncertainty.mean_m
         settings["quantile"] = uncertainty.quantile
         self._scratch = Scratch(0, 0, 0)
         self._felt = room_to_feel()
         self._classes: tuple[object, IntArray, IntArray] | None = None
+        self._frame: object = None
         self._room: tuple[int, SceneTable | None] = (-1, None)
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
@@ -91,6 +96,10 @@ class SweptLaw:
         self._make_room(pose, scene)
         _, classes, closing = self._classes_of(situation)
         velocities, (right, up) = situation.objects.velocities_m_s, situation.lateral
+        if situation.objects is not self._frame:
+            self._frame = situation.objects
+            if velocities is not None and np.abs(velocities).max(initial=0.0) > STILL_M_S:
+                self._look_around_anew()
         if not sense(
             *(pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, pose.sphere_centers_m),
             *(pose.sphere_radii_m, pose.sphere_on_finger, situation.joint_velocities_rad_s),
@@ -106,6 +115,29 @@ class SweptLaw:
         """P of eq. 10 from now on; ConfigurationError outside (0, 1)."""
         self._uncertainty = replace(self._uncertainty, probability=probability)
         self.memory.settings["quantile"] = self._uncertainty.quantile
+        self._look_around_anew()
+
+    def around(self, pose: GripperPose) -> Around | None:
+        """Ways from around the gripper, from where it is; None while not all are known, or nobody asks for them."""
+        ways_m = np.empty((4, PROBES))
+        asked = bool(self.memory.settings["around"][0]) and self._room[0] >= 0
+        if not (asked and ways_around(self.memory.bundle, pose.tool_position_m, ways_m)):
+            return None
+        r2, r2_slow, l2, l2_slow = np.clip(ways_m, 0.0, MOST_M).tolist()
+        return Around(float(self.memory.state["until"][0]), tuple(l2), tuple(l2_slow), tuple(r2), tuple(r2_slow))
+
+    def ask_around(self, *, asked: bool) -> None:
+        """Look from around the gripper, too, from now on, or no longer; nobody asks for it at first."""
+        self.memory.settings["around"] = float(asked)
+
+    def forget_around(self, before_s: float) -> None:
+        """Forget what was seen from around before then: the next tick sees all of that at once."""
+        at = self.memory.around["at"]
+        at[at < before_s] = -np.inf
+
+    def _look_around_anew(self) -> None:
+        """Take all that was seen from around for old: what is looked at, or how, has changed."""
+        self.memory.state["moved"] = np.inf
 
     def summary(self) -> dict[str, int]:
         """How much work there was and was not, over the run."""
@@ -183,6 +215,7 @@ class SweptLaw:
             classes = np.array([of_role.get(role, OBSTACLE) for role in roles], dtype=np.int64)
             if held is not None:
                 classes[held] = PASSED_OVER
+            self._look_around_anew()
             self._classes = (roles, held), classes, np.where(classes == TARGET, PASSED_OVER, classes)
         return self._classes
 

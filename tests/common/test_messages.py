@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol import messages as control
+from common.protocol.around import PROBES, Around
 from common.protocol.codec import (
     MAXIMUM_BYTES,
     PROTOCOL_VERSION,
@@ -64,6 +65,7 @@ finite = st.floats(-1e6, 1e6)
 stamps = st.integers(0, 2**63 - 1)
 headers = st.builds(Header, stamps, stamps, finite) | st.builds(Header, stamps, stamps, finite, finite, unit)
 eight_ways = st.lists(st.floats(-100.0, 100.0), min_size=8, max_size=8).map(lambda metres: ways(*sorted(metres)))
+probed = st.lists(st.floats(0.0, 100.0), min_size=PROBES, max_size=PROBES).map(tuple)
 BY_HAND: dict[str, st.SearchStrategy[Any]] = {
     **dict.fromkeys(("header",), headers),
     **dict.fromkeys(("fast_m", "slow_m"), eight_ways),
@@ -73,6 +75,7 @@ BY_HAND: dict[str, st.SearchStrategy[Any]] = {
     **dict.fromkeys(("target_in_tool_m",), st.none() | st.tuples(finite, finite, finite)),
     **dict.fromkeys(("full_speed_m_s", "acceleration_m_s2"), st.floats(1e-6, 100.0)),
     **dict.fromkeys(("told_m_s",), st.none() | stick),
+    **dict.fromkeys(("around",), st.none() | st.builds(Around, st.floats(1e-6, 100.0), probed, probed, probed, probed)),
     **dict.fromkeys(("token",), stamps),
     **dict.fromkeys(("lacks",), st.none() | st.tuples(stamps, stamps)),
 }
@@ -113,7 +116,7 @@ def said(message: Message) -> dict[str, Any]:
     """Flatten the message's numbers by name."""
     found: dict[str, Any] = {}
     for name, value in msgspec.structs.asdict(message).items():
-        is_field = isinstance(value, TriggerField)
+        is_field = isinstance(value, TriggerField | Around)
         found |= {f"{name}.{key}": one for key, one in said(value).items()} if is_field else {name: value}
     return found
 
@@ -140,7 +143,12 @@ def is_told_as_it_was(message: StiffnessUpdate | Telemetry, back: Any) -> None:
     assert type(back) is type(message)
     told, horizon_m = said(back), getattr(back, "horizon_m", 0.0)
     for name, value in said(message).items():
-        if name.endswith(("fast_m", "slow_m")):
+        if name.startswith("around.") and name.endswith("_m"):
+            for sent_m, told_m in zip(value, told[name], strict=True):
+                # In 2 mm up to half a metre, and rounded towards the gripper.
+                nearer_m = min(sent_m, 254 * 2.0**-9)
+                assert told_m == horizon_m <= sent_m or nearer_m - 2.0**-9 <= told_m <= sent_m
+        elif name.endswith(("fast_m", "slow_m")):
             for sent_m, told_m in zip(value, told[name], strict=True):
                 assert told_m <= sent_m
                 known = -2.0 + STEP_M <= sent_m <= min(2.0 - 2.0 * STEP_M, horizon_m)
@@ -219,6 +227,11 @@ EVERYDAY: tuple[AnyMessage, ...] = (
 @pytest.mark.parametrize("message", EVERYDAY, ids=lambda message: type(message).__name__)
 def test_every_message_for_hands_and_fingers_is_at_most_200_bytes(message: AnyMessage) -> None:
     assert len(encode(message)) <= 200
+
+
+def test_a_map_adds_88_bytes() -> None:
+    plain, told = felt(FULL, l2=8, r2=5), Around(0.8, *((0.1,) * PROBES for _ in range(4)))
+    assert len(encode(msgspec.structs.replace(plain, around=told))) - len(encode(plain)) == 88
 
 
 def test_every_kind_of_them_was_measured() -> None:

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from common.protocol.around import Around
 from common.protocol.messages import Header
 from common.silence import KEEP_ALIVE_S
 from feelahead.lab.faults.session_bench import QUICK, TICK_S, Bench, Operator
+from robot_side.arm.port import GripperPose
 from robot_side.assembly import assemble
 from robot_side.gripper.held_object import grip
 from robot_side.laws.law import Law, Situation
@@ -136,6 +138,9 @@ class Listening:
     def sense(self, situation: Situation, now_s: float) -> Sensed:
         self.heard.append(situation)
         return self._law.sense(situation, now_s)
+
+    def around(self, pose: GripperPose) -> Around | None:
+        return self._law.around(pose)
 
     def summary(self) -> dict[str, int]:
         return self._law.summary()

@@ -15,6 +15,7 @@ from feelahead.lab.approaches.spoilt import SPOILING_DELAY_S, Spoil
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.feel.commands_under_way import Displacement
+from operator_side.feel.path_ahead import Aside
 from operator_side.feel.rendering import RenderingSettings, TriggerRendering
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 from robot_side.enlargement.distance import Uncertainty
@@ -28,6 +29,8 @@ from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.surroundings.perceived import PerceivedObjects
 
 _TRAVEL: Final = TriggerTravel()
+_OLDEST_S: Final = 0.05
+"""What was seen from around is this old at most."""
 _FRAME_S: Final = 1.0 / 30.0
 
 
@@ -93,12 +96,13 @@ class Judged:
             if np.isnan(sent_s) or sent_s < record.pose_time_s[0]:
                 continue
             row = record.pose_row(float(sent_s))
+            if isinstance(law, SweptLaw):
+                law.forget_around(float(record.pose_time_s[row]) - _OLDEST_S)
             sensed = law.sense(self._situation(draw, row), float(record.pose_time_s[row]))
             pulled = [_TRAVEL.travel(min(travel / SENSED_TRAVEL, 1.0)) for travel in record.travel[tick]]
             message = _message(sensed, row)
-            shown = rendering.render(
-                message, (pulled[0], pulled[1]), self._under_way(draw.replay, sensed, row, felt_s), felt_s
-            )
+            known, aside = self._under_way(draw.replay, law, sensed, row, felt_s)
+            shown = rendering.render(message, (pulled[0], pulled[1]), known, felt_s, aside)
             for trigger, effect in enumerate((shown.l2, shown.r2)):
                 strengths[number, trigger] = 0 if effect is None else effect.zone_strengths
         return strengths[:, ::-1] if self.spoil == "swapped" else strengths
@@ -107,7 +111,12 @@ class Judged:
         replay = draw.replay
         uncertainty = Uncertainty(self.probability, camera_sd_m=draw.camera_sd_m, prediction=_prediction_errors())
         arguments = uncertainty, replay.encoder_sigma_rad, MotionLimits().of_joints(replay.joints), replay.motion
-        return PaperLaw(*arguments) if law_of_robot(self.law) == "paper" else SweptLaw(*arguments)
+        if law_of_robot(self.law) == "paper":
+            return PaperLaw(*arguments)
+        law = SweptLaw(*arguments)
+        # Where sticks rest nothing is traced: what would be seen from around serves nobody.
+        law.ask_around(asked=replay.sticks_moved_s > -math.inf and self.law == "swept")
+        return law
 
     def _situation(self, draw: Draw, row: int) -> Situation:
         replay, record = draw.replay, draw.replay.record
@@ -123,20 +132,26 @@ class Judged:
             lateral=(0.0, 0.0),
         )
 
-    def _under_way(self, replay: Replay, sensed: Sensed, row: int, now_s: float) -> Displacement | None:
-        """Work out δ and w of the commands under way since the pose in `row`; None for the robot side's."""
+    def _under_way(
+        self, replay: Replay, law: RobotLaw, sensed: Sensed, row: int, now_s: float
+    ) -> tuple[Displacement | None, Aside | None]:
+        """Work out what commands under way since the pose in `row` do, trigger's and sticks'; None for the robot's."""
         if compensation_of(self.law) == "robot":
-            return None
+            return None, None
         record, then_s = replay.record, float(replay.record.pose_time_s[row])
         tick = record.tick_row(then_s)
         echo_sent_s = float(record.applied_sent_s[tick])
         if np.isnan(echo_sent_s):
-            return None
+            return None, None
         held_s = then_s - float(record.applied_at_s[tick])
         able = sensed.r2
-        return replay.commands.displacement(
-            now_s, echo_sent_s, held_s, sensed.speed_m_s, able.full_speed_m_s, able.acceleration_m_s2
+        report = (
+            *(now_s, echo_sent_s, held_s, sensed.speed_m_s),
+            *(able.full_speed_m_s, able.acceleration_m_s2),
         )
+        course, around = replay.commands.course(*report), law.around(replay.estimated[row])
+        aside = None if course is None or around is None else Aside(around, course, replay.commands.sticks_at(now_s))
+        return replay.commands.displacement(*report), aside
 
 
 @cache

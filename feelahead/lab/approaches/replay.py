@@ -74,8 +74,9 @@ class Replay:
     def commands(self) -> CommandsUnderWay:
         """All commands of the record, in the operator side's memory."""
         commands = CommandsUnderWay(window_s=_WHOLE_S)
-        for time_s, travel in zip(self.record.command_time_s, self.record.command, strict=True):
-            commands.sent(float(time_s), float(travel))
+        sticks = np.hstack([self.record.lateral, self.record.turning]).tolist()
+        for time_s, travel, stick in zip(self.record.command_time_s, self.record.command, sticks, strict=True):
+            commands.sent(float(time_s), float(travel), tuple(stick))
         return commands
 
     @cached_property

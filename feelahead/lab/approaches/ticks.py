@@ -5,6 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from common.protocol.around import Around
 from common.protocol.messages import Vector2
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.lab.approaches.arming import wait_for_pull
@@ -75,6 +76,10 @@ class _Noting:
         if self._state is not None:
             self.ticks.append(Tick(now_s, situation, self._state))
         return self._law.sense(situation, now_s)
+
+    def around(self, pose: GripperPose) -> Around | None:
+        """Return the law's."""
+        return self._law.around(pose)
 
     def summary(self) -> dict[str, int]:
         """Return the law's."""

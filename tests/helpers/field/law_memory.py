@@ -9,7 +9,7 @@ from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, compiled, input_array, output_array
 from robot_side.compiled.vectors import load
 from robot_side.laws import felt, fingers, path, recent_looks
-from robot_side.laws.memory import Memory
+from robot_side.laws.memory import Memory, memory_at
 
 
 def memory(spheres: int = 0) -> Memory:
@@ -50,7 +50,8 @@ def fingers_m_s(kept: Memory, pose: GripperPose, now_s: float, *, changed: bool 
 def _move(
     bundle: IntArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray, after: float, ahead: float
 ) -> None:
-    path.move(bundle, load(tool.reshape(1, 3), 0), rotation, centers, after, ahead)
+    velocity = load(memory_at(bundle).velocity, 0), load(memory_at(bundle).velocity, 1)
+    path.move(bundle, load(tool.reshape(1, 3), 0), rotation, centers, *velocity, after, ahead)
 
 
 @compiled(BUNDLE, input_array(1), input_array(2), input_array(2), NUMBER, NUMBER)

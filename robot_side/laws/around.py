@@ -1,0 +1,125 @@
+"""Ways from around the gripper: a coarse map for the operator side of where its sticks may take it until it stands.
+
+The operator side knows its sticks a loop before the robot side does. It traces its path through the map
+(`operator_side/feel/path_ahead.py`). A probe is a place that a fully deflected stick reaches (`Around`). Of each only
+the way of full strength is kept, fast and slow.
+"""
+
+import math
+from typing import Final
+
+from common.arrays import FloatArray, IntArray
+from common.protocol.around import ACROSS, PROBES, TURNED
+from robot_side.compiled.columns import BUNDLE
+from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array, output_array
+from robot_side.compiled.vectors import Vector, add, dot, load, norm, scale
+from robot_side.field.scratch import STRENGTHS
+from robot_side.laws.memory import MOST_PLACES, memory_at
+from robot_side.laws.path import move
+from robot_side.laws.sensed import L2, R2
+
+FIRST_PROBE: Final = 1 + MOST_PLACES
+"""The number that the first probe has as a place"""
+PERIOD_S: Final = 0.08
+"""The period of looks from each probe while something moves."""
+STILL_M_S: Final = 0.005
+_STILL_RAD_S: Final = 0.02
+"""Slower than this, gripper and objects rest."""
+_RETREATS_M_S: Final = 0.01
+"""Slower than this, either trigger may be meant."""
+_SELDOM: Final = 4.0
+"""Periods between looks along the trigger that does not lead"""
+_SOON: Final = 1.2
+"""The longest wait of a probe, in periods: what the gripper is about to do comes first."""
+_SAME_TIME: Final = 0.05
+"""Share by which T may be off"""
+
+
+@inlined
+def follow_motion(bundle: IntArray, velocity: Vector, turning: Vector, moves: bool, until: float, now: float) -> None:
+    """Remember when the gripper moved last, and take over T (s) where it has changed."""
+    memory = memory_at(bundle)
+    state = memory.state[0]
+    moves = moves or state.moved == math.inf
+    if moves or norm(velocity) > STILL_M_S or norm(turning) > _STILL_RAD_S or state.moves_fingers == 1:
+        state.moved = now
+    if abs(until - state.until) > _SAME_TIME * state.until:
+        state.until, state.moved = until, now
+
+
+@inlined
+def probe_waiting(bundle: IntArray, now: float, speed: float, by_operator: bool) -> tuple[float, int, int]:
+    """Find the probe that has waited longest: how many periods, its side and its place; see `longest_waiting`."""
+    memory = memory_at(bundle)
+    most, of_side, of_place = -math.inf, 0, 0
+    if memory.settings[0].around == 0.0 or not by_operator:
+        return most, of_side, of_place
+    for side in (R2, L2):
+        leads = speed > -_RETREATS_M_S if side == R2 else speed < _RETREATS_M_S
+        for probe in range(PROBES):
+            at = memory.around[side * PROBES + probe].at
+            waited = (now - at) / (PERIOD_S if leads else _SELDOM * PERIOD_S)
+            waited = waited if at <= memory.state[0].moved else -math.inf
+            waited = min(waited, _SOON) if waited < math.inf else waited
+            if waited > most:
+                most, of_side, of_place = waited, side, FIRST_PROBE + probe
+    return most, of_side, of_place
+
+
+@inlined
+def go_to_probe(
+    bundle: IntArray,
+    tool: Vector,
+    rotation: FloatArray,
+    centers: FloatArray,
+    side: int,
+    probe: int,
+    speed: float,
+    loop_age: float,
+) -> float:
+    """Move to a probe, 0 for where the gripper is; the way (m) gone by then, as `go_to` has it."""
+    memory = memory_at(bundle)
+    settings, until = memory.settings[0], float(memory.state[0].until)
+    linear, turning, after, since = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0
+    if probe > 0:
+        quarter, part = (probe - 1) // (ACROSS + TURNED), (probe - 1) % (ACROSS + TURNED) + 1
+        right, up = (1.0 - quarter, 0.0) if quarter % 2 == 0 else (0.0, 2.0 - quarter)
+        x, y = (rotation[0, 0], rotation[1, 0], rotation[2, 0]), (rotation[0, 1], rotation[1, 1], rotation[2, 1])
+        if part <= ACROSS:
+            linear = scale(settings.stick_speed, add(scale(right, x), scale(-up, y)))
+            after, since = until * part / ACROSS, until * (part - 0.5) / ACROSS
+        else:
+            turning = scale(settings.turn_speed, add(scale(up, x), scale(right, y)))
+            after, since = until * (part - ACROSS) / TURNED, until * (part - ACROSS - 0.5) / TURNED
+    forth = 1.0 if side == R2 else -1.0
+    gone: float = max(forth * speed, 0.0) * min(since, loop_age)
+    move(bundle, tool, rotation, centers, linear, turning, after, forth * gone)
+    return gone
+
+
+@inlined
+def keep_probe(bundle: IntArray, side: int, probe: int, now: float, tool: Vector, ways: FloatArray) -> None:
+    """Keep a look from a probe, as `keep` does from a place."""
+    memory = memory_at(bundle)
+    along, prospect = load(memory.direction.reshape(1, 3), 0), memory.prospect[0]
+    new = memory.around[side * PROBES + probe]
+    new.at, new.began = now, dot(along, tool)
+    for axis in range(3):
+        new.direction[axis] = along[axis]
+    for kind in range(2):
+        new.ways[kind] = prospect.gone + prospect.stretch * ways[kind, STRENGTHS - 1]
+
+
+@compiled(BUNDLE, input_array(1), output_array(2), returns=TRUTH)
+def ways_around(bundle: IntArray, tool: FloatArray, ways: FloatArray) -> bool:
+    """Fill ways (4, PROBES), R2's fast and slow and L2's, from where the tool (3,) is; False while one is not known."""
+    memory, place = memory_at(bundle), load(tool.reshape(1, 3), 0)
+    for side in range(2):
+        for probe in range(PROBES):
+            one = memory.around[side * PROBES + probe]
+            if one.at == -math.inf:
+                return False
+            moved = dot((one.direction[0], one.direction[1], one.direction[2]), place) - one.began
+            for kind in range(2):
+                ways[2 * side + kind, probe] = one.ways[kind] - moved
+    return True

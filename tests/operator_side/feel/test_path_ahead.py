@@ -1,0 +1,163 @@
+"""Where sticks lead is felt by who moves them, before the robot side can know it."""
+
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.arrays import FloatArray
+from common.protocol.around import PROBES, Around
+from common.protocol.messages import Header, MotionCommand, StiffnessUpdate
+from common.protocol.uniform_field import FAR_M, uniform_field
+from common.reaction import HORIZON_S
+from operator_side.dualsense.effects.official import ZONE_COUNT
+from operator_side.feel.blindness import Blindness
+from operator_side.feel.commands_under_way import AT_REST, CommandsUnderWay, Sticks
+from operator_side.feel.haptics import MAP_EXPIRES_S, Haptics
+from operator_side.feel.path_ahead import Aside, first_full_zone, free_ways_m
+from operator_side.feel.rendering import RenderingSettings
+from operator_side.feel.zones import zone_travels
+from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
+
+FULL_S = 0.8
+FIELD = uniform_field(0)
+TRAVELS = zone_travels(TriggerTravel())
+RIGHT_ACROSS, RIGHT_TURNED, UP_ACROSS = (1, 2, 3), (4, 5), (6, 7, 8)
+RIGHT: Sticks = (1.0, 0.0, 0.0, 0.0)
+
+
+def around(near: dict[int, float], far_m: float = 0.3, *, advancing: bool = True) -> Around:
+    """Nothing within reach but from these probes."""
+    free = (far_m,) * PROBES
+    mine = tuple(near.get(probe, far_m) for probe in range(PROBES))
+    return Around(FULL_S, free, free, mine, mine) if advancing else Around(FULL_S, mine, mine, free, free)
+
+
+def under_way(now_s: float, sticks: Sticks, travel: float = 0.0, since_s: float = 0.0) -> CommandsUnderWay:
+    """At rest until then, and as commanded from then on, every 4 ms."""
+    commands = CommandsUnderWay()
+    for number in range(round(now_s / 0.004) + 1):
+        moves = number * 0.004 >= since_s - 1e-9
+        commands.sent(number * 0.004, travel if moves else 0.0, sticks if moves else AT_REST)
+    return commands
+
+
+def first_zone(told: Around, sticks: Sticks, *, now_s: float = 0.4, travel: float = 0.0, forth: bool = True) -> int:
+    commands = under_way(now_s, sticks, travel)
+    course = commands.course(now_s, 0.0, 0.0, 0.0, FIELD.full_speed_m_s, FIELD.acceleration_m_s2)
+    if course is None:
+        return ZONE_COUNT
+    aside = Aside(told, course, commands.sticks_at(now_s))
+    return first_full_zone(aside, FIELD, TRAVELS, 0.0, HORIZON_S, forth=forth)
+
+
+def test_sticks_that_rest_are_not_traced() -> None:
+    assert under_way(0.4, AT_REST).course(0.4, 0.0, 0.0, 0.1, 0.25, 3.0) is None
+    # One that has just come to rest is still under way.
+    commands = under_way(0.4, RIGHT)
+    commands.sent(0.404, 0.5, AT_REST)
+    assert commands.course(0.41, 0.0, 0.0, 0.1, 0.25, 3.0) is not None
+
+
+@pytest.mark.parametrize("forth", [True, False])
+def test_what_stands_where_the_stick_leads_makes_the_zones_full_that_get_so_far(forth: bool) -> None:
+    """By 0.4 s of commands under way and what follows, the stick leads past two thirds and on to the end."""
+    told = around(dict.fromkeys(RIGHT_ACROSS, 0.03), advancing=forth)
+    found = first_zone(told, RIGHT, forth=forth)
+    assert 0 < found < ZONE_COUNT
+    # The zone before gets less far, this one farther: u h + u²/2a, from rest less what the start takes.
+    for zone, reaches in ((found - 1, False), (found, True)):
+        u = TRAVELS[zone] * FIELD.full_speed_m_s
+        assert (u * HORIZON_S >= 0.03) is reaches
+    for elsewhere in ((-1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0)):
+        assert first_zone(told, elsewhere, forth=forth) == ZONE_COUNT
+    assert first_zone(told, RIGHT, forth=not forth) == ZONE_COUNT
+
+
+def test_it_does_not_count_that_the_stick_does_not_reach() -> None:
+    told = around({RIGHT_ACROSS[2]: 0.0})
+    assert first_zone(told, RIGHT, now_s=0.0) == ZONE_COUNT
+    assert first_zone(told, RIGHT, now_s=0.5) < ZONE_COUNT
+    slowly = (0.3, 0.0, 0.0, 0.0)
+    assert first_zone(told, slowly, now_s=0.5) == ZONE_COUNT
+
+
+def test_what_is_under_way_along_the_trigger_counts() -> None:
+    told = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.09))
+    assert first_zone(told, RIGHT, travel=0.0) > first_zone(told, RIGHT, travel=1.0)
+
+
+def test_both_sticks_at_once_take_the_shorter_way() -> None:
+    told = around(dict.fromkeys(RIGHT_TURNED, 0.02))
+    assert first_zone(told, RIGHT) == ZONE_COUNT
+    turned = first_zone(told, (0.0, 0.0, 1.0, 0.0))
+    assert turned < ZONE_COUNT
+    assert first_zone(told, (1.0, 0.0, 1.0, 0.0)) == turned
+    diagonal = around(dict.fromkeys((*RIGHT_ACROSS, *UP_ACROSS), 0.02))
+    assert first_zone(diagonal, (0.7, 0.7, 0.0, 0.0)) < ZONE_COUNT
+
+
+def probes_at() -> FloatArray:
+    """Where the probes are (PROBES, 4), in shares of T of a fully deflected stick."""
+    found = [[0.0, 0.0, 0.0, 0.0]]
+    for x, y in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)):
+        found += [[part * x / 3, part * y / 3, 0.0, 0.0] for part in (1, 2, 3)]
+        found += [[0.0, 0.0, 0.5 * x, 0.5 * y], [0.0, 0.0, x, y]]
+    return np.array(found)
+
+
+@given(st.lists(st.floats(0.0, 0.3), min_size=PROBES, max_size=PROBES), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
+def test_ways_are_interpolated_between_probes_and_never_beyond_them(ways: list[float], x: float, y: float) -> None:
+    ways_m, exact = np.array(ways), probes_at()
+    # Each probe's own way, or that of where the gripper is, which a turn or a drift alone starts from.
+    np.testing.assert_allclose(free_ways_m(ways_m, exact), np.minimum(ways_m, ways_m[0]), atol=1e-12)
+    between = free_ways_m(ways_m, np.array([[x, y, 0.0, 0.0], [0.0, 0.0, x, y]]))
+    assert (between >= ways_m.min() - 1e-12).all()
+    assert (between <= ways_m[0] + 1e-12).all()
+
+
+# Within all that is rendered
+
+
+def message(sent_s: float, told: Around | None, epoch: int = 1, **changes: Any) -> StiffnessUpdate:
+    header = Header(epoch, round(1e3 * sent_s), sent_s, echo_sent_s=0.0, echo_held_s=0.0)
+    update = StiffnessUpdate(header, FIELD, FIELD, 0.0, FAR_M, 0.0, "armed", around=told)
+    return msgspec.structs.replace(update, **changes)
+
+
+def haptics() -> Haptics:
+    made = Haptics(RenderingSettings(), TravelCalibration(), enabled=True, swap_sides=False, compensation="operator")
+    for number in range(101):
+        made.commanded(MotionCommand(Header(9, number, 0.004 * number), 0.0, 0.8, lateral=(1.0, 0.0), run=True))
+    return made
+
+
+def strengths(made: Haptics, update: StiffnessUpdate, now_s: float = 0.4) -> tuple[int, ...]:
+    report = made.output_report(update, (0.0, 0.8), Blindness(), now_s)
+    effect = None if report is None else report.r2
+    return (0,) * ZONE_COUNT if effect is None else effect.zone_strengths
+
+
+def test_the_newest_map_holds_until_it_is_old_or_another_robot_side_speaks() -> None:
+    told = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03))
+    made = haptics()
+    assert strengths(made, message(0.3, told))[-1] == 8
+    assert made.output_report(message(0.32, None), (0.0, 0.8), Blindness(), 0.41) is None  # nothing changes
+    for later in (message(0.3 + MAP_EXPIRES_S + 0.01, None), message(0.35, None, epoch=2)):
+        made = haptics()
+        strengths(made, message(0.3, told))
+        report = made.output_report(later, (0.0, 0.8), Blindness(), 0.6)
+        assert report is not None
+        assert report.r2 is not None
+        assert report.r2.zone_strengths[-1] < 8
+
+
+def test_without_a_map_or_where_the_robot_side_reckons_nothing_is_traced() -> None:
+    assert strengths(haptics(), message(0.3, None)) == (0,) * ZONE_COUNT
+    reckons = Haptics(RenderingSettings(), TravelCalibration(), enabled=True, swap_sides=False, compensation="robot")
+    for number in range(101):
+        reckons.commanded(MotionCommand(Header(9, number, 0.004 * number), 0.0, 0.8, lateral=(1.0, 0.0), run=True))
+    assert strengths(reckons, message(0.3, around(dict.fromkeys(RIGHT_ACROSS, 0.03)))) == (0,) * ZONE_COUNT

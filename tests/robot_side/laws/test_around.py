@@ -1,0 +1,167 @@
+"""What is told of the surroundings, wherever sticks may take the gripper, and when it is looked at."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from common.protocol.around import PROBES
+from common.reaction import HORIZON_S
+from feelahead.lab.reference.ways_by_definition import defined_ways
+from robot_side.enlargement.prediction_errors import PredictionErrors
+from robot_side.field.field import Along
+from robot_side.field.object_class import OBSTACLE
+from robot_side.laws.around import PERIOD_S
+from robot_side.laws.swept import SweptLaw
+from robot_side.surroundings.perceived import PerceivedObjects
+from tests.helpers.field.fields import ball_pose
+from tests.helpers.field.situations import (
+    ACCELERATION_M_S2,
+    CAMERA_SD_M,
+    FULL_SPEED_M_S,
+    SIGMA_M,
+    STICK_SPEED_M_S,
+    situation,
+    swept,
+    walls,
+)
+from tests.helpers.perceived_scenes import Scene
+
+LOOP_S = 0.2
+FULL_S = LOOP_S + HORIZON_S + FULL_SPEED_M_S / ACCELERATION_M_S2
+RIGHT, UP, LEFT, DOWN = (slice(1 + 5 * side, 4 + 5 * side) for side in range(4))
+"""The three probes across of each side"""
+HALF, TURNED = [4, 9, 14, 19], [5, 10, 15, 20]
+WALL = walls(0.1)
+
+
+def asking(**changes: Any) -> SweptLaw:
+    made = swept(**changes)
+    made.ask_around(asked=True)
+    return made
+
+
+@pytest.fixture
+def law() -> SweptLaw:
+    return asking()
+
+
+def around(law: SweptLaw, objects: PerceivedObjects, now_s: float = 0.0, **changes: Any) -> Any:
+    asked = situation(ball_pose(), objects, loop_age_s=LOOP_S, **changes)
+    law.sense(asked, now_s)
+    return law.around(asked.pose)
+
+
+def post(x_m: float, y_m: float, z_m: float = 0.06) -> PerceivedObjects:
+    return Scene().add().box([x_m, y_m, z_m], [0.01, 0.01, 0.01]).objects()
+
+
+def test_nobody_gets_it_who_does_not_ask() -> None:
+    assert around(swept(), walls(0.1)) is None
+
+
+def test_a_wall_is_as_far_from_every_probe_across_and_nearer_or_farther_in_a_turn(law: SweptLaw) -> None:
+    told = around(law, walls(0.08, 0.05))
+    assert told.full_s == pytest.approx(FULL_S)
+    for ways_m, ahead_m in ((told.r2_m, 0.08), (told.l2_m, 0.05)):
+        across = np.delete(np.array(ways_m), [*HALF, *TURNED])
+        np.testing.assert_allclose(across, ahead_m - SIGMA_M, atol=1e-3)
+        # A ball that turns about itself goes along the chord, half the turn aside: by 1/cos farther, on an arc.
+        for probes, half in ((HALF, 0.125 * FULL_S), (TURNED, 0.25 * FULL_S)):
+            farther = (ahead_m - SIGMA_M) / np.cos(half) * half / np.sin(half)
+            np.testing.assert_allclose(np.array(ways_m)[probes], farther, atol=1e-3)
+
+
+def test_each_side_is_where_a_stick_leads_there() -> None:
+    """The tool's x points to the right, y down."""
+    aside_m = STICK_SPEED_M_S * FULL_S
+    for side, x_m, y_m in ((RIGHT, 1, 0), (UP, 0, -1), (LEFT, -1, 0), (DOWN, 0, 1)):
+        near = np.array(around(asking(), post(x_m * aside_m, y_m * aside_m)).r2_m) < 0.06
+        assert near[side][2], side
+        assert near.sum() - near[TURNED].sum() - near[HALF].sum() <= 2
+
+
+def test_what_is_under_way_is_gone_by_the_time_that_a_probe_is_reached(law: SweptLaw) -> None:
+    """At 0.2 m/s, 40 mm are under way: what is nearer, aside, is passed before the stick gets there."""
+    aside_m = STICK_SPEED_M_S * FULL_S
+    forth = np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0])
+    still = around(law, post(aside_m, 0.0, 0.03))
+    moving = around(asking(), post(aside_m, 0.0, 0.03), joint_velocities_rad_s=forth)
+    assert still.r2_m[3] < 0.03
+    assert moving.r2_m[3] > 0.1
+
+
+def test_ways_are_those_of_the_definition_and_follow_the_gripper(law: SweptLaw) -> None:
+    objects = Scene().add().sphere([0.03, 0.01, 0.08], 0.03).objects()
+    told = around(law, objects)
+    for part in range(1, 4):
+        moved_m = np.array([STICK_SPEED_M_S * FULL_S * part / 3, 0.0, 0.0])
+        pose = ball_pose(tool_position_m=moved_m)
+        along = Along(np.array([0.0, 0.0, 1.0]), 0.0, CAMERA_SD_M**2, SIGMA_M / CAMERA_SD_M, 0.3)
+        defined = defined_ways(pose, objects, np.array([OBSTACLE]), along, np.inf, np.zeros(6))
+        expected_m = min(float(defined.ways_m[0, 0, 7]), 100.0)
+        assert told.r2_m[part] == pytest.approx(expected_m, abs=2e-4) or (told.r2_m[part] == 100.0 and expected_m > 0.2)
+    ahead = law.around(ball_pose(tool_position_m=[0.0, 0.0, 0.01]))
+    assert ahead is not None
+    assert ahead.r2_m[0] == pytest.approx(told.r2_m[0] - 0.01, abs=1e-9)
+
+
+def looks(law: SweptLaw, ticks: int, velocity: FloatArray, now_s: float, **changes: Any) -> int:
+    before = law.summary()["fields"]
+    for tick in range(ticks):
+        asked = situation(ball_pose(), WALL, joint_velocities_rad_s=velocity, loop_age_s=LOOP_S, **changes)
+        law.sense(asked, now_s + 1e-3 * tick)
+    return law.summary()["fields"] - before
+
+
+def test_at_rest_nothing_is_looked_at_from_around_and_in_motion_one_look_a_tick(law: SweptLaw) -> None:
+    still, forth = np.zeros(6), np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0])
+    looks(law, 500, still, 0.0)
+    resting = looks(law, 1000, still, 0.5)
+    moving = looks(law, 1000, forth, 1.5)
+    # R2 and L2 are looked along a hundred times a second each.
+    assert resting == pytest.approx(200, abs=4)
+    assert moving - resting == pytest.approx(PROBES * (1.0 + 0.25) / PERIOD_S, rel=0.1)
+
+
+def test_what_matters_sooner_is_never_late_for_it(law: SweptLaw) -> None:
+    drifting = np.array([0.1, 0.0, 0.2, 0.0, 0.0, 0.0])
+    looks(law, 100, drifting, 0.0)
+    for tick in range(300):
+        now_s = 0.1 + 1e-3 * tick
+        looks(law, 1, drifting, now_s)
+        assert now_s - law.memory.looked_s[:2, 0].min() < 0.02
+
+
+def test_it_is_looked_at_anew_where_roles_or_p_change(law: SweptLaw) -> None:
+    looks(law, 300, np.zeros(6), 0.0)
+    law.expect(0.5)
+    assert looks(law, 500, np.zeros(6), 0.3) > 100 + PROBES
+    told = law.around(ball_pose())
+    assert told is not None
+    assert told.r2_m[0] == pytest.approx(0.1, abs=1e-3)
+
+
+def test_it_is_looked_at_anew_while_an_object_moves(law: SweptLaw) -> None:
+    looks(law, 300, np.zeros(6), 0.0)
+    for frame in range(10):
+        moved = replace(walls(0.1 - 0.001 * frame), velocities_m_s=np.array([[0.0, 0.0, -0.03]]))
+        for tick in range(33):
+            law.sense(situation(ball_pose(), moved, loop_age_s=LOOP_S), 1.0 + 0.033 * frame + 0.001 * tick)
+    told = law.around(ball_pose())
+    assert told is not None
+    assert told.r2_m[0] < 0.1 - 0.005 - SIGMA_M
+
+
+def test_the_robot_sides_own_prediction_asks_for_none(law: SweptLaw) -> None:
+    assert around(law, walls(0.1), compensation="robot") is None
+
+
+def test_errors_of_the_prediction_shorten_these_ways_too() -> None:
+    told = []
+    for mean_m in (0.0, 0.005):
+        made = asking(prediction=PredictionErrors({"operator": ((1.0, mean_m, 0.0),), "robot": ((1.0, 0.0, 0.0),)}))
+        told.append(around(made, walls(0.1)).r2_m[0])
+    assert told[0] - told[1] == pytest.approx(0.005, abs=2e-4)
