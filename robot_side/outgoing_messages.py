@@ -24,8 +24,6 @@ SHOWN_NAME = 100
 _AROUND_S: Final = 0.05
 _AROUND_AGAIN_S: Final = 0.4
 """A lost one is missed for no longer."""
-_AROUND_M: Final = 1e-3
-"""Ways that differ by less are the same: they are sent in steps of 2 mm."""
 _NO_HEADER = Header(0, 0, 0.0)
 _FASTEST_M_S, _LARGEST_M = 100.0, 100.0
 """A simulation about to become unstable shows wild figures, and must get as far as saying so."""
@@ -53,7 +51,7 @@ class AroundNow:
         if now_s - self._sent_s < _AROUND_S:
             return None
         around = law.around(pose)
-        known = self._sent is not None and around is not None and not around.differs(self._sent, _AROUND_M)
+        known = self._sent is not None and around is not None and not around.differs(self._sent)
         if around is None or (known and now_s - self._sent_s < _AROUND_AGAIN_S):
             return None
         self._sent, self._sent_s = around, now_s

@@ -1,9 +1,11 @@
 """Ways from around the gripper, part of a StiffnessUpdate: for an operator side that traces where its sticks lead."""
 
-import math
 from typing import Final
 
 import msgspec
+import numpy as np
+
+from common.arrays import FloatArray
 
 DIRECTIONS: Final = 4
 """Right, up, left and down of the tool"""
@@ -11,9 +13,11 @@ ACROSS: Final = 3
 TURNED: Final = 2
 PROBES: Final = 1 + DIRECTIONS * (ACROSS + TURNED)
 """Number of places from which a way is sent"""
+LISTS: Final = 4
+STEP_M: Final = 2.0**-9
+_FREE: Final = 255
+"""Stands for a way that nothing ends within the horizon."""
 _LONGEST_S: Final = 100.0
-_FARTHEST_M: Final = 100.0
-_WAYS: Final = ("l2_m", "l2_slow_m", "r2_m", "r2_slow_m")
 
 
 class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -25,24 +29,28 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
 
     full_s: float
     """T: until the arm stands at the latest."""
-    l2_m: tuple[float, ...]
-    """From each probe, none farther than the horizon; slow: as those of a TriggerField."""
-    l2_slow_m: tuple[float, ...]
-    r2_m: tuple[float, ...]
-    r2_slow_m: tuple[float, ...]
+    steps: bytes
+    """(LISTS, PROBES) ways in steps of 2 mm, rounded towards the gripper: R2's, fast and slow, and L2's."""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.full_s <= _LONGEST_S):
             raise ValueError(f"full_s = {self.full_s}; valid: above 0 to {_LONGEST_S}")
-        for name in _WAYS:
-            ways = getattr(self, name)
-            if len(ways) != PROBES:
-                raise ValueError(f"{name} has {len(ways)} ways; valid: {PROBES}")
-            for way_m in ways:
-                if not (0.0 <= way_m <= _FARTHEST_M and math.isfinite(way_m)):
-                    raise ValueError(f"{name} = {way_m}; valid: 0 to {_FARTHEST_M}")
+        if len(self.steps) != LISTS * PROBES:
+            raise ValueError(f"steps has {len(self.steps)} bytes; valid: {LISTS * PROBES}")
 
-    def differs(self, other: "Around", by_m: float) -> bool:
-        """Tell whether a way differs by more than this, or T does."""
-        pairs = (zip(getattr(self, name), getattr(other, name), strict=True) for name in _WAYS)
-        return self.full_s != other.full_s or any(abs(new - old) > by_m for pair in pairs for new, old in pair)
+    @classmethod
+    def of(cls, full_s: float, ways_m: FloatArray) -> "Around":
+        """Make one of ways (LISTS, PROBES), infinite where nothing ends them; 0.5 m stands for longer ones."""
+        steps = np.clip(np.floor(ways_m / STEP_M), 0, _FREE - 1)
+        return cls(full_s, np.where(np.isinf(ways_m), _FREE, steps).astype(np.uint8).tobytes())
+
+    def ways_m(self, horizon_m: float) -> FloatArray:
+        """Work out the ways (LISTS, PROBES), none beyond the horizon."""
+        steps = np.frombuffer(self.steps, dtype=np.uint8).reshape(LISTS, PROBES)
+        ways_m: FloatArray = np.where(steps == _FREE, horizon_m, np.minimum(steps * STEP_M, horizon_m))
+        return ways_m
+
+    def differs(self, other: "Around") -> bool:
+        """Tell whether a way differs by more than a step, or T does."""
+        mine, others = (np.frombuffer(one.steps, dtype=np.uint8).astype(np.int16) for one in (self, other))
+        return self.full_s != other.full_s or bool((np.abs(mine - others) > 1).any())

@@ -13,7 +13,7 @@ import struct
 from bisect import bisect_left
 from typing import Final, get_args
 
-from common.protocol.around import PROBES, Around
+from common.protocol.around import LISTS, PROBES, Around
 from common.protocol.messages import (
     Hello,
     LeaseNotice,
@@ -51,11 +51,8 @@ _LARGEST_SINGLE: Final = (2.0 - 2.0**-23) * 2.0**127
 _STIFFNESS: Final = struct.Struct("<32h10fiBB")
 """Ways of L2, fast and slow, and of R2; v_max, a, δ, s of each; v; told, NaN for none; horizon; rumble; state, and
 a bit for what stands."""
-_AROUND: Final = struct.Struct(f"<f{4 * PROBES}B")
-"""Behind it, in some: T, and the ways of L2, fast and slow, and of R2, in 2 mm."""
-_COARSE_M: Final = 2.0**-9
-_FAR: Final = 255
-"""Stands for a way at the horizon or beyond it."""
+_AROUND: Final = struct.Struct(f"<f{LISTS * PROBES}s")
+"""Behind it, in some: T, and the map's steps."""
 _TELEMETRY: Final = struct.Struct("<14fB")
 """Position, target, up; speed, opening, enlargement, L2, R2; state, and bits for holding and a known target."""
 
@@ -109,20 +106,8 @@ def _pack_stiffness(update: StiffnessUpdate) -> bytes:
         math.ceil(8.0 * update.rumble),
         _STATES.index(update.state) + _STANDS * update.stands,
     )
-    return field if update.around is None else field + _pack_around(update.around, horizon_m)
-
-
-def _pack_around(around: Around, horizon_m: float) -> bytes:
-    ways = (*around.l2_m, *around.l2_slow_m, *around.r2_m, *around.r2_slow_m)
-    return _AROUND.pack(
-        around.full_s, *(_FAR if way >= horizon_m else min(int(way / _COARSE_M), _FAR - 1) for way in ways)
-    )
-
-
-def _unpack_around(packed: bytes, horizon_m: float) -> Around:
-    full_s, *steps = _AROUND.unpack(packed)
-    ways = [horizon_m if step == _FAR else min(step * _COARSE_M, horizon_m) for step in steps]
-    return Around(full_s, *(tuple(ways[PROBES * k : PROBES * (k + 1)]) for k in range(4)))
+    around = update.around
+    return field if around is None else field + _AROUND.pack(around.full_s, around.steps)
 
 
 def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
@@ -143,7 +128,7 @@ def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
         _STATES[state],
         told_m_s if told_m_s == told_m_s else None,  # noqa: PLR0124  # faster than a call
         bool(bits & _STANDS),
-        _unpack_around(behind, horizon_m) if behind else None,
+        Around(*_AROUND.unpack(behind)) if behind else None,
     )
 
 

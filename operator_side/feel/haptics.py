@@ -122,7 +122,7 @@ class Haptics:
         return (
             None
             if course is None or mapped.around is None
-            else Aside(mapped.around, course, self._commands.sticks_at(now_s))
+            else Aside(mapped.around, mapped.horizon_m, course, self._commands.sticks_at(now_s))
         )
 
     def needed_m(self, felt: StiffnessUpdate, pulled: tuple[float, float], now_s: float) -> tuple[float, float]:

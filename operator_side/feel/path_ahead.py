@@ -31,6 +31,8 @@ class Aside(NamedTuple):
     """A map, and the gripper's course in it."""
 
     around: Around
+    horizon_m: float
+    """That of the message with it"""
     course: Course
     """Along the direction in which R2 advances, from the message with `around` to now"""
     sticks: Sticks
@@ -38,9 +40,8 @@ class Aside(NamedTuple):
 
     def ways_m(self, *, advancing: bool) -> tuple[FloatArray, FloatArray]:
         """Take the ways (PROBES,) of one trigger, fast and slow."""
-        around = self.around
-        fast_m, slow_m = (around.r2_m, around.r2_slow_m) if advancing else (around.l2_m, around.l2_slow_m)
-        return np.array(fast_m), np.array(slow_m)
+        r2, r2_slow, l2, l2_slow = self.around.ways_m(self.horizon_m)
+        return (r2, r2_slow) if advancing else (l2, l2_slow)
 
 
 def first_full_zone(

@@ -20,7 +20,7 @@ from robot_side.laws.sensed import L2, R2
 
 FIRST_PROBE: Final = 1 + MOST_PLACES
 """The number that the first probe has as a place"""
-PERIOD_S: Final = 0.08
+PERIOD_S: Final = 0.1
 """The period of looks from each probe while something moves."""
 STILL_M_S: Final = 0.005
 _STILL_RAD_S: Final = 0.02
@@ -112,7 +112,7 @@ def keep_probe(bundle: IntArray, side: int, probe: int, now: float, tool: Vector
 
 @compiled(BUNDLE, input_array(1), output_array(2), returns=TRUTH)
 def ways_around(bundle: IntArray, tool: FloatArray, ways: FloatArray) -> bool:
-    """Fill ways (4, PROBES), R2's fast and slow and L2's, from where the tool (3,) is; False while one is not known."""
+    """Fill ways (LISTS, PROBES) from where the tool (3,) is; False while one is not known."""
     memory, place = memory_at(bundle), load(tool.reshape(1, 3), 0)
     for side in range(2):
         for probe in range(PROBES):

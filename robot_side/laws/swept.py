@@ -17,7 +17,7 @@ from typing import Final, NamedTuple, NoReturn
 import numpy as np
 
 from common.arrays import FloatArray, IntArray, require_finite
-from common.protocol.around import PROBES, Around
+from common.protocol.around import LISTS, PROBES, Around
 from common.touch_speed import touch_speed_m_s
 from robot_side.arm.ability import JointLimits, find_ability
 from robot_side.arm.port import GripperPose
@@ -37,7 +37,7 @@ from robot_side.laws.explanation import (
     moved_and_inflated,
     overlaps_by_object,
 )
-from robot_side.laws.felt import MOST_M, room_to_feel
+from robot_side.laws.felt import room_to_feel
 from robot_side.laws.law import Situation
 from robot_side.laws.memory import Memory, Total
 from robot_side.laws.path import go_to_place
@@ -98,7 +98,9 @@ class SweptLaw:
         velocities, (right, up) = situation.objects.velocities_m_s, situation.lateral
         if situation.objects is not self._frame:
             self._frame = situation.objects
-            if velocities is not None and np.abs(velocities).max(initial=0.0) > STILL_M_S:
+            since = situation.objects.since
+            moving = velocities if velocities is None or since is None else velocities[since[0].things]
+            if moving is not None and np.abs(moving).max(initial=0.0) > STILL_M_S:
                 self._look_around_anew()
         if not sense(
             *(pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, pose.sphere_centers_m),
@@ -119,12 +121,11 @@ class SweptLaw:
 
     def around(self, pose: GripperPose) -> Around | None:
         """Ways from around the gripper, from where it is; None while not all are known, or nobody asks for them."""
-        ways_m = np.empty((4, PROBES))
+        ways_m = np.empty((LISTS, PROBES))
         asked = bool(self.memory.settings["around"][0]) and self._room[0] >= 0
         if not (asked and ways_around(self.memory.bundle, pose.tool_position_m, ways_m)):
             return None
-        r2, r2_slow, l2, l2_slow = np.clip(ways_m, 0.0, MOST_M).tolist()
-        return Around(float(self.memory.state["until"][0]), tuple(l2), tuple(l2_slow), tuple(r2), tuple(r2_slow))
+        return Around.of(float(self.memory.state["until"][0]), ways_m)
 
     def ask_around(self, *, asked: bool) -> None:
         """Look from around the gripper, too, from now on, or no longer; nobody asks for it at first."""

@@ -150,7 +150,9 @@ class Judged:
             *(able.full_speed_m_s, able.acceleration_m_s2),
         )
         course, around = replay.commands.course(*report), law.around(replay.estimated[row])
-        aside = None if course is None or around is None else Aside(around, course, replay.commands.sticks_at(now_s))
+        if course is None or around is None:
+            return replay.commands.displacement(*report), None
+        aside = Aside(around, sensed.horizon_m, course, replay.commands.sticks_at(now_s))
         return replay.commands.displacement(*report), aside
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from common.protocol.around import PROBES, Around
+from common.protocol.around import LISTS, PROBES, Around
 from common.protocol.messages import Header, MotionCommand, StiffnessUpdate
 from common.protocol.uniform_field import FAR_M, uniform_field
 from common.reaction import HORIZON_S
@@ -29,11 +29,15 @@ RIGHT_ACROSS, RIGHT_TURNED, UP_ACROSS = (1, 2, 3), (4, 5), (6, 7, 8)
 RIGHT: Sticks = (1.0, 0.0, 0.0, 0.0)
 
 
-def around(near: dict[int, float], far_m: float = 0.3, *, advancing: bool = True) -> Around:
+HORIZON_M = 0.4
+
+
+def around(near: dict[int, float], *, advancing: bool = True) -> Around:
     """Nothing within reach but from these probes."""
-    free = (far_m,) * PROBES
-    mine = tuple(near.get(probe, far_m) for probe in range(PROBES))
-    return Around(FULL_S, free, free, mine, mine) if advancing else Around(FULL_S, mine, mine, free, free)
+    ways_m = np.full((LISTS, PROBES), np.inf)
+    for probe, way_m in near.items():
+        ways_m[slice(0, 2) if advancing else slice(2, 4), probe] = way_m
+    return Around.of(FULL_S, ways_m)
 
 
 def under_way(now_s: float, sticks: Sticks, travel: float = 0.0, since_s: float = 0.0) -> CommandsUnderWay:
@@ -50,7 +54,7 @@ def first_zone(told: Around, sticks: Sticks, *, now_s: float = 0.4, travel: floa
     course = commands.course(now_s, 0.0, 0.0, 0.0, FIELD.full_speed_m_s, FIELD.acceleration_m_s2)
     if course is None:
         return ZONE_COUNT
-    aside = Aside(told, course, commands.sticks_at(now_s))
+    aside = Aside(told, HORIZON_M, course, commands.sticks_at(now_s))
     return first_full_zone(aside, FIELD, TRAVELS, 0.0, HORIZON_S, forth=forth)
 
 
