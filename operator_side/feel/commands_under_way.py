@@ -14,6 +14,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.following import follow
+from common.protocol.around import PERIOD_S
 
 MAX_DELAY_S: Final = 2.0
 """Beyond this loop age the robot side is disarmed, so that no older command matters."""
@@ -181,7 +182,16 @@ class CommandsUnderWay:
             target = told_m_s if number == 0 and told_m_s is not None else one.travel * full_speed_m_s
             way_m, speed = follow(ways_m[-1], speed, target, acceleration_m_s2, following.sent_s - one.sent_s)
             ways_m.append(way_m)
-        return Course(ways_m, speed, _integrated(counting) if aside else _NOWHERE)
+        return Course(ways_m, speed, self._aside_s(counting) if aside else _NOWHERE)
+
+    def _aside_s(self, commands: list[Command]) -> FloatArray:
+        """Integrate the sticks (k, 4) to each command, from when the map was looked at on average."""
+        age_s, since_s = 0.5 * PERIOD_S, commands[0].sent_s
+        before = np.add(self.sticks_at(since_s - age_s), self.sticks_at(since_s))
+        durations_s = np.diff([one.sent_s for one in commands])
+        steps = durations_s[:, None] * np.array([one.sticks for one in commands[:-1]])
+        found: FloatArray = 0.5 * age_s * before + np.concatenate([np.zeros((1, 4)), np.cumsum(steps, axis=0)])
+        return found
 
     def _from_echo_on(self, echo_sent_s: float, echo_held_s: float, now_s: float) -> list[Command]:
         """Every command that counts between e and now, the oldest first, and the end of it."""
@@ -194,10 +204,3 @@ class CommandsUnderWay:
         followed, *under_way = reversed(newest_first)
         since_s = min(echo_sent_s + echo_held_s, under_way[0].sent_s if under_way else now_s)
         return [followed._replace(sent_s=since_s), *under_way, Command(now_s, 0.0)]
-
-
-def _integrated(commands: list[Command]) -> FloatArray:
-    """Integrate the sticks (k, 4) from the first command to each."""
-    durations_s = np.diff([one.sent_s for one in commands])
-    steps = durations_s[:, None] * np.array([one.sticks for one in commands[:-1]])
-    return np.concatenate([np.zeros((1, 4)), np.cumsum(steps, axis=0)])

@@ -9,7 +9,7 @@ import math
 from typing import Final
 
 from common.arrays import FloatArray, IntArray
-from common.protocol.around import ACROSS, PROBES, TURNED
+from common.protocol.around import ACROSS, PERIOD_S, PROBES, TURNED
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array, output_array
 from robot_side.compiled.vectors import Vector, add, dot, load, norm, scale
@@ -20,8 +20,6 @@ from robot_side.laws.sensed import L2, R2
 
 FIRST_PROBE: Final = 1 + MOST_PLACES
 """The number that the first probe has as a place"""
-PERIOD_S: Final = 0.1
-"""The period of looks from each probe while something moves."""
 STILL_M_S: Final = 0.005
 _STILL_RAD_S: Final = 0.02
 """Slower than this, gripper and objects rest."""
@@ -29,7 +27,7 @@ _RETREATS_M_S: Final = 0.01
 """Slower than this, either trigger may be meant."""
 _SELDOM: Final = 4.0
 """Periods between looks along the trigger that does not lead"""
-_SOON: Final = 1.2
+_SOON: Final = 1.0
 """The longest wait of a probe, in periods: what the gripper is about to do comes first."""
 _SAME_TIME: Final = 0.05
 """Share by which T may be off"""

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from common.protocol.around import PERIOD_S
 from common.protocol.messages import Header, StiffnessUpdate
 from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
 from feelahead.lab.approaches.replay import Replay
@@ -29,8 +30,6 @@ from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.surroundings.perceived import PerceivedObjects
 
 _TRAVEL: Final = TriggerTravel()
-_OLDEST_S: Final = 0.05
-"""What was seen from around is this old at most."""
 _FRAME_S: Final = 1.0 / 30.0
 
 
@@ -97,7 +96,7 @@ class Judged:
                 continue
             row = record.pose_row(float(sent_s))
             if isinstance(law, SweptLaw):
-                law.forget_around(float(record.pose_time_s[row]) - _OLDEST_S)
+                self._look_around(law, draw, float(sent_s))
             sensed = law.sense(self._situation(draw, row), float(record.pose_time_s[row]))
             pulled = [_TRAVEL.travel(min(travel / SENSED_TRAVEL, 1.0)) for travel in record.travel[tick]]
             message = _message(sensed, row)
@@ -106,6 +105,13 @@ class Judged:
             for trigger, effect in enumerate((shown.l2, shown.r2)):
                 strengths[number, trigger] = 0 if effect is None else effect.zone_strengths
         return strengths[:, ::-1] if self.spoil == "swapped" else strengths
+
+    def _look_around(self, law: SweptLaw, draw: Draw, now_s: float) -> None:
+        """Look from around, where that is older than it ever gets, as long ago as it is on average."""
+        row = draw.replay.record.pose_row(now_s - 0.5 * PERIOD_S)
+        law.forget_around(now_s - PERIOD_S)
+        if np.isneginf(law.memory.around["at"]).any():
+            law.sense(self._situation(draw, row), float(draw.replay.record.pose_time_s[row]))
 
     def _law(self, draw: Draw) -> RobotLaw:
         replay = draw.replay

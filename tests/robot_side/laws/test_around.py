@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from common.protocol.around import PROBES
+from common.protocol.around import PERIOD_S, PROBES
 from common.reaction import HORIZON_S
 from feelahead.lab.reference.ways_by_definition import defined_ways
 from robot_side.arm.port import GripperPose
 from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.field.field import Along
 from robot_side.field.object_class import OBSTACLE
-from robot_side.laws.around import PERIOD_S
 from robot_side.laws.swept import SweptLaw
 from robot_side.surroundings.perceived import PerceivedObjects
 from tests.helpers.field.fields import ball_pose
