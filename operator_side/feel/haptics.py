@@ -1,9 +1,11 @@
 """From what the robot side reports and what our hands commanded to what is written to the controller."""
 
 import dataclasses
+import math
 from typing import Any, Final
 
 from common.protocol.messages import Compensation, MotionCommand, StiffnessUpdate
+from common.reaction import WRITE_S
 from operator_side.dualsense.reports.output_report import RELEASED, OutputReport
 from operator_side.feel.blindness import Blindness
 from operator_side.feel.commands_under_way import CommandsUnderWay, Displacement
@@ -42,6 +44,8 @@ class Haptics:
         self._commands = CommandsUnderWay()
         self._commanding = False
         self._mapped: StiffnessUpdate | None = None
+        self._traced: Aside | None = None
+        self._traced_s = -math.inf
         self.calibrate(calibration)
 
     def calibrate(self, calibration: TravelCalibration) -> None:
@@ -106,7 +110,16 @@ class Haptics:
         return self._commands.displacement(now_s, *echo, felt.speed_m_s, *able, felt.told_m_s)
 
     def _aside(self, felt: StiffnessUpdate, now_s: float) -> Aside | None:
-        """Where our sticks lead, among what the newest map knows; None while they rest, or without a map."""
+        """Where our sticks lead, among what the newest map knows; None while they rest, or without a map.
+
+        The same again until a controller may be written to once more: the path is traced once for that.
+        """
+        if (felt.around is None or felt is self._mapped) and 0.0 <= now_s - self._traced_s < WRITE_S:
+            return self._traced
+        self._traced, self._traced_s = self._newest_aside(felt, now_s), now_s
+        return self._traced
+
+    def _newest_aside(self, felt: StiffnessUpdate, now_s: float) -> Aside | None:
         if felt.around is not None:
             self._mapped = felt
         mapped = self._mapped

@@ -12,7 +12,6 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from common.following import follow
 from common.protocol.around import ACROSS, DIRECTIONS, TURNED, Around
 from common.protocol.messages import TriggerField
 from common.touch_speed import touch_speed_m_s
@@ -38,10 +37,9 @@ class Aside(NamedTuple):
     sticks: Sticks
     """Deflections, as commanded now"""
 
-    def ways_m(self, *, advancing: bool) -> tuple[FloatArray, FloatArray]:
-        """Take the ways (PROBES,) of one trigger, fast and slow."""
-        r2, r2_slow, l2, l2_slow = self.around.ways_m(self.horizon_m)
-        return (r2, r2_slow) if advancing else (l2, l2_slow)
+    def ways_m(self, *, advancing: bool) -> FloatArray:
+        """Take the ways (2, PROBES) of one trigger, fast and slow."""
+        return self.around.ways_m(self.horizon_m)[slice(0, 2) if advancing else slice(2, 4)]
 
 
 def first_full_zone(
@@ -52,73 +50,77 @@ def first_full_zone(
     travels: at the middle of each zone. forth: the trigger advances.
     """
     course = aside.course if forth else aside.course.turned_back()
-    some = np.unique(np.linspace(0, len(course.ways_m) - 1, _UNDER_WAY).astype(np.int64))
-    under_way_m, under_way_s = np.array(course.ways_m)[some], course.aside_s[some]
-    speeds_m_s = [(travel - other_travel) * field.full_speed_m_s for travel in travels]
-    first = next((zone for zone, speed_m_s in enumerate(speeds_m_s) if speed_m_s > 0.0), len(travels))
+    full_m_s, acceleration = field.full_speed_m_s, field.acceleration_m_s2
+    speeds_m_s = (np.array(travels) - other_travel) * full_m_s
+    first = int(np.searchsorted(speeds_m_s, 0.0, side="right"))
     if first == len(travels):
         return first
-    touch_m_s = touch_speed_m_s(field.full_speed_m_s)
-    after_s = np.array([_after_s(field, speed_m_s, horizon_s) for speed_m_s in speeds_m_s[first:]])
-    ahead_s = under_way_s[-1] + after_s[..., None] * np.array(aside.sticks)
-    points = np.concatenate([under_way_s, ahead_s.reshape(-1, 4)]) / aside.around.full_s
-    fast_m, slow_m = (free_ways_m(ways_m, points) for ways_m in aside.ways_m(advancing=forth))
-    count = len(some)
-    for place, speed_m_s in enumerate(speeds_m_s[first:]):
-        free_m = slow_m if place == 0 or speed_m_s < touch_m_s else fast_m
-        mine = np.concatenate([free_m[:count], free_m[count + place * _AHEAD : count + (place + 1) * _AHEAD]])
-        ahead_m = _ways_m(course, field, speed_m_s, horizon_s, after_s[place].tolist())
-        # A point counts with those before and after it.
-        if (np.concatenate([under_way_m[1:], ahead_m]) >= np.minimum(mine[:-1], mine[1:])).any():
-            return first + place
-    return len(travels)
-
-
-def _after_s(field: TriggerField, speed_m_s: float, horizon_s: float) -> FloatArray:
-    """Spread the points (_AHEAD,) of a path over the time until an arm of this speed stands."""
-    return np.linspace(0.0, horizon_s + speed_m_s / field.acceleration_m_s2, _AHEAD + 1)[1:]
+    some = np.unique(np.linspace(0, len(course.ways_m) - 1, _UNDER_WAY).astype(np.int64))
+    speeds_m_s, here_s = speeds_m_s[first:, None], course.aside_s[some]
+    after_s = np.arange(1, _AHEAD + 1) / _AHEAD * (horizon_s + speeds_m_s / acceleration)
+    ahead_s = here_s[-1] + after_s[..., None] * np.array(aside.sticks)
+    points = np.concatenate([here_s, ahead_s.reshape(-1, 4)]) / aside.around.full_s
+    free_m = free_ways_m(aside.ways_m(advancing=forth), points)
+    # From here on a row for each zone: the way along its path, and the ways that are free there.
+    slow = speeds_m_s < touch_speed_m_s(full_m_s)
+    slow[0] = True
+    count, zones = len(some), len(speeds_m_s)
+    under_way_m = np.where(slow, free_m[1, :count], free_m[0, :count])
+    ahead_m = np.where(slow, free_m[1, count:].reshape(zones, -1), free_m[0, count:].reshape(zones, -1))
+    free_m = np.hstack([under_way_m, ahead_m])
+    known_m = np.broadcast_to(np.array(course.ways_m)[some[1:]], (zones, count - 1))
+    path_m = np.hstack([known_m, _ways_m(course, speeds_m_s, acceleration, horizon_s, after_s)])
+    # A point counts with those before and after it.
+    meets = (path_m >= np.minimum(free_m[:, :-1], free_m[:, 1:])).any(axis=1)
+    return first + int(np.argmax(meets)) if meets.any() else len(travels)
 
 
 def _ways_m(
-    course: Course, field: TriggerField, speed_m_s: float, horizon_s: float, after_s: list[float]
-) -> list[float]:
-    """Work out how far the gripper is at these times, at a zone's speed for one reaction and braking then."""
-    here = course.ways_m[-1], course.speed_m_s
-    there = follow(*here, speed_m_s, field.acceleration_m_s2, horizon_s)
-    return [
-        follow(*here, speed_m_s, field.acceleration_m_s2, after)[0]
-        if after <= horizon_s
-        else follow(*there, 0.0, field.acceleration_m_s2, after - horizon_s)[0]
-        for after in after_s
-    ]
+    course: Course, speeds_m_s: FloatArray, acceleration_m_s2: float, horizon_s: float, after_s: FloatArray
+) -> FloatArray:
+    """Work out how far the gripper is at times (z, k), at each zone's speed (z, 1) for one reaction and braking then.
+
+    As `common.following.follow` twice.
+    """
+    faster = np.sign(speeds_m_s - course.speed_m_s) * acceleration_m_s2
+    changing_s = np.abs(speeds_m_s - course.speed_m_s) / acceleration_m_s2
+    going_s, braking_s = np.minimum(after_s, horizon_s), np.maximum(after_s - horizon_s, 0.0)
+    first_s = np.minimum(going_s, changing_s)
+    ways_m = course.ways_m[-1] + course.speed_m_s * first_s + 0.5 * faster * first_s**2
+    ways_m += speeds_m_s * (going_s - first_s)
+    then_m_s = course.speed_m_s + faster * np.minimum(horizon_s, changing_s)
+    last_s = np.minimum(braking_s, np.abs(then_m_s) / acceleration_m_s2)
+    found: FloatArray = ways_m + then_m_s * last_s - 0.5 * np.sign(then_m_s) * acceleration_m_s2 * last_s**2
+    return found
 
 
 def free_ways_m(ways_m: FloatArray, aside: FloatArray) -> FloatArray:
-    """Interpolate the ways (PROBES,) at points (k, 4), of a fully deflected stick's course: right, up, and turned so.
+    """Interpolate ways (n, PROBES) at points (k, 4), of a fully deflected stick's course: right, up, and turned so.
 
     The shorter of those across and turned. Across, a thing begins at once: the nearest probe counts. In a turn a wall
     comes nearer steadily: linear in the angle. Beyond the farthest probe its way holds.
     """
-    here_m, sides_m = np.full((DIRECTIONS, 1), ways_m[0]), ways_m[1:].reshape(DIRECTIONS, ACROSS + TURNED)
-    across_m, turned_m = (np.hstack([here_m, part]) for part in (sides_m[:, :ACROSS], sides_m[:, ACROSS:]))
+    sides_m = ways_m[:, 1:].reshape(-1, DIRECTIONS, ACROSS + TURNED)
+    here_m = np.broadcast_to(ways_m[:, :1, None], (len(ways_m), DIRECTIONS, 1))
+    across_m, turned_m = (np.dstack([here_m, part]) for part in (sides_m[..., :ACROSS], sides_m[..., ACROSS:]))
     return np.minimum(
         _between(across_m, aside[:, _ACROSS], linear=False), _between(turned_m, aside[:, _TURNED], linear=True)
     )
 
 
 def _between(ways_m: FloatArray, aside: FloatArray, *, linear: bool) -> FloatArray:
-    """Interpolate ways (DIRECTIONS, r + 1), evenly from 0 to 1, at points (k, 2): outwards, then between two sides.
+    """Interpolate ways (n, DIRECTIONS, r + 1), evenly from 0 to 1, at points (k, 2): outwards, then between two sides.
 
     linear: outwards; else the nearest way, and the shorter of two about as near.
     """
     size = np.abs(aside).sum(axis=1)
     share = np.abs(aside[:, 0]) / np.where(size > 0.0, size, 1.0)
-    ring = np.minimum(np.hypot(aside[:, 0], aside[:, 1]), 1.0) * (ways_m.shape[1] - 1)
-    inner: IntArray = np.minimum(ring.astype(np.int64), ways_m.shape[1] - 2)
-    part, found = ring - inner, np.zeros(len(aside))
+    ring = np.minimum(np.hypot(aside[:, 0], aside[:, 1]), 1.0) * (ways_m.shape[2] - 1)
+    inner: IntArray = np.minimum(ring.astype(np.int64), ways_m.shape[2] - 2)
+    part, found = ring - inner, np.zeros((len(ways_m), len(aside)))
     for axis, weight in ((0, share), (1, 1.0 - share)):
         side = np.where(aside[:, axis] >= 0.0, axis, axis + 2)
-        one, other = ways_m[side, inner], ways_m[side, inner + 1]
+        one, other = ways_m[:, side, inner], ways_m[:, side, inner + 1]
         if linear:
             mine = (1.0 - part) * one + part * other
         else:

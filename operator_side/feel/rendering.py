@@ -48,6 +48,8 @@ class RenderedTrigger:
         self._travels = zone_travels(travel)
         self._levels = [0.0] * ZONE_COUNT
         self._last_s = -math.inf
+        self._traced: Aside | None = None
+        self._first_full = ZONE_COUNT
         self._strengths: tuple[int, ...] = FREE.strengths
         self._effect: TriggerEffect = Off()
 
@@ -67,8 +69,10 @@ class RenderedTrigger:
             field, horizon_m, self._travels, other_travel, moving, horizon_s=self._settings.horizon_s
         )
         if aside is not None:
-            where = field, self._travels, other_travel, self._settings.horizon_s
-            zones = zones.full_from(first_full_zone(aside, *where, forth=forth))
+            if aside is not self._traced:
+                where = field, self._travels, other_travel, self._settings.horizon_s
+                self._traced, self._first_full = aside, first_full_zone(aside, *where, forth=forth)
+            zones = zones.full_from(self._first_full)
         self.beyond_horizon += zones.beyond_horizon
         if zones is FREE and not any(self._levels):
             self._last_s = now_s

@@ -9,15 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
+from common.following import follow
 from common.protocol.around import LISTS, PROBES, Around
 from common.protocol.messages import Header, MotionCommand, StiffnessUpdate
 from common.protocol.uniform_field import FAR_M, uniform_field
 from common.reaction import HORIZON_S
 from operator_side.dualsense.effects.official import ZONE_COUNT
 from operator_side.feel.blindness import Blindness
-from operator_side.feel.commands_under_way import AT_REST, CommandsUnderWay, Sticks
+from operator_side.feel.commands_under_way import AT_REST, CommandsUnderWay, Course, Sticks
 from operator_side.feel.haptics import MAP_EXPIRES_S, Haptics
-from operator_side.feel.path_ahead import Aside, first_full_zone, free_ways_m
+from operator_side.feel.path_ahead import Aside, _ways_m, first_full_zone, free_ways_m
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.feel.zones import zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
@@ -117,10 +118,25 @@ def probes_at() -> FloatArray:
 def test_ways_are_interpolated_between_probes_and_never_beyond_them(ways: list[float], x: float, y: float) -> None:
     ways_m, exact = np.array(ways), probes_at()
     # Each probe's own way, or that of where the gripper is, which a turn or a drift alone starts from.
-    np.testing.assert_allclose(free_ways_m(ways_m, exact), np.minimum(ways_m, ways_m[0]), atol=1e-12)
-    between = free_ways_m(ways_m, np.array([[x, y, 0.0, 0.0], [0.0, 0.0, x, y]]))
+    np.testing.assert_allclose(free_ways_m(ways_m[None], exact)[0], np.minimum(ways_m, ways_m[0]), atol=1e-12)
+    between = free_ways_m(ways_m[None], np.array([[x, y, 0.0, 0.0], [0.0, 0.0, x, y]]))
     assert (between >= ways_m.min() - 1e-12).all()
     assert (between <= ways_m[0] + 1e-12).all()
+
+
+@given(st.floats(-0.3, 0.3), st.floats(0.5, 20.0), st.floats(0.01, 0.25))
+def test_ways_along_a_path_are_those_of_the_arms_model(speed: float, acceleration: float, zone: float) -> None:
+    course = Course([0.01], speed, np.zeros((1, 4)))
+    after_s = np.linspace(0.0, HORIZON_S + zone / acceleration, 9)[None]
+    found = _ways_m(course, np.array([[zone]]), acceleration, HORIZON_S, after_s)[0]
+    then = follow(0.01, speed, zone, acceleration, HORIZON_S)
+    expected = [
+        follow(0.01, speed, zone, acceleration, after)[0]
+        if after <= HORIZON_S
+        else follow(*then, 0.0, acceleration, after - HORIZON_S)[0]
+        for after in after_s[0].tolist()
+    ]
+    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 # Within all that is rendered
@@ -165,3 +181,15 @@ def test_without_a_map_or_where_the_robot_side_reckons_nothing_is_traced() -> No
     for number in range(101):
         reckons.commanded(MotionCommand(Header(9, number, 0.004 * number), 0.0, 0.8, lateral=(1.0, 0.0), run=True))
     assert strengths(reckons, message(0.3, around(dict.fromkeys(RIGHT_ACROSS, 0.03)))) == (0,) * ZONE_COUNT
+
+
+def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> None:
+    """A thing that the stick reaches is felt 10 ms late at most."""
+    told, free = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03)), around({})
+    made = haptics()
+    assert strengths(made, message(0.3, free)) == (0,) * ZONE_COUNT
+    assert made.output_report(message(0.31, None), (0.0, 0.8), Blindness(), 0.405) is None
+    report = made.output_report(message(0.32, told), (0.0, 0.8), Blindness(), 0.406)
+    assert report is not None
+    assert report.r2 is not None
+    assert report.r2.zone_strengths[-1] == 8
