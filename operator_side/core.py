@@ -131,6 +131,9 @@ class OperatorSide:
         armed, one_way_s = felt.state == "armed", arrival.one_way_s
         if armed and one_way_s is not None and not arrival.copy:
             self.driving_delay.add(one_way_s)
+        if not arrival.copy and felt.header.epoch == self.link.peer_epoch:
+            # Whatever overtook it, and however soon the next one comes: few messages have a map.
+            self.haptics.take_map(felt)
         if arrival.fresh:
             self._look(now_s)  # before it counts: a field that was lost meanwhile is back, and not unbroken
             self._blindness.end()

@@ -19,7 +19,8 @@ PERIOD_S: Final = 0.15
 """The period of looks from each probe while something moves; on average a look is half as old."""
 _FREE: Final = 255
 """Stands for a way that nothing ends within the horizon."""
-_LONGEST_S: Final = 100.0
+LONGEST_S: Final = 4.0
+"""A robot side that has not heard of its operator for 2 s is disarmed: there is no map for a longer T."""
 
 
 class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -35,8 +36,8 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
     """(LISTS, PROBES) ways in steps of 2 mm, rounded towards the gripper: R2's, fast and slow, and L2's."""
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.full_s <= _LONGEST_S):
-            raise ValueError(f"full_s = {self.full_s}; valid: above 0 to {_LONGEST_S}")
+        if not (0.0 < self.full_s <= LONGEST_S):
+            raise ValueError(f"full_s = {self.full_s}; valid: above 0 to {LONGEST_S}")
         if len(self.steps) != LISTS * PROBES:
             raise ValueError(f"steps has {len(self.steps)} bytes; valid: {LISTS * PROBES}")
 

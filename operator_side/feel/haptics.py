@@ -109,6 +109,13 @@ class Haptics:
         able = along.full_speed_m_s, along.acceleration_m_s2
         return self._commands.displacement(now_s, *echo, felt.speed_m_s, *able, felt.told_m_s)
 
+    def take_map(self, felt: StiffnessUpdate) -> None:
+        """Keep the newest message that has a map."""
+        known = self._mapped
+        newer = known is None or known.header.epoch != felt.header.epoch or known.header.sent_s < felt.header.sent_s
+        if felt.around is not None and newer:
+            self._mapped = felt
+
     def _aside(self, felt: StiffnessUpdate, now_s: float) -> Aside | None:
         """Where our sticks lead, among what the newest map knows; None while they rest, or without a map.
 
@@ -120,8 +127,7 @@ class Haptics:
         return self._traced
 
     def _newest_aside(self, felt: StiffnessUpdate, now_s: float) -> Aside | None:
-        if felt.around is not None:
-            self._mapped = felt
+        self.take_map(felt)
         mapped = self._mapped
         if mapped is None or self._compensation == "robot":
             return None

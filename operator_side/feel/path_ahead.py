@@ -23,6 +23,8 @@ _AHEAD: Final = 8
 """and the points beyond."""
 _ALIKE: Final = 0.1
 """Share of the distance between two probes: both count within it of the middle."""
+_ALONE: Final = 0.15
+"""Share of a deflection that does not count beside the other direction's"""
 _ACROSS, _TURNED = slice(0, 2), slice(2, 4)
 
 
@@ -111,20 +113,20 @@ def free_ways_m(ways_m: FloatArray, aside: FloatArray) -> FloatArray:
 def _between(ways_m: FloatArray, aside: FloatArray, *, linear: bool) -> FloatArray:
     """Interpolate ways (n, DIRECTIONS, r + 1), evenly from 0 to 1, at points (k, 2): outwards, then between two sides.
 
-    linear: outwards; else the nearest way, and the shorter of two about as near.
+    linear: outwards and between sides; else the nearest way, and the shorter of two about as near.
     """
     size = np.abs(aside).sum(axis=1)
     share = np.abs(aside[:, 0]) / np.where(size > 0.0, size, 1.0)
     ring = np.minimum(np.hypot(aside[:, 0], aside[:, 1]), 1.0) * (ways_m.shape[2] - 1)
     inner: IntArray = np.minimum(ring.astype(np.int64), ways_m.shape[2] - 2)
-    part, found = ring - inner, np.zeros((len(ways_m), len(aside)))
-    for axis, weight in ((0, share), (1, 1.0 - share)):
+    part, found = ring - inner, []
+    for axis in range(2):
         side = np.where(aside[:, axis] >= 0.0, axis, axis + 2)
         one, other = ways_m[:, side, inner], ways_m[:, side, inner + 1]
-        if linear:
-            mine = (1.0 - part) * one + part * other
-        else:
-            nearest = np.where(part < 0.5 + _ALIKE, one, other), np.where(part > 0.5 - _ALIKE, other, one)
-            mine = np.minimum(*nearest)
-        found += weight * mine
-    return found
+        nearest = np.where(part < 0.5 + _ALIKE, one, other), np.where(part > 0.5 - _ALIKE, other, one)
+        found.append((1.0 - part) * one + part * other if linear else np.minimum(*nearest))
+    if linear:
+        between: FloatArray = share * found[0] + (1.0 - share) * found[1]
+        return between
+    alone = np.where(share < _ALONE, found[1], np.where(share > 1.0 - _ALONE, found[0], np.inf))
+    return np.minimum(alone, np.where(np.isinf(alone), np.minimum(*found), np.inf))

@@ -40,7 +40,7 @@ def carried_n(tool_jacobian: FloatArray, joint_loads_nm: FloatArray | None) -> f
 
     tool_jacobian (6, n), linear rows first.
     """
-    if joint_loads_nm is None:
+    if joint_loads_nm is None or not np.isfinite(joint_loads_nm).all():
         return None
     return float(joint_loads_nm @ joint_velocities(tool_jacobian, _UP, np.full(joint_loads_nm.size, np.inf)))
 

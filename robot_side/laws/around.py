@@ -20,29 +20,41 @@ from robot_side.laws.sensed import L2, R2
 
 FIRST_PROBE: Final = 1 + MOST_PLACES
 """The number that the first probe has as a place"""
-STILL_M_S: Final = 0.005
-_STILL_RAD_S: Final = 0.02
+STILL_M_S: Final = 0.002
+_STILL_RAD_S: Final = 0.01
 """Slower than this, gripper and objects rest."""
 _RETREATS_M_S: Final = 0.01
 """Slower than this, either trigger may be meant."""
 _SELDOM: Final = 4.0
 """Periods between looks along the trigger that does not lead"""
-_SOON: Final = 1.0
-"""The longest wait of a probe, in periods: what the gripper is about to do comes first."""
+_HOLDS_S: Final = 1.5
+"""While something moves, a look from a probe holds no longer. Where ticks are rare, probes come late."""
 _SAME_TIME: Final = 0.05
 """Share by which T may be off"""
 
 
 @inlined
 def follow_motion(bundle: IntArray, velocity: Vector, turning: Vector, moves: bool, until: float, now: float) -> None:
-    """Remember when the gripper moved last, and take over T (s) where it has changed."""
+    """Remember when the gripper moved last, and begin anew with another T (s), or where looks count no more."""
     memory = memory_at(bundle)
     state = memory.state[0]
-    moves = moves or state.moved == math.inf
-    if moves or norm(velocity) > STILL_M_S or norm(turning) > _STILL_RAD_S or state.moves_fingers == 1:
+    if state.anew == math.inf or abs(until - state.until) > _SAME_TIME * state.until:
+        state.anew, state.until, moves = now, until, True
+    moves = moves or state.moved == math.inf or state.moves_fingers == 1
+    if moves or norm(velocity) > STILL_M_S or norm(turning) > _STILL_RAD_S:
         state.moved = now
-    if abs(until - state.until) > _SAME_TIME * state.until:
-        state.until, state.moved = until, now
+
+
+@inlined
+def is_known(bundle: IntArray) -> bool:
+    """Tell whether the map holds: each probe was looked from since that counts, and lately if anything moved."""
+    memory = memory_at(bundle)
+    state, known = memory.state[0], bool(memory.settings[0].around != 0.0)
+    for probe in range(2 * PROBES):
+        at = memory.around[probe].at
+        if at == -math.inf or at < state.anew or (at <= state.moved and state.measured - at > _HOLDS_S):
+            known = False
+    return known
 
 
 @inlined
@@ -50,15 +62,17 @@ def probe_waiting(bundle: IntArray, now: float, speed: float, by_operator: bool)
     """Find the probe that has waited longest: how many periods, its side and its place; see `longest_waiting`."""
     memory = memory_at(bundle)
     most, of_side, of_place = -math.inf, 0, 0
+    state = memory.state[0]
+    if not by_operator:
+        state.anew = math.inf
     if memory.settings[0].around == 0.0 or not by_operator:
         return most, of_side, of_place
     for side in (R2, L2):
         leads = speed > -_RETREATS_M_S if side == R2 else speed < _RETREATS_M_S
         for probe in range(PROBES):
             at = memory.around[side * PROBES + probe].at
-            waited = (now - at) / (PERIOD_S if leads else _SELDOM * PERIOD_S)
-            waited = waited if at <= memory.state[0].moved else -math.inf
-            waited = min(waited, _SOON) if waited < math.inf else waited
+            waited = (now - at) / (PERIOD_S if leads or at < state.anew else _SELDOM * PERIOD_S)
+            waited = waited if at <= state.moved or at < state.anew else -math.inf
             if waited > most:
                 most, of_side, of_place = waited, side, FIRST_PROBE + probe
     return most, of_side, of_place
@@ -112,11 +126,11 @@ def keep_probe(bundle: IntArray, side: int, probe: int, now: float, tool: Vector
 def ways_around(bundle: IntArray, tool: FloatArray, ways: FloatArray) -> bool:
     """Fill ways (LISTS, PROBES) from where the tool (3,) is; False while one is not known."""
     memory, place = memory_at(bundle), load(tool.reshape(1, 3), 0)
+    if not is_known(bundle):
+        return False
     for side in range(2):
         for probe in range(PROBES):
             one = memory.around[side * PROBES + probe]
-            if one.at == -math.inf:
-                return False
             moved = dot((one.direction[0], one.direction[1], one.direction[2]), place) - one.began
             for kind in range(2):
                 ways[2 * side + kind, probe] = one.ways[kind] - moved

@@ -127,18 +127,14 @@ def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool
     return True
 
 
-@building_block
-def _longest_waiting(bundle: IntArray, moment: Moment) -> tuple[float, int, int]:
-    """How many periods the side and place, or the probe, that has waited longest has waited, with these two."""
-    waited, side, place = longest_waiting(bundle, moment.now)
-    longer, of_side, of_place = probe_waiting(bundle, moment.now, moment.speed, moment.by_operator)
-    return (longer, of_side, of_place) if longer > waited else (waited, side, place)
-
-
 @inlined
 def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
-    """Look at what has waited longest; at more than `at_most` fields where they have waited too long."""
-    waited, side, place = _longest_waiting(bundle, moment)
+    """Look at what has waited longest; at more than `at_most` fields where they have waited too long.
+
+    A probe comes where no field is due, and in a tick that measures the motion (`at_most` 0), lest it starve.
+    """
+    measures, looked = at_most == 0, False
+    waited, side, place = longest_waiting(bundle, moment.now)
     if waited >= _FAR_BEHIND:
         at_most = _ALL
     elif waited >= _OVERDUE:
@@ -146,7 +142,13 @@ def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
     while at_most > 0 and waited >= 1.0 - _ROUNDING:
         if not _look_along(bundle, moment, side, place):
             return False
-        at_most -= 1
-        waited, side, place = _longest_waiting(bundle, moment)
-    memory_at(bundle).state[0].next = moment.now if waited >= 1.0 - _ROUNDING else math.inf
+        at_most, looked = at_most - 1, True
+        waited, side, place = longest_waiting(bundle, moment.now)
+    of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed, moment.by_operator)
+    while of_probe >= 1.0 - _ROUNDING and (of_probe == math.inf or measures or not looked):
+        if not _look_along(bundle, moment, side, place):
+            return False
+        measures, looked = False, True
+        of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed, moment.by_operator)
+    memory_at(bundle).state[0].next = moment.now if max(waited, of_probe) >= 1.0 - _ROUNDING else math.inf
     return True

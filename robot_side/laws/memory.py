@@ -43,13 +43,13 @@ class Total(IntEnum):
 STATE: Final = np.dtype(
     [
         *((name, np.int64) for name in ("spheres", "moments", "finger_poses", "moves_fingers")),
-        *((name, np.float64) for name in ("measured", "next", "next_overlap", "overlap", "moved", "until")),
+        *((name, np.float64) for name in ("measured", "next", "next_overlap", "overlap", "moved", "anew", "until")),
     ]
 )
 """spheres: how many the gripper had, -1 before the first tick. moments: how many places besides the gripper's own are
 looked from. finger_poses: how many are kept. measured, next, next_overlap: when the motion was measured, when something
 is due again at the earliest, when the overlap at δ is (s). overlap: that one (m³). moved: when anything moved last.
-until: T, the time until the arm stands (s)."""
+anew: since when looks from probes count (`around`). until: T, the time until the arm stands (s)."""
 SEEN: Final = np.dtype(
     [
         ("place", np.int64),
@@ -145,7 +145,7 @@ class Memory:
         """missed: rows (k, 3) of loop age, μ_δ, σ_δ, for the operator side's prediction and for the robot side's."""
         self.state: np.ndarray = np.zeros(1, dtype=STATE)
         self.state["spheres"] = -1
-        for name in ("measured", "next", "next_overlap", "moved"):
+        for name in ("measured", "next", "next_overlap", "moved", "anew"):
             self.state[name] = -np.inf
         self.seen: np.ndarray = np.zeros(SIDES * ROOM, dtype=SEEN)
         """Those of one side together, from `ROOM` times the side on"""

@@ -20,7 +20,7 @@ from robot_side.compiled.kernel import (
     output_array,
 )
 from robot_side.compiled.vectors import Vector, add, dot, load, scale, subtract
-from robot_side.laws.around import follow_motion
+from robot_side.laws.around import follow_motion, is_known
 from robot_side.laws.felt import feel
 from robot_side.laws.fingers import measure_fingers
 from robot_side.laws.looking import ROUNDING_S, Moment, look_at_due
@@ -49,7 +49,7 @@ def _measure(bundle: IntArray, moment: Moment, velocity: Vector, turning: Vector
     memory = memory_at(bundle)
     state, across = memory.state[0], subtract(velocity, scale(moment.speed, moment.approach))
     # What sticks do the operator side traces, from around the gripper.
-    traced = memory.settings[0].around != 0.0 and moment.by_operator
+    traced = is_known(bundle) and moment.by_operator
     for axis in range(3):
         memory.velocity[0, axis] = 0.0 if traced else across[axis]
         memory.velocity[1, axis] = 0.0 if traced else turning[axis]

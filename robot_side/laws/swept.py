@@ -17,7 +17,7 @@ from typing import Final, NamedTuple, NoReturn
 import numpy as np
 
 from common.arrays import FloatArray, IntArray, require_finite
-from common.protocol.around import LISTS, PROBES, Around
+from common.protocol.around import LISTS, LONGEST_S, PROBES, Around
 from common.touch_speed import touch_speed_m_s
 from robot_side.arm.ability import JointLimits, find_ability
 from robot_side.arm.port import GripperPose
@@ -100,8 +100,8 @@ class SweptLaw:
             self._frame = situation.objects
             since = situation.objects.since
             moving = velocities if velocities is None or since is None else velocities[since[0].things]
-            if moving is not None and np.abs(moving).max(initial=0.0) > STILL_M_S:
-                self._look_around_anew()
+            if moving is None or np.abs(moving).max(initial=0.0) > STILL_M_S:
+                self.memory.state["moved"] = np.inf
         if not sense(
             *(pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, pose.sphere_centers_m),
             *(pose.sphere_radii_m, pose.sphere_on_finger, situation.joint_velocities_rad_s),
@@ -122,10 +122,9 @@ class SweptLaw:
     def around(self, pose: GripperPose) -> Around | None:
         """Ways from around the gripper, from where it is; None while not all are known, or nobody asks for them."""
         ways_m = np.empty((LISTS, PROBES))
-        asked = bool(self.memory.settings["around"][0]) and self._room[0] >= 0
-        if not (asked and ways_around(self.memory.bundle, pose.tool_position_m, ways_m)):
-            return None
-        return Around.of(float(self.memory.state["until"][0]), ways_m)
+        until_s = float(self.memory.state["until"][0])
+        known = self._room[0] >= 0 and ways_around(self.memory.bundle, pose.tool_position_m, ways_m)
+        return Around.of(until_s, ways_m) if known and 0.0 < until_s <= LONGEST_S else None
 
     def ask_around(self, *, asked: bool) -> None:
         """Look from around the gripper, too, from now on, or no longer; nobody asks for it at first."""
@@ -137,8 +136,8 @@ class SweptLaw:
         at[at < before_s] = -np.inf
 
     def _look_around_anew(self) -> None:
-        """Take all that was seen from around for old: what is looked at, or how, has changed."""
-        self.memory.state["moved"] = np.inf
+        """Let what was seen from around count no more: what is looked at, or how, has changed."""
+        self.memory.state["anew"] = np.inf
 
     def summary(self) -> dict[str, int]:
         """How much work there was and was not, over the run."""

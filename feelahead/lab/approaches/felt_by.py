@@ -111,6 +111,7 @@ class Judged:
         row = draw.replay.record.pose_row(now_s - 0.5 * PERIOD_S)
         law.forget_around(now_s - PERIOD_S)
         if np.isneginf(law.memory.around["at"]).any():
+            law.memory.state["next"] = -np.inf
             law.sense(self._situation(draw, row), float(draw.replay.record.pose_time_s[row]))
 
     def _law(self, draw: Draw) -> RobotLaw:
@@ -120,8 +121,7 @@ class Judged:
         if law_of_robot(self.law) == "paper":
             return PaperLaw(*arguments)
         law = SweptLaw(*arguments)
-        # Where sticks rest nothing is traced: what would be seen from around serves nobody.
-        law.ask_around(asked=replay.sticks_moved_s > -math.inf and self.law == "swept")
+        law.ask_around(asked=self.law == "swept")
         return law
 
     def _situation(self, draw: Draw, row: int) -> Situation:

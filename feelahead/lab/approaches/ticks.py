@@ -54,6 +54,8 @@ class Recorded:
         law = assemble(self.settings, 0, "", scene=scene_of(self.name)).law
         if not isinstance(law, SweptLaw):
             raise TypeError(f"a {type(law).__name__}; valid: SweptLaw")
+        # Its fields alone, with those from the path that it measures.
+        law.ask_around(asked=False)
         return law
 
 

@@ -101,6 +101,9 @@ def test_both_sticks_at_once_take_the_shorter_way() -> None:
     turned = first_zone(told, (0.0, 0.0, 1.0, 0.0))
     assert turned < ZONE_COUNT
     assert first_zone(told, (1.0, 0.0, 1.0, 0.0)) == turned
+    # A stick between two directions meets what stands in either.
+    assert first_zone(around(dict.fromkeys(RIGHT_ACROSS, 0.02)), (0.7, 0.4, 0.0, 0.0)) < ZONE_COUNT
+    assert first_zone(around(dict.fromkeys(UP_ACROSS, 0.02)), (0.9, 0.05, 0.0, 0.0)) == ZONE_COUNT
     diagonal = around(dict.fromkeys((*RIGHT_ACROSS, *UP_ACROSS), 0.02))
     assert first_zone(diagonal, (0.7, 0.7, 0.0, 0.0)) < ZONE_COUNT
 
@@ -193,3 +196,11 @@ def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> Non
     assert report is not None
     assert report.r2 is not None
     assert report.r2.zone_strengths[-1] == 8
+
+
+def test_a_map_counts_that_came_before_arming_or_was_overtaken() -> None:
+    told = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03))
+    made = haptics()
+    made.take_map(message(0.3, told))
+    made.take_map(message(0.29, around({})))
+    assert strengths(made, message(0.32, None))[-1] == 8

@@ -170,6 +170,42 @@ def test_it_is_looked_at_anew_while_an_object_moves(law: SweptLaw) -> None:
     assert told.r2_m[0] < 0.1 - 0.005 - SIGMA_M
 
 
+@pytest.mark.parametrize("step_s", [0.001, 0.002, 0.004, 0.02])
+def test_no_probe_starves_however_late_the_ticks_are(law: SweptLaw, step_s: float) -> None:
+    drifting, now_s = np.array([0.1, 0.0, 0.2, 0.0, 0.0, 0.0]), 0.0
+    while now_s < 3.0:
+        now_s += step_s
+        asked = situation(ball_pose(), WALL, joint_velocities_rad_s=drifting, loop_age_s=LOOP_S, lateral=(1.0, 0.0))
+        law.sense(asked, now_s)
+    assert now_s - law.memory.around["at"][:PROBES].min() < 1.0
+    assert law.around(ball_pose()) is not None
+
+
+def test_there_is_no_map_for_an_operator_who_is_not_heard_of(law: SweptLaw) -> None:
+    for loop_s in (0.2, 1.5, 5.0, 120.0):
+        law.sense(situation(ball_pose(), WALL, loop_age_s=loop_s), loop_s)
+        law.sense(situation(ball_pose(), WALL, loop_age_s=loop_s), loop_s + 1.0)
+        told = law.around(ball_pose())
+        assert told is None or (loop_s < 2.0 and told.full_s > loop_s)
+
+
+def test_a_map_of_before_is_withheld_and_the_robot_side_follows_the_path_itself(law: SweptLaw) -> None:
+    """After another T, P or role, and after a time in which the robot side reckoned."""
+    drifting = np.array([0.1, 0.0, 0.2, 0.0, 0.0, 0.0])
+    looks(law, 300, drifting, 0.0)
+    assert law.around(ball_pose()) is not None
+    assert law.memory.state["moments"][0] == 0
+    law.expect(0.5)
+    looks(law, 20, drifting, 0.3)
+    assert law.around(ball_pose()) is None
+    assert law.memory.state["moments"][0] > 0
+    looks(law, 300, drifting, 0.32)
+    assert law.around(ball_pose()) is not None
+    assert law.memory.state["moments"][0] == 0
+    looks(law, 20, drifting, 0.62, compensation="robot")
+    assert law.around(ball_pose()) is None
+
+
 def test_the_robot_sides_own_prediction_asks_for_none(law: SweptLaw) -> None:
     assert around(law, walls(0.1), compensation="robot") is None
 
