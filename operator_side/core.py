@@ -57,11 +57,9 @@ class OperatorSide:
         """The newest view of the robot; None before the first."""
         self.stiffness: StiffnessUpdate | None = None
         """The newest stiffness; None before the first and once it has expired."""
-        self.rejected = 0
+        self.rejected = self.stiffness_received = self.motion_sent = 0
         self.other_version: str | None = None
         """What the robot side's messages said when they were of another version; None once they are not."""
-        self.stiffness_received = 0
-        self.motion_sent = 0
         self.driving_delay = RunningStatistics(seed)
         """One-way delay in seconds of what an armed robot side sent: a link's first moments are not in it."""
         self.applied_age = RunningStatistics(seed)
@@ -127,13 +125,12 @@ class OperatorSide:
             self._follow(message, now_s)
 
     def _feel(self, felt: StiffnessUpdate, arrival: Arrival, now_s: float) -> None:
-        self.stiffness_received += not arrival.copy
         armed, one_way_s = felt.state == "armed", arrival.one_way_s
-        if armed and one_way_s is not None and not arrival.copy:
-            self.driving_delay.add(one_way_s)
-        if not arrival.copy and felt.header.epoch == self.link.peer_epoch:
-            # Whatever overtook it, and however soon the next one comes: few messages have a map.
+        if not arrival.copy:
+            self.stiffness_received += 1
             self.haptics.take_map(felt)
+            if armed and one_way_s is not None:
+                self.driving_delay.add(one_way_s)
         if arrival.fresh:
             self._look(now_s)  # before it counts: a field that was lost meanwhile is back, and not unbroken
             self._blindness.end()

@@ -110,7 +110,7 @@ class Haptics:
         return self._commands.displacement(now_s, *echo, felt.speed_m_s, *able, felt.told_m_s)
 
     def take_map(self, felt: StiffnessUpdate) -> None:
-        """Keep the newest message that has a map."""
+        """Keep the newest message that has a map, even where another has overtaken it: few have one."""
         known = self._mapped
         newer = known is None or known.header.epoch != felt.header.epoch or known.header.sent_s < felt.header.sent_s
         if felt.around is not None and newer:

@@ -75,7 +75,7 @@ BY_HAND: dict[str, st.SearchStrategy[Any]] = {
     **dict.fromkeys(("full_speed_m_s", "acceleration_m_s2"), st.floats(1e-6, 100.0)),
     **dict.fromkeys(("told_m_s",), st.none() | stick),
     **dict.fromkeys(
-        ("around",), st.none() | st.builds(Around, st.floats(1e-6, 99.0), st.binary(min_size=84, max_size=84))
+        ("around",), st.none() | st.builds(Around, st.floats(1e-6, 4.0), st.binary(min_size=84, max_size=84))
     ),
     **dict.fromkeys(("token",), stamps),
     **dict.fromkeys(("lacks",), st.none() | st.tuples(stamps, stamps)),
