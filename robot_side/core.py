@@ -30,7 +30,7 @@ from robot_side.laws.law import Law, Situation
 from robot_side.laws.sensed import Sensed
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
-from robot_side.outgoing_messages import SHOWN_NAME, AroundNow, Outgoing, stiffness_message, telemetry
+from robot_side.outgoing_messages import SHOWN_NAME, MapSchedule, Outgoing, stiffness_message, telemetry
 from robot_side.perceptual_deadband import StiffnessDeadband, TelemetryDeadband
 from robot_side.placing import scaled
 from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects, Role
@@ -98,7 +98,7 @@ class RobotSide:
         self._loop_age_s = RunningStatistics(seed)
         self.felt = StiffnessDeadband(full_rate=full_rate)
         """When a stiffness leaves"""
-        self._around = AroundNow()
+        self._around = MapSchedule()
         self._seen = TelemetryDeadband()
 
     @property
@@ -122,7 +122,7 @@ class RobotSide:
         if self.session.take_owner_changed():
             self._loop_age.reset()
             self.felt.forget()
-            self._around = AroundNow()
+            self._around = MapSchedule()
         if (age_s := self.session.loop_age_s(now_s)) is not None:
             # In every tick, so that a link that falls silent ages, too (eq. 8).
             delay_s = self._loop_age.update(age_s, now_s)

@@ -39,15 +39,15 @@ class Outgoing(NamedTuple):
     """Over every connection of `peer`, as something that must arrive soon; else over the next in turn."""
 
 
-class AroundNow:
-    """When ways from around the gripper go along: 20 times a second as they change, and else twice."""
+class MapSchedule:
+    """Decide which messages bring a map: 20 a second while it changes, and else two."""
 
     def __init__(self) -> None:
         self._sent: Around | None = None
         self._sent_s = -math.inf
 
     def due(self, law: Law, pose: GripperPose, now_s: float) -> Around | None:
-        """The ways, if they are due."""
+        """Return the map if one is due."""
         if now_s - self._sent_s < _AROUND_S:
             return None
         around = law.around(pose)

@@ -114,22 +114,20 @@ class Haptics:
         known = self._mapped
         newer = known is None or known.header.epoch != felt.header.epoch or known.header.sent_s < felt.header.sent_s
         if felt.around is not None and newer:
-            self._mapped = felt
+            self._mapped, self._traced_s = felt, -math.inf
 
     def _aside(self, felt: StiffnessUpdate, now_s: float) -> Aside | None:
         """Where our sticks lead, among what the newest map knows; None while they rest, or without a map.
 
-        The same again until a controller may be written to once more: the path is traced once for that.
+        The same one for the time between two writes to a controller: a path is traced once for each write.
         """
-        if (felt.around is None or felt is self._mapped) and 0.0 <= now_s - self._traced_s < WRITE_S:
-            return self._traced
-        self._traced, self._traced_s = self._newest_aside(felt, now_s), now_s
+        if not 0.0 <= now_s - self._traced_s < WRITE_S:
+            self._traced, self._traced_s = self._newest_aside(felt, now_s), now_s
         return self._traced
 
     def _newest_aside(self, felt: StiffnessUpdate, now_s: float) -> Aside | None:
-        self.take_map(felt)
         mapped = self._mapped
-        if mapped is None or self._compensation == "robot":
+        if mapped is None or mapped.around is None or self._compensation == "robot":
             return None
         header, along = mapped.header, mapped.r2
         if header.epoch != felt.header.epoch or felt.header.sent_s - header.sent_s > MAP_EXPIRES_S:
@@ -138,11 +136,9 @@ class Haptics:
         echo = header.echo_sent_s, header.echo_held_s
         able = along.full_speed_m_s, along.acceleration_m_s2
         course = self._commands.course(now_s, *echo, mapped.speed_m_s, *able, mapped.told_m_s)
-        return (
-            None
-            if course is None or mapped.around is None
-            else Aside(mapped.around, mapped.horizon_m, course, self._commands.sticks_at(now_s))
-        )
+        if course is None:
+            return None
+        return Aside(mapped.around, mapped.horizon_m, course, self._commands.sticks_at(now_s))
 
     def needed_m(self, felt: StiffnessUpdate, pulled: tuple[float, float], now_s: float) -> tuple[float, float]:
         """D at the present travel, in metres: of the trigger that retreats and of the one that advances.

@@ -33,7 +33,7 @@ class Aside(NamedTuple):
 
     around: Around
     horizon_m: float
-    """That of the message with it"""
+    """Horizon of the message that brought the map"""
     course: Course
     """Along the direction in which R2 advances, from the message with `around` to now"""
     sticks: Sticks
@@ -128,5 +128,4 @@ def _between(ways_m: FloatArray, aside: FloatArray, *, linear: bool) -> FloatArr
     if linear:
         between: FloatArray = share * found[0] + (1.0 - share) * found[1]
         return between
-    alone = np.where(share < _ALONE, found[1], np.where(share > 1.0 - _ALONE, found[0], np.inf))
-    return np.minimum(alone, np.where(np.isinf(alone), np.minimum(*found), np.inf))
+    return np.where(share < _ALONE, found[1], np.where(share > 1.0 - _ALONE, found[0], np.minimum(*found)))

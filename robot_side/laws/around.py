@@ -34,11 +34,18 @@ _SAME_TIME: Final = 0.05
 
 
 @inlined
-def follow_motion(bundle: IntArray, velocity: Vector, turning: Vector, moves: bool, until: float, now: float) -> None:
-    """Remember when the gripper moved last, and begin anew with another T (s), or where looks count no more."""
+def follow_motion(
+    bundle: IntArray, velocity: Vector, turning: Vector, moves: bool, until: float, now: float, by_operator: bool
+) -> None:
+    """Remember when the gripper moved last, and begin anew with another T (s), or where looks count no more.
+
+    by_operator: somebody traces the map; while nobody does, no look counts.
+    """
     memory = memory_at(bundle)
     state = memory.state[0]
-    if state.anew == math.inf or abs(until - state.until) > _SAME_TIME * state.until:
+    if not by_operator:
+        state.anew = math.inf
+    elif state.anew == math.inf or abs(until - state.until) > _SAME_TIME * state.until:
         state.anew, state.until, moves = now, until, True
     moves = moves or state.moved == math.inf or state.moves_fingers == 1
     if moves or norm(velocity) > STILL_M_S or norm(turning) > _STILL_RAD_S:
@@ -58,14 +65,12 @@ def is_known(bundle: IntArray) -> bool:
 
 
 @inlined
-def probe_waiting(bundle: IntArray, now: float, speed: float, by_operator: bool) -> tuple[float, int, int]:
+def probe_waiting(bundle: IntArray, now: float, speed: float) -> tuple[float, int, int]:
     """Find the probe that has waited longest: how many periods, its side and its place; see `longest_waiting`."""
     memory = memory_at(bundle)
     most, of_side, of_place = -math.inf, 0, 0
     state = memory.state[0]
-    if not by_operator:
-        state.anew = math.inf
-    if memory.settings[0].around == 0.0 or not by_operator:
+    if memory.settings[0].around == 0.0 or state.anew == math.inf:
         return most, of_side, of_place
     for side in (R2, L2):
         leads = speed > -_RETREATS_M_S if side == R2 else speed < _RETREATS_M_S

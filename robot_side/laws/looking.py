@@ -144,11 +144,11 @@ def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
             return False
         at_most, looked = at_most - 1, True
         waited, side, place = longest_waiting(bundle, moment.now)
-    of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed, moment.by_operator)
+    of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed)
     while of_probe >= 1.0 - _ROUNDING and (of_probe == math.inf or measures or not looked):
         if not _look_along(bundle, moment, side, place):
             return False
         measures, looked = False, True
-        of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed, moment.by_operator)
+        of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed)
     memory_at(bundle).state[0].next = moment.now if max(waited, of_probe) >= 1.0 - _ROUNDING else math.inf
     return True

@@ -95,9 +95,8 @@ def move(
 ) -> None:
     """Put the tool and its spheres where they will be after that time, and find the chord that leads on from there.
 
-    origin, rotation (3, 3), centers (m, 3): where they are; after 0 s, exactly these. linear, turning: the velocity of
-    the tool, but for the trigger's, and its turning. ahead: what the trigger moves it
-    by then, along the approach axis (m).
+    origin, rotation (3, 3), centers (m, 3): where they are; after 0 s, exactly these. linear, turning: of the
+    tool, but for what the trigger adds (m/s, rad/s). ahead: the trigger's own way by then, along the approach axis (m).
     """
     memory = memory_at(bundle)
     stays, axis, angle = after == 0.0, unit(turning), after * norm(turning)

@@ -61,7 +61,7 @@ def _measure(bundle: IntArray, moment: Moment, velocity: Vector, turning: Vector
         return False
     able = memory.prospect[0]
     until = stopping(able.speed, able.acceleration, moment.loop_age)
-    follow_motion(bundle, velocity, turning, changed, until, moment.now)
+    follow_motion(bundle, velocity, turning, changed, until, moment.now, moment.by_operator)
     plan_places(bundle, moment.centers, moment.tool, moment.approach, until, until * able.speed)
     state.measured = moment.now
     return True

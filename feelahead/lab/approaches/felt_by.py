@@ -70,7 +70,7 @@ def _moved(objects: PerceivedObjects, velocity_m_s: FloatArray, after_s: float) 
 
 @dataclass(frozen=True)
 class Judged:
-    """One law at one P, in the shipped pipeline.
+    """One law at one P, in the shipped pipeline; but each message brings a map, of the age that it has on average.
 
     The field is by the pose before the message left, the zones by the time they are felt. Nothing is rendered between
     these times, so that a strength falls as from one to the next.
@@ -95,7 +95,7 @@ class Judged:
             if np.isnan(sent_s) or sent_s < record.pose_time_s[0]:
                 continue
             row = record.pose_row(float(sent_s))
-            if isinstance(law, SweptLaw):
+            if isinstance(law, SweptLaw) and self.law == "swept":
                 self._look_around(law, draw, float(sent_s))
             sensed = law.sense(self._situation(draw, row), float(record.pose_time_s[row]))
             pulled = [_TRAVEL.travel(min(travel / SENSED_TRAVEL, 1.0)) for travel in record.travel[tick]]
@@ -151,15 +151,12 @@ class Judged:
             return None, None
         held_s = then_s - float(record.applied_at_s[tick])
         able = sensed.r2
-        report = (
-            *(now_s, echo_sent_s, held_s, sensed.speed_m_s),
-            *(able.full_speed_m_s, able.acceleration_m_s2),
-        )
-        course, around = replay.commands.course(*report), law.around(replay.estimated[row])
+        report = now_s, echo_sent_s, held_s, sensed.speed_m_s, able.full_speed_m_s, able.acceleration_m_s2
+        known, course = replay.commands.displacement(*report), replay.commands.course(*report)
+        around = None if course is None else law.around(replay.estimated[row])
         if course is None or around is None:
-            return replay.commands.displacement(*report), None
-        aside = Aside(around, sensed.horizon_m, course, replay.commands.sticks_at(now_s))
-        return replay.commands.displacement(*report), aside
+            return known, None
+        return known, Aside(around, sensed.horizon_m, course, replay.commands.sticks_at(now_s))
 
 
 @cache

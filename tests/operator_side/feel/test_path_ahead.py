@@ -159,6 +159,7 @@ def haptics() -> Haptics:
 
 
 def strengths(made: Haptics, update: StiffnessUpdate, now_s: float = 0.4) -> tuple[int, ...]:
+    made.take_map(update)
     report = made.output_report(update, (0.0, 0.8), Blindness(), now_s)
     effect = None if report is None else report.r2
     return (0,) * ZONE_COUNT if effect is None else effect.zone_strengths
@@ -192,7 +193,8 @@ def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> Non
     made = haptics()
     assert strengths(made, message(0.3, free)) == (0,) * ZONE_COUNT
     assert made.output_report(message(0.31, None), (0.0, 0.8), Blindness(), 0.405) is None
-    report = made.output_report(message(0.32, told), (0.0, 0.8), Blindness(), 0.406)
+    made.take_map(message(0.32, told))
+    report = made.output_report(message(0.33, None), (0.0, 0.8), Blindness(), 0.406)
     assert report is not None
     assert report.r2 is not None
     assert report.r2.zone_strengths[-1] == 8
