@@ -191,7 +191,7 @@ class RobotSide:
 
     def _follow_stand(self, pose: GripperPose, state: ArmState) -> None:
         """Notice when what is held comes to stand."""
-        if self._held is not None:
+        if self._held is not None and self._touching_down.due(state.time_s):
             carried = carried_n(pose.tool_jacobian, state.joint_loads_nm)
             height_m = float(pose.tool_position_m[2])
             self._touching_down.update(carried, height_m, self._rises_m_s, state.time_s)

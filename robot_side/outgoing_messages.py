@@ -21,7 +21,7 @@ TOPICS: Final[dict[OutgoingStream, bytes]] = {"telemetry": b"telemetry", "video"
 
 SHOWN_NAME = 100
 """Characters of an object's name that are sent and shown; a message has a limit."""
-_AROUND_S: Final = 0.05
+_AROUND_S: Final = 0.1
 _AROUND_AGAIN_S: Final = 0.4
 """A lost one is missed for no longer."""
 _NO_HEADER = Header(0, 0, 0.0)
@@ -40,17 +40,17 @@ class Outgoing(NamedTuple):
 
 
 class MapSchedule:
-    """Decide which messages bring a map: 20 a second while it changes, and else two."""
+    """Decide which messages bring a map: ten a second while it changes, and else two."""
 
     def __init__(self) -> None:
         self._sent: Around | None = None
-        self._sent_s = -math.inf
+        self._sent_s = self._looked_s = -math.inf
 
     def due(self, law: Law, pose: GripperPose, now_s: float) -> Around | None:
         """Return the map if one is due."""
-        if now_s - self._sent_s < _AROUND_S:
+        if now_s - self._looked_s < _AROUND_S:
             return None
-        around = law.around(pose)
+        self._looked_s, around = now_s, law.around(pose)
         known = self._sent is not None and around is not None and not around.differs(self._sent)
         if around is None or (known and now_s - self._sent_s < _AROUND_AGAIN_S):
             return None

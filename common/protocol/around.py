@@ -15,7 +15,7 @@ PROBES: Final = 1 + DIRECTIONS * (ACROSS + TURNED)
 """Number of places from which a way is sent"""
 LISTS: Final = 4
 STEP_M: Final = 2.0**-9
-PERIOD_S: Final = 0.15
+PERIOD_S: Final = 0.25
 """The period of looks from each probe while something moves; on average a look is half as old."""
 _FREE: Final = 255
 """Stands for a way that nothing ends within the horizon."""

@@ -25,6 +25,7 @@ _STALLED_S: Final = 0.15
 needs less time to begin to move."""
 _SINKS_M_S: Final = 1e-3
 _LEAVES_M: Final = 3e-3
+_PERIOD_S: Final = 0.004
 _GIVES_WAY_S: Final = 0.01
 """For this time the arm halts where it is measured. It is longer than a step of the physics or of a controller."""
 _NOISE_S: Final = 0.01
@@ -53,6 +54,10 @@ class TouchingDown:
         self._since_s = self._time_s = -math.inf
         self._height_m = self._sinks_m_s = self._stalled_s = 0.0
         self._carried_n = self._usual_n = 0.0
+
+    def due(self, time_s: float) -> bool:
+        """Whether to take in a load at `time_s`: what it takes to work one out is a tenth of a tick."""
+        return time_s - self._time_s >= _PERIOD_S
 
     @property
     def gives_way(self) -> bool:

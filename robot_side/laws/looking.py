@@ -131,9 +131,9 @@ def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool
 def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
     """Look at what has waited longest; at more than `at_most` fields where they have waited too long.
 
-    A probe comes where no field is due, and in a tick that measures the motion (`at_most` 0), lest it starve.
+    One probe comes where no field is looked along, nor the motion measured (`at_most` 0); sooner where it has waited.
     """
-    measures, looked = at_most == 0, False
+    busy = at_most == 0
     waited, side, place = longest_waiting(bundle, moment.now)
     if waited >= _FAR_BEHIND:
         at_most = _ALL
@@ -142,13 +142,16 @@ def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
     while at_most > 0 and waited >= 1.0 - _ROUNDING:
         if not _look_along(bundle, moment, side, place):
             return False
-        at_most, looked = at_most - 1, True
+        at_most, busy = at_most - 1, True
         waited, side, place = longest_waiting(bundle, moment.now)
     of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed)
-    while of_probe >= 1.0 - _ROUNDING and (of_probe == math.inf or measures or not looked):
+    # No probe has ever been looked from: all are, at once.
+    while of_probe == math.inf or of_probe >= (_OVERDUE if busy else 1.0 - _ROUNDING):
         if not _look_along(bundle, moment, side, place):
             return False
-        measures, looked = False, True
+        once, busy = of_probe < math.inf, True
         of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed)
+        if once:
+            break
     memory_at(bundle).state[0].next = moment.now if max(waited, of_probe) >= 1.0 - _ROUNDING else math.inf
     return True
