@@ -15,6 +15,10 @@ PROBES: Final = 1 + DIRECTIONS * (ACROSS + TURNED)
 """Number of places from which a way is sent"""
 LISTS: Final = 4
 STEP_M: Final = 2.0**-9
+AXES: Final = 1 + DIRECTIONS
+"""The trigger, and sticks: across, right and up, and turning, right and up"""
+MOST_JOINTS: Final = 32
+CHANGE_STEP_S: Final = 2.0**-9
 PERIOD_S: Final = 0.25
 """The period of looks from each probe while something moves; on average a look is half as old."""
 _FREE: Final = 255
@@ -34,24 +38,39 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
     """T: until the arm stands at the latest."""
     steps: bytes
     """(LISTS, PROBES) ways in steps of 2 mm, rounded towards the gripper: R2's, fast and slow, and L2's."""
+    changes: bytes
+    """(n, AXES) signed steps of 2 ms: how long joints take to full travel of R2, and to fully deflected sticks."""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.full_s <= LONGEST_S):
             raise ValueError(f"full_s = {self.full_s}; valid: above 0 to {LONGEST_S}")
         if len(self.steps) != LISTS * PROBES:
             raise ValueError(f"steps has {len(self.steps)} bytes; valid: {LISTS * PROBES}")
+        if not self.changes or len(self.changes) % AXES or len(self.changes) > MOST_JOINTS * AXES:
+            raise ValueError(
+                f"changes has {len(self.changes)} bytes; valid: {AXES} for each of 1 to {MOST_JOINTS} joints"
+            )
 
     @classmethod
-    def of(cls, full_s: float, ways_m: FloatArray) -> "Around":
-        """Make one of ways (LISTS, PROBES), infinite where nothing ends them; 0.5 m stands for longer ones."""
+    def of(cls, full_s: float, ways_m: FloatArray, changes_s: FloatArray) -> "Around":
+        """Make one of ways (LISTS, PROBES), infinite where nothing ends them; 0.5 m stands for longer ones.
+
+        changes_s (n, AXES): see `changes`; a quarter of a second stands for longer.
+        """
         steps = np.clip(np.floor(ways_m / STEP_M), 0, _FREE - 1)
-        return cls(full_s, np.where(np.isinf(ways_m), _FREE, steps).astype(np.uint8).tobytes())
+        changes = np.clip(np.rint(changes_s / CHANGE_STEP_S), -128, 127).astype(np.int8)
+        return cls(full_s, np.where(np.isinf(ways_m), _FREE, steps).astype(np.uint8).tobytes(), changes.tobytes())
 
     def ways_m(self, horizon_m: float) -> FloatArray:
         """Work out the ways (LISTS, PROBES), none beyond the horizon."""
         steps = np.frombuffer(self.steps, dtype=np.uint8).reshape(LISTS, PROBES)
         ways_m: FloatArray = np.where(steps == _FREE, horizon_m, np.minimum(steps * STEP_M, horizon_m))
         return ways_m
+
+    def changes_s(self) -> FloatArray:
+        """Work out `changes` in seconds (n, AXES)."""
+        changes: FloatArray = np.frombuffer(self.changes, dtype=np.int8).reshape(-1, AXES) * np.float64(CHANGE_STEP_S)
+        return changes
 
     def differs(self, other: "Around") -> bool:
         """Tell whether a way differs by more than a step, or T does."""

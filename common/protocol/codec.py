@@ -16,7 +16,7 @@ from common.protocol.view_messages import AnyViewMessage
 
 Kind = TypeVar("Kind")
 
-PROTOCOL_VERSION = 8
+PROTOCOL_VERSION = 9
 """2: the lease, with its token in every command. 3: predicted contact in each stiffness. 4: a field for
 each trigger in place of stiffness and contact, and in each command who reckons with the delay. 6: who watches what.
 7: stiffness and telemetry packed."""

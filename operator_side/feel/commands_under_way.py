@@ -13,18 +13,18 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray
-from common.following import follow
+from common.following import follow, follow_together
 from common.protocol.around import PERIOD_S
 
 MAX_DELAY_S: Final = 2.0
 """Beyond this loop age the robot side is disarmed, so that no older command matters."""
 _MOST_COMMANDS: Final = 4096
 """Kept at most: eight times what 250 commands a second leave in the window."""
+_STEP_S: Final = 0.01
+"""In one step of a course trigger and sticks go towards their mean."""
+_LEAST_S: Final = 1e-9
 _CLOCK_RATES_S: Final = 0.001
 """By so much two clocks that run at slightly different rates may make `held` too long."""
-
-
-_NOWHERE: Final[FloatArray] = np.zeros((0, 4))
 
 
 class Displacement(NamedTuple):
@@ -52,16 +52,26 @@ class Command(NamedTuple):
 class Course(NamedTuple):
     """The gripper's way by the commands under way, point by point."""
 
-    ways_m: list[float]
+    ways_m: FloatArray
     """(k,) signed, along the direction in which R2 advances, from where the gripper was in the report"""
     speed_m_s: float
     """w: the speed at the end, so signed"""
     aside_s: FloatArray
     """(k, 4) how long each stick, fully deflected, would take to where it has led by then"""
+    followed: FloatArray
+    """(4,) deflections that the arm follows at the end"""
+    changes_s: FloatArray
+    """(n, 5) K: how long each joint takes to full travel of R2, and to each fully deflected stick"""
+
+    @property
+    def displacement(self) -> Displacement:
+        """δ and w at its end."""
+        return Displacement(float(self.ways_m[-1]), self.speed_m_s)
 
     def turned_back(self) -> "Course":
         """The same along the direction in which L2 retreats."""
-        return Course([-way_m for way_m in self.ways_m], -self.speed_m_s, self.aside_s)
+        changes_s = self.changes_s * [-1.0, 1.0, 1.0, 1.0, 1.0]
+        return self._replace(ways_m=-self.ways_m, speed_m_s=-self.speed_m_s, changes_s=changes_s)
 
 
 class CommandsUnderWay:
@@ -141,10 +151,16 @@ class CommandsUnderWay:
         window or the first command, or that says what cannot be. ValueError for a speed or an acceleration that is
         none.
         """
-        course = self.course(
-            now_s, echo_sent_s, echo_held_s, speed_m_s, full_speed_m_s, acceleration_m_s2, told_m_s, aside=False
-        )
-        return None if course is None else Displacement(course.ways_m[-1], course.speed_m_s)
+        if not acceleration_m_s2 > 0.0:
+            raise ValueError(f"acceleration_m_s2 = {acceleration_m_s2}; valid: above 0")
+        counting = self._counting(now_s, echo_sent_s, echo_held_s, speed_m_s, full_speed_m_s)
+        if counting is None:
+            return None
+        way_m, speed = 0.0, speed_m_s
+        for number, (one, following) in enumerate(pairwise(counting)):
+            target = told_m_s if number == 0 and told_m_s is not None else one.travel * full_speed_m_s
+            way_m, speed = follow(way_m, speed, target, acceleration_m_s2, following.sent_s - one.sent_s)
+        return Displacement(way_m, speed)
 
     def course(
         self,
@@ -153,45 +169,62 @@ class CommandsUnderWay:
         echo_held_s: float | None,
         speed_m_s: float,
         full_speed_m_s: float,
-        acceleration_m_s2: float,
+        changes_s: FloatArray,
         told_m_s: float | None = None,
-        *,
-        aside: bool = True,
     ) -> Course | None:
-        """Follow the commands to the time at which one sent at `now_s` is followed; see `displacement`.
+        """Follow trigger and sticks to the time at which a command sent at `now_s` is followed; see `displacement`.
 
-        aside: the sticks, too, which the tool is taken to follow at once; None where they rest all the time.
+        changes_s: K (n, 5). A change Δ of travel and deflections takes max |K Δ|, and all change in proportion. None
+        where the sticks rest all the time, too.
         """
+        counting = self._counting(now_s, echo_sent_s, echo_held_s, speed_m_s, full_speed_m_s)
+        if counting is None or all(one.sticks == AT_REST for one in counting[:-1]):
+            return None
+        since_s = counting[0].sent_s
+        if told_m_s is not None:
+            counting[0] = counting[0]._replace(travel=told_m_s / full_speed_m_s)
+        edges_s, before = _edges_s(since_s, now_s)
+        targets = _means([*self._before(since_s), *counting], edges_s)
+        followed, passed = targets[0], [np.zeros(5)]
+        for number, (target, lasts_s) in enumerate(zip(targets, np.diff(edges_s).tolist(), strict=True)):
+            if number == before:
+                followed = np.array([speed_m_s / full_speed_m_s, *followed[1:]])
+            gained, followed = follow_together(followed, target, changes_s, lasts_s)
+            passed.append(passed[-1] + gained)
+        points = np.array(passed[before:])
+        ways_m = full_speed_m_s * (points[:, 0] - points[0, 0])
+        return Course(ways_m, full_speed_m_s * float(followed[0]), points[:, 1:], followed[1:], changes_s)
+
+    def _counting(
+        self,
+        now_s: float,
+        echo_sent_s: float | None,
+        echo_held_s: float | None,
+        speed_m_s: float,
+        full_speed_m_s: float,
+    ) -> list[Command] | None:
+        """Check what `displacement` is given, and list the commands from e on."""
         if not math.isfinite(speed_m_s):
             raise ValueError(f"speed_m_s = {speed_m_s}; valid: finite")
         if not (math.isfinite(full_speed_m_s) and full_speed_m_s > 0.0):
             raise ValueError(f"full_speed_m_s = {full_speed_m_s}; valid: finite and above 0")
-        if not acceleration_m_s2 > 0.0:
-            raise ValueError(f"acceleration_m_s2 = {acceleration_m_s2}; valid: above 0")
         if echo_sent_s is None or echo_held_s is None:
             return None
         if not (self._sent and max(now_s - self._window_s, self._sent[0].sent_s) <= echo_sent_s <= now_s):
             return None
         if not 0.0 <= echo_held_s <= now_s - echo_sent_s + _CLOCK_RATES_S:
             return None
-        counting = self._from_echo_on(echo_sent_s, echo_held_s, now_s)
-        if aside and all(one.sticks == AT_REST for one in counting[:-1]):
-            return None
-        ways_m, speed = [0.0], speed_m_s
-        for number, (one, following) in enumerate(pairwise(counting)):
-            target = told_m_s if number == 0 and told_m_s is not None else one.travel * full_speed_m_s
-            way_m, speed = follow(ways_m[-1], speed, target, acceleration_m_s2, following.sent_s - one.sent_s)
-            ways_m.append(way_m)
-        return Course(ways_m, speed, self._aside_s(counting) if aside else _NOWHERE)
+        return self._from_echo_on(echo_sent_s, echo_held_s, now_s)
 
-    def _aside_s(self, commands: list[Command]) -> FloatArray:
-        """Integrate the sticks (k, 4) to each command, from when the map was looked at on average."""
-        age_s, since_s = 0.5 * PERIOD_S, commands[0].sent_s
-        before = np.add(self.sticks_at(since_s - age_s), self.sticks_at(since_s))
-        durations_s = np.diff([one.sent_s for one in commands])
-        steps = durations_s[:, None] * np.array([one.sticks for one in commands[:-1]])
-        found: FloatArray = 0.5 * age_s * before + np.concatenate([np.zeros((1, 4)), np.cumsum(steps, axis=0)])
-        return found
+    def _before(self, until_s: float) -> list[Command]:
+        """Every command that counts from when the map was looked at, on average, to then; the oldest first."""
+        since_s, newest_first = until_s - 0.5 * PERIOD_S, list[Command]()
+        for one in reversed(self._sent):
+            if one.sent_s < until_s:
+                newest_first.append(one._replace(sent_s=max(one.sent_s, since_s)))
+            if one.sent_s <= since_s:
+                break
+        return newest_first[::-1]
 
     def _from_echo_on(self, echo_sent_s: float, echo_held_s: float, now_s: float) -> list[Command]:
         """Every command that counts between e and now, the oldest first, and the end of it."""
@@ -204,3 +237,24 @@ class CommandsUnderWay:
         followed, *under_way = reversed(newest_first)
         since_s = min(echo_sent_s + echo_held_s, under_way[0].sent_s if under_way else now_s)
         return [followed._replace(sent_s=since_s), *under_way, Command(now_s, 0.0)]
+
+
+def _edges_s(since_s: float, now_s: float) -> tuple[FloatArray, int]:
+    """Lay out times from when the map was looked at to `since_s` and on to `now_s`, and count those before that."""
+    age_s = 0.5 * PERIOD_S
+    before, after = math.ceil(age_s / _STEP_S), max(math.ceil((now_s - since_s) / _STEP_S), 1)
+    looked, known = (
+        np.linspace(a, b, n + 1) for a, b, n in ((since_s - age_s, since_s, before), (since_s, now_s, after))
+    )
+    return np.concatenate([looked, known[1:]]), before
+
+
+def _means(commands: list[Command], edges_s: FloatArray) -> FloatArray:
+    """Average travel and sticks (k - 1, 5), as commanded, between edges (k,)."""
+    sent_s = np.array([one.sent_s for one in commands])
+    asked = np.array([(one.travel, *one.sticks) for one in commands])
+    sums = np.concatenate([np.zeros((1, 5)), np.cumsum(np.diff(sent_s)[:, None] * asked[:-1], axis=0)])
+    at = np.stack([np.interp(edges_s, sent_s, column) for column in sums.T], axis=1)
+    lasts_s = np.maximum(np.diff(edges_s), _LEAST_S)
+    means: FloatArray = np.diff(at, axis=0) / lasts_s[:, None]
+    return means

@@ -134,7 +134,7 @@ class Haptics:
             self._mapped = None
             return None
         echo = header.echo_sent_s, header.echo_held_s
-        able = along.full_speed_m_s, along.acceleration_m_s2
+        able = along.full_speed_m_s, mapped.around.changes_s()
         course = self._commands.course(now_s, *echo, mapped.speed_m_s, *able, mapped.told_m_s)
         if course is None:
             return None

@@ -21,6 +21,7 @@ _UNDER_WAY: Final = 9
 """The most points of a path by the commands under way,"""
 _AHEAD: Final = 8
 """and the points beyond."""
+_LEAST_S: Final = 1e-9
 _ALIKE: Final = 0.1
 """Share of the distance between two probes: both count within it of the middle."""
 _ALONE: Final = 0.15
@@ -52,15 +53,14 @@ def first_full_zone(
     travels: at the middle of each zone. forth: the trigger advances.
     """
     course = aside.course if forth else aside.course.turned_back()
-    full_m_s, acceleration = field.full_speed_m_s, field.acceleration_m_s2
+    full_m_s = field.full_speed_m_s
     speeds_m_s = (np.array(travels) - other_travel) * full_m_s
     first = int(np.searchsorted(speeds_m_s, 0.0, side="right"))
     if first == len(travels):
         return first
     some = np.unique(np.linspace(0, len(course.ways_m) - 1, _UNDER_WAY).astype(np.int64))
     speeds_m_s, here_s = speeds_m_s[first:, None], course.aside_s[some]
-    after_s = np.arange(1, _AHEAD + 1) / _AHEAD * (horizon_s + speeds_m_s / acceleration)
-    ahead_s = here_s[-1] + after_s[..., None] * np.array(aside.sticks)
+    ahead_m, ahead_s = _ahead(course, speeds_m_s, aside.sticks, full_m_s, horizon_s)
     points = np.concatenate([here_s, ahead_s.reshape(-1, 4)]) / aside.around.full_s
     free_m = free_ways_m(aside.ways_m(advancing=forth), points)
     # From here on a row for each zone: the way along its path, and the ways that are free there.
@@ -68,32 +68,41 @@ def first_full_zone(
     slow[0] = True
     count, zones = len(some), len(speeds_m_s)
     under_way_m = np.where(slow, free_m[1, :count], free_m[0, :count])
-    ahead_m = np.where(slow, free_m[1, count:].reshape(zones, -1), free_m[0, count:].reshape(zones, -1))
-    free_m = np.hstack([under_way_m, ahead_m])
-    known_m = np.broadcast_to(np.array(course.ways_m)[some[1:]], (zones, count - 1))
-    path_m = np.hstack([known_m, _ways_m(course, speeds_m_s, acceleration, horizon_s, after_s)])
+    then_m = np.where(slow, free_m[1, count:].reshape(zones, -1), free_m[0, count:].reshape(zones, -1))
+    free_m = np.hstack([under_way_m, then_m])
+    known_m = np.broadcast_to(course.ways_m[some[1:]], (zones, count - 1))
+    path_m = np.hstack([known_m, ahead_m])
     # A point counts with those before and after it.
     meets = (path_m >= np.minimum(free_m[:, :-1], free_m[:, 1:])).any(axis=1)
     return first + int(np.argmax(meets)) if meets.any() else len(travels)
 
 
-def _ways_m(
-    course: Course, speeds_m_s: FloatArray, acceleration_m_s2: float, horizon_s: float, after_s: FloatArray
-) -> FloatArray:
-    """Work out how far the gripper is at times (z, k), at each zone's speed (z, 1) for one reaction and braking then.
+def _ahead(
+    course: Course, speeds_m_s: FloatArray, sticks: Sticks, full_m_s: float, horizon_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Go on from the course's end at each zone's speed (z, 1) for one reaction, and brake then; the sticks stay.
 
-    As `common.following.follow` twice.
+    Returns the ways (z, k) and how long each stick would take (z, k, 4), at _AHEAD times until the arm stands. As
+    `common.following.follow_together` twice.
     """
-    faster = np.sign(speeds_m_s - course.speed_m_s) * acceleration_m_s2
-    changing_s = np.abs(speeds_m_s - course.speed_m_s) / acceleration_m_s2
-    going_s, braking_s = np.minimum(after_s, horizon_s), np.maximum(after_s - horizon_s, 0.0)
-    first_s = np.minimum(going_s, changing_s)
-    ways_m = course.ways_m[-1] + course.speed_m_s * first_s + 0.5 * faster * first_s**2
-    ways_m += speeds_m_s * (going_s - first_s)
-    then_m_s = course.speed_m_s + faster * np.minimum(horizon_s, changing_s)
-    last_s = np.minimum(braking_s, np.abs(then_m_s) / acceleration_m_s2)
-    found: FloatArray = ways_m + then_m_s * last_s - 0.5 * np.sign(then_m_s) * acceleration_m_s2 * last_s**2
-    return found
+    followed = np.array([course.speed_m_s / full_m_s, *course.followed])
+    targets = np.hstack([speeds_m_s / full_m_s, np.tile(sticks, (len(speeds_m_s), 1))])
+    change = targets - followed
+    changing_s = np.abs(change @ course.changes_s.T).max(axis=1, keepdims=True)
+    then = followed + change * np.minimum(horizon_s / np.maximum(changing_s, _LEAST_S), 1.0)
+    braking = np.hstack([np.zeros_like(speeds_m_s), targets[:, 1:]]) - then
+    braking_s = np.abs(braking @ course.changes_s.T).max(axis=1, keepdims=True)
+    after_s = np.arange(1, _AHEAD + 1) / _AHEAD * (horizon_s + braking_s)
+    going_s, since_s = np.minimum(after_s, horizon_s), np.maximum(after_s - horizon_s, 0.0)
+    passed = followed * going_s[..., None] + change[:, None] * _counts_s(going_s, changing_s)[..., None]
+    passed += then[:, None] * since_s[..., None] + braking[:, None] * _counts_s(since_s, braking_s)[..., None]
+    return course.ways_m[-1] + full_m_s * passed[..., 0], course.aside_s[-1] + passed[..., 1:]
+
+
+def _counts_s(after_s: FloatArray, changing_s: FloatArray) -> FloatArray:
+    """Integrate a change's share, which grows evenly for `changing_s` to 1, until `after_s`."""
+    growing_s = np.minimum(after_s, changing_s)
+    return after_s - growing_s + 0.5 * growing_s**2 / np.maximum(changing_s, _LEAST_S)
 
 
 def free_ways_m(ways_m: FloatArray, aside: FloatArray) -> FloatArray:

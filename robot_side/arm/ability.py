@@ -8,7 +8,8 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.arm.port import GripperPose
-from robot_side.arm.resolved_rate import refuse, resolve
+from robot_side.arm.resolved_rate import joint_velocities, refuse, resolve
+from robot_side.arm.tool_motion import ToolMotionSettings, full_twists
 from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, output_array
 from robot_side.compiled.stack import on_stack
 
@@ -108,3 +109,14 @@ def find_ability(
 def along_approach(pose: GripperPose, limits: JointLimits, full_speed_m_s: float) -> Ability:
     """The same along the tool's approach axis."""
     return ability(pose, limits, pose.tool_rotation[:, 2], full_speed_m_s)
+
+
+def change_times_s(pose: GripperPose, limits: JointLimits, motion: ToolMotionSettings) -> FloatArray:
+    """Work out how long (n, 5) each joint takes from rest to full travel of R2, and to each fully deflected stick.
+
+    K of a change Δ (5,) of travel and deflections, which takes max |K Δ|: the joint that changes most limits all.
+    """
+    twists = pose.tool_rotation @ full_twists(motion).reshape(5, 2, 3, 1)
+    rates = [joint_velocities(pose.tool_jacobian, twist.ravel(), limits.velocity_rad_s) for twist in twists]
+    times_s: FloatArray = np.stack(rates, axis=1) / limits.acceleration_rad_s2[:, None]
+    return times_s

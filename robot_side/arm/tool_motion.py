@@ -7,8 +7,10 @@ along +z and L2 retreats; the left stick moves across, the right stick turns the
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
 from msgspec import Meta
 
+from common.arrays import FloatArray
 from common.limits import check_limits
 from common.protocol.messages import MotionCommand
 
@@ -39,3 +41,11 @@ def tool_motion(command: MotionCommand, settings: ToolMotionSettings) -> tuple[V
         (across * right, -across * up, settings.trigger_speed_m_s * (command.r2 - command.l2)),
         (turn * turn_up, turn * turn_right, 0.0),
     )
+
+
+def full_twists(settings: ToolMotionSettings) -> FloatArray:
+    """Lay out the tool's twists (5, 6), linear part first, of full travel of R2 and of each fully deflected stick."""
+    travel, across, turn = settings.trigger_speed_m_s, settings.stick_speed_m_s, settings.turn_speed_rad_s
+    twists = np.zeros((5, 6))
+    twists[0, 2], twists[1, 0], twists[2, 1], twists[3, 4], twists[4, 3] = travel, across, -across, turn, turn
+    return twists

@@ -19,7 +19,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray, require_finite
 from common.protocol.around import LISTS, LONGEST_S, PROBES, Around
 from common.touch_speed import touch_speed_m_s
-from robot_side.arm.ability import JointLimits, find_ability
+from robot_side.arm.ability import JointLimits, change_times_s, find_ability
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import refuse
 from robot_side.arm.tool_motion import ToolMotionSettings
@@ -76,6 +76,7 @@ class SweptLaw:
         self.encoder_sigma_rad = encoder_sigma_rad
         self._uncertainty = uncertainty
         self._limits = limits
+        self._motion = motion
         missed = [uncertainty.prediction.table(kind) for kind in ("operator", "robot")]
         self.memory = Memory(limits, encoder_sigma_rad, missed)
         settings = self.memory.settings[0]
@@ -124,7 +125,9 @@ class SweptLaw:
         ways_m = np.empty((LISTS, PROBES))
         until_s = float(self.memory.state["until"][0])
         known = self._room[0] >= 0 and ways_around(self.memory.bundle, pose.tool_position_m, ways_m)
-        return Around.of(until_s, ways_m) if known and 0.0 < until_s <= LONGEST_S else None
+        if not (known and 0.0 < until_s <= LONGEST_S):
+            return None
+        return Around.of(until_s, ways_m, change_times_s(pose, self._limits, self._motion))
 
     def ask_around(self, *, asked: bool) -> None:
         """Look from around the gripper, too, from now on, or no longer; nobody asks for it at first."""

@@ -5,36 +5,52 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.protocol.around import LISTS, PROBES, STEP_M, Around
+from common.protocol.around import AXES, CHANGE_STEP_S, LISTS, PROBES, STEP_M, Around
 
 COUNT = LISTS * PROBES
+CHANGES_S = np.full((6, AXES), 0.05)
 ways = st.floats(-0.1, 1.0) | st.just(float("inf"))
 
 
 @pytest.mark.parametrize("full_s", [0.0, -1.0, float("nan"), float("inf"), 101.0])
 def test_a_time_that_cannot_be_is_named(full_s: float) -> None:
     with pytest.raises(ValueError, match="full_s"):
-        Around(full_s, bytes(COUNT))
+        Around(full_s, bytes(COUNT), bytes(AXES))
 
 
 @pytest.mark.parametrize("count", [0, COUNT - 1, COUNT + 1])
 def test_another_number_of_ways_is_named(count: int) -> None:
     with pytest.raises(ValueError, match=f"steps has {count} bytes; valid: {COUNT}"):
-        Around(0.8, bytes(count))
+        Around(0.8, bytes(count), bytes(AXES))
+
+
+@pytest.mark.parametrize("count", [0, AXES - 1, 33 * AXES])
+def test_changes_of_no_joints_or_too_many_are_named(count: int) -> None:
+    with pytest.raises(ValueError, match=f"changes has {count} bytes; valid: 5 for each of 1 to 32 joints"):
+        Around(0.8, bytes(COUNT), bytes(count))
+
+
+def test_changes_are_told_to_a_millisecond_up_to_a_quarter_of_a_second() -> None:
+    changes_s = np.random.default_rng(4).uniform(-0.3, 0.3, (7, AXES))
+    told_s = Around.of(0.8, np.full((LISTS, PROBES), 0.1), changes_s).changes_s()
+    np.testing.assert_allclose(told_s, np.clip(changes_s, -0.25, 127 * CHANGE_STEP_S), atol=0.5 * CHANGE_STEP_S)
 
 
 @given(st.lists(ways, min_size=COUNT, max_size=COUNT), st.floats(0.1, 2.0))
 def test_no_way_gets_longer_and_by_two_millimetres_at_most_shorter(metres: list[float], horizon_m: float) -> None:
     sent_m = np.array(metres).reshape(LISTS, PROBES)
-    told_m, within_m = Around.of(0.8, sent_m).ways_m(horizon_m), np.clip(sent_m, 0.0, horizon_m)
+    told_m, within_m = Around.of(0.8, sent_m, CHANGES_S).ways_m(horizon_m), np.clip(sent_m, 0.0, horizon_m)
     assert (told_m <= within_m).all()
     assert (told_m >= np.minimum(within_m, 254 * STEP_M) - STEP_M).all()
     np.testing.assert_array_equal(told_m[np.isinf(sent_m)], horizon_m)
 
 
 def test_it_differs_by_more_than_a_step_or_by_its_time() -> None:
-    told = Around.of(0.8, np.full((LISTS, PROBES), 0.1))
+    def all_at(way_m: float, full_s: float = 0.8) -> Around:
+        return Around.of(full_s, np.full((LISTS, PROBES), way_m), CHANGES_S)
+
+    told = all_at(0.1)
     assert not told.differs(told)
-    assert not told.differs(Around.of(0.8, np.full((LISTS, PROBES), 0.1 + STEP_M)))
-    assert told.differs(Around.of(0.8, np.full((LISTS, PROBES), 0.1 + 2.0 * STEP_M)))
-    assert told.differs(Around.of(0.81, np.full((LISTS, PROBES), 0.1)))
+    assert not told.differs(all_at(0.1 + STEP_M))
+    assert told.differs(all_at(0.1 + 2.0 * STEP_M))
+    assert told.differs(all_at(0.1, 0.81))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol import messages as control
-from common.protocol.around import LISTS, PROBES, Around
+from common.protocol.around import AXES, LISTS, PROBES, Around
 from common.protocol.codec import (
     MAXIMUM_BYTES,
     PROTOCOL_VERSION,
@@ -75,7 +75,14 @@ BY_HAND: dict[str, st.SearchStrategy[Any]] = {
     **dict.fromkeys(("full_speed_m_s", "acceleration_m_s2"), st.floats(1e-6, 100.0)),
     **dict.fromkeys(("told_m_s",), st.none() | stick),
     **dict.fromkeys(
-        ("around",), st.none() | st.builds(Around, st.floats(1e-6, 4.0), st.binary(min_size=84, max_size=84))
+        ("around",),
+        st.none()
+        | st.builds(
+            Around,
+            st.floats(1e-6, 4.0),
+            st.binary(min_size=84, max_size=84),
+            st.integers(1, 32).flatmap(lambda joints: st.binary(min_size=5 * joints, max_size=5 * joints)),
+        ),
     ),
     **dict.fromkeys(("token",), stamps),
     **dict.fromkeys(("lacks",), st.none() | st.tuples(stamps, stamps)),
@@ -225,9 +232,10 @@ def test_every_message_for_hands_and_fingers_is_at_most_200_bytes(message: AnyMe
     assert len(encode(message)) <= 200
 
 
-def test_a_map_adds_88_bytes() -> None:
-    plain, told = felt(FULL, l2=8, r2=5), Around(0.8, bytes(LISTS * PROBES))
-    assert len(encode(msgspec.structs.replace(plain, around=told))) - len(encode(plain)) == 88
+def test_a_map_of_six_joints_adds_118_bytes() -> None:
+    plain, told = felt(FULL, l2=8, r2=5), Around(0.8, bytes(LISTS * PROBES), bytes(6 * AXES))
+    mapped = msgspec.structs.replace(plain, around=told)
+    assert len(encode(mapped)) - len(encode(plain)) == 118
 
 
 def test_every_kind_of_them_was_measured() -> None:

@@ -151,12 +151,13 @@ class Judged:
             return None, None
         held_s = then_s - float(record.applied_at_s[tick])
         able = sensed.r2
-        report = now_s, echo_sent_s, held_s, sensed.speed_m_s, able.full_speed_m_s, able.acceleration_m_s2
-        known, course = replay.commands.displacement(*report), replay.commands.course(*report)
-        around = None if course is None else law.around(replay.estimated[row])
+        report = now_s, echo_sent_s, held_s, sensed.speed_m_s, able.full_speed_m_s
+        around = law.around(replay.estimated[row])
+        course = None if around is None else replay.commands.course(*report, around.changes_s())
         if course is None or around is None:
-            return known, None
-        return known, Aside(around, sensed.horizon_m, course, replay.commands.sticks_at(now_s))
+            return replay.commands.displacement(*report, able.acceleration_m_s2), None
+        aside = Aside(around, sensed.horizon_m, course, replay.commands.sticks_at(now_s))
+        return course.displacement, aside
 
 
 @cache

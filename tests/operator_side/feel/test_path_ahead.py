@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from common.following import follow
-from common.protocol.around import LISTS, PROBES, Around
+from common.following import follow_together
+from common.protocol.around import AXES, LISTS, PROBES, Around
 from common.protocol.messages import Header, MotionCommand, StiffnessUpdate
 from common.protocol.uniform_field import FAR_M, uniform_field
 from common.reaction import HORIZON_S
@@ -18,7 +18,7 @@ from operator_side.dualsense.effects.official import ZONE_COUNT
 from operator_side.feel.blindness import Blindness
 from operator_side.feel.commands_under_way import AT_REST, CommandsUnderWay, Course, Sticks
 from operator_side.feel.haptics import MAP_EXPIRES_S, Haptics
-from operator_side.feel.path_ahead import Aside, _ways_m, first_full_zone, free_ways_m
+from operator_side.feel.path_ahead import Aside, _ahead, first_full_zone, free_ways_m
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.feel.zones import zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
@@ -28,7 +28,8 @@ FIELD = uniform_field(0)
 TRAVELS = zone_travels(TriggerTravel())
 RIGHT_ACROSS, RIGHT_TURNED, UP_ACROSS = (1, 2, 3), (4, 5), (6, 7, 8)
 RIGHT: Sticks = (1.0, 0.0, 0.0, 0.0)
-
+CHANGES_S = np.diag([FIELD.full_speed_m_s / FIELD.acceleration_m_s2, 0.0, 0.0, 0.0, 0.0])
+"""The trigger alone takes time."""
 
 HORIZON_M = 0.4
 
@@ -38,7 +39,7 @@ def around(near: dict[int, float], *, advancing: bool = True) -> Around:
     ways_m = np.full((LISTS, PROBES), np.inf)
     for probe, way_m in near.items():
         ways_m[slice(0, 2) if advancing else slice(2, 4), probe] = way_m
-    return Around.of(FULL_S, ways_m)
+    return Around.of(FULL_S, ways_m, CHANGES_S)
 
 
 def under_way(now_s: float, sticks: Sticks, travel: float = 0.0, since_s: float = 0.0) -> CommandsUnderWay:
@@ -52,7 +53,7 @@ def under_way(now_s: float, sticks: Sticks, travel: float = 0.0, since_s: float 
 
 def first_zone(told: Around, sticks: Sticks, *, now_s: float = 0.4, travel: float = 0.0, forth: bool = True) -> int:
     commands = under_way(now_s, sticks, travel)
-    course = commands.course(now_s, 0.0, 0.0, 0.0, FIELD.full_speed_m_s, FIELD.acceleration_m_s2)
+    course = commands.course(now_s, 0.0, 0.0, 0.0, FIELD.full_speed_m_s, CHANGES_S)
     if course is None:
         return ZONE_COUNT
     aside = Aside(told, HORIZON_M, course, commands.sticks_at(now_s))
@@ -60,11 +61,11 @@ def first_zone(told: Around, sticks: Sticks, *, now_s: float = 0.4, travel: floa
 
 
 def test_sticks_that_rest_are_not_traced() -> None:
-    assert under_way(0.4, AT_REST).course(0.4, 0.0, 0.0, 0.1, 0.25, 3.0) is None
+    assert under_way(0.4, AT_REST).course(0.4, 0.0, 0.0, 0.1, 0.25, CHANGES_S) is None
     # One that has just come to rest is still under way.
     commands = under_way(0.4, RIGHT)
     commands.sent(0.404, 0.5, AT_REST)
-    assert commands.course(0.41, 0.0, 0.0, 0.1, 0.25, 3.0) is not None
+    assert commands.course(0.41, 0.0, 0.0, 0.1, 0.25, CHANGES_S) is not None
 
 
 @pytest.mark.parametrize("forth", [True, False])
@@ -127,19 +128,24 @@ def test_ways_are_interpolated_between_probes_and_never_beyond_them(ways: list[f
     assert (between <= ways_m[0] + 1e-12).all()
 
 
-@given(st.floats(-0.3, 0.3), st.floats(0.5, 20.0), st.floats(0.01, 0.25))
-def test_ways_along_a_path_are_those_of_the_arms_model(speed: float, acceleration: float, zone: float) -> None:
-    course = Course([0.01], speed, np.zeros((1, 4)))
-    after_s = np.linspace(0.0, HORIZON_S + zone / acceleration, 9)[None]
-    found = _ways_m(course, np.array([[zone]]), acceleration, HORIZON_S, after_s)[0]
-    then = follow(0.01, speed, zone, acceleration, HORIZON_S)
-    expected = [
-        follow(0.01, speed, zone, acceleration, after)[0]
-        if after <= HORIZON_S
-        else follow(*then, 0.0, acceleration, after - HORIZON_S)[0]
-        for after in after_s[0].tolist()
-    ]
-    np.testing.assert_allclose(found, expected, atol=1e-12)
+@given(st.floats(-0.3, 0.3), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(0.01, 0.25), st.integers(0, 99))
+def test_ways_ahead_are_those_of_the_arms_model(speed: float, was: float, stick: float, zone: float, seed: int) -> None:
+    changes_s = np.random.default_rng(seed).uniform(-0.1, 0.1, (6, AXES))
+    course = Course(np.array([0.01]), speed, np.zeros((1, 4)), np.array([was, 0.0, 0.0, 0.0]), changes_s)
+    ways_m, aside_s = _ahead(course, np.array([[zone]]), (stick, 0.0, 0.0, 0.0), 0.25, HORIZON_S)
+    began, going, rests = (
+        np.array([travel, at, 0.0, 0.0, 0.0])
+        for travel, at in ((speed / 0.25, was), (zone / 0.25, stick), (0.0, stick))
+    )
+    first, then = follow_together(began, going, changes_s, HORIZON_S)
+    braking_s = float(np.abs(changes_s @ (rests - then)).max())
+    for k in range(8):
+        after_s = (k + 1) / 8 * (HORIZON_S + braking_s)
+        passed = follow_together(began, going, changes_s, min(after_s, HORIZON_S))[0]
+        if after_s > HORIZON_S:
+            passed = first + follow_together(then, rests, changes_s, after_s - HORIZON_S)[0]
+        assert ways_m[0, k] == pytest.approx(0.01 + 0.25 * passed[0], abs=1e-9)
+        np.testing.assert_allclose(aside_s[0, k], passed[1:], atol=1e-9)
 
 
 # Within all that is rendered
