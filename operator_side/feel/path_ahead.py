@@ -6,6 +6,7 @@ one reaction and until the arm stands. A zone is full where its path is longer, 
 there.
 """
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
@@ -15,7 +16,9 @@ from common.arrays import FloatArray, IntArray
 from common.protocol.around import ACROSS, DIRECTIONS, TURNED, Around
 from common.protocol.messages import TriggerField
 from common.touch_speed import touch_speed_m_s
+from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.feel.commands_under_way import Course, Sticks
+from operator_side.feel.zones import FREE, Zones
 
 _UNDER_WAY: Final = 9
 """The most points of a path by the commands under way,"""
@@ -26,6 +29,8 @@ _ALIKE: Final = 0.1
 """Share of the distance between two probes: both count within it of the middle."""
 _ALONE: Final = 0.15
 """Share of a deflection that does not count beside the other direction's"""
+_LEFT_OUT: Final = 0.02
+"""Share of T that does not count as moved across, or turned"""
 _ACROSS, _TURNED = slice(0, 2), slice(2, 4)
 
 
@@ -45,10 +50,10 @@ class Aside(NamedTuple):
         return self.around.ways_m(self.horizon_m)[slice(0, 2) if advancing else slice(2, 4)]
 
 
-def first_full_zone(
+def traced_zones(
     aside: Aside, field: TriggerField, travels: Sequence[float], other_travel: float, horizon_s: float, *, forth: bool
-) -> int:
-    """Find the first zone whose path meets something, as many as there are zones for none.
+) -> Zones:
+    """Find how stiff each zone is: full where its path meets something, and as much less before as `field` says.
 
     travels: at the middle of each zone. forth: the trigger advances.
     """
@@ -57,7 +62,7 @@ def first_full_zone(
     speeds_m_s = (np.array(travels) - other_travel) * full_m_s
     first = int(np.searchsorted(speeds_m_s, 0.0, side="right"))
     if first == len(travels):
-        return first
+        return FREE
     some = np.unique(np.linspace(0, len(course.ways_m) - 1, _UNDER_WAY).astype(np.int64))
     speeds_m_s, here_s = speeds_m_s[first:, None], course.aside_s[some]
     ahead_m, ahead_s = _ahead(course, speeds_m_s, aside.sticks, full_m_s, horizon_s)
@@ -73,8 +78,13 @@ def first_full_zone(
     known_m = np.broadcast_to(course.ways_m[some[1:]], (zones, count - 1))
     path_m = np.hstack([known_m, ahead_m])
     # A point counts with those before and after it.
-    meets = (path_m >= np.minimum(free_m[:, :-1], free_m[:, 1:])).any(axis=1)
-    return first + int(np.argmax(meets)) if meets.any() else len(travels)
+    short_m = (path_m - np.minimum(free_m[:, :-1], free_m[:, 1:])).max(axis=1).tolist()
+    found = [0] * first
+    for of_slow, beyond_m in zip(slow[:, 0].tolist(), short_m, strict=True):
+        ways = field.slow_m if of_slow else field.fast_m
+        strength = MAX_STRENGTH if beyond_m >= 0.0 else bisect_right(ways, ways[-1] + beyond_m)
+        found.append(max(found[-1] if found else 0, strength))
+    return Zones(tuple(found), int((path_m[:, -1] > aside.horizon_m).sum())) if any(found) else FREE
 
 
 def _ahead(
@@ -114,9 +124,10 @@ def free_ways_m(ways_m: FloatArray, aside: FloatArray) -> FloatArray:
     sides_m = ways_m[:, 1:].reshape(-1, DIRECTIONS, ACROSS + TURNED)
     here_m = np.broadcast_to(ways_m[:, :1, None], (len(ways_m), DIRECTIONS, 1))
     across_m, turned_m = (np.dstack([here_m, part]) for part in (sides_m[..., :ACROSS], sides_m[..., ACROSS:]))
-    return np.minimum(
-        _between(across_m, aside[:, _ACROSS], linear=False), _between(turned_m, aside[:, _TURNED], linear=True)
-    )
+    moves, turns = (np.abs(aside[:, part]).max(axis=1) > _LEFT_OUT for part in (_ACROSS, _TURNED))
+    across_m = _between(across_m, aside[:, _ACROSS], linear=False)
+    turned_m = _between(turned_m, aside[:, _TURNED], linear=True)
+    return np.where(turns & ~moves, turned_m, np.where(turns, np.minimum(across_m, turned_m), across_m))
 
 
 def _between(ways_m: FloatArray, aside: FloatArray, *, linear: bool) -> FloatArray:

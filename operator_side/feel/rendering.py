@@ -16,7 +16,7 @@ from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT, M
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble
 from operator_side.feel.commands_under_way import Displacement
-from operator_side.feel.path_ahead import Aside, first_full_zone
+from operator_side.feel.path_ahead import Aside, traced_zones
 from operator_side.feel.stand_pulse import StandPulse
 from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
@@ -49,7 +49,7 @@ class RenderedTrigger:
         self._levels = [0.0] * ZONE_COUNT
         self._last_s = -math.inf
         self._traced: Aside | None = None
-        self._first_full = ZONE_COUNT
+        self._zones = FREE
         self._strengths: tuple[int, ...] = FREE.strengths
         self._effect: TriggerEffect = Off()
 
@@ -64,15 +64,15 @@ class RenderedTrigger:
         *,
         forth: bool = True,
     ) -> TriggerEffect:
-        """The effect at `now_s`; the others: of `zone_strengths`, and of `first_full_zone` while sticks lead aside."""
-        zones = zone_strengths(
-            field, horizon_m, self._travels, other_travel, moving, horizon_s=self._settings.horizon_s
-        )
-        if aside is not None:
+        """The effect at `now_s`; the others: of `zone_strengths`, or of `traced_zones` while sticks lead aside."""
+        horizon_s = self._settings.horizon_s
+        if aside is None:
+            zones = zone_strengths(field, horizon_m, self._travels, other_travel, moving, horizon_s)
+        else:
             if aside is not self._traced:
-                where = field, self._travels, other_travel, self._settings.horizon_s
-                self._traced, self._first_full = aside, first_full_zone(aside, *where, forth=forth)
-            zones = zones.full_from(self._first_full)
+                self._traced = aside
+                self._zones = traced_zones(aside, field, self._travels, other_travel, horizon_s, forth=forth)
+            zones = self._zones
         self.beyond_horizon += zones.beyond_horizon
         if zones is FREE and not any(self._levels):
             self._last_s = now_s

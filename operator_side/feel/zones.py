@@ -30,12 +30,6 @@ class Zones(NamedTuple):
     beyond_horizon: int
     """How many are full because nobody knows what lies so far ahead."""
 
-    def full_from(self, first: int) -> "Zones":
-        """Make all zones from this one on full."""
-        if first >= ZONE_COUNT:
-            return self
-        return Zones(self.strengths[:first] + (MAX_STRENGTH,) * (ZONE_COUNT - first), self.beyond_horizon)
-
 
 FREE: Final = Zones((0,) * ZONE_COUNT, 0)
 
