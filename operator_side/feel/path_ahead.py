@@ -29,6 +29,8 @@ _ALIKE: Final = 0.1
 """Share of the distance between two probes: both count within it of the middle."""
 _ALONE: Final = 0.15
 """Share of a deflection that does not count beside the other direction's"""
+_RISES_M: Final = 0.01
+"""Before full strength; what is weaker farther ahead of it is another thing."""
 _LEFT_OUT: Final = 0.02
 """Share of T that does not count as moved across, or turned"""
 _ACROSS, _TURNED = slice(0, 2), slice(2, 4)
@@ -82,7 +84,8 @@ def traced_zones(
     found = [0] * first
     for of_slow, beyond_m in zip(slow[:, 0].tolist(), short_m, strict=True):
         ways = field.slow_m if of_slow else field.fast_m
-        strength = MAX_STRENGTH if beyond_m >= 0.0 else bisect_right(ways, ways[-1] + beyond_m)
+        weaker = bisect_right(ways, ways[-1] + beyond_m) if beyond_m > -_RISES_M else 0
+        strength = MAX_STRENGTH if beyond_m >= 0.0 else weaker
         found.append(max(found[-1] if found else 0, strength))
     return Zones(tuple(found), int((path_m[:, -1] > aside.horizon_m).sum())) if any(found) else FREE
 

@@ -18,10 +18,11 @@ from operator_side.dualsense.effects.official import ZONE_COUNT
 from operator_side.feel.blindness import Blindness
 from operator_side.feel.commands_under_way import AT_REST, CommandsUnderWay, Course, Sticks
 from operator_side.feel.haptics import MAP_EXPIRES_S, Haptics
-from operator_side.feel.path_ahead import Aside, _ahead, first_full_zone, free_ways_m
+from operator_side.feel.path_ahead import Aside, _ahead, free_ways_m, traced_zones
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.feel.zones import zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
+from tests.helpers.felt import ways
 
 FULL_S = 0.8
 FIELD = uniform_field(0)
@@ -57,7 +58,8 @@ def first_zone(told: Around, sticks: Sticks, *, now_s: float = 0.4, travel: floa
     if course is None:
         return ZONE_COUNT
     aside = Aside(told, HORIZON_M, course, commands.sticks_at(now_s))
-    return first_full_zone(aside, FIELD, TRAVELS, 0.0, HORIZON_S, forth=forth)
+    strengths = traced_zones(aside, FIELD, TRAVELS, 0.0, HORIZON_S, forth=forth).strengths
+    return sum(strength < 8 for strength in strengths)
 
 
 def test_sticks_that_rest_are_not_traced() -> None:
@@ -96,6 +98,33 @@ def test_what_is_under_way_along_the_trigger_counts() -> None:
     assert first_zone(told, RIGHT, travel=0.0) > first_zone(told, RIGHT, travel=1.0)
 
 
+def test_what_lies_straight_ahead_of_a_turn_or_a_drift_is_not_met() -> None:
+    told = around({0: 0.01})
+    assert first_zone(told, AT_REST) == ZONE_COUNT  # not traced
+    for sticks in (RIGHT, (0.0, 0.0, 1.0, 0.0)):
+        assert first_zone(told, sticks) == ZONE_COUNT
+        # Who has just begun is still in front of it.
+        assert first_zone(told, sticks, now_s=0.0) < ZONE_COUNT
+
+
+def test_strength_rises_before_full_as_it_does_straight_ahead_and_no_farther() -> None:
+    rising = ways(*(0.193 + 0.001 * k for k in range(8)))
+    two_things = ways(0.05, 0.06, *(0.195 + 0.001 * k for k in range(6)))
+    # From rest: what the start takes, braking gives back.
+    reaches_m = FIELD.full_speed_m_s * TRAVELS[-1] * HORIZON_S
+    for field in (rising, two_things):
+        told = around(dict.fromkeys((*RIGHT_ACROSS, 0), reaches_m + 0.003))
+        commands = under_way(0.4, RIGHT)
+        course = commands.course(0.4, 0.0, 0.0, 0.0, FIELD.full_speed_m_s, CHANGES_S)
+        assert course is not None
+        aside = Aside(told, HORIZON_M, course, RIGHT)
+        along = msgspec.structs.replace(FIELD, fast_m=field, slow_m=field)
+        strengths = traced_zones(aside, along, TRAVELS, 0.0, HORIZON_S, forth=True).strengths
+        assert strengths[0] == 0
+        assert 0 < strengths[-1] < 8
+        assert list(strengths) == sorted(strengths)
+
+
 def test_both_sticks_at_once_take_the_shorter_way() -> None:
     told = around(dict.fromkeys(RIGHT_TURNED, 0.02))
     assert first_zone(told, RIGHT) == ZONE_COUNT
@@ -121,11 +150,10 @@ def probes_at() -> FloatArray:
 @given(st.lists(st.floats(0.0, 0.3), min_size=PROBES, max_size=PROBES), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
 def test_ways_are_interpolated_between_probes_and_never_beyond_them(ways: list[float], x: float, y: float) -> None:
     ways_m, exact = np.array(ways), probes_at()
-    # Each probe's own way, or that of where the gripper is, which a turn or a drift alone starts from.
-    np.testing.assert_allclose(free_ways_m(ways_m[None], exact)[0], np.minimum(ways_m, ways_m[0]), atol=1e-12)
+    np.testing.assert_allclose(free_ways_m(ways_m[None], exact)[0], ways_m, atol=1e-12)
     between = free_ways_m(ways_m[None], np.array([[x, y, 0.0, 0.0], [0.0, 0.0, x, y]]))
     assert (between >= ways_m.min() - 1e-12).all()
-    assert (between <= ways_m[0] + 1e-12).all()
+    assert (between <= ways_m.max() + 1e-12).all()
 
 
 @given(st.floats(-0.3, 0.3), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(0.01, 0.25), st.integers(0, 99))
