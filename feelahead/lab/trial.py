@@ -9,6 +9,7 @@ from common.protocol.around import Around
 from common.protocol.uniform_field import uniform_field
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.lab.table import Row
+from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.person import SimulatedOperator
@@ -27,6 +28,7 @@ from robot_side.surroundings.perceived import Role
 
 Arm = Literal["off", "mechanical", "reacting"]
 """off: nothing is felt. mechanical: triggers stiffen, and the person takes no notice. reacting: they do."""
+_L2, _R2 = 0, 1
 _SAME_CONTACT_S: Final = 0.1
 """A contact with a thing that comes back within this time is the same one."""
 _LOOK_S: Final = 0.05
@@ -48,6 +50,8 @@ class Trial:
     """The robot side's"""
     camera_sd_m: float = CameraSettings().sd_m
     """Standard deviation of the camera's error along each axis, which the law knows"""
+    probability: float = RobotSettings().probability
+    """P of eq. 10"""
 
 
 class _Silent:
@@ -79,6 +83,8 @@ class _Watch:
         self.hits = 0
         self.hit_first: str | None = None
         self.fastest_m_s: float | None = None
+        self.pulled_s = self.full_s = 0.0
+        """How long R2 was pulled, and was full under the finger"""
         self.placing = Placing()
         self.scene = load_scene(name=trial.scene, seed=seed)
         self._contact, self._truth = TrueContact(self.scene), GroundTruth(self.scene)
@@ -93,6 +99,7 @@ class _Watch:
                     seed=seed,
                     scene=trial.scene,
                     camera=CameraSettings(sd_m=trial.camera_sd_m),
+                    probability=trial.probability,
                 ),
                 OperatorSettings(
                     link=trial.link,
@@ -118,6 +125,9 @@ class _Watch:
                 self._hit(onset.thing, onset.closing_speed_m_s, now_s)
         if now_s >= self._next_s - 1e-9:
             self._next_s = now_s + _TRUTH_S
+            strength = self._strength_of(_R2)
+            self.pulled_s += _TRUTH_S * (strength is not None)
+            self.full_s += _TRUTH_S * (strength == MAX_STRENGTH)
             if (target := self._truth.target()) is not None:
                 is_target = held is not None and roles[held] is Role.TARGET
                 self.placing.observe(target, is_target, self._felt(), now_s)
@@ -131,12 +141,14 @@ class _Watch:
 
     def _felt(self) -> bool:
         """Whether a finger meets an effect, or the controller shakes."""
+        stiff = any((self._strength_of(trigger) or 0) > 0 for trigger in (_L2, _R2))
+        return stiff or self.loopback.device.rumble.left > 0.0
+
+    def _strength_of(self, trigger: int) -> int | None:
+        """Take the strength of the zone under the finger; None for a trigger that is not pulled."""
         device = self.loopback.device
-        stiff = any(
-            travel > 0.0 and effect.zone_strengths[zone_of(travel)] > 0
-            for effect, travel in zip(device.effects, device.travel, strict=True)
-        )
-        return stiff or device.rumble.left > 0.0
+        travel = device.travel[trigger]
+        return device.effects[trigger].zone_strengths[zone_of(travel)] if travel > 0.0 else None
 
 
 def run_trial(trial: Trial, seed: int) -> Row:
@@ -144,6 +156,7 @@ def run_trial(trial: Trial, seed: int) -> Row:
 
     The seed draws the scene, the errors of camera and encoders, the link and the person.
     hits: contacts of the gripper with anything but the target, and of the held thing with obstacles.
+    full_share: of the time in which R2 is pulled, how much of it is full in the zone under the finger.
     finished_s: from arming until the thing is placed and the hand has drawn back; None where time ran out.
     felt_before_s: for how long rumble or a stiff trigger was felt without a break before the thing touched its place.
     """
@@ -166,6 +179,7 @@ def run_trial(trial: Trial, seed: int) -> Row:
         "hits": watch.hits,
         "hit_first": watch.hit_first,
         "fastest_hit_mm_s": None if watch.fastest_m_s is None else 1e3 * watch.fastest_m_s,
+        "full_share": watch.full_s / watch.pulled_s if watch.pulled_s else None,
         "grasped": task["time_to_grasp_s"] is not None,
         "lifted_mm": task["lifted_mm"],
         "placed": placing["placed"],

@@ -49,6 +49,8 @@ class HapticsSettings(Sweep):
     """Standard deviation of each delay above 0, in milliseconds."""
     camera_mm: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MM")] = 3.0
     """Standard deviation of the camera's error along each axis, which the law knows."""
+    probability: Annotated[float, Meta(gt=0.0, lt=1.0), tyro.conf.arg(metavar="P")] = 0.99
+    """The robot side's own P (eq. 10)."""
     link_model: LinkModel = "datagram"
     """datagram lets jitter reorder messages, stream keeps them in order."""
     duration: Annotated[float, Meta(gt=0.0, lt=1e4), tyro.conf.arg(metavar="SECONDS")] = 45.0
@@ -96,6 +98,7 @@ def cells(settings: HapticsSettings) -> Iterator[Cell]:
                 settings.link_model,
                 1e-3 * settings.tick,
                 1e-3 * settings.camera_mm,
+                settings.probability,
             ),
         )
 
@@ -110,7 +113,7 @@ def show(settings: HapticsSettings, table: Table) -> Iterator[Shown]:
     for (scene, delay_ms), pairs in table.groups("scene", "delay_ms"):
         title = f"{scene}, {delay_ms:g} ms each way, {settings.seeds} pairs"
         hits = "trials with a hit [95 %]", "p", "hits", "mm/s, median (most)", "grasped", "placed"
-        headings = ("haptics", *hits, "felt first", "finished, s", "longer by [95 %]")
+        headings = ("haptics", *hits, "felt first", "R2 full", "finished, s", "longer by [95 %]")
         yield shown(
             title, headings, ((words, *_figures(pairs, arm, settings.duration)) for arm, words in _ARMS.items())
         )
@@ -142,6 +145,7 @@ def _figures(pairs: Table, arm: Arm, limit_s: float) -> list[str]:
         str(sum(row["grasped"] for row in those)),
         str(len(placed)),
         str(sum(row["felt_before_s"] is not None for row in placed)),
+        f"{fmean(shares):.0%}" if (shares := Table(those).values("full_share")) else "",
         f"{fmean(times):.1f}",
         longer,
     ]
