@@ -44,7 +44,7 @@ from robot_side.laws.path import go_to_place
 from robot_side.laws.prospect import find_prospect, stopping_s
 from robot_side.laws.sense import sense
 from robot_side.laws.sensed import L2, NUMBERS, R2, Sensed
-from robot_side.surroundings.perceived import Role
+from robot_side.surroundings.perceived import PerceivedObjects, Role
 from robot_side.surroundings.scene_table import SceneTable
 from robot_side.surroundings.surroundings import Surroundings
 
@@ -88,7 +88,7 @@ class SweptLaw:
         self._scratch = Scratch(0, 0, 0)
         self._felt = room_to_feel()
         self._classes: tuple[object, IntArray, IntArray] | None = None
-        self._frame: object = None
+        self._frame: PerceivedObjects | None = None
         self._room: tuple[int, SceneTable | None] = (-1, None)
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
@@ -127,7 +127,19 @@ class SweptLaw:
         known = self._room[0] >= 0 and ways_around(self.memory.bundle, pose.tool_position_m, ways_m)
         if not (known and 0.0 < until_s <= LONGEST_S):
             return None
+        if (closing_m_s := self._closing_m_s(pose)).any():
+            # A look knows what moves until the gripper stands, and not what has moved since.
+            since_s = self.memory.state["measured"] - self.memory.around["at"].reshape(2, 1, PROBES)
+            ways_m -= (closing_m_s[:, None, None] * since_s).repeat(2, axis=1).reshape(LISTS, PROBES)
         return Around.of(until_s, ways_m, change_times_s(pose, self._limits, self._motion))
+
+    def _closing_m_s(self, pose: GripperPose) -> FloatArray:
+        """Find how fast the fastest of all things comes nearer (2,) against the ways of R2 and of L2."""
+        velocities = None if self._frame is None else self._frame.velocities_m_s
+        if velocities is None or not velocities.size:
+            return np.zeros(2)
+        along_m_s = velocities @ pose.tool_rotation[:, 2]
+        return np.array([max(0.0, -along_m_s.min()), max(0.0, along_m_s.max())])
 
     def ask_around(self, *, asked: bool) -> None:
         """Look from around the gripper, too, from now on, or no longer; nobody asks for it at first."""

@@ -159,15 +159,23 @@ def test_it_is_looked_at_anew_where_roles_or_p_change(law: SweptLaw) -> None:
     assert told.r2_m[0] == pytest.approx(0.1, abs=3e-3)
 
 
-def test_it_is_looked_at_anew_while_an_object_moves(law: SweptLaw) -> None:
+def test_what_comes_nearer_shortens_every_way_by_what_it_covers_until_it_is_told(law: SweptLaw) -> None:
     looks(law, 300, np.zeros(6), 0.0)
-    for frame in range(10):
-        moved = replace(walls(0.1 - 0.001 * frame), velocities_m_s=np.array([[0.0, 0.0, -0.03]]))
+    comes_m_s, until_s, told = 0.06, 0.0, []
+    for frame in range(20):
         for tick in range(33):
-            law.sense(situation(ball_pose(), moved, loop_age_s=LOOP_S), 1.0 + 0.033 * frame + 0.001 * tick)
-    told = told_by(law, ball_pose())
-    assert told is not None
-    assert told.r2_m[0] < 0.1 - 0.005 - SIGMA_M
+            moved = replace(
+                walls(0.15 - comes_m_s * 0.033 * frame, 0.1), velocities_m_s=np.array([[0, 0, -comes_m_s], [0, 0, 0]])
+            )
+            until_s = 1.0 + 0.033 * frame + 0.001 * tick
+            law.sense(situation(ball_pose(), moved, loop_age_s=LOOP_S), until_s)
+        told.append(told_by(law, ball_pose()))
+    first, last = told[10], told[19]
+    assert first is not None
+    assert last is not None
+    # Probes are looked from every 250 ms, in turns; the camera's newest frame is 33 ms old.
+    np.testing.assert_allclose(last.r2_m - first.r2_m, -9 * 0.033 * comes_m_s, atol=0.004)
+    np.testing.assert_array_equal(last.l2_m, first.l2_m)
 
 
 @pytest.mark.parametrize("step_s", [0.001, 0.002, 0.004, 0.02])
