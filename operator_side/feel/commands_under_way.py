@@ -63,11 +63,6 @@ class Course(NamedTuple):
     changes_s: FloatArray
     """(n, 5) K: how long each joint takes to full travel of R2, and to each fully deflected stick"""
 
-    @property
-    def displacement(self) -> Displacement:
-        """δ and w at its end."""
-        return Displacement(float(self.ways_m[-1]), self.speed_m_s)
-
     def turned_back(self) -> "Course":
         """The same along the direction in which L2 retreats."""
         changes_s = self.changes_s * [-1.0, 1.0, 1.0, 1.0, 1.0]

@@ -141,7 +141,8 @@ class TriggerRendering:
         """What both triggers and the motors have to do at `now_s`; all off, at once, for None.
 
         pulled: present calibrated travel of the trigger that retreats and of the one that advances. known: δ and w by
-        our own commands under way; None where the robot side's are to be taken. aside: where our sticks lead.
+        our own commands under way; None where the robot side's are to be taken. aside: where our sticks lead, which is
+        felt in their stead.
         """
         if felt is None:
             self.l2.release()

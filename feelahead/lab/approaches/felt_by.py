@@ -156,8 +156,7 @@ class Judged:
         course = None if around is None else replay.commands.course(*report, around.changes_s())
         if course is None or around is None:
             return replay.commands.displacement(*report, able.acceleration_m_s2), None
-        aside = Aside(around, sensed.horizon_m, course, replay.commands.sticks_at(now_s))
-        return course.displacement, aside
+        return None, Aside(around, sensed.horizon_m, course, replay.commands.sticks_at(now_s))
 
 
 @cache
