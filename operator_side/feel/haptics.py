@@ -87,9 +87,8 @@ class Haptics:
         if not self._enabled:
             return None
         aside = None if felt is None else self._aside(felt, now_s)
-        known = None if felt is None or aside is not None else self._displacement(felt, now_s)
-        unknown = felt is not None and aside is None and known is None
-        self.without_history += unknown and self._compensation == "operator"
+        known = None if felt is None else self._displacement(felt, now_s)
+        self.without_history += felt is not None and known is None and self._compensation == "operator"
         wanted = self.rendering.render(felt, pulled, known, now_s, aside)
         if blindness.light is not None:
             rumble = blindness.rumble(now_s) if felt is None else wanted.rumble

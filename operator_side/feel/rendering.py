@@ -24,6 +24,8 @@ from operator_side.hands.travel_calibration import TravelCalibration, TriggerTra
 FALL_S: Final = 0.1
 """From full strength to none, unless the trigger is released."""
 _ROUNDING: Final = 1e-9
+_TOUCHED: Final = MAX_STRENGTH // 2
+"""The most that is felt, in slow zones, of what is to be touched"""
 
 
 @dataclass(frozen=True)
@@ -66,13 +68,14 @@ class RenderedTrigger:
     ) -> TriggerEffect:
         """The effect at `now_s`; the others: of `zone_strengths`, or of `traced_zones` while sticks lead aside."""
         horizon_s = self._settings.horizon_s
-        if aside is None:
-            zones = zone_strengths(field, horizon_m, self._travels, other_travel, moving, horizon_s)
-        else:
+        zones = zone_strengths(field, horizon_m, self._travels, other_travel, moving, horizon_s)
+        if aside is not None:
             if aside is not self._traced:
                 self._traced = aside
                 self._zones = traced_zones(aside, field, self._travels, other_travel, horizon_s, forth=forth)
-            zones = self._zones
+            # A map has ways of full strength alone: what is to be touched is felt straight ahead.
+            touched = field.slow_m[-1] > field.fast_m[-1]
+            zones = self._zones.at_least(zones, _TOUCHED) if touched else self._zones
         self.beyond_horizon += zones.beyond_horizon
         if zones is FREE and not any(self._levels):
             self._last_s = now_s

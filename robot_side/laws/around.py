@@ -76,7 +76,8 @@ def probe_waiting(bundle: IntArray, now: float, speed: float) -> tuple[float, in
         leads = speed > -_RETREATS_M_S if side == R2 else speed < _RETREATS_M_S
         for probe in range(PROBES):
             at = memory.around[side * PROBES + probe].at
-            waited = (now - at) / (PERIOD_S if leads or at < state.anew else _SELDOM * PERIOD_S)
+            # What counts no more is due at once: until it is seen anew the operator side has a map of before.
+            waited = (now - at) / (PERIOD_S if leads else _SELDOM * PERIOD_S) + (2.0 if at < state.anew else 0.0)
             waited = waited if at <= state.moved or at < state.anew else -math.inf
             if waited > most:
                 most, of_side, of_place = waited, side, FIRST_PROBE + probe
