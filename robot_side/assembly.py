@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 from common.errors import ConfigurationError
+from common.protocol.around import MOST_JOINTS
 from common.protocol.link_end import LinkEnd
 from common.timing.ages import LoopAge
 from robot_side.arm.port import Arm
@@ -136,7 +137,7 @@ def assemble(
         surroundings,
     )
     if isinstance(law, SweptLaw):
-        law.ask_around(asked=True)
+        law.ask_around(asked=len(law.encoder_sigma_rad) <= MOST_JOINTS)
     core = side(
         arm if watch is None else watch(arm),
         kinematics,

@@ -18,9 +18,10 @@ STEP_M: Final = 2.0**-9
 AXES: Final = 1 + DIRECTIONS
 """The trigger, and sticks: across, right and up, and turning, right and up"""
 MOST_JOINTS: Final = 32
-CHANGE_STEP_S: Final = 2.0**-9
+CHANGE_STEP_S: Final = 2.0**-12
 PERIOD_S: Final = 0.25
 """The period of looks from each probe while something moves; on average a look is half as old."""
+_OF_A_JOINT: Final = 2 * AXES
 _FREE: Final = 255
 """Stands for a way that nothing ends within the horizon."""
 LONGEST_S: Final = 4.0
@@ -39,26 +40,26 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
     steps: bytes
     """(LISTS, PROBES) ways in steps of 2 mm, rounded towards the gripper: R2's, fast and slow, and L2's."""
     changes: bytes
-    """(n, AXES) signed steps of 2 ms: how long joints take to full travel of R2, and to fully deflected sticks."""
+    """(n, AXES) in 16 bits each, steps of 0.25 ms: how long joints take to full travel of R2 and fully deflected sticks"""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.full_s <= LONGEST_S):
             raise ValueError(f"full_s = {self.full_s}; valid: above 0 to {LONGEST_S}")
         if len(self.steps) != LISTS * PROBES:
             raise ValueError(f"steps has {len(self.steps)} bytes; valid: {LISTS * PROBES}")
-        if not self.changes or len(self.changes) % AXES or len(self.changes) > MOST_JOINTS * AXES:
+        if not self.changes or len(self.changes) % _OF_A_JOINT or len(self.changes) > MOST_JOINTS * _OF_A_JOINT:
             raise ValueError(
-                f"changes has {len(self.changes)} bytes; valid: {AXES} for each of 1 to {MOST_JOINTS} joints"
+                f"changes has {len(self.changes)} bytes; valid: {_OF_A_JOINT} for each of 1 to {MOST_JOINTS} joints"
             )
 
     @classmethod
     def of(cls, full_s: float, ways_m: FloatArray, changes_s: FloatArray) -> "Around":
         """Make one of ways (LISTS, PROBES), infinite where nothing ends them; 0.5 m stands for longer ones.
 
-        changes_s (n, AXES): see `changes`; a quarter of a second stands for longer.
+        changes_s (n, AXES): see `changes`; 8 s stand for longer.
         """
         steps = np.clip(np.floor(ways_m / STEP_M), 0, _FREE - 1)
-        changes = np.clip(np.rint(changes_s / CHANGE_STEP_S), -128, 127).astype(np.int8)
+        changes = np.clip(np.rint(changes_s / CHANGE_STEP_S), -(2**15), 2**15 - 1).astype("<i2")
         return cls(full_s, np.where(np.isinf(ways_m), _FREE, steps).astype(np.uint8).tobytes(), changes.tobytes())
 
     def ways_m(self, horizon_m: float) -> FloatArray:
@@ -69,7 +70,7 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
 
     def changes_s(self) -> FloatArray:
         """Work out `changes` in seconds (n, AXES)."""
-        changes: FloatArray = np.frombuffer(self.changes, dtype=np.int8).reshape(-1, AXES) * np.float64(CHANGE_STEP_S)
+        changes: FloatArray = np.frombuffer(self.changes, dtype="<i2").reshape(-1, AXES) * np.float64(CHANGE_STEP_S)
         return changes
 
     def differs(self, other: "Around") -> bool:

@@ -17,7 +17,7 @@ from common.protocol.around import ACROSS, DIRECTIONS, TURNED, Around
 from common.protocol.messages import TriggerField
 from common.touch_speed import touch_speed_m_s
 from operator_side.dualsense.effects.official import MAX_STRENGTH
-from operator_side.feel.commands_under_way import Course, Sticks
+from operator_side.feel.commands_under_way import AT_REST, Course, Sticks
 from operator_side.feel.zones import FREE, Zones
 
 _UNDER_WAY: Final = 9
@@ -57,8 +57,19 @@ def traced_zones(
 ) -> Zones:
     """Find how stiff each zone is: full where its path meets something, and as much less before as `field` says.
 
-    travels: at the middle of each zone. forth: the trigger advances.
+    The sticks stay as they are, or are let go now: the stiffer of both counts, as nobody knows which. travels: at the
+    middle of each zone. forth: the trigger advances.
     """
+    where = field, travels, other_travel, horizon_s
+    goes_on = _traced(aside, *where, forth=forth)
+    if aside.sticks == AT_REST:
+        return goes_on
+    return goes_on.at_least(_traced(aside._replace(sticks=AT_REST), *where, forth=forth), MAX_STRENGTH)
+
+
+def _traced(
+    aside: Aside, field: TriggerField, travels: Sequence[float], other_travel: float, horizon_s: float, *, forth: bool
+) -> Zones:
     course = aside.course if forth else aside.course.turned_back()
     full_m_s = field.full_speed_m_s
     speeds_m_s = (np.array(travels) - other_travel) * full_m_s

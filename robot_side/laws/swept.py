@@ -27,7 +27,7 @@ from robot_side.enlargement.distance import Uncertainty
 from robot_side.field.field import Along
 from robot_side.field.look import look
 from robot_side.field.object_class import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
-from robot_side.field.scratch import Count, Scratch
+from robot_side.field.scratch import STRENGTHS, Count, Scratch
 from robot_side.field.total_overlap import sum_overlaps
 from robot_side.laws.around import STILL_M_S, ways_around
 from robot_side.laws.explanation import (
@@ -43,11 +43,13 @@ from robot_side.laws.memory import Memory, Total
 from robot_side.laws.path import go_to_place
 from robot_side.laws.prospect import find_prospect, stopping_s
 from robot_side.laws.sense import sense
-from robot_side.laws.sensed import L2, NUMBERS, R2, Sensed
+from robot_side.laws.sensed import HORIZON, L2, NUMBERS, OF_A_SIDE, R2, Sensed
 from robot_side.surroundings.perceived import PerceivedObjects, Role
 from robot_side.surroundings.scene_table import SceneTable
 from robot_side.surroundings.surroundings import Surroundings
 
+_FULL_WAYS: Final = [side * OF_A_SIDE + kind * STRENGTHS + STRENGTHS - 1 for side in (R2, L2) for kind in range(2)]
+"""Of what a tick found out, in the order of a map: R2's ways of full strength, fast and slow, and L2's"""
 _NO_VELOCITIES: Final[FloatArray] = np.empty((0, 3))
 
 
@@ -127,6 +129,9 @@ class SweptLaw:
         known = self._room[0] >= 0 and ways_around(self.memory.bundle, pose.tool_position_m, ways_m)
         if not (known and 0.0 < until_s <= LONGEST_S):
             return None
+        # Straight ahead the newest looks know more: what has just appeared, and what the fingers do.
+        newest_m = self._felt[_FULL_WAYS]
+        ways_m[:, 0] = np.where(newest_m < self._felt[HORIZON], np.minimum(ways_m[:, 0], newest_m), ways_m[:, 0])
         if (closing_m_s := self._closing_m_s(pose)).any():
             # A look knows what moves until the gripper stands, and not what has moved since.
             since_s = self.memory.state["measured"] - self.memory.around["at"].reshape(2, 1, PROBES)
@@ -136,10 +141,10 @@ class SweptLaw:
     def _closing_m_s(self, pose: GripperPose) -> FloatArray:
         """Find how fast the fastest of all things comes nearer (2,) against the ways of R2 and of L2."""
         velocities = None if self._frame is None else self._frame.velocities_m_s
-        if velocities is None or not velocities.size:
+        if velocities is None or self._classes is None:
             return np.zeros(2)
-        along_m_s = velocities @ pose.tool_rotation[:, 2]
-        return np.array([max(0.0, -along_m_s.min()), max(0.0, along_m_s.max())])
+        along_m_s = velocities[self._classes[1] != PASSED_OVER] @ pose.tool_rotation[:, 2]
+        return np.array([-along_m_s.min(initial=0.0), along_m_s.max(initial=0.0)])
 
     def ask_around(self, *, asked: bool) -> None:
         """Look from around the gripper, too, from now on, or no longer; nobody asks for it at first."""
