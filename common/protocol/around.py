@@ -40,7 +40,7 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
     steps: bytes
     """(LISTS, PROBES) ways in steps of 2 mm, rounded towards the gripper: R2's, fast and slow, and L2's."""
     changes: bytes
-    """(n, AXES) in 16 bits each, steps of 0.25 ms: how long joints take to full travel of R2 and fully deflected sticks"""
+    """(n, AXES) in 16 bits, steps of 0.25 ms: how long joints take to full travel of R2 and fully deflected sticks"""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.full_s <= LONGEST_S):
