@@ -102,8 +102,8 @@ class RobotSettings(RunOptions):
     """What the prediction of the commands under way misses on this arm, from: feelahead bench error --table FILE.toml.
     Known for the built-in arm; without it a fifth of the way that full speed goes in the loop age is added."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
-    """How often a warning must come before the contact, between 0 and 1 (eq. 10). With a camera of 3 mm it enlarges the
-    gripper by 4 mm for 0.9, and by 7 mm for 0.99. An edge nearer than that to the way makes a trigger stiff."""
+    """How often a warning must come before the contact, between 0 and 1 (eq. 10). With a camera of 3 mm 0.9
+    enlarges the gripper by 4 mm, and 0.99 by 7 mm. An edge nearer than that to the way makes a trigger stiff."""
     permit_tuning: bool = False
     """Let the operator that owns the robot change the probability and this side's emulated link while it runs."""
     assumed_delay_s: Annotated[float, Meta(ge=0.001, le=60.0)] = 1.0

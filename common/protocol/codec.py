@@ -19,7 +19,8 @@ Kind = TypeVar("Kind")
 PROTOCOL_VERSION = 9
 """2: the lease, with its token in every command. 3: predicted contact in each stiffness. 4: a field for
 each trigger in place of stiffness and contact, and in each command who reckons with the delay. 6: who watches what.
-7: stiffness and telemetry packed."""
+7: stiffness and telemetry packed. 8: ways from around, and whether what is held stands. 9: how long joints take to
+change."""
 MAXIMUM_BYTES = 4096
 """The largest message is an eighth of this; a longer payload is not looked into."""
 VIEW_MAXIMUM_BYTES: Final = 4 * 1024 * 1024

@@ -1,6 +1,6 @@
 """Stiffness and telemetry packed: everything but the header and a name stands in one binary field.
 
-    stiffness    [tag, header, field]            110 bytes of field, some 230 with ways from around
+    stiffness    [tag, header, field]            110 bytes of field, some 260 with ways from around
     telemetry    [tag, header, name, field]      57 bytes
 
 Ways are whole steps of 2^-14 m, a sixteenth of a millimetre, in 16 bits. They are rounded towards the gripper: a way is
@@ -52,7 +52,7 @@ _STIFFNESS: Final = struct.Struct("<32h10fiBB")
 """Ways of L2, fast and slow, and of R2; v_max, a, δ, s of each; v; told, NaN for none; horizon; rumble; state, and
 a bit for what stands."""
 _AROUND: Final = struct.Struct(f"<f{LISTS * PROBES}s")
-"""Behind it, in some: T and the map's steps; then its changes."""
+"""Behind it, in some: T, the map's steps, and then the map's changes."""
 _TELEMETRY: Final = struct.Struct("<14fB")
 """Position, target, up; speed, opening, enlargement, L2, R2; state, and bits for holding and a known target."""
 
@@ -128,8 +128,13 @@ def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
         _STATES[state],
         told_m_s if told_m_s == told_m_s else None,  # noqa: PLR0124  # faster than a call
         bool(bits & _STANDS),
-        Around(*_AROUND.unpack_from(behind), behind[_AROUND.size :]) if behind else None,  # type: ignore[call-arg]
+        _unpack_around(behind) if behind else None,
     )
+
+
+def _unpack_around(behind: bytes) -> Around:
+    full_s, steps = _AROUND.unpack_from(behind)
+    return Around(full_s, steps, behind[_AROUND.size :])
 
 
 def _steps(ways: Ways, horizon_m: float) -> list[int]:

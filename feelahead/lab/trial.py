@@ -84,7 +84,7 @@ class _Watch:
         self.hit_first: str | None = None
         self.fastest_m_s: float | None = None
         self.pulled_s = self.full_s = 0.0
-        """How long R2 was pulled, and was full under the finger"""
+        """Time in which R2 was pulled, and in which R2 was full under the finger"""
         self.placing = Placing()
         self.scene = load_scene(name=trial.scene, seed=seed)
         self._contact, self._truth = TrueContact(self.scene), GroundTruth(self.scene)

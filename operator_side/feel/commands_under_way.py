@@ -21,7 +21,7 @@ MAX_DELAY_S: Final = 2.0
 _MOST_COMMANDS: Final = 4096
 """Kept at most: eight times what 250 commands a second leave in the window."""
 _STEP_S: Final = 0.01
-"""In one step of a course trigger and sticks go towards their mean."""
+"""One step of a course, in which trigger and sticks go towards the mean of what was commanded."""
 _LEAST_S: Final = 1e-9
 _CLOCK_RATES_S: Final = 0.001
 """By so much two clocks that run at slightly different rates may make `held` too long."""
@@ -47,6 +47,21 @@ class Command(NamedTuple):
     sent_s: float
     travel: float
     sticks: Sticks = AT_REST
+
+
+class Report(NamedTuple):
+    """What a message of the robot side says of the arm and of our commands."""
+
+    echo_sent_s: float | None
+    """From the header: the stamp of the newest command that the robot side had"""
+    echo_held_s: float | None
+    """and how long that had lain there."""
+    speed_m_s: float
+    """v along the direction in which R2 advances"""
+    full_speed_m_s: float
+    """v_max, of full travel"""
+    told_m_s: float | None = None
+    """The speed that the robot gives that command; None: what the command asked for."""
 
 
 class Course(NamedTuple):
@@ -91,8 +106,8 @@ class CommandsUnderWay:
 
         δ = ∫ v dt,  w = v(now),  |dv/dt| <= a
 
-    exactly, as u is constant between commands. What differs in truth: d changes from message to message, the joints
-    share out their acceleration among them, and an arm at the edge of its reach does not do what it is told.
+    exactly, as u is constant between commands. What differs in truth: d changes from message to message, and an
+    arm at the edge of its reach does not do what it is told. That joints share out their acceleration `course` knows.
     `feelahead bench error` measures the sum of it.
     """
 
@@ -127,111 +142,75 @@ class CommandsUnderWay:
         """Find how they were commanded last at `now_s`."""
         return next((one.sticks for one in reversed(self._sent) if one.sent_s <= now_s), AT_REST)
 
-    def displacement(
-        self,
-        now_s: float,
-        echo_sent_s: float | None,
-        echo_held_s: float | None,
-        speed_m_s: float,
-        full_speed_m_s: float,
-        acceleration_m_s2: float,
-        told_m_s: float | None = None,
-    ) -> Displacement | None:
+    def displacement(self, now_s: float, report: Report, acceleration_m_s2: float) -> Displacement | None:
         """δ and w by the time that a command sent at `now_s` is followed.
 
-        echo_sent_s, echo_held_s: from the header of the report that `speed_m_s`, v along the direction in which R2
-        advances, came in. full_speed_m_s: v_max, of full travel. acceleration_m_s2: a; infinite for an arm that follows
-        at once. told_m_s: the speed that the robot gives the newest command that it had then; None: what that asked
-        for. None where the commands since the echo are not known: without an echo, or with one that is older than the
-        window or the first command, or that says what cannot be. ValueError for a speed or an acceleration that is
-        none.
+        acceleration_m_s2: a; infinite for an arm that follows at once. None where the commands since the echo are not
+        known: without an echo, or with one that is older than the window or the first command, or that says what cannot
+        be. ValueError for a speed or an acceleration that is none.
         """
         if not acceleration_m_s2 > 0.0:
             raise ValueError(f"acceleration_m_s2 = {acceleration_m_s2}; valid: above 0")
-        counting = self._counting(now_s, echo_sent_s, echo_held_s, speed_m_s, full_speed_m_s)
+        counting = self._counting(now_s, report)
         if counting is None:
             return None
-        way_m, speed = 0.0, speed_m_s
-        for number, (one, following) in enumerate(pairwise(counting)):
-            target = told_m_s if number == 0 and told_m_s is not None else one.travel * full_speed_m_s
-            way_m, speed = follow(way_m, speed, target, acceleration_m_s2, following.sent_s - one.sent_s)
+        way_m, speed = 0.0, report.speed_m_s
+        for one, following in pairwise(counting):
+            target, lasts_s = one.travel * report.full_speed_m_s, following.sent_s - one.sent_s
+            way_m, speed = follow(way_m, speed, target, acceleration_m_s2, lasts_s)
         return Displacement(way_m, speed)
 
-    def course(
-        self,
-        now_s: float,
-        echo_sent_s: float | None,
-        echo_held_s: float | None,
-        speed_m_s: float,
-        full_speed_m_s: float,
-        changes_s: FloatArray,
-        told_m_s: float | None = None,
-    ) -> Course | None:
+    def course(self, now_s: float, report: Report, changes_s: FloatArray) -> Course | None:
         """Follow trigger and sticks to the time at which a command sent at `now_s` is followed; see `displacement`.
 
         changes_s: K (n, 5). A change Δ of travel and deflections takes max |K Δ|, and all change in proportion. None
         where the sticks rest all the time, too.
         """
-        counting = self._counting(now_s, echo_sent_s, echo_held_s, speed_m_s, full_speed_m_s)
+        counting = self._counting(now_s, report)
         if counting is None or all(one.sticks == AT_REST for one in counting[:-1]):
             return None
-        since_s = counting[0].sent_s
-        if told_m_s is not None:
-            counting[0] = counting[0]._replace(travel=told_m_s / full_speed_m_s)
+        since_s, full_speed_m_s = counting[0].sent_s, report.full_speed_m_s
         edges_s, before = _edges_s(since_s, now_s)
-        targets = _means([*self._before(since_s), *counting], edges_s)
+        looked_s = float(edges_s[0])
+        earlier = [one._replace(sent_s=max(one.sent_s, looked_s)) for one in self._from(looked_s, since_s)]
+        targets = _means([*earlier, *counting], edges_s)
         followed, passed = targets[0], [np.zeros(5)]
         for number, (target, lasts_s) in enumerate(zip(targets, np.diff(edges_s).tolist(), strict=True)):
             if number == before:
-                followed = np.array([speed_m_s / full_speed_m_s, *followed[1:]])
+                followed = np.array([report.speed_m_s / full_speed_m_s, *followed[1:]])
             gained, followed = follow_together(followed, target, changes_s, lasts_s)
             passed.append(passed[-1] + gained)
         points = np.array(passed[before:])
         ways_m = full_speed_m_s * (points[:, 0] - points[0, 0])
         return Course(ways_m, full_speed_m_s * float(followed[0]), points[:, 1:], followed[1:], changes_s)
 
-    def _counting(
-        self,
-        now_s: float,
-        echo_sent_s: float | None,
-        echo_held_s: float | None,
-        speed_m_s: float,
-        full_speed_m_s: float,
-    ) -> list[Command] | None:
-        """Check what `displacement` is given, and list the commands from e on."""
+    def _counting(self, now_s: float, report: Report) -> list[Command] | None:
+        """List the commands that count from e to now, the oldest first, and the end; None where they are not known."""
+        echo_sent_s, held_s, speed_m_s, full_speed_m_s, told_m_s = report
         if not math.isfinite(speed_m_s):
             raise ValueError(f"speed_m_s = {speed_m_s}; valid: finite")
         if not (math.isfinite(full_speed_m_s) and full_speed_m_s > 0.0):
             raise ValueError(f"full_speed_m_s = {full_speed_m_s}; valid: finite and above 0")
-        if echo_sent_s is None or echo_held_s is None:
+        if echo_sent_s is None or held_s is None:
             return None
         if not (self._sent and max(now_s - self._window_s, self._sent[0].sent_s) <= echo_sent_s <= now_s):
             return None
-        if not 0.0 <= echo_held_s <= now_s - echo_sent_s + _CLOCK_RATES_S:
+        if not 0.0 <= held_s <= now_s - echo_sent_s + _CLOCK_RATES_S:
             return None
-        return self._from_echo_on(echo_sent_s, echo_held_s, now_s)
+        followed, *under_way = self._from(echo_sent_s, now_s)
+        since_s = min(echo_sent_s + held_s, under_way[0].sent_s if under_way else now_s)
+        travel = followed.travel if told_m_s is None else told_m_s / full_speed_m_s
+        return [followed._replace(sent_s=since_s, travel=travel), *under_way, Command(now_s, 0.0)]
 
-    def _before(self, until_s: float) -> list[Command]:
-        """Every command that counts from when the map was looked at, on average, to then; the oldest first."""
-        since_s, newest_first = until_s - 0.5 * PERIOD_S, list[Command]()
+    def _from(self, since_s: float, until_s: float) -> list[Command]:
+        """List the commands from the one that counts at `since_s` on, the oldest first."""
+        newest_first = []
         for one in reversed(self._sent):
-            if one.sent_s < until_s:
-                newest_first.append(one._replace(sent_s=max(one.sent_s, since_s)))
+            if one.sent_s <= until_s:
+                newest_first.append(one)
             if one.sent_s <= since_s:
                 break
         return newest_first[::-1]
-
-    def _from_echo_on(self, echo_sent_s: float, echo_held_s: float, now_s: float) -> list[Command]:
-        """Every command that counts between e and now, the oldest first, and the end of it."""
-        newest_first = []
-        for one in reversed(self._sent):
-            if one.sent_s <= now_s:
-                newest_first.append(one)
-            if one.sent_s <= echo_sent_s:
-                break
-        followed, *under_way = reversed(newest_first)
-        since_s = min(echo_sent_s + echo_held_s, under_way[0].sent_s if under_way else now_s)
-        return [followed._replace(sent_s=since_s), *under_way, Command(now_s, 0.0)]
 
 
 def _edges_s(since_s: float, now_s: float) -> tuple[FloatArray, int]:

@@ -8,7 +8,7 @@ from common.protocol.messages import Compensation, MotionCommand, StiffnessUpdat
 from common.reaction import WRITE_S
 from operator_side.dualsense.reports.output_report import RELEASED, OutputReport
 from operator_side.feel.blindness import Blindness
-from operator_side.feel.commands_under_way import CommandsUnderWay, Displacement
+from operator_side.feel.commands_under_way import CommandsUnderWay, Displacement, Report
 from operator_side.feel.path_ahead import Aside
 from operator_side.feel.rendering import RenderingSettings, TriggerRendering
 from operator_side.feel.write_bound import WriteBound
@@ -105,10 +105,7 @@ class Haptics:
         """δ and w by our own commands under way, from where the gripper was when `felt` was sent."""
         if self._compensation == "robot":
             return None
-        header, along = felt.header, felt.r2
-        echo = header.echo_sent_s, header.echo_held_s
-        able = along.full_speed_m_s, along.acceleration_m_s2
-        return self._commands.displacement(now_s, *echo, felt.speed_m_s, *able, felt.told_m_s)
+        return self._commands.displacement(now_s, _report(felt), felt.r2.acceleration_m_s2)
 
     def take_map(self, felt: StiffnessUpdate) -> None:
         """Keep the newest message that has a map, even where another has overtaken it: few have one."""
@@ -130,13 +127,11 @@ class Haptics:
         mapped = self._mapped
         if mapped is None or mapped.around is None or self._compensation == "robot":
             return None
-        header, along = mapped.header, mapped.r2
+        header = mapped.header
         if header.epoch != felt.header.epoch or felt.header.sent_s - header.sent_s > MAP_EXPIRES_S:
             self._mapped = None
             return None
-        echo = header.echo_sent_s, header.echo_held_s
-        able = along.full_speed_m_s, mapped.around.changes_s()
-        course = self._commands.course(now_s, *echo, mapped.speed_m_s, *able, mapped.told_m_s)
+        course = self._commands.course(now_s, _report(mapped), mapped.around.changes_s())
         if course is None:
             return None
         return Aside(mapped.around, mapped.horizon_m, course, self._commands.sticks_at(now_s))
@@ -165,3 +160,8 @@ class Haptics:
     def summary(self) -> dict[str, Any]:
         """What is to be known of the run."""
         return self.rendering.summary() | {"writes": self.writes, "without_history": self.without_history}
+
+
+def _report(felt: StiffnessUpdate) -> Report:
+    header = felt.header
+    return Report(header.echo_sent_s, header.echo_held_s, felt.speed_m_s, felt.r2.full_speed_m_s, felt.told_m_s)

@@ -1,9 +1,9 @@
 """Trace the gripper's path, trigger and sticks together, through the robot side's map of what is around it.
 
 The robot side knows a stick a loop after the hand does. So it sends ways from probes around the gripper (`Around`).
-The path begins where that message was sent. It follows the commands under way. Then the sticks stay as they are, for
-one reaction and until the arm stands. A zone is full where its path is longer, at some point, than the way that is free
-there.
+The path begins where that message was sent. It follows the commands under way. Then it goes on for one reaction and
+until the arm stands: with the sticks as they are, and with the sticks let go. A zone is full where either path is
+longer, at some point, than the way that is free there.
 """
 
 from bisect import bisect_right
@@ -104,7 +104,7 @@ def _traced(
 def _ahead(
     course: Course, speeds_m_s: FloatArray, sticks: Sticks, full_m_s: float, horizon_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Go on from the course's end at each zone's speed (z, 1) for one reaction, and brake then; the sticks stay.
+    """Go on from the course's end at each zone's speed (z, 1) for one reaction, and brake then; sticks: all the time.
 
     Returns the ways (z, k) and how long each stick would take (z, k, 4), at _AHEAD times until the arm stands. As
     `common.following.follow_together` twice.

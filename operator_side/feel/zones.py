@@ -33,7 +33,7 @@ class Zones(NamedTuple):
     def at_least(self, others: "Zones", most: int) -> "Zones":
         """Make each as stiff as in `others`, but by these to `most` at most."""
         strengths = (max(mine, min(other, most)) for mine, other in zip(self.strengths, others.strengths, strict=True))
-        return Zones(tuple(strengths), self.beyond_horizon)
+        return Zones(tuple(strengths), max(self.beyond_horizon, others.beyond_horizon))
 
 
 FREE: Final = Zones((0,) * ZONE_COUNT, 0)

@@ -56,7 +56,7 @@ class TouchingDown:
         self._carried_n = self._usual_n = 0.0
 
     def due(self, time_s: float) -> bool:
-        """Whether to take in a load at `time_s`: what it takes to work one out is a tenth of a tick."""
+        """Tell whether a load is wanted at `time_s`, every 4 ms: to work one out takes a tenth of a tick."""
         return time_s - self._time_s >= _PERIOD_S
 
     @property

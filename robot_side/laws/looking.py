@@ -145,13 +145,12 @@ def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
         at_most, busy = at_most - 1, True
         waited, side, place = longest_waiting(bundle, moment.now)
     of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed)
-    # No probe has ever been looked from: all are, at once.
-    while of_probe == math.inf or of_probe >= (_OVERDUE if busy else 1.0 - _ROUNDING):
+    due = _OVERDUE if busy else 1.0 - _ROUNDING
+    while of_probe >= due:
+        # After the first one only those that were never looked from.
+        due = math.inf
         if not _look_along(bundle, moment, side, place):
             return False
-        once, busy = of_probe < math.inf, True
         of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed)
-        if once:
-            break
     memory_at(bundle).state[0].next = moment.now if max(waited, of_probe) >= 1.0 - _ROUNDING else math.inf
     return True

@@ -129,17 +129,17 @@ class SweptLaw:
         known = self._room[0] >= 0 and ways_around(self.memory.bundle, pose.tool_position_m, ways_m)
         if not (known and 0.0 < until_s <= LONGEST_S):
             return None
-        # Straight ahead the newest looks know more: what has just appeared, and what the fingers do.
-        newest_m = self._felt[_FULL_WAYS]
-        ways_m[:, 0] = np.where(newest_m < self._felt[HORIZON], np.minimum(ways_m[:, 0], newest_m), ways_m[:, 0])
         if (closing_m_s := self._closing_m_s(pose)).any():
             # A look knows what moves until the gripper stands, and not what has moved since.
             since_s = self.memory.state["measured"] - self.memory.around["at"].reshape(2, 1, PROBES)
             ways_m -= (closing_m_s[:, None, None] * since_s).repeat(2, axis=1).reshape(LISTS, PROBES)
+        # Straight ahead the newest looks know more: what has just appeared, and what the fingers do.
+        newest_m = self._felt[_FULL_WAYS]
+        ways_m[:, 0] = np.where(newest_m < self._felt[HORIZON], np.minimum(ways_m[:, 0], newest_m), ways_m[:, 0])
         return Around.of(until_s, ways_m, change_times_s(pose, self._limits, self._motion))
 
     def _closing_m_s(self, pose: GripperPose) -> FloatArray:
-        """Find how fast the fastest of all things comes nearer (2,) against the ways of R2 and of L2."""
+        """Find how fast the fastest thing that may be met comes nearer, against R2's ways and against L2's (2,)."""
         velocities = None if self._frame is None else self._frame.velocities_m_s
         if velocities is None or self._classes is None:
             return np.zeros(2)

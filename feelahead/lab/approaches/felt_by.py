@@ -15,7 +15,7 @@ from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.spoilt import SPOILING_DELAY_S, Spoil
 from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
-from operator_side.feel.commands_under_way import Displacement
+from operator_side.feel.commands_under_way import Displacement, Report
 from operator_side.feel.path_ahead import Aside
 from operator_side.feel.rendering import RenderingSettings, TriggerRendering
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
@@ -151,11 +151,11 @@ class Judged:
             return None, None
         held_s = then_s - float(record.applied_at_s[tick])
         able = sensed.r2
-        report = now_s, echo_sent_s, held_s, sensed.speed_m_s, able.full_speed_m_s
+        report = Report(echo_sent_s, held_s, sensed.speed_m_s, able.full_speed_m_s)
         around = law.around(replay.estimated[row])
-        course = None if around is None else replay.commands.course(*report, around.changes_s())
+        course = None if around is None else replay.commands.course(now_s, report, around.changes_s())
         if course is None or around is None:
-            return replay.commands.displacement(*report, able.acceleration_m_s2), None
+            return replay.commands.displacement(now_s, report, able.acceleration_m_s2), None
         return None, Aside(around, sensed.horizon_m, course, replay.commands.sticks_at(now_s))
 
 

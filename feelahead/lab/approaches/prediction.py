@@ -12,7 +12,7 @@ from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 from common.arrays import BoolArray, FloatArray
 from feelahead.lab.approaches.recording import RecordedApproach
 from feelahead.lab.table import Row, Table
-from operator_side.feel.commands_under_way import CommandsUnderWay
+from operator_side.feel.commands_under_way import CommandsUnderWay, Report
 from robot_side.arm.ability import along_approach
 from robot_side.arm.port import GripperPose
 from robot_side.simulation.joint_reference import MotionLimits
@@ -132,14 +132,8 @@ def predicted(
         while sent < len(record.command_time_s) and record.command_time_s[sent] <= now_s:
             commands.sent(float(record.command_time_s[sent]), float(record.command[sent]))
             sent += 1
-        found = commands.displacement(
-            float(now_s),
-            float(at.echo_sent_s[row]),
-            float(at.echo_held_s[row]),
-            float(speeds_m_s[row]),
-            float(full_speeds_m_s[row]),
-            float(accelerations_m_s2[row]),
-        )
+        numbers = at.echo_sent_s[row], at.echo_held_s[row], speeds_m_s[row], full_speeds_m_s[row]
+        found = commands.displacement(float(now_s), Report(*map(float, numbers)), float(accelerations_m_s2[row]))
         if found is not None:
             ways_m[row], speeds[row] = found
     return ways_m, speeds

@@ -1,16 +1,19 @@
 """Commands under way are followed as a slow stepping of time would follow them, whatever was sent and when."""
 
+import itertools
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from operator_side.feel.commands_under_way import MAX_DELAY_S, CommandsUnderWay, Displacement
+from operator_side.feel.commands_under_way import MAX_DELAY_S, CommandsUnderWay, Displacement, Report
 
 FULL_M_S = 0.25
 PERIOD_S = 0.004
+STEPS = 200
 TRAVEL = st.floats(-1.0, 1.0)
 SPEED = st.floats(-0.3, 0.3)
 ACCELERATION = st.floats(0.5, 20.0)
@@ -34,22 +37,22 @@ def displacement(
     acceleration_m_s2: float = 3.0,
     told_m_s: float | None = None,
 ) -> Displacement:
-    found = commands.displacement(now_s, echo_sent_s, echo_held_s, speed_m_s, FULL_M_S, acceleration_m_s2, told_m_s)
+    report = Report(echo_sent_s, echo_held_s, speed_m_s, FULL_M_S, told_m_s)
+    found = commands.displacement(now_s, report, acceleration_m_s2)
     assert found is not None
     return found
 
 
 def stepped(travels: list[float], now_s: float, since_s: float, speed_m_s: float, acceleration: float) -> Displacement:
-    """The same by time steps; command i holds from i periods on."""
-    steps = 20_000
-    step_s, way_m = (now_s - since_s) / steps, 0.0
-    for step in range(steps):
-        time_s = since_s + (step + 0.5) * step_s
-        target = FULL_M_S * travels[min(int(time_s / PERIOD_S), len(travels) - 1)]
-        most = acceleration * step_s
-        after = speed_m_s + min(max(target - speed_m_s, -most), most)
-        way_m += 0.5 * (speed_m_s + after) * step_s
-        speed_m_s = after
+    """The same by time steps, none across a command; command i holds from i periods on."""
+    way_m, commands = 0.0, [index * PERIOD_S for index in range(len(travels)) if since_s < index * PERIOD_S < now_s]
+    for began_s, ended_s in itertools.pairwise([since_s, *commands, now_s]):
+        target = FULL_M_S * travels[min(int((began_s + ended_s) / 2.0 / PERIOD_S), len(travels) - 1)]
+        step_s = (ended_s - began_s) / STEPS
+        for _ in range(STEPS):
+            after = speed_m_s + min(max(target - speed_m_s, -acceleration * step_s), acceleration * step_s)
+            way_m += 0.5 * (speed_m_s + after) * step_s
+            speed_m_s = after
     return Displacement(way_m, speed_m_s)
 
 
@@ -88,6 +91,23 @@ def test_what_the_robot_gives_the_newest_command_takes_the_place_of_what_that_as
     assert found == pytest.approx(displacement(sent_every(travels), *moment), abs=1e-12)
 
 
+@given(st.lists(st.floats(-0.1, 0.1), min_size=1, max_size=60), SPEED, ACCELERATION, st.data())
+def test_a_course_beside_a_stick_that_costs_no_time_goes_the_same_way(
+    changes: list[float], speed: float, acceleration: float, data: st.DataObject
+) -> None:
+    """Each 10 ms it goes towards the mean of what a finger commanded that takes 40 ms from end to end."""
+    commands, now_s, travel = CommandsUnderWay(), (len(changes) - 1) * PERIOD_S + 0.01, 0.0
+    for index, change in enumerate(changes):
+        travel = min(max(travel + change, -1.0), 1.0)
+        commands.sent(index * PERIOD_S, travel, (1.0, 0.0, 0.0, 0.0))
+    report = Report(data.draw(st.integers(0, len(changes) - 1)) * PERIOD_S, 0.001, speed, FULL_M_S)
+    expected = commands.displacement(now_s, report, acceleration)
+    course = commands.course(now_s, report, np.array([[FULL_M_S / acceleration, 0.0, 0.0, 0.0, 0.0]]))
+    assert expected is not None
+    assert course is not None
+    assert course.ways_m[-1] == pytest.approx(expected.way_m, abs=5e-4)
+
+
 def test_a_command_that_had_not_come_when_it_should_have_is_still_under_way() -> None:
     # The robot had nothing newer than 0.0 for 30 ms: what was sent at 4 ms comes at the time of the report or later.
     commands = sent_every([1.0] + [0.0] * 24)
@@ -122,15 +142,16 @@ def test_without_an_echo_that_history_reaches_back_to_there_is_no_answer(
     commands = CommandsUnderWay()
     for tick in range(501):
         commands.sent(0.01 * tick, 0.5)
-    assert commands.displacement(5.0, echo_sent_s, echo_held_s, 0.1, FULL_M_S, 3.0) is None
-    assert commands.displacement(5.0, 3.0, 0.0, 0.1, FULL_M_S, 3.0) is not None
+    assert commands.displacement(5.0, Report(echo_sent_s, echo_held_s, 0.1, FULL_M_S), 3.0) is None
+    assert commands.displacement(5.0, Report(3.0, 0.0, 0.1, FULL_M_S), 3.0) is not None
 
 
 def test_there_is_no_answer_from_before_the_first_command() -> None:
     commands = CommandsUnderWay()
-    assert commands.displacement(1.0, 0.9, 0.0, 0.0, FULL_M_S, 3.0) is None
+    report = Report(0.9, 0.0, 0.0, FULL_M_S)
+    assert commands.displacement(1.0, report, 3.0) is None
     commands.sent(0.95, 0.0)
-    assert commands.displacement(1.0, 0.9, 0.0, 0.0, FULL_M_S, 3.0) is None
+    assert commands.displacement(1.0, report, 3.0) is None
     assert displacement(commands, 1.0, 0.95) == Displacement(0.0, 0.0)
 
 
@@ -144,7 +165,7 @@ def test_memory_is_bounded_whatever_the_rate() -> None:
         commands.sent(1e-6 * tick, 0.0)
     assert len(commands) == 4096
     # What was forgotten is not taken for nothing.
-    assert commands.displacement(0.01, 0.001, 0.0, 0.0, FULL_M_S, 3.0) is None
+    assert commands.displacement(0.01, Report(0.001, 0.0, 0.0, FULL_M_S), 3.0) is None
     for tick in range(2000):
         commands.sent(1.0 + PERIOD_S * tick, 0.0)
     assert len(commands) <= MAX_DELAY_S / PERIOD_S + 2
@@ -154,21 +175,23 @@ def test_memory_is_bounded_whatever_the_rate() -> None:
     assert len(short) <= 0.1 / PERIOD_S + 2
 
 
-MOMENT = (0.01, 0.0, 0.0)
-
-
 @pytest.mark.parametrize(
     ("what", "values"),
     [
         *((CommandsUnderWay.sent, values) for values in ((1.0, 1.001), (1.0, math.nan), (0.0, 0.0), (math.inf, 0.0))),
-        *((CommandsUnderWay.displacement, (*MOMENT, *arm)) for arm in ((math.nan, 0.25, 3.0), (0.0, 0.0, 3.0))),
         *(
-            (CommandsUnderWay.displacement, (*MOMENT, 0.0, *arm))
-            for arm in ((math.inf, 3.0), (0.25, 0.0), (0.25, math.nan))
+            (CommandsUnderWay.displacement, (0.01, Report(0.0, 0.0, speed, full), acceleration))
+            for speed, full, acceleration in (
+                (math.nan, 0.25, 3.0),
+                (0.0, 0.0, 3.0),
+                (0.0, math.inf, 3.0),
+                (0.0, 0.25, 0.0),
+                (0.0, 0.25, math.nan),
+            )
         ),
         *((CommandsUnderWay.__init__, (window_s,)) for window_s in (0.0, -1.0, math.inf, math.nan)),
     ],
 )
-def test_what_cannot_be_is_refused(what: Callable[..., object], values: tuple[float, ...]) -> None:
+def test_what_cannot_be_is_refused(what: Callable[..., object], values: tuple[object, ...]) -> None:
     with pytest.raises(ValueError, match="valid: "):
         what(sent_every([0.0, 0.0]), *values)

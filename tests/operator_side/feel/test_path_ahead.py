@@ -16,7 +16,7 @@ from common.protocol.uniform_field import FAR_M, uniform_field
 from common.reaction import HORIZON_S
 from operator_side.dualsense.effects.official import ZONE_COUNT
 from operator_side.feel.blindness import Blindness
-from operator_side.feel.commands_under_way import AT_REST, CommandsUnderWay, Course, Sticks
+from operator_side.feel.commands_under_way import AT_REST, CommandsUnderWay, Course, Report, Sticks
 from operator_side.feel.haptics import MAP_EXPIRES_S, Haptics
 from operator_side.feel.path_ahead import Aside, _ahead, free_ways_m, traced_zones
 from operator_side.feel.rendering import RenderingSettings
@@ -31,6 +31,7 @@ RIGHT_ACROSS, RIGHT_TURNED, UP_ACROSS = (1, 2, 3), (4, 5), (6, 7, 8)
 RIGHT: Sticks = (1.0, 0.0, 0.0, 0.0)
 CHANGES_S = np.diag([FIELD.full_speed_m_s / FIELD.acceleration_m_s2, 0.0, 0.0, 0.0, 0.0])
 """The trigger alone takes time."""
+REPORT = Report(0.0, 0.0, 0.0, FIELD.full_speed_m_s)
 
 HORIZON_M = 0.4
 
@@ -54,7 +55,7 @@ def under_way(now_s: float, sticks: Sticks, travel: float = 0.0, since_s: float 
 
 def first_zone(told: Around, sticks: Sticks, *, now_s: float = 0.4, travel: float = 0.0, forth: bool = True) -> int:
     commands = under_way(now_s, sticks, travel)
-    course = commands.course(now_s, 0.0, 0.0, 0.0, FIELD.full_speed_m_s, CHANGES_S)
+    course = commands.course(now_s, REPORT, CHANGES_S)
     if course is None:
         return ZONE_COUNT
     aside = Aside(told, HORIZON_M, course, commands.sticks_at(now_s))
@@ -63,11 +64,11 @@ def first_zone(told: Around, sticks: Sticks, *, now_s: float = 0.4, travel: floa
 
 
 def test_sticks_that_rest_are_not_traced() -> None:
-    assert under_way(0.4, AT_REST).course(0.4, 0.0, 0.0, 0.1, 0.25, CHANGES_S) is None
+    assert under_way(0.4, AT_REST).course(0.4, REPORT, CHANGES_S) is None
     # One that has just come to rest is still under way.
     commands = under_way(0.4, RIGHT)
     commands.sent(0.404, 0.5, AT_REST)
-    assert commands.course(0.41, 0.0, 0.0, 0.1, 0.25, CHANGES_S) is not None
+    assert commands.course(0.41, REPORT, CHANGES_S) is not None
 
 
 @pytest.mark.parametrize("forth", [True, False])
@@ -107,6 +108,14 @@ def test_what_lies_straight_ahead_of_a_turn_or_a_drift_is_not_met() -> None:
         assert first_zone(told, sticks, now_s=0.0) < ZONE_COUNT
 
 
+def test_a_stick_that_is_let_go_now_leads_to_what_it_would_have_passed() -> None:
+    """Nobody knows whether the stick goes on: it has just begun, and the thing stands where the gripper is."""
+    told = around({0: 0.05})
+    assert first_zone(told, RIGHT, now_s=0.012) < ZONE_COUNT
+    # By two thirds of the way to the first probe it has led past.
+    assert first_zone(told, RIGHT, now_s=0.2) == ZONE_COUNT
+
+
 def test_strength_rises_before_full_as_it_does_straight_ahead_and_no_farther() -> None:
     rising = ways(*(0.193 + 0.001 * k for k in range(8)))
     two_things = ways(0.05, 0.06, *(0.195 + 0.001 * k for k in range(6)))
@@ -115,7 +124,7 @@ def test_strength_rises_before_full_as_it_does_straight_ahead_and_no_farther() -
     for field in (rising, two_things):
         told = around(dict.fromkeys((*RIGHT_ACROSS, 0), reaches_m + 0.003))
         commands = under_way(0.4, RIGHT)
-        course = commands.course(0.4, 0.0, 0.0, 0.0, FIELD.full_speed_m_s, CHANGES_S)
+        course = commands.course(0.4, REPORT, CHANGES_S)
         assert course is not None
         aside = Aside(told, HORIZON_M, course, RIGHT)
         along = msgspec.structs.replace(FIELD, fast_m=field, slow_m=field)
@@ -232,6 +241,20 @@ def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> Non
     assert report is not None
     assert report.r2 is not None
     assert report.r2.zone_strengths[-1] == 8
+
+
+def test_what_is_to_be_touched_is_felt_beside_a_stick_in_the_zones_that_touch_it() -> None:
+    """A map has ways of full strength alone; the slow ways of a target rise to strength 4, and are full behind it."""
+    target = msgspec.structs.replace(FIELD, slow_m=ways(*[0.002] * 4, *[0.3] * 4), fast_m=ways(*[0.002] * 8))
+    slow, fast = around({0: 0.002}).ways_m(FAR_M)[:2], around({}).ways_m(FAR_M)[0]
+    told = Around.of(FULL_S, np.stack([slow[0], fast, fast, fast]), CHANGES_S)
+    made = haptics()
+    update = message(0.3, told, r2=target)
+    made.take_map(update)
+    report = made.output_report(update, (0.0, 0.1), Blindness(), 0.4)
+    assert report is not None
+    assert report.r2 is not None
+    assert report.r2.zone_strengths[1] == 4
 
 
 def test_a_map_counts_that_came_before_arming_or_was_overtaken() -> None:

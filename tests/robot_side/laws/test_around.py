@@ -159,6 +159,37 @@ def test_it_is_looked_at_anew_where_roles_or_p_change(law: SweptLaw) -> None:
     assert told.r2_m[0] == pytest.approx(0.1, abs=3e-3)
 
 
+def test_what_has_just_appeared_straight_ahead_is_in_the_next_map(law: SweptLaw) -> None:
+    looks(law, 300, np.zeros(6), 0.0)
+    for tick in range(30):
+        law.sense(situation(ball_pose(), walls(0.05), loop_age_s=LOOP_S), 0.3 + 0.001 * tick)
+    told = told_by(law, ball_pose())
+    assert told is not None
+    assert told.r2_m[0] < 0.05
+    assert told.r2_m[1:].max() > 0.09  # of before
+
+
+def test_what_is_held_or_ignored_shortens_no_way_by_moving(law: SweptLaw) -> None:
+    lifted = Scene().add().box([0.0, 0.0, 0.3], [0.01] * 3).add().box([0.0, 0.0, 0.2], [0.5, 0.5, 0.05]).objects()
+    moved = replace(lifted, velocities_m_s=np.array([[0.0, 0.0, -0.1], [0.0, 0.0, 0.0]]))
+    for tick in range(300):
+        law.sense(situation(ball_pose(), lifted, loop_age_s=LOOP_S, held=0), 0.001 * tick)
+    before = told_by(law, ball_pose())
+    for tick in range(100):
+        law.sense(situation(ball_pose(), moved, loop_age_s=LOOP_S, held=0), 0.3 + 0.001 * tick)
+    after = told_by(law, ball_pose())
+    assert before is not None
+    assert after is not None
+    np.testing.assert_array_equal(before.r2_m, after.r2_m)
+
+
+def test_after_a_change_of_role_a_new_map_comes_within_a_tenth_of_a_second(law: SweptLaw) -> None:
+    looks(law, 300, np.zeros(6), 0.0)
+    law.expect(0.5)
+    looks(law, 100, np.zeros(6), 0.3)
+    assert told_by(law, ball_pose()) is not None
+
+
 def test_what_comes_nearer_shortens_every_way_by_what_it_covers_until_it_is_told(law: SweptLaw) -> None:
     looks(law, 300, np.zeros(6), 0.0)
     comes_m_s, until_s, told = 0.12, 0.0, []
