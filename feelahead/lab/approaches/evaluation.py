@@ -123,9 +123,9 @@ class _Staged:
 
     @property
     def knowable(self) -> tuple[tuple[Collision, float], ...]:
-        """Those of them that are judged after the sticks have moved: nobody can know the others."""
-        moved_s = self.replay.sticks_moved_s
-        return tuple((one, last_s) for one, last_s in self.avoidable if last_s - REACTION_S >= moved_s)
+        """Those of them whose sticks stay from when they are judged to the last release: nobody can know the others."""
+        moves = self.replay.moves_sticks
+        return tuple((one, last_s) for one, last_s in self.avoidable if not moves(last_s - REACTION_S, last_s))
 
     def draw(self, shift_m: FloatArray, cell: Placed, number: int) -> Draw:
         """Move the objects by shift_m (3,), seen with the camera's `number`-th error."""
@@ -255,7 +255,7 @@ def _figures(counts: _Counts, staged: Sequence[_Staged], probability: float) -> 
     the places in which full strength stands before the touch; never: the share of the others. reported: draws in which
     the operator side has a report of the drift or turn, if any, 0.25 s before the last moment; reported_coverage is of
     these alone. mean_strength: in the zone that the finger reaches, at that time. Places without draws: unavoidable, as
-    no release avoids the contact, and unknowable, as the sticks have not moved by then. alarm_share: of the time in
+    no release avoids the contact, and unknowable, as the sticks are moved after that. alarm_share: of the time in
     which R2 was pulled, judged_s.
     """
     draws, covered = sum(counts.draws), len(counts.hits) > 0

@@ -4,6 +4,7 @@ A pull is open loop: it does not depend on the objects in the way.
 """
 
 import math
+from bisect import bisect_right
 from typing import Final, Literal, get_args
 
 import numpy as np
@@ -13,7 +14,7 @@ from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SP
 from operator_side.hands.travel_calibration import StickRest, TriggerTravel
 from operator_side.simulated_person.pulling_hands import Hands, Pull
 
-PullKind = Literal["steady", "bell", "on_off", "random", "drift", "yaw"]
+PullKind = Literal["steady", "bell", "on_off", "random", "drift", "yaw", "swerve"]
 PULL_KINDS: Final[tuple[PullKind, ...]] = get_args(PullKind)
 
 _TRAVEL = TriggerTravel()
@@ -32,7 +33,8 @@ def make_pull(kind: PullKind, seed: int) -> Pull:
 
     steady: one travel between 0.25 and 1. bell: bell-shaped pulls of 0.7 to 1.4 s (minimum jerk), rests between.
     on_off: pressed for 0.3 to 0.7 s, let go for 0.2 to 0.5 s. random: travel that wanders between 0 and 1.
-    drift, yaw: steady, while a stick moves across at 0.1 m/s, or turns at 0.5 rad/s, to one side.
+    drift, yaw: steady, while a stick moves across at 0.1 m/s, or turns at 0.5 rad/s, to one side. swerve: steady, while
+    either stick, 0.4 to 0.8 deflected, is swapped to the other side each 0.3 to 0.7 s.
     """
     generator = np.random.default_rng([seed, PULL_KINDS.index(kind)])
     if kind == "bell":
@@ -41,6 +43,8 @@ def make_pull(kind: PullKind, seed: int) -> Pull:
         return _on_off(generator)
     if kind == "random":
         return _wandering(generator)
+    if kind == "swerve":
+        return _swerving(generator)
     side = float(generator.choice([-1.0, 1.0]))
     stick = (side * (_STICK.dead_zone + 1.0 - _STICK.dead_zone), 0.0)
     hands = Hands(
@@ -78,6 +82,20 @@ def _on_off(generator: np.random.Generator) -> Pull:
         end_s += pressed_s + float(generator.uniform(0.2, 0.5))
     pressed = Hands(r2_n=force_n)
     return lambda since_s: pressed if any(start <= since_s < end for start, end in presses) else Hands()
+
+
+def _swerving(generator: np.random.Generator) -> Pull:
+    force_n, turns = force_for(float(generator.uniform(0.25, 1.0))), bool(generator.integers(2))
+    deflected = float(generator.uniform(0.4, 0.8)) * float(generator.choice([-1.0, 1.0]))
+    ends_s = np.cumsum(generator.uniform(0.3, 0.7, size=round(_LONGEST_S / 0.3))).tolist()
+
+    def pull(since_s: float) -> Hands:
+        stick = (deflected * (-1.0) ** bisect_right(ends_s, since_s), 0.0)
+        return Hands(
+            r2_n=force_n, left_stick=(0.0, 0.0) if turns else stick, right_stick=stick if turns else (0.0, 0.0)
+        )
+
+    return pull
 
 
 def _wandering(generator: np.random.Generator) -> Pull:

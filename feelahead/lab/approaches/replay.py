@@ -175,12 +175,12 @@ class Replay:
         command = MotionCommand(Header(epoch=1, sequence=row, sent_s=0.0), 0.0, 0.0, lateral, turning)
         return np.concatenate(tool_motion(command, self.motion))
 
-    @cached_property
-    def sticks_moved_s(self) -> float:
-        """Time of the first command that asks for a motion aside; before all times where none does."""
+    def moves_sticks(self, from_s: float, until_s: float) -> bool:
+        """Tell whether sticks are commanded otherwise at any time up to `until_s` than at `from_s`."""
         record = self.record
-        moved = record.lateral.any(axis=1) | record.turning.any(axis=1)
-        return float(record.command_time_s[np.argmax(moved)]) if moved.any() else -math.inf
+        first, last = (max(int(np.searchsorted(record.command_time_s, at + 1e-9)) - 1, 0) for at in (from_s, until_s))
+        sticks = np.hstack([record.lateral, record.turning])[first : last + 1]
+        return bool((sticks != sticks[0]).any())
 
     def _end_s(self) -> float:
         record = self.record

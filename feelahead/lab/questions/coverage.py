@@ -156,7 +156,7 @@ def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
     )
     yield _by_cell(found, settings.laws, "false alarms a minute (share of the time in which R2 is pulled)", _alarms)
     yield "n: draws (approaches). apart: places in which no release avoids the contact / that are judged before the"
-    yield "sticks have moved, so that nobody can know / that were not found"
+    yield "sticks move once more, so that nobody can know / that were not found"
     yield from (by_pull(found, law) for law in settings.laws)
     yield "once reported: draws in which the operator side had a report of the drift or turn in time"
     yield by_law(table, settings.laws)

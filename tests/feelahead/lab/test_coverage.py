@@ -245,7 +245,7 @@ def test_a_cell_has_what_it_takes_to_judge_it() -> None:
         assert row["alarm_s"] == pytest.approx(row["alarm_share"] * row["judged_s"])
 
 
-def test_places_that_are_judged_before_the_stick_has_moved_are_counted_apart() -> None:
+def test_places_after_whose_judging_the_stick_moves_are_counted_apart() -> None:
     (row,) = evaluate(Pulls("drift", "200 ms", "empty", (Placed("rod_5mm"),), (1, 8), (0.5,), ("full",)), 0)
     assert (row["places"], row["unavoidable"], row["unknowable"], row["coverage"]) == (8, 0, 1, 1.0)
     # As many draws in each other place, 20 or more in all.
@@ -276,7 +276,7 @@ def test_full_physics_does_as_reckoned_around_the_last_moment(link: str, around_
 def test_the_plans() -> None:
     full = CoverageSettings().pulls()
     cells = [(pulls.pull, pulls.link, cell) for pulls in full for cell in pulls.cells]
-    assert len({cell.key(pull, link) for pull, link, cell in cells}) == len(cells) == 179
+    assert len({cell.key(pull, link) for pull, link, cell in cells}) == len(cells) == 191
     kinds = {(pulls.pull, pulls.link) for pulls in full}
     for kind in kinds:
         assert sum(len(one.cells) * one.judged_s for one in full if (one.pull, one.link) == kind) == pytest.approx(

@@ -45,7 +45,7 @@ def test_a_pull_is_that_of_its_seed_and_presses_r2_alone_no_harder_than_a_finger
         assert all(0.0 <= hands.r2_n <= (3.7 if kind == "on_off" else force_for(1.0)) for hands in seen)
         assert any(hands.r2_n > 0.5 for hands in seen)
         assert {hands.l2_n for hands in seen} == {0.0}
-        if kind not in ("drift", "yaw"):
+        if kind not in ("drift", "yaw", "swerve"):
             assert {(hands.left_stick, hands.right_stick) for hands in seen} == {((0.0, 0.0), (0.0, 0.0))}
 
 
@@ -141,3 +141,15 @@ def test_drift_and_yaw_deflect_one_stick_to_the_full_to_either_side(kind: PullKi
         assert 0.25 <= settled_travel(pull(1.0).r2_n) <= 1.0
         assert pull(0.0) == pull(30.0)
     assert sides == {-1, 1}
+
+
+def test_a_swerve_swaps_one_stick_from_side_to_side() -> None:
+    turned = set()
+    for seed in range(8):
+        seen = samples(make_pull("swerve", seed), 19.0, 0.01)
+        turned.add(turns := any(any(hands.right_stick) for hands in seen))
+        sides = [(hands.right_stick if turns else hands.left_stick)[0] for hands in seen]
+        assert 0.4 <= max(sides) == -min(sides) <= 0.8
+        lasts_s = [0.01 * len(list(run)) for _, run in itertools.groupby(sides)]
+        assert all(0.29 <= last_s <= 0.71 for last_s in lasts_s[:-1])
+    assert turned == {False, True}
