@@ -58,9 +58,10 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
 
         changes_s (n, AXES): see `changes`; 8 s stand for longer.
         """
-        steps = np.clip(np.floor(ways_m / STEP_M), 0, _FREE - 1)
-        changes = np.clip(np.rint(changes_s / CHANGE_STEP_S), -(2**15), 2**15 - 1).astype("<i2")
-        return cls(full_s, np.where(np.isinf(ways_m), _FREE, steps).astype(np.uint8).tobytes(), changes.tobytes())
+        steps = np.minimum(np.maximum(ways_m / STEP_M, 0.0), _FREE - 1)
+        steps[ways_m == np.inf] = _FREE
+        changes = np.minimum(np.maximum(np.rint(changes_s / CHANGE_STEP_S), -(2**15)), 2**15 - 1)
+        return cls(full_s, steps.astype(np.uint8).tobytes(), changes.astype("<i2").tobytes())
 
     def ways_m(self, horizon_m: float) -> FloatArray:
         """Work out the ways (LISTS, PROBES), none beyond the horizon."""
@@ -75,5 +76,5 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
 
     def differs(self, other: "Around") -> bool:
         """Tell whether a way differs by more than a step, or T does."""
-        mine, others = (np.frombuffer(one.steps, dtype=np.uint8).astype(np.int16) for one in (self, other))
-        return self.full_s != other.full_s or bool((np.abs(mine - others) > 1).any())
+        both = np.frombuffer(self.steps + other.steps, dtype=np.uint8).reshape(2, -1)
+        return self.full_s != other.full_s or int((both.max(axis=0) - both.min(axis=0)).max()) > 1

@@ -8,8 +8,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.arm.port import GripperPose
-from robot_side.arm.resolved_rate import joint_velocities, refuse, resolve
-from robot_side.arm.tool_motion import ToolMotionSettings, full_twists
+from robot_side.arm.resolved_rate import refuse, resolve
 from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, output_array
 from robot_side.compiled.stack import on_stack
 
@@ -111,12 +110,37 @@ def along_approach(pose: GripperPose, limits: JointLimits, full_speed_m_s: float
     return ability(pose, limits, pose.tool_rotation[:, 2], full_speed_m_s)
 
 
-def change_times_s(pose: GripperPose, limits: JointLimits, motion: ToolMotionSettings) -> FloatArray:
+def change_times_s(pose: GripperPose, limits: JointLimits, twists: FloatArray) -> FloatArray:
     """Work out how long (n, 5) each joint takes from rest to full travel of R2, and to each fully deflected stick.
 
     K of a change Δ (5,) of travel and deflections, which takes max |K Δ|: the joint that changes most limits all.
+    twists (5, 6): `tool_motion.full_twists`. ValueError as `joint_velocities`.
     """
-    twists = pose.tool_rotation @ full_twists(motion).reshape(5, 2, 3, 1)
-    rates = [joint_velocities(pose.tool_jacobian, twist.ravel(), limits.velocity_rad_s) for twist in twists]
-    times_s: FloatArray = np.stack(rates, axis=1) / limits.acceleration_rad_s2[:, None]
-    return times_s
+    times_s = np.empty((len(twists), limits.velocity_rad_s.size))
+    jacobian, rotation = np.ascontiguousarray(pose.tool_jacobian), np.ascontiguousarray(pose.tool_rotation)
+    if not _find_change_times(jacobian, rotation, twists, limits.velocity_rad_s, limits.acceleration_rad_s2, times_s):
+        refuse(pose.tool_jacobian, twists[0], limits.velocity_rad_s)
+    return times_s.T
+
+
+@compiled(*(input_array(2),) * 3, *(input_array(1),) * 2, output_array(2), returns=TRUTH)
+def _find_change_times(
+    jacobian: FloatArray,
+    rotation: FloatArray,
+    twists: FloatArray,
+    limits: FloatArray,
+    accelerations: FloatArray,
+    times: FloatArray,
+) -> bool:
+    for axis in range(twists.shape[0]):
+        twist, rates = _twist(), times[axis]
+        for i in range(6):
+            row, part = i % 3, i - i % 3
+            twist[i] = 0.0
+            for k in range(3):
+                twist[i] += rotation[row, k] * twists[axis, part + k]
+        if not resolve(jacobian, twist, limits, rates):
+            return False
+        for joint in range(limits.size):
+            rates[joint] /= accelerations[joint]
+    return True

@@ -11,12 +11,13 @@ from typing import Final
 from common.arrays import FloatArray, IntArray
 from common.protocol.around import ACROSS, PERIOD_S, PROBES, TURNED
 from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array, output_array
+from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array, input_indices, output_array
 from robot_side.compiled.vectors import Vector, add, dot, load, norm, scale
+from robot_side.field.object_class import PASSED_OVER
 from robot_side.field.scratch import STRENGTHS
 from robot_side.laws.memory import MOST_PLACES, memory_at
 from robot_side.laws.path import move
-from robot_side.laws.sensed import L2, R2
+from robot_side.laws.sensed import HORIZON, L2, OF_A_SIDE, R2
 
 FIRST_PROBE: Final = 1 + MOST_PLACES
 """The number that the first probe has as a place"""
@@ -128,16 +129,49 @@ def keep_probe(bundle: IntArray, side: int, probe: int, now: float, tool: Vector
         new.ways[kind] = prospect.gone + prospect.stretch * ways[kind, STRENGTHS - 1]
 
 
-@compiled(BUNDLE, input_array(1), output_array(2), returns=TRUTH)
-def ways_around(bundle: IntArray, tool: FloatArray, ways: FloatArray) -> bool:
-    """Fill ways (LISTS, PROBES) from where the tool (3,) is; False while one is not known."""
+@inlined
+def _closing(approach: Vector, classes: IntArray, velocities: FloatArray) -> float:
+    """Find how fast the fastest thing that may be met comes nearer against `approach`."""
+    closing = 0.0
+    for thing in range(velocities.shape[0]):
+        if classes[thing] != PASSED_OVER:
+            closing = max(closing, -dot(approach, load(velocities, thing)))
+    return closing
+
+
+@compiled(
+    *(BUNDLE, input_array(1), input_array(2), input_indices(), input_array(2), input_array(1), output_array(2)),
+    returns=TRUTH,
+)
+def ways_around(
+    bundle: IntArray,
+    tool: FloatArray,
+    rotation: FloatArray,
+    classes: IntArray,
+    velocities: FloatArray,
+    felt: FloatArray,
+    ways: FloatArray,
+) -> bool:
+    """Fill ways (LISTS, PROBES) from where the tool (3,) is; False while one is not known.
+
+    rotation (3, 3), classes (k,), velocities (k, 3), or (0, 3) where none is known, and felt as `sense` filled it.
+    """
     memory, place = memory_at(bundle), load(tool.reshape(1, 3), 0)
-    if not is_known(bundle):
+    if velocities.shape[0] > classes.size or not is_known(bundle):
         return False
-    for side in range(2):
+    for side in (R2, L2):
+        approach = scale(1.0 if side == R2 else -1.0, (rotation[0, 2], rotation[1, 2], rotation[2, 2]))
+        closing = _closing(approach, classes, velocities)
         for probe in range(PROBES):
             one = memory.around[side * PROBES + probe]
-            moved = dot((one.direction[0], one.direction[1], one.direction[2]), place) - one.began
+            gone = dot((one.direction[0], one.direction[1], one.direction[2]), place) - one.began
+            # A look knows what moves until the gripper stands, and not what has moved since.
+            gone += closing * (memory.state[0].measured - one.at)
             for kind in range(2):
-                ways[2 * side + kind, probe] = one.ways[kind] - moved
+                ways[2 * side + kind, probe] = one.ways[kind] - gone
+        for kind in range(2):
+            # Straight ahead the newest look knows more: what has just appeared, and what the fingers do.
+            newest = felt[side * OF_A_SIDE + kind * STRENGTHS + STRENGTHS - 1]
+            if newest < felt[HORIZON]:
+                ways[2 * side + kind, 0] = min(ways[2 * side + kind, 0], newest)
     return True

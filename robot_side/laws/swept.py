@@ -22,12 +22,12 @@ from common.touch_speed import touch_speed_m_s
 from robot_side.arm.ability import JointLimits, change_times_s, find_ability
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import refuse
-from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.arm.tool_motion import ToolMotionSettings, full_twists
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.field.field import Along
 from robot_side.field.look import look
 from robot_side.field.object_class import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
-from robot_side.field.scratch import STRENGTHS, Count, Scratch
+from robot_side.field.scratch import Count, Scratch
 from robot_side.field.total_overlap import sum_overlaps
 from robot_side.laws.around import STILL_M_S, ways_around
 from robot_side.laws.explanation import (
@@ -43,13 +43,11 @@ from robot_side.laws.memory import Memory, Total
 from robot_side.laws.path import go_to_place
 from robot_side.laws.prospect import find_prospect, stopping_s
 from robot_side.laws.sense import sense
-from robot_side.laws.sensed import HORIZON, L2, NUMBERS, OF_A_SIDE, R2, Sensed
+from robot_side.laws.sensed import L2, NUMBERS, R2, Sensed
 from robot_side.surroundings.perceived import PerceivedObjects, Role
 from robot_side.surroundings.scene_table import SceneTable
 from robot_side.surroundings.surroundings import Surroundings
 
-_FULL_WAYS: Final = [side * OF_A_SIDE + kind * STRENGTHS + STRENGTHS - 1 for side in (R2, L2) for kind in range(2)]
-"""Of what a tick found out, in the order of a map: R2's ways of full strength, fast and slow, and L2's"""
 _NO_VELOCITIES: Final[FloatArray] = np.empty((0, 3))
 
 
@@ -78,7 +76,7 @@ class SweptLaw:
         self.encoder_sigma_rad = encoder_sigma_rad
         self._uncertainty = uncertainty
         self._limits = limits
-        self._motion = motion
+        self._twists = full_twists(motion)
         missed = [uncertainty.prediction.table(kind) for kind in ("operator", "robot")]
         self.memory = Memory(limits, encoder_sigma_rad, missed)
         settings = self.memory.settings[0]
@@ -124,27 +122,14 @@ class SweptLaw:
 
     def around(self, pose: GripperPose) -> Around | None:
         """Ways from around the gripper, from where it is; None while not all are known, or nobody asks for them."""
-        ways_m = np.empty((LISTS, PROBES))
-        until_s = float(self.memory.state["until"][0])
-        known = self._room[0] >= 0 and ways_around(self.memory.bundle, pose.tool_position_m, ways_m)
-        if not (known and 0.0 < until_s <= LONGEST_S):
+        until_s, ways_m = float(self.memory.state["until"][0]), np.empty((LISTS, PROBES))
+        if self._frame is None or self._classes is None or not 0.0 < until_s <= LONGEST_S:
             return None
-        if (closing_m_s := self._closing_m_s(pose)).any():
-            # A look knows what moves until the gripper stands, and not what has moved since.
-            since_s = self.memory.state["measured"] - self.memory.around["at"].reshape(2, 1, PROBES)
-            ways_m -= (closing_m_s[:, None, None] * since_s).repeat(2, axis=1).reshape(LISTS, PROBES)
-        # Straight ahead the newest looks know more: what has just appeared, and what the fingers do.
-        newest_m = self._felt[_FULL_WAYS]
-        ways_m[:, 0] = np.where(newest_m < self._felt[HORIZON], np.minimum(ways_m[:, 0], newest_m), ways_m[:, 0])
-        return Around.of(until_s, ways_m, change_times_s(pose, self._limits, self._motion))
-
-    def _closing_m_s(self, pose: GripperPose) -> FloatArray:
-        """Find how fast the fastest thing that may be met comes nearer, against R2's ways and against L2's (2,)."""
-        velocities = None if self._frame is None else self._frame.velocities_m_s
-        if velocities is None or self._classes is None:
-            return np.zeros(2)
-        along_m_s = velocities[self._classes[1] != PASSED_OVER] @ pose.tool_rotation[:, 2]
-        return np.array([-along_m_s.min(initial=0.0), along_m_s.max(initial=0.0)])
+        velocities = self._frame.velocities_m_s
+        seen = self._classes[1], _NO_VELOCITIES if velocities is None else velocities, self._felt
+        if not ways_around(self.memory.bundle, pose.tool_position_m, pose.tool_rotation, *seen, ways_m):
+            return None
+        return Around.of(until_s, ways_m, change_times_s(pose, self._limits, self._twists))
 
     def ask_around(self, *, asked: bool) -> None:
         """Look from around the gripper, too, from now on, or no longer; nobody asks for it at first."""

@@ -36,7 +36,7 @@ def test_trigger_and_sticks_are_followed_as_the_joints_references_follow_them(
     began: list[float], then: list[float]
 ) -> None:
     joints = POSE.tool_jacobian.shape[1]
-    changes_s = change_times_s(POSE, LIMITS.of_joints(joints), MOTION)
+    changes_s = change_times_s(POSE, LIMITS.of_joints(joints), full_twists(MOTION))
 
     def rates(of: list[float]) -> np.ndarray:
         linear, angular = np.array(of) @ full_twists(MOTION)[:, :3], np.array(of) @ full_twists(MOTION)[:, 3:]
@@ -55,7 +55,7 @@ def test_trigger_and_sticks_are_followed_as_the_joints_references_follow_them(
 
 
 def test_each_axis_alone_takes_what_its_slowest_joint_takes() -> None:
-    changes_s = change_times_s(POSE, LIMITS.of_joints(POSE.tool_jacobian.shape[1]), MOTION)
+    changes_s = change_times_s(POSE, LIMITS.of_joints(POSE.tool_jacobian.shape[1]), full_twists(MOTION))
     assert changes_s.shape == (POSE.tool_jacobian.shape[1], 5)
     _, followed = follow_together(np.zeros(5), np.eye(5)[0], changes_s, 0.5 * float(np.abs(changes_s[:, 0]).max()))
     assert followed[0] == pytest.approx(0.5)
