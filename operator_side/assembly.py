@@ -1,16 +1,17 @@
 """Settings to an operator side that is ready to feel."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 
 from operator_side.core import OperatorSide
+from operator_side.events import Listener
 from operator_side.settings import OperatorSettings
 
 
 def build_operator_side(
-    settings: OperatorSettings, epoch: int, clock_domain: str, side: Callable[..., OperatorSide] = OperatorSide
+    settings: OperatorSettings, epoch: int, clock_domain: str, listeners: Sequence[Listener] = ()
 ) -> OperatorSide:
-    """Put an operator side together. `side`: makes the core, as one that notes what happens to it."""
-    return side(
+    """Put an operator side together. listeners: hear what happens to it."""
+    return OperatorSide(
         epoch,
         clock_domain,
         haptics=settings.haptics,
@@ -21,4 +22,5 @@ def build_operator_side(
         seed=settings.seed,
         asymmetry_s=settings.asymmetry_s(),
         full_rate=settings.full_rate,
+        listeners=listeners,
     )

@@ -71,7 +71,7 @@ def operator_facts(
         to_operator=_delay("", (there for _, there, _ in recent)),
         to_robot=_delay(surroundings.asked_to_robot, (_back(there, both) for _, there, both in recent)),
         round_trip_ms=None if offset.round_trip_s is None else 1e3 * offset.round_trip_s,
-        field_age_ms=1e3 * (now_s - core.stiffness_s) if core.stiffness_received else None,
+        field_age_ms=1e3 * (now_s - core.felt.received_s) if core.felt.count else None,
         hands=surroundings.hands,
         may_tune=lease is not None and lease.may_tune,
         probability=None if lease is None else lease.probability,

@@ -34,7 +34,7 @@ def hear_pages(console: Console, pages: DrivingPage, now_s: float) -> None:
 def follow_pages(pages: DrivingPage, core: OperatorSide, now_s: float) -> None:
     """In every turn: a stop on a page counts like the controller's, and what a page wants tuned is asked for."""
     if pages.stopping(now_s):
-        core.stop_button.press(now_s)
+        core.press_stop(now_s)
     if (wish := pages.take_wish()) is not None:
         core.tune(wish.probability, wish.link, now_s)
 

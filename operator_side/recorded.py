@@ -1,7 +1,6 @@
-"""An operator side that notes every call of its core and what it answered, to be made again bit for bit."""
+"""Note every call of the core and what it answered, so that a replay makes them again bit for bit."""
 
-import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import msgspec
@@ -12,85 +11,48 @@ from common.recording.entries import Kind, entry, text
 from common.recording.provenance import provenance
 from common.recording.side import SideRecording
 from operator_side.assembly import build_operator_side
-from operator_side.commanding import StopButton, ToRobot
+from operator_side.commanding import ToRobot
 from operator_side.core import OperatorSide
 from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
-from operator_side.hands.travel_calibration import TravelCalibration
+from operator_side.events import Input, Listener
 from operator_side.settings import OperatorSettings
 
-Note = Callable[[Any], None]
 _HAPTICS: Final = text(b"haptics")
 _NOBODY: Final = text(b"")
 
 
-class RecordedOperatorSide(OperatorSide):
-    """As the one that it extends; `note` takes what happened."""
+_KINDS: Final[dict[Input, Kind]] = {
+    "received": Kind.RECEIVED,
+    "seen": Kind.SEEN,
+    "report": Kind.REPORT,
+    "tuned": Kind.TUNED,
+    "calibrated": Kind.CALIBRATED,
+    "found": Kind.FOUND,
+    "lost": Kind.LOST,
+    "stopped": Kind.STOPPED,
+}
 
-    def __init__(self, note: Note, epoch: int, clock_domain: str, **settings: Any) -> None:
-        super().__init__(epoch, clock_domain, **settings)
+
+class Recorder(Listener):
+    """Passes to `note` what happens."""
+
+    def __init__(self, note: Callable[[Any], None]) -> None:
         self._note = note
         self._now_s = 0.0
-        self.stop_button = _NotedStop(note)
 
-    def receive(self, payload: bytes, now_s: float) -> None:
-        """As the core's."""
-        self._note((Kind.RECEIVED, now_s, payload))
-        super().receive(payload, now_s)
+    def on_input(self, what: Input, content: object, now_s: float | None) -> None:
+        """Note it; what has no time happened after the last call that had one."""
+        packed = content if isinstance(content, bytes) else msgspec.json.encode(content)
+        self._note((_KINDS[what], self._now_s if now_s is None else now_s, packed))
 
-    def receive_view(self, payload: bytes, now_s: float) -> None:
-        """As the core's."""
-        self._note((Kind.SEEN, now_s, payload))
-        super().receive_view(payload, now_s)
-
-    def read_report(self, report: bytes, now_s: float) -> None:
-        """As the core's."""
-        self._note((Kind.REPORT, now_s, report))
-        super().read_report(report, now_s)
-
-    def tune(self, probability: float | None, link: str | None, now_s: float) -> None:
-        """As the core's."""
-        self._note((Kind.TUNED, now_s, msgspec.json.encode({"probability": probability, "link": link})))
-        super().tune(probability, link, now_s)
-
-    def calibrate(self, calibration: TravelCalibration) -> None:
-        """As the core's, which asks for no time: it happened after the last call that had one."""
-        self._note((Kind.CALIBRATED, self._now_s, msgspec.json.encode(calibration)))
-        super().calibrate(calibration)
-
-    def controller_found(self, now_s: float) -> None:
-        """As the core's."""
-        self._note((Kind.FOUND, now_s, b""))
-        super().controller_found(now_s)
-
-    def controller_lost(self, now_s: float) -> None:
-        """As the core's."""
-        self._note((Kind.LOST, now_s, b""))
-        super().controller_lost(now_s)
-
-    def motion(self, now_s: float) -> list[ToRobot]:
-        """As the core's."""
-        messages = super().motion(now_s)
+    def on_motion(self, messages: Sequence[ToRobot], now_s: float) -> None:
+        """Note the messages."""
         self._note((Kind.MOTION, now_s, messages))
-        return messages
 
-    def output_report(self, now_s: float) -> OutputReport | None:
-        """As the core's."""
+    def on_output(self, report: OutputReport | None, now_s: float) -> None:
+        """Note the report."""
         self._now_s = now_s
-        report = super().output_report(now_s)
         self._note((Kind.OUTPUT, now_s, report))
-        return report
-
-
-class _NotedStop(StopButton):
-    """A stop that was pressed away from the controller."""
-
-    def __init__(self, note: Note) -> None:
-        super().__init__()
-        self._note = note
-
-    def press(self, now_s: float) -> None:
-        self._note((Kind.STOPPED, now_s, b""))
-        super().press(now_s)
 
 
 class OperatorEncoder:
@@ -119,16 +81,11 @@ class OperatorEncoder:
 
 
 def build_recorded(settings: OperatorSettings, epoch: int, recording: SideRecording | None) -> OperatorSide:
-    """The core of `settings`, whose calls go to `recording` where there is one."""
-    core = build_operator_side(settings, epoch, clock_domain(), recorded_by(recording))
-    if recording is not None:
-        recording.begin(provenance(settings, epoch, clock_domain()))
-    return core
-
-
-def recorded_by(recording: SideRecording | None) -> Callable[..., OperatorSide]:
-    """What makes a core whose calls go to `recording`; the plain one without a recording."""
-    return OperatorSide if recording is None else functools.partial(RecordedOperatorSide, recording.noted.append)
+    """Make the core of `settings`, whose calls go to `recording` where there is one."""
+    if recording is None:
+        return build_operator_side(settings, epoch, clock_domain())
+    recording.begin(provenance(settings, epoch, clock_domain()))
+    return build_operator_side(settings, epoch, clock_domain(), [Recorder(recording.noted.append)])
 
 
 def recorded_status(core: OperatorSide, now_s: float) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.statistics import BLOCK, RunningStatistics
+from robot_side.events import Listener, Tick
 from robot_side.laws.sensed import (
     ENLARGEMENT,
     L2,
@@ -26,6 +27,7 @@ from robot_side.surroundings.perceived import Role
 if TYPE_CHECKING:
     from robot_side.simulation.ground_truth import Truth
 
+TRUTH_PERIOD_S = 0.01
 MOVING_M_S = 0.01
 """A tool faster than this counts as moving."""
 _CONTACT_REST_S = 0.1
@@ -38,11 +40,16 @@ _MOST_ROWS = 8 * BLOCK
 """That many ticks wait at most to be reckoned with, if nobody asks for it between ticks."""
 
 
-class RunFigures:
+class RunFigures(Listener):
     """Statistics over the ticks; nothing here is read back by the control."""
 
-    def __init__(self, seed: int = 0) -> None:
+    def __init__(self, seed: int = 0, truth: Observer | None = None) -> None:
+        """truth: sees what really happens, where there is a simulation to see it in."""
         self.ticks = 0
+        self._observer = truth
+        self._start_s: float | None = None
+        self._next_truth_s = -np.inf
+        self._loop_age = RunningStatistics(seed)
         self._rows: list[tuple[FloatArray, bool]] = []
         """Of the newest ticks: the numbers of `Sensed`, and whether the arm was armed."""
         self._enlargement = RunningStatistics(seed)
@@ -64,17 +71,38 @@ class RunFigures:
         self._held = False
         self._newest: FloatArray = np.zeros(NUMBERS)
 
+    def on_tick(self, tick: Tick) -> None:
+        """Take in one tick; one that failed found nothing."""
+        if self._start_s is None:
+            self._start_s = tick.now_s
+        if (found := tick.found) is None:
+            return
+        armed = found.permission.state == "armed"
+        if found.situation.loop_age_known:
+            self._loop_age.add(found.situation.loop_age_s)
+        self.tick(found.sensed, armed=armed)
+        self.task(armed, found.holds_target, found.target_m, tick.now_s)
+
+    def on_sent(self, now_s: float) -> None:
+        """Reckon with a block of ticks at once, which costs each of them less, and see what is true."""
+        if len(self._rows) >= BLOCK:
+            self._take_in()
+        if self._observer is not None:
+            self._observer.watch(self, now_s)
+            if now_s >= self._next_truth_s:
+                self._next_truth_s = now_s + TRUTH_PERIOD_S
+                self._observer.observe(self, now_s)
+
+    def since_start_s(self, time_s: float) -> float:
+        """Return the time since the first tick."""
+        return time_s - (self._start_s or 0.0)
+
     def tick(self, sensed: Sensed, *, armed: bool = True) -> None:
         """One tick's enlargement, overlap and stiffness; nobody feels any while the arm is not armed."""
         self._newest = sensed.numbers
         self._rows.append((sensed.numbers, armed))
         self.ticks += 1
         if len(self._rows) == _MOST_ROWS:
-            self._take_in()
-
-    def reckon(self) -> None:
-        """Between ticks: reckon with those of a block at once, which costs each of them less."""
-        if len(self._rows) >= BLOCK:
             self._take_in()
 
     def _take_in(self) -> None:
@@ -107,10 +135,10 @@ class RunFigures:
         """Whether the first contact has been."""
         return self._first_contact is not None
 
-    def first_contact(self, thing: str, closing_speed_m_s: float, since_start_s: float) -> None:
-        """The gripper has touched something that is no support, for the first time, at so much since the start."""
+    def first_contact(self, thing: str, closing_speed_m_s: float, now_s: float) -> None:
+        """Note the gripper's first contact with something that is no support."""
         speed_mm_s = 1e3 * closing_speed_m_s
-        self._first_contact = {"with": thing, "speed_mm_s": speed_mm_s, "time_s": since_start_s}
+        self._first_contact = {"with": thing, "speed_mm_s": speed_mm_s, "time_s": self.since_start_s(now_s)}
 
     def task(self, armed: bool, held: bool, target_center_m: FloatArray | None, now_s: float) -> None:
         """How far the task has come: armed, grasped, lifted; the target's centre (3,) as perceived."""
@@ -148,6 +176,7 @@ class RunFigures:
             "min_distance_mm": scaled(self._min_distance_m, 1e3),
             "contacts": sum(self._contacts.values()),
             "first_contact": self._first_contact,
+            "loop_age_ms": self._loop_age.summary_ms(),
             "task": {
                 "time_to_grasp_s": grasp_s,
                 "lifted_mm": 1e3 * self._lifted_m,
@@ -166,8 +195,8 @@ class Observer(Protocol):
         """Tell `figures` the true distances and contacts."""
         ...
 
-    def watch(self, figures: RunFigures, since_start_s: float) -> None:
-        """In every turn: tell `figures` the first contact."""
+    def watch(self, figures: RunFigures, now_s: float) -> None:
+        """Tell `figures` the first contact, in every turn."""
         ...
 
 

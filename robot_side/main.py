@@ -2,8 +2,7 @@
 
 import secrets
 from collections import deque
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from common.clock import MonotonicClock, ThreadClock, clock_domain
@@ -25,17 +24,19 @@ from common.sockets.admission import Admission
 from common.sockets.authentication import RobotKeys
 from common.sockets.robot import RobotSockets
 from common.statistics import RunningStatistics
-from robot_side.assembly import Assembled, assemble
 from robot_side.cameras.pictures import Cameras
 from robot_side.cameras.shapes import SceneModel
 from robot_side.compiled.warm_up import warm_up
+from robot_side.core import RobotSide
+from robot_side.events import Listener
 from robot_side.link_reporter import LinkReporter
 from robot_side.looking import Looking
-from robot_side.recorded import RobotEncoder, recorded_by, recorded_status, robot_header
+from robot_side.parts import RobotParts, build_parts
+from robot_side.recorded import Recorder, RobotEncoder, recorded_status, robot_header
 from robot_side.scene_view import SceneView
 from robot_side.sending import SENT_STREAMS, Sending
 from robot_side.settings import RobotSettings
-from robot_side.timed import HELPS, STAGES, TimedArm, TimedLaw
+from robot_side.turn_stages import HELPS, STAGES, StageTiming
 
 TICK_PERIOD_S = 1e-3
 KEYS_PERIOD_S = 0.2
@@ -52,8 +53,11 @@ def main() -> None:
     run_command("feelahead-robot", command)
 
 
-def command(arguments: Sequence[str]) -> int:
-    """Run the robot side until --duration, Ctrl-C or SIGTERM; the arm stands still on every way out."""
+def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[Listener]], RobotSide] = RobotSide) -> int:
+    """Run the robot side until --duration, Ctrl-C or SIGTERM; the arm stands still on every way out.
+
+    build: makes the core.
+    """
     settings = parse_settings(RobotSettings, "feelahead-robot", arguments)
     link = settings.link_spec()
     keys = None if settings.keys is None else RobotKeys.load(settings.keys)
@@ -68,22 +72,15 @@ def command(arguments: Sequence[str]) -> int:
     ):
         epoch = secrets.randbits(53)
         stages = Stages(STAGES, MonotonicClock(), ThreadClock(), settings.seed)
-        assembled = assemble(
-            settings,
-            epoch,
-            clock_domain(),
-            watch=partial(TimedArm, stages=stages),
-            other_law=partial(TimedLaw, stages=stages),
-            announce=status.note,
-            side=recorded_by(recording),
-        )
-        core = assembled.core
+        parts = build_parts(settings, epoch, clock_domain(), announce=status.note)
+        listeners: list[Listener] = [StageTiming(stages)]
+        core = build(parts, listeners if recording is None else [*listeners, Recorder(recording.noted.append)])
         sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
-        for text in (*core.notes, *unused_clauses(link, [("to_operator", stream) for stream in sent])):
+        for text in (*parts.notes, *unused_clauses(link, [("to_operator", stream) for stream in sent])):
             status.note(text)
-        warm_up(lambda: status.note(_COMPILING), assembled.kernels)
+        warm_up(lambda: status.note(_COMPILING), parts.kernels)
         if recording is not None:
-            recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": core.notes})
+            recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": parts.notes})
             status.also = recording.note
         with StopSignal() as stop:
             status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
@@ -94,7 +91,7 @@ def command(arguments: Sequence[str]) -> int:
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
-            loop = _Loop(settings, assembled, link, sockets, status, recording, stages)
+            loop = _Loop(settings, core, link, sockets, status, recording, stages)
             failure: Exception | None = None
             try:
                 loop.run(stop)
@@ -122,22 +119,22 @@ class _Loop:
     def __init__(
         self,
         settings: RobotSettings,
-        assembled: Assembled,
+        core: RobotSide,
         link: LinkSpec,
         sockets: RobotSockets,
         status: Status,
         recording: SideRecording | None,
         stages: Stages,
     ) -> None:
-        self._recording = recording
+        parts, self._recording = core.parts, recording
         self._duration_s = settings.duration
-        self._core = core = assembled.core
+        self._core = core
         self._link = link
         self._sockets = sockets
         self._status = status
         self._clock = MonotonicClock()
         self._computed = ThreadClock()
-        self._arm = assembled.arm
+        self._arm = parts.simulation
         self._arm.give_way(self._clock)
         self._told_slow = False
         self._admission = Admission()
@@ -147,8 +144,8 @@ class _Loop:
         self._sending = Sending(link, sockets, secrets.randbits(32))
         self._looking = Looking(
             core,
-            SceneView(SceneModel(assembled.scene), assembled.kinematics, assembled.law),
-            Cameras(assembled.scene, settings.cameras, status.note) if settings.cameras.on else None,
+            SceneView(SceneModel(parts.scene), parts.kinematics, parts.explains),
+            Cameras(parts.scene, settings.cameras, status.note) if settings.cameras.on else None,
             self._sending,
             always=() if recording is None else (*VIEW_NAMES, "scene"),
             seed=settings.seed,
@@ -224,7 +221,7 @@ class _Loop:
         self._pacer.begin(now_s)
         self._admission.begin_tick()
         began_s, computed_s = self._clock.now(), self._computed.now()
-        self._core.felt.interval_s = self._sending.budget.haptic_interval_s
+        self._core.reports.felt.interval_s = self._sending.budget.haptic_interval_s
         outgoing = self._core.tick(now_s)
         self._tick_cpu_time.add(self._computed.now() - computed_s)
         took_s = self._clock.now() - began_s

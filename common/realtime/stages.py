@@ -27,6 +27,8 @@ class Stages:
         self._wall, self._processor = wall, processor
         self._every, self._until_next, self._looks = every, 0, True
         self._turn_s = [0.0] * len(self.spent_s)
+        self._begun: tuple[int, float, float] | None = None
+        """The stage that was begun: its place, and both clocks then"""
         self._turns_s: list[list[float]] = []
         self._statistics = [RunningStatistics(seed) for _ in self.spent_s]
 
@@ -46,6 +48,17 @@ class Stages:
             return result
 
         return measured
+
+    def begin(self, name: str | None) -> None:
+        """What follows counts to the stage `name`, until this is called again; None: to none."""
+        if not self._looks:
+            return
+        wall_s, processor_s = self._wall.now(), self._processor.now()
+        if self._begun is not None:
+            place, began_s, computed_s = self._begun
+            self._turn_s[place] += wall_s - began_s
+            self._turn_s[place + 1] += processor_s - computed_s
+        self._begun = None if name is None else (2 * self.names.index(name), wall_s, processor_s)
 
     def end_turn(self) -> None:
         """What was spent since the last call is one turn's."""

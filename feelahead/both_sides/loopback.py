@@ -4,7 +4,7 @@ Everything happens at the instant when it is due, in order of time, so that the 
 the same numbers on every machine.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -17,8 +17,8 @@ from common.realtime.stages import microseconds
 from common.silence import MOTION_PERIOD_S
 from common.statistics import RunningStatistics
 from feelahead.both_sides.summary import merge_summaries
+from operator_side import events as operator_events
 from operator_side.assembly import build_operator_side
-from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.connection import Connection
 from operator_side.dualsense.hid.search import OpenController, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
@@ -26,11 +26,11 @@ from operator_side.following_pages import follow_pages
 from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.whoever import whoever
-from robot_side.assembly import assemble
+from robot_side import events as robot_events
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
-from robot_side.laws.law import Law
 from robot_side.main import TICK_PERIOD_S
+from robot_side.parts import RobotParts, build_parts
 from robot_side.settings import RobotSettings
 from robot_side.simulation.scene import Scene
 
@@ -50,6 +50,11 @@ class LoopbackSettings:
     operator: OperatorSettings = field(default_factory=OperatorSettings)
 
 
+def robot_parts(settings: RobotSettings, scene: Scene | None = None) -> RobotParts:
+    """Make the robot side's parts for a virtual clock, in this scene or the one that the settings name."""
+    return build_parts(settings, 1, VIRTUAL_CLOCK, scene)
+
+
 class Person(Protocol):
     """Whoever has the controller in their hands."""
 
@@ -64,32 +69,28 @@ class Loopback:
         self,
         settings: LoopbackSettings,
         *,
-        scene: Scene | None = None,
+        parts: RobotParts | None = None,
         device: SimulatedDualSense | None = None,
         person: Callable[[SimulatedDualSense], Person] | None = None,
         pages: DrivingPage | None = None,
-        after_robot_tick: Callable[[float], None] | None = None,
-        other_law: Callable[[Law], Law] | None = None,
+        listeners: Sequence[robot_events.Listener] = (),
+        operator_listeners: Sequence[operator_events.Listener] = (),
         tick_period_s: float = TICK_PERIOD_S,
-        robot_side: Callable[..., RobotSide] = RobotSide,
-        operator_side: Callable[..., OperatorSide] = OperatorSide,
     ) -> None:
-        """`scene`: instead of the one that the settings name; `person`: instead of the scripted one.
+        """parts: the robot side's, instead of those that the settings name (see `robot_parts`).
+
+        person: instead of the scripted one.
 
         tick_period_s: of the robot side; the physics keeps its own steps, and its fields come each 10 ms at most.
 
         pages: of the console, as the person knows them.
-        other_law: makes another law of the one that the settings name.
-        robot_side, operator_side: make the cores, as ones that note what happens to them.
-        after_robot_tick: called with `now_s` after each turn of the robot side, to watch what happens.
+        listeners, operator_listeners: hear what happens to the two cores.
         """
         self.clock = VirtualClock()
-        self.robot: RobotSide = assemble(
-            settings.robot, 1, VIRTUAL_CLOCK, scene=scene, other_law=other_law, side=robot_side
-        ).core
+        self.robot = RobotSide(parts or robot_parts(settings.robot), listeners)
         # After the scene, which decides what kernels there are.
         warm_up()
-        self.operator = build_operator_side(settings.operator, 2, VIRTUAL_CLOCK, operator_side)
+        self.operator = build_operator_side(settings.operator, 2, VIRTUAL_CLOCK, operator_listeners)
         self.device = device or SimulatedDualSense()
         self.connection = Connection(Ready(OpenController(self.device, "simulated DualSense")), self.operator)
         self.pages = pages or DrivingPage(may_drive=False)
@@ -104,7 +105,6 @@ class Loopback:
                 swap_sides=settings.operator.swap_sides,
             )
         )
-        self._after_robot_tick = after_robot_tick
         self._tick_period_s = tick_period_s
         self.tick_time = RunningStatistics(settings.robot.seed)
         self._there, self._back = settings.operator.link_spec(), settings.robot.link_spec()
@@ -178,5 +178,3 @@ class Loopback:
             self._back = tuned_link(self._back, words)
             for stream, line in self._to_operator.items():
                 line.change(self._back.profile("to_operator", stream))
-        if self._after_robot_tick is not None:
-            self._after_robot_tick(now_s)

@@ -7,7 +7,7 @@ from typing import Final, Literal
 from common.emulation.clauses import LinkModel
 from common.protocol.around import Around
 from common.protocol.uniform_field import uniform_field
-from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
 from feelahead.lab.table import Row
 from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.dualsense.simulated.trigger_model import zone_of
@@ -15,6 +15,7 @@ from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.person import SimulatedOperator
 from operator_side.simulated_person.settings import PersonSettings
 from robot_side.arm.port import GripperPose
+from robot_side.events import Listener
 from robot_side.laws.law import Law, Situation
 from robot_side.laws.sensed import Sensed
 from robot_side.main import TICK_PERIOD_S
@@ -76,7 +77,7 @@ class _Silent:
         return self._law.summary()
 
 
-class _Watch:
+class _Watch(Listener):
     """Truth, tick by tick."""
 
     def __init__(self, trial: Trial, seed: int) -> None:
@@ -91,31 +92,31 @@ class _Watch:
         self._parts = {self.scene.model.geom(geom).name for geom in self.scene.robot.gripper_geoms}
         self._hit_s: dict[str, float] = {}
         self._next_s = -math.inf
+        robot = RobotSettings(
+            link=trial.link,
+            link_model=trial.link_model,
+            seed=seed,
+            scene=trial.scene,
+            camera=CameraSettings(sd_m=trial.camera_sd_m),
+            probability=trial.probability,
+        )
+        operator = OperatorSettings(
+            link=trial.link,
+            link_model=trial.link_model,
+            seed=seed,
+            haptics=trial.arm != "off",
+            person=trial.person if trial.arm == "reacting" else replace(trial.person, trust=0.0),
+        )
+        parts = robot_parts(robot, self.scene)
         self.loopback = Loopback(
-            LoopbackSettings(
-                RobotSettings(
-                    link=trial.link,
-                    link_model=trial.link_model,
-                    seed=seed,
-                    scene=trial.scene,
-                    camera=CameraSettings(sd_m=trial.camera_sd_m),
-                    probability=trial.probability,
-                ),
-                OperatorSettings(
-                    link=trial.link,
-                    link_model=trial.link_model,
-                    seed=seed,
-                    haptics=trial.arm != "off",
-                    person=trial.person if trial.arm == "reacting" else replace(trial.person, trust=0.0),
-                ),
-            ),
-            scene=self.scene,
-            after_robot_tick=self._look,
-            other_law=_Silent if trial.arm == "off" else None,
+            LoopbackSettings(robot, operator),
+            parts=replace(parts, law=_Silent(parts.law)) if trial.arm == "off" else parts,
+            listeners=[self],
             tick_period_s=trial.tick_period_s,
         )
 
-    def _look(self, now_s: float) -> None:
+    def on_sent(self, now_s: float) -> None:
+        """See what is true."""
         held, roles = self.loopback.robot.held, self.scene.roles
         onset = self._contact.update(held)
         if onset is not None and roles[onset.thing] is not Role.TARGET:

@@ -1,9 +1,9 @@
 """The cores once more, with the inputs that were recorded: the same stiffness bit for bit, or by how much not."""
 
-import functools
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Any, Final
+from dataclasses import replace
+from typing import Final
 
 import msgspec
 
@@ -18,23 +18,22 @@ from operator_side.core import OperatorSide
 from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
-from robot_side.arm.port import Arm, ArmState
-from robot_side.assembly import assemble
+from robot_side.arm.port import ArmState
 from robot_side.compiled.warm_up import kernel_digests, warm_up
 from robot_side.core import RobotSide
+from robot_side.parts import build_parts
 from robot_side.recorded_inputs import FrameUnpacker, unpack_state
 from robot_side.settings import RobotSettings
-from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects, Role
+from robot_side.surroundings.perceived import PerceivedObjects, Role
 
 
 class _Given:
     """An Arm and an ObjectSource that give what was recorded; what they are told goes nowhere."""
 
-    def __init__(self) -> None:
-        self.joint_count = 0
+    def __init__(self, joint_count: int) -> None:
+        self.joint_count = joint_count
         self.newest_state: ArmState | None = None
         self.newest_frame: PerceivedObjects | None = None
-        self.frames: FrameUnpacker | None = None
 
     def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
         """Nothing moves."""
@@ -58,22 +57,15 @@ class _Given:
         """The frames that were recorded have it."""
 
 
-def _side(
-    given: _Given, arm: Arm, kinematics: Any, camera: ObjectSource, law: Any, *others: Any, **named: Any
-) -> RobotSide:
-    """The core between the recorded arm and camera. Nobody observes what is true: nothing moves in the simulation."""
-    given.joint_count = arm.joint_count
-    given.frames = FrameUnpacker(camera.perceive(0.0))
-    surroundings, session, loop_age, limits, motion, *_ = others
-    return RobotSide(given, kinematics, given, law, surroundings, session, loop_age, limits, motion, **named)
-
-
 def replay_robot(recording: Recording) -> Comparison:
     """Make every stiffness message of the robot side again; ConfigurationError where it was not recorded."""
     header = require_side(recording, "robot")
-    given = _Given()
     settings = settings_from(header["settings"], RobotSettings)
-    core = assemble(settings, header["epoch"], header["clock_domain"], side=functools.partial(_side, given)).core
+    parts = build_parts(settings, header["epoch"], header["clock_domain"])
+    given = _Given(parts.arm.joint_count)
+    frames = FrameUnpacker(parts.camera.perceive(0.0))
+    # Nobody observes what is true: nothing moves in the simulation.
+    core = RobotSide(replace(parts, arm=given, camera=given, truth=None))
     warm_up()
     compared = Comparison("robot", "stiffness messages")
     # There may be more of them here, for other scenes and laws.
@@ -92,9 +84,9 @@ def replay_robot(recording: Recording) -> Comparison:
             core.receive(peer, payload, entry.now_s)
         elif entry.kind == Kind.STATE:
             given.newest_state = unpack_state(entry.content)
-        elif entry.kind == Kind.FRAME and given.frames is not None:
-            given.newest_frame = given.frames.unpack(entry.content)
-            core.see(entry.now_s)
+        elif entry.kind == Kind.FRAME:
+            given.newest_frame = frames.unpack(entry.content)
+            core.sight.see(entry.now_s)
         elif entry.kind == Kind.TICK:
             _compare_rest(compared, made)
             made.extend(one.payload for one in core.tick(entry.now_s) if one.stream == "haptics")
@@ -113,7 +105,7 @@ _INPUTS: Final[Mapping[int, Callable[[OperatorSide, bytes, float], object]]] = {
     Kind.FOUND: lambda core, _, now_s: core.controller_found(now_s),
     Kind.LOST: lambda core, _, now_s: core.controller_lost(now_s),
     Kind.WATCHED: lambda core, _, now_s: core.link.stamp(now_s),
-    Kind.STOPPED: lambda core, _, now_s: core.stop_button.press(now_s),
+    Kind.STOPPED: lambda core, _, now_s: core.press_stop(now_s),
     Kind.TUNED: lambda core, content, now_s: core.tune(**msgspec.json.decode(content), now_s=now_s),
 }
 """Inputs of the operator side's core, by the kind of entry."""

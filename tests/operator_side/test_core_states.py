@@ -140,7 +140,7 @@ class Core(RuleBasedStateMachine):
             self.bench.side.controller_lost(self.bench.now_s)
             self.hands, self.held, self.lost_s = None, None, self.bench.now_s
         elif event == "stop pressed on a page":
-            self.bench.side.stop_button.press(self.bench.now_s)
+            self.bench.side.press_stop(self.bench.now_s)
             self.presses += math.isnan(self.pressed_s)
             self.pressed_s = self.bench.now_s
         else:

@@ -5,23 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from common.protocol.around import Around
 from common.protocol.messages import Header
 from common.silence import KEEP_ALIVE_S
 from feelahead.lab.faults.session_bench import QUICK, TICK_S, Bench, Operator
-from robot_side.arm.port import GripperPose
-from robot_side.assembly import assemble
+from robot_side.core import RobotSide
+from robot_side.events import Listener, Tick
 from robot_side.gripper.held_object import grip
-from robot_side.laws.law import Law, Situation
-from robot_side.laws.sensed import Sensed
+from robot_side.laws.law import Situation
+from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 from robot_side.simulation.scene import load_scene
 from robot_side.surroundings.perceived import Role
-
-
-@pytest.fixture
-def bench() -> Bench:
-    return Bench()
 
 
 def test_an_armed_robot_moves_as_asked_and_stops_when_commands_stop(bench: Bench) -> None:
@@ -76,7 +70,7 @@ def test_an_emergency_stop_stops_the_gripper(bench: Bench, monkeypatch: pytest.M
 
 def test_an_unarmed_robot_lets_no_load_sink_however_unevenly_it_ticks() -> None:
     scene = load_scene()
-    robot = assemble(RobotSettings(), epoch=1, clock_domain="test", scene=scene).core
+    robot = RobotSide(build_parts(RobotSettings(), epoch=1, clock_domain="test", scene=scene))
     scene.data.xfrc_applied[scene.model.site_bodyid[scene.robot.site], 2] = -3.0  # what a held thing weighs
     generator = np.random.default_rng(0)
     now_s, height_m = 0.0, []
@@ -128,29 +122,25 @@ def test_the_status_says_who_pulls_how_far_everything_is_and_why_it_stopped(benc
     assert bench.robot.summary()["loop_age_ms"]["mean"] > 0.0
 
 
-class Listening:
-    """A law that remembers what it was told."""
+class Listening(Listener):
+    """Keeps what the law was told."""
 
-    def __init__(self, law: Law) -> None:
-        self._law = law
+    def __init__(self) -> None:
         self.heard: list[Situation] = []
 
-    def sense(self, situation: Situation, now_s: float) -> Sensed:
-        self.heard.append(situation)
-        return self._law.sense(situation, now_s)
-
-    def around(self, pose: GripperPose) -> Around | None:
-        return self._law.around(pose)
-
-    def summary(self) -> dict[str, int]:
-        return self._law.summary()
+    def on_tick(self, tick: Tick) -> None:
+        assert tick.found is not None
+        self.heard.append(tick.found.situation)
 
 
 @pytest.fixture
-def listening(bench: Bench) -> Listening:
-    law = bench.robot._law = Listening(bench.robot._law)
-    assert isinstance(law, Listening)
-    return law
+def listening() -> Listening:
+    return Listening()
+
+
+@pytest.fixture
+def bench(listening: Listening) -> Bench:
+    return Bench(listeners=[listening])
 
 
 def test_a_tick_knows_the_frame_that_was_taken_in_before_it_began(bench: Bench, listening: Listening) -> None:
@@ -210,11 +200,11 @@ def test_an_operator_hears_that_a_joint_is_at_its_end(bench: Bench) -> None:
     operator = bench.join(2)
     bench.cruise(operator, 0.1)
     free = told_m_s(operator)
-    limits = bench.robot._limits
+    limits = bench.robot.motion._limits
     assert limits.lower_rad is not None
     here, ends = bench.arm.state(bench.now_s).joint_positions_rad, limits.lower_rad.copy()
     ends[2] = here[2]  # The elbow, which stretches as the tool advances.
-    bench.robot._limits = replace(limits, lower_rad=ends)
+    bench.robot.motion._limits = replace(limits, lower_rad=ends)
     bench.drive(KEEP_ALIVE_S, operator, r2=0.4)
     assert told_m_s(operator) < 0.9 * free
     bench.drive(KEEP_ALIVE_S, operator, l2=0.4)
@@ -245,8 +235,8 @@ def test_the_law_knows_the_gap_between_the_fingers_and_what_they_hold(bench: Ben
     # A box between the fingers, gripped.
     objects = listening.heard[-1].objects
     target = objects.roles.index(Role.TARGET)
-    bench.robot._held = grip(objects, target, listening.heard[-1].pose)
-    bench.robot._held_s = np.inf
+    bench.robot.grip.held = grip(objects, target, listening.heard[-1].pose)
+    bench.robot.grip._held_s = np.inf
     bench.tick()
     assert listening.heard[-1].held == target
     assert len(listening.heard[-1].pose.sphere_radii_m) > spheres

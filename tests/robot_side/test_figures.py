@@ -61,7 +61,7 @@ def test_figures_of_many_ticks_are_those_of_each(asked_every: int) -> None:
     for enlargement_m, overlap_m3, speed_m_s in zip(enlargements, overlaps, speeds, strict=True):
         figures.tick(sensed(float(enlargement_m), float(overlap_m3), tool_speed_m_s=float(speed_m_s)), armed=False)
         if figures.ticks % asked_every == 0:
-            figures.reckon()
+            figures.on_sent(0.0)
     summary = figures.summary()
     assert summary["ticks"] == 5000
     assert summary["enlargement_mm"]["mean"] == pytest.approx(1e3 * np.mean(enlargements), rel=1e-12)

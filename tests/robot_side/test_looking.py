@@ -10,7 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
 from common.emulation.spec import LinkSpec
-from robot_side.assembly import assemble
+from robot_side.laws.paper import PaperLaw
+from robot_side.laws.swept import SweptLaw
+from robot_side.parts import build_parts
 from robot_side.settings import CameraSettings, RobotSettings
 from tests.robot_side.cameras.looking_table import TABLES, Table
 
@@ -143,9 +145,9 @@ def test_a_state_says_where_the_robot_side_believes_everything_is(law: str) -> N
     table.watch(scene=True)
     table.run(0.5)
     state, [shapes] = table.states()[-1], table.shapes()
-    scene, kinematics = table.robot.scene, table.robot.kinematics
-    assert table.robot.core.newest is not None
-    _, situation = table.robot.core.newest
+    scene, kinematics = table.parts.scene, table.parts.kinematics
+    assert table.robot.newest is not None
+    _, situation = table.robot.newest
     objects = situation.objects
     assert objects.positions_m is not None
     # Links where the encoders say, objects where the camera does: each is wrong by its own error.
@@ -180,7 +182,7 @@ def test_a_state_says_where_the_robot_side_believes_everything_is(law: str) -> N
 def test_overlaps_add_up_to_the_total_that_the_law_has(law: str) -> None:
     table = Table(RobotSettings(camera=CameraSettings(mean_m=-0.01), law=law))  # type: ignore[arg-type]
     table.run(0.1)
-    core = table.robot.core
+    core = table.robot
     assert core.newest is not None
     sensed, situation = core.newest
     # Among things, with a delay that is known, moving: a tenth of a second's way ahead something is met.
@@ -188,7 +190,8 @@ def test_overlaps_add_up_to_the_total_that_the_law_has(law: str) -> None:
     there = replace(pose, sphere_centers_m=pose.sphere_centers_m + np.array([0.2, 0.02, -0.17]))
     velocities = np.linalg.pinv(pose.tool_jacobian) @ [0.1, 0.0, 0.0, 0.0, 0.0, 0.0]
     moving = replace(situation, pose=there, loop_age_known=True, loop_age_s=0.3, joint_velocities_rad_s=velocities)
-    law_anew = assemble(table.settings, 1, "clock").law
+    law_anew = build_parts(table.settings, 1, "clock").explains
+    assert isinstance(law_anew, SweptLaw | PaperLaw)
     sensed = law_anew.sense(moving, 10.0)
     assert sensed.overlap_m3 > 1e-6
     l2, r2 = law_anew.explain("l2", moving, sensed), law_anew.explain("r2", moving, sensed)

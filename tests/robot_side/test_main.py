@@ -9,10 +9,11 @@ from common.emulation.spec import LinkSpec
 from common.realtime.stages import Stages
 from common.sockets.tcp_figures import TcpFigures
 from robot_side import main
-from robot_side.assembly import assemble
 from robot_side.cameras.settings import CamerasSettings
+from robot_side.core import RobotSide
+from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
-from robot_side.timed import STAGES
+from robot_side.turn_stages import STAGES
 
 
 class SteppedClock:
@@ -60,13 +61,13 @@ def test_the_clock_is_read_after_receiving(monkeypatch: pytest.MonkeyPatch) -> N
     clock, heard = SteppedClock(), []
     monkeypatch.setattr(main, "MonotonicClock", lambda: clock)
     settings = RobotSettings(cameras=CamerasSettings(on=False))
-    assembled = assemble(settings, 1, "clock")
-    monkeypatch.setattr(assembled.core, "receive", lambda *message: heard.append(message))
-    monkeypatch.setattr(assembled.core, "tick", lambda _: [])
+    core = RobotSide(build_parts(settings, 1, "clock"))
+    monkeypatch.setattr(core, "receive", lambda *message: heard.append(message))
+    monkeypatch.setattr(core, "tick", lambda _: [])
     monkeypatch.setattr(main._Loop, "_use_idle_time", lambda *_: None)
     stages = Stages(STAGES, clock, clock)
     with Status("none", "robot") as status:
-        loop = main._Loop(settings, assembled, LinkSpec.parse(""), SuspendedSockets(clock), status, None, stages)  # type: ignore[arg-type]
+        loop = main._Loop(settings, core, LinkSpec.parse(""), SuspendedSockets(clock), status, None, stages)  # type: ignore[arg-type]
         loop.run(Once())  # type: ignore[arg-type]
         loop.close()
     assert heard == [(b"peer", b"payload", 101.0)]

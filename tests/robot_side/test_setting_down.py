@@ -6,38 +6,39 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feelahead.lab.faults.session_bench import QUICK, Bench, WatchedArm
+from feelahead.lab.faults.session_bench import QUICK, Bench
 from robot_side.arm.port import Arm, ArmState
 from robot_side.arm.touching_down import carried_n
+from robot_side.parts import build_parts
 from tests.helpers.repository import DATA
 
 SETTINGS = replace(QUICK, model=DATA / "place_held.xml", site="tool")
 
 
-class Forgetful(WatchedArm):
+class Forgetful:
     """An arm that does not measure loads."""
 
+    def __init__(self, arm: Arm) -> None:
+        self.joint_count, self.command, self.command_gripper = arm.joint_count, arm.command, arm.command_gripper
+        self._arm = arm
+
     def state(self, now_s: float) -> ArmState:
-        return replace(super().state(now_s), joint_loads_nm=None)
+        return replace(self._arm.state(now_s), joint_loads_nm=None)
 
 
 class Placing(Bench):
     """The tool points down, and holds a box 10 mm above a table."""
 
     def __init__(self, *, measures: bool = True) -> None:
-        self._measures = measures
-        super().__init__(SETTINGS)
+        parts = build_parts(SETTINGS, 1, "clock")
+        self.simulated = parts.arm
+        super().__init__(parts=parts if measures else replace(parts, arm=Forgetful(parts.arm)))
         self.owner = self.join(2)
         self.arm_it(self.owner)
         self.go(1.0)
         assert self.robot.held == "target"
         self.go(1.55, r2=0.8)
         assert not self.stands
-
-    def _watch(self, arm: Arm) -> Arm:
-        self.simulated = arm
-        self.arm = WatchedArm(arm) if self._measures else Forgetful(arm)
-        return self.arm
 
     def go(self, duration_s: float, gripper: float = 1.0, **fields: Any) -> None:
         self.drive(duration_s, self.owner, gripper=gripper, **fields)

@@ -8,9 +8,9 @@ import pytest
 from common.command.command_line import load_toml, parse_settings
 from common.errors import ConfigurationError
 from robot_side.arm.tool_motion import ToolMotionSettings
-from robot_side.assembly import assemble
 from robot_side.cameras.settings import CamerasSettings
 from robot_side.operators.safety import SafetySettings
+from robot_side.parts import build_parts
 from robot_side.settings import CameraSettings, EncoderSettings, RobotSettings
 from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.surroundings.perceived import Role
@@ -63,9 +63,9 @@ def test_the_limits_are_those_of_the_contract() -> None:
 
 def test_model_and_site_come_together() -> None:
     with pytest.raises(ValueError, match="--model is given without --site; valid: both, or neither"):
-        assemble(RobotSettings(model=Path("arm.xml")), 1, "")
+        build_parts(RobotSettings(model=Path("arm.xml")), 1, "")
     with pytest.raises(ValueError, match="--site is given without --model; valid: both, or neither"):
-        assemble(RobotSettings(site="tool"), 1, "")
+        build_parts(RobotSettings(site="tool"), 1, "")
     with pytest.raises(ValueError, match="--scene wall with --model: valid: one of them"):
         RobotSettings(model=Path("arm.xml"), site="tool", scene="wall")
 

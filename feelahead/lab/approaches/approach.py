@@ -9,7 +9,7 @@ from common.arrays import FloatArray
 from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
 from common.protocol.messages import Vector2
-from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
 from feelahead.lab.approaches.arming import wait_for_pull
 from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
 from feelahead.lab.approaches.outcome import SAMPLE_S, End, Outcome, Samples, reversals, stands
@@ -18,6 +18,7 @@ from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.pulling_hands import Pull, PullingHands, constant_force
 from robot_side.compiled.warm_up import import_kernels, warm_up
+from robot_side.events import Listener
 from robot_side.settings import Assist, CameraSettings, RobotSettings
 from robot_side.simulation.scene import load_scene
 from robot_side.simulation.true_contact import ContactOnset, TrueContact
@@ -52,7 +53,7 @@ class Approach:
     """σ_c; None for the settings' own."""
 
 
-class PullRun:
+class PullRun(Listener):
     """Both sides, their link and a hand that pulls, run step by step."""
 
     def __init__(self, approach: Approach, pull: Pull | None = None) -> None:
@@ -78,10 +79,10 @@ class PullRun:
         )
         self.loopback = Loopback(
             LoopbackSettings(robot, operator),
-            scene=scene,
+            parts=robot_parts(robot, scene),
             device=device,
             person=lambda _: self.hands,
-            after_robot_tick=self._after_robot_tick,
+            listeners=[self],
         )
         self._scene = scene
         self._next_s = -math.inf
@@ -112,7 +113,8 @@ class PullRun:
             self.loopback.run_until(min(clock.now() + SAMPLE_S, until_s))
             yield clock.now()
 
-    def _after_robot_tick(self, now_s: float) -> None:
+    def on_sent(self, now_s: float) -> None:
+        """See what is true."""
         if self.onset is not None:
             return
         run, hands = self.loopback, self.hands

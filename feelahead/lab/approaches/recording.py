@@ -13,13 +13,14 @@ import numpy as np
 from common.arrays import FloatArray
 from common.errors import FeelaheadError
 from common.silence import MOTION_PERIOD_S
-from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
 from feelahead.lab.approaches.arming import wait_for_pull
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from feelahead.lab.approaches.pulls import PullKind, make_pull
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.pulling_hands import PullingHands
+from robot_side.events import Listener
 from robot_side.settings import RobotSettings
 from robot_side.simulation.posed_scene import let_through
 from robot_side.simulation.scene import Scene, load_scene
@@ -104,11 +105,12 @@ def record_approach(
     notes = _Notes(scene)
     run = Loopback(
         LoopbackSettings(robot, operator),
-        scene=scene,
+        parts=robot_parts(robot, scene),
         device=device,
         person=lambda _: hands,
-        after_robot_tick=lambda now_s: notes.take(run, now_s),
+        listeners=[notes],
     )
+    notes.run = run
     began_s = wait_for_pull(run, hands, link)
     run.run_until(began_s + duration_s)
     if run.robot.session.safety.stops:
@@ -116,18 +118,21 @@ def record_approach(
     return notes.record(seed, began_s)
 
 
-class _Notes:
+class _Notes(Listener):
     """Notes taken after each turn of the robot side: rows by the names of the record's columns."""
 
     def __init__(self, scene: Scene) -> None:
+        self.run: Loopback | None = None
         self._scene = scene
         self._poses: list[dict[str, Any]] = []
         self._ticks: list[dict[str, Any]] = []
         self._commands: list[dict[str, Any]] = []
         self._applied = (math.nan, math.nan)
 
-    def take(self, run: Loopback, now_s: float) -> None:
+    def on_sent(self, now_s: float) -> None:
         """Note one turn."""
+        if (run := self.run) is None:
+            return
         data, robot = self._scene.data, self._scene.robot
         command, seen = run.robot.session.safety.command, run.operator.stiffness
         if command is None:

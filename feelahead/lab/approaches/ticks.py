@@ -5,20 +5,18 @@ from typing import Any, Final
 
 import numpy as np
 
-from common.protocol.around import Around
 from common.protocol.messages import Vector2
-from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
 from feelahead.lab.approaches.arming import wait_for_pull
 from feelahead.lab.approaches.frozen import ASIDE, GRIPPED, SITE, frozen_scene
 from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.pulling_hands import PullingHands, constant_force
-from robot_side.arm.port import ArmState, GripperPose
-from robot_side.assembly import assemble
-from robot_side.core import RobotSide
-from robot_side.laws.law import Law, Situation
-from robot_side.laws.sensed import Sensed
+from robot_side import events
+from robot_side.arm.port import ArmState
+from robot_side.events import Listener
+from robot_side.laws.law import Situation
 from robot_side.laws.swept import SweptLaw
 from robot_side.settings import RobotSettings
 from robot_side.simulation.kinematics import MujocoKinematics
@@ -51,7 +49,7 @@ class Recorded:
 
     def new_law(self) -> SweptLaw:
         """Make a law as that of the run was at its start."""
-        law = assemble(self.settings, 0, "", scene=scene_of(self.name)).law
+        law = robot_parts(self.settings, scene_of(self.name)).law
         if not isinstance(law, SweptLaw):
             raise TypeError(f"a {type(law).__name__}; valid: SweptLaw")
         # Its fields alone, with those from the path that it measures.
@@ -59,33 +57,16 @@ class Recorded:
         return law
 
 
-class _Noting:
-    """A law and the kinematics before it, in front of the real ones."""
+class _Noting(Listener):
+    """Keeps what the law was asked, and the state before it."""
 
-    def __init__(self, kinematics: MujocoKinematics, law: Law) -> None:
-        self.has_fingers = kinematics.has_fingers
+    def __init__(self) -> None:
         self.ticks: list[Tick] = []
-        self._kinematics, self._law = kinematics, law
-        self._state: ArmState | None = None
 
-    def pose(self, state: ArmState) -> GripperPose:
-        """Measure the pose, and keep the state."""
-        self._state = state
-        return self._kinematics.pose(state)
-
-    def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Ask the law, and keep the question."""
-        if self._state is not None:
-            self.ticks.append(Tick(now_s, situation, self._state))
-        return self._law.sense(situation, now_s)
-
-    def around(self, pose: GripperPose) -> Around | None:
-        """Return the law's."""
-        return self._law.around(pose)
-
-    def summary(self) -> dict[str, int]:
-        """Return the law's."""
-        return self._law.summary()
+    def on_tick(self, tick: events.Tick) -> None:
+        """Keep one."""
+        if tick.found is not None:
+            self.ticks.append(Tick(tick.now_s, tick.found.situation, tick.found.state))
 
 
 def record(name: str, duration_s: float, seed: int = 0, sticks: tuple[Vector2, Vector2] | None = None) -> Recorded:
@@ -95,25 +76,19 @@ def record(name: str, duration_s: float, seed: int = 0, sticks: tuple[Vector2, V
     """
     model = None if name == DEMO else frozen_scene(name)
     robot = RobotSettings(model=model, site=None if model is None else SITE, seed=seed, full_rate=True)
-    noting: list[_Noting] = []
-
-    def noted(arm: Any, kinematics: Any, camera: Any, law: Law, *others: Any, **named: Any) -> RobotSide:
-        noting.append(_Noting(kinematics, law))
-        return RobotSide(arm, noting[0], camera, noting[0], *others, **named)
-
     device = SimulatedDualSense(strength_step_n=_STRONGEST_N / MAX_STRENGTH)
     across, turning = ASIDE.get(name, _STRAIGHT) if sticks is None else sticks
     hands = PullingHands(device, constant_force(FORCE_N, across, turning), grip=name in GRIPPED)
     run = Loopback(
         LoopbackSettings(robot, OperatorSettings(seed=seed, full_rate=True)),
-        scene=scene_of(name),
+        parts=robot_parts(robot, scene_of(name)),
         device=device,
         person=None if model is None else lambda _: hands,
-        robot_side=noted,
+        listeners=[noting := _Noting()],
     )
     from_s = 0.0 if model is None else wait_for_pull(run, hands, "") - _BEFORE_S
     run.run_until(from_s + duration_s)
-    return Recorded(name, tuple(tick for tick in noting[0].ticks if tick.now_s >= from_s), robot)
+    return Recorded(name, tuple(tick for tick in noting.ticks if tick.now_s >= from_s), robot)
 
 
 def scene_of(name: str) -> Scene:

@@ -24,16 +24,16 @@ _WALL_CLOCK_S = 1.8e9
 def operator_restarts() -> Outcome:
     """Killed in full motion; its successor pulls R2 from the start, over the same connection."""
     bench, old = cruising()
-    before = np.array([speed for _, speed in bench.arm.speeds_rad_s])
+    before = np.array([speed for _, speed in bench.watch.speeds_rad_s])
     largest_step = float(np.abs(np.diff(before)).max())
     new = bench.join(3)
     disarmed = bench.state == "disarmed"
-    start = len(bench.arm.speeds_rad_s)
+    start = len(bench.watch.speeds_rad_s)
     bench.drive(0.5, new, r2=1.0)
     # What the old one had sent comes late.
     bench.send(old, r2=1.0)
     bench.tick(5)
-    after = np.array([speed for _, speed in bench.arm.speeds_rad_s[start:]])
+    after = np.array([speed for _, speed in bench.watch.speeds_rad_s[start:]])
     moved = 3 in bench.moved_by or float(after[50:].max()) > 0.005
     step = float(np.abs(np.diff(after)).max())
     bench.say_hello(old)
@@ -85,7 +85,7 @@ def wall_clock_jumps() -> Outcome:
         shown_s = _WALL_CLOCK_S + jump_s
         with mock.patch("time.time", lambda shown_s=shown_s: shown_s):
             bench.drive(0.2, operator, r2=CRUISE)
-        traces.append((list(bench.arm.speeds_rad_s), list(bench.robot.session.safety.stops), bench.state))
+        traces.append((list(bench.watch.speeds_rad_s), list(bench.robot.session.safety.stops), bench.state))
     alike = traces[0] == traces[1] == traces[2]
     trips = sum(len(stops) for _, stops, _ in traces)
     return Outcome(
@@ -106,7 +106,7 @@ def bad_messages() -> Outcome:
         if number % 4 == 0:
             accepted.add(decode(bench.send(operator, r2=CRUISE)).header.sequence)
     refused = bench.robot.session.rejected - before
-    reached = len(set(bench.applied) - accepted) + bench.arm.not_finite
+    reached = len(set(bench.applied) - accepted) + bench.watch.not_finite
     safe = refused == len(spoilt) and reached == 0 and bench.state == "armed"
     return Outcome(safe, f"{len(spoilt)} sent, {refused} rejected, {reached} reached the controller")
 
@@ -147,14 +147,14 @@ def emergency_stop() -> Outcome:
     """Pressed once in full motion; the operator goes on pulling, leaves, and another one comes."""
     bench, operator = cruising()
     bench.send(operator, r2=CRUISE, emergency_stop=True)
-    told = bench.arm.told_to_move
+    told = bench.watch.told_to_move
     bench.drive(0.5, operator, r2=CRUISE)
-    stopped = bench.state == "stopped" and bench.arm.told_to_move == told and bench.speed_rad_s < 0.005
+    stopped = bench.state == "stopped" and bench.watch.told_to_move == told and bench.speed_rad_s < 0.005
     bench.silence(1.0)
     other = bench.join(3, b"other")
     latched = bench.state == "stopped" and other.state is SessionState.STOPPED
     bench.drive(0.3, other, r2=CRUISE)
-    latched &= bench.state == "stopped" and bench.arm.told_to_move == told
+    latched &= bench.state == "stopped" and bench.watch.told_to_move == told
     bench.cruise(other)
     return Outcome(stopped and latched, "stopped at once; latched until the next operator armed")
 

@@ -1,6 +1,7 @@
 """A robot side in virtual time with operators in our hands; every message arrives at once unless it is kept back."""
 
 from collections import deque
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,10 +21,11 @@ from common.protocol.messages import (
     Watch,
 )
 from common.protocol.session import SessionState
-from robot_side.arm.port import Arm, ArmState
-from robot_side.assembly import assemble
+from robot_side.arm.port import ArmState
 from robot_side.core import RobotSide
+from robot_side.events import Listener, Tick
 from robot_side.operators.safety import SafetySettings
+from robot_side.parts import RobotParts, build_parts
 from robot_side.settings import RobotSettings
 from robot_side.simulation.joint_reference import MotionLimits
 
@@ -39,38 +41,35 @@ _MOVING_RAD_S = 0.05
 _DECELERATION_RAD_S2 = MotionLimits().deceleration_rad_s2
 
 
-class WatchedArm:
-    """An arm that remembers commands and its own measured speed."""
+class ArmWatch(Listener):
+    """Remembers commands to the arm and its measured speed."""
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self) -> None:
         self.speeds_rad_s: list[tuple[float, float]] = []
         """(when, the largest joint speed) of each state."""
         self.told_to_move = 0
         """Commands that were not to stand still."""
         self.not_finite = 0
         """Commands that held NaN or infinity."""
-        self._arm = arm
-        self.joint_count = arm.joint_count
-        self.command_gripper = arm.command_gripper
         self._accepted_s: list[float] = []
         """When the newest of those commands was accepted, for each state."""
         self._newest_s = 0.0
 
-    def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
-        """Do as the arm does."""
-        if np.any(joint_velocity_rad_s):
-            self.told_to_move += 1
-            self._newest_s = valid_until_s - QUICK.safety.gap_s
-        self.not_finite += not np.isfinite(joint_velocity_rad_s).all()
-        self._arm.command(joint_velocity_rad_s, valid_until_s)
+    def on_tick(self, tick: Tick) -> None:
+        """Note a tick's state, and then its command."""
+        if tick.measured is not None:
+            self.note(tick.measured)
+        if tick.found is not None and (velocity := tick.found.commanded_rad_s) is not None:
+            if np.any(velocity):
+                self.told_to_move += 1
+                self._newest_s = tick.found.permission.valid_until_s - QUICK.safety.gap_s
+            self.not_finite += not np.isfinite(velocity).all()
 
-    def state(self, now_s: float) -> ArmState:
-        """Do as the arm does."""
-        state = self._arm.state(now_s)
+    def note(self, state: ArmState) -> None:
+        """Note a measured state."""
         if not self.speeds_rad_s or state.time_s > self.speeds_rad_s[-1][0]:
             self.speeds_rad_s.append((state.time_s, float(np.abs(state.joint_velocities_rad_s).max())))
             self._accepted_s.append(self._newest_s)
-        return state
 
     def decelerations_s(self) -> list[float]:
         """Return when each deceleration began after an even stretch, since the newest command was accepted."""
@@ -129,8 +128,13 @@ class Operator:
 class Bench:
     """The robot side, messages to each operator, and the arm's motion."""
 
-    def __init__(self, settings: RobotSettings = QUICK) -> None:
-        self.robot: RobotSide = assemble(settings, 1, "clock", self._watch).core
+    def __init__(
+        self, settings: RobotSettings = QUICK, parts: RobotParts | None = None, listeners: Sequence[Listener] = ()
+    ) -> None:
+        """parts: instead of those that the settings name."""
+        self.watch = ArmWatch()
+        parts = parts or build_parts(settings, 1, "clock")
+        self.arm, self.robot = parts.arm, RobotSide(parts, [self.watch, *listeners])
         self.ticks = 0
         self.operators: dict[bytes, Operator] = {}
         self.views: list[Telemetry] = []
@@ -141,10 +145,6 @@ class Bench:
         self.answer_delay_s = 0.0
         """Delay of all messages from the robot side."""
         self._under_way: deque[tuple[float, Operator, StiffnessUpdate | Hello | LeaseNotice]] = deque()
-
-    def _watch(self, arm: Arm) -> Arm:
-        self.arm = WatchedArm(arm)
-        return self.arm
 
     @property
     def now_s(self) -> float:
@@ -159,7 +159,7 @@ class Bench:
     @property
     def speed_rad_s(self) -> float:
         """The speed of the fastest joint, now."""
-        return self.arm.speeds_rad_s[-1][1]
+        return self.watch.speeds_rad_s[-1][1]
 
     @property
     def tool_m(self) -> FloatArray:

@@ -21,15 +21,15 @@ def stream_stops() -> Outcome:
     bench, operator = cruising()
     accepted_s = bench.now_s - 3 * TICK_S  # the last of the commands, one each four ticks
     bench.silence(T_S + 0.3)
-    speeds = dict(bench.arm.speeds_rad_s)
+    speeds = dict(bench.watch.speeds_rad_s)
     before, at_limit = (
         speeds[min(speeds, key=lambda when_s: abs(when_s - at_s))] for at_s in (accepted_s, accepted_s + T_S)
     )
-    onsets_s = bench.arm.decelerations_s()
+    onsets_s = bench.watch.decelerations_s()
     stood = bench.speed_rad_s < _RESTING_RAD_S
-    told = bench.arm.told_to_move
+    told = bench.watch.told_to_move
     bench.drive(0.3, operator, r2=CRUISE)
-    stayed = bench.speed_rad_s < _RESTING_RAD_S and bench.arm.told_to_move == told and bench.state == "disarmed"
+    stayed = bench.speed_rad_s < _RESTING_RAD_S and bench.watch.told_to_move == told and bench.state == "disarmed"
     bench.cruise(operator)
     again = bench.speed_rad_s > _RESTING_RAD_S
     return Outcome(
@@ -44,8 +44,8 @@ def ticks_stop() -> Outcome:
     bench, _ = cruising()
     start_s = bench.now_s
     for millisecond in range(1, 1001):
-        bench.arm.state(start_s + millisecond * TICK_S)
-    onsets_s = bench.arm.decelerations_s()
+        bench.watch.note(bench.arm.state(start_s + millisecond * TICK_S))
+    onsets_s = bench.watch.decelerations_s()
     safe = _begins_at_limit(onsets_s) and bench.speed_rad_s < _RESTING_RAD_S
     return Outcome(safe, f"deceleration at {_milliseconds(onsets_s)}; then it stands")
 
@@ -60,7 +60,7 @@ def short_gap() -> Outcome:
         bench.silence(1e-3 * gap_ms - TICK_S)
         least = min(least, bench.speed_rad_s / before)
         bench.drive(0.03, operator, r2=CRUISE)
-    slowed = len(bench.arm.decelerations_s())
+    slowed = len(bench.watch.decelerations_s())
     safe = not slowed and bench.state == "armed" and least > 0.98
     return Outcome(safe, f"{slowed} decelerations; least speed {100.0 * least:.1f} %")
 
@@ -83,12 +83,12 @@ def backlog() -> Outcome:
         bench.tick()
         if step % 4 == 0:
             held.append(operator.command(bench.now_s, r2=1.0))
-    told = bench.arm.told_to_move
+    told = bench.watch.told_to_move
     for payload in held:
         bench.robot.receive(operator.peer, payload, bench.now_s)
     bench.drive(0.1, operator, r2=CRUISE)
     old = sum(age > _AGE_LIMIT_S + 2.0 * TICK_S for age in bench.applied.values())
-    safe = old == 0 and bench.state == "disarmed" and bench.arm.told_to_move == told
+    safe = old == 0 and bench.state == "disarmed" and bench.watch.told_to_move == told
     return Outcome(safe, f"{old} applied, {bench.robot.session.safety.discarded_by_age} discarded by age")
 
 
@@ -105,12 +105,12 @@ def robot_stopped() -> Outcome:
             bench.ticks += 1
             if step % 4 == 0:
                 held.append(operator.command(bench.now_s, r2=1.0))
-        told = bench.arm.told_to_move
+        told = bench.watch.told_to_move
         for payload in held:
             bench.robot.receive(operator.peer, payload, bench.now_s)
         bench.drive(0.2, operator, r2=CRUISE)
         applied = sum(sequence > last for sequence in bench.applied)
-        safe &= applied == 0 and bench.arm.told_to_move == told and bench.state == "disarmed"
+        safe &= applied == 0 and bench.watch.told_to_move == told and bench.state == "disarmed"
         measured.append(f"{applied} of {len(held)} applied after {pause_s:g} s")
     return Outcome(safe, ", ".join(measured))
 
@@ -138,13 +138,13 @@ def replay() -> Outcome:
     still_armed = bench.state == "armed"
     back = sum(later < earlier for earlier, later in pairwise(order))
     bench.silence(0.2)
-    told = bench.arm.told_to_move
+    told = bench.watch.told_to_move
     # The owner is gone; all its messages keep coming over another connection.
     for step in range(1500):
         bench.tick()
         bench.robot.receive(b"elsewhere", recorded[step % len(recorded)], bench.now_s)
     session = bench.robot.session
-    gone = session.lease.owner is None and bench.arm.told_to_move == told
+    gone = session.lease.owner is None and bench.watch.told_to_move == told
     safe = still_armed and back == 0 and len(order) > 20 and gone
     return Outcome(safe, f"{back} of {len(order)} applied twice or late; the replay kept no lease: {gone}")
 
@@ -191,7 +191,7 @@ def _mean_speed(delay_s: float) -> float:
             bench.robot.receive(operator.peer, there.popleft()[1], bench.now_s)
     if bench.robot.session.safety.stops or bench.state != "armed":
         return 0.0
-    steady = [speed for _, speed in bench.arm.speeds_rad_s if speed > _RESTING_RAD_S]
+    steady = [speed for _, speed in bench.watch.speeds_rad_s if speed > _RESTING_RAD_S]
     return sum(steady[100:400]) / 300
 
 

@@ -119,16 +119,17 @@ def run(cell: Case, seed: int) -> Iterator[Row]:
 def _pictures(cell: Case, seed: int) -> Iterator[Iterator[Image]]:
     """Render both views, one after the other, of the same motion."""
     choose(BACKENDS[0])
-    from feelahead.both_sides.loopback import Loopback, LoopbackSettings  # noqa: PLC0415  # after the choice
+    from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts  # noqa: PLC0415  # after the choice
     from robot_side.cameras.exchange import Setup  # noqa: PLC0415
     from robot_side.cameras.pictures import saved_model  # noqa: PLC0415
     from robot_side.cameras.rendering import Renderer  # noqa: PLC0415
     from robot_side.cameras.viewpoints import viewpoints  # noqa: PLC0415
+    from robot_side.settings import RobotSettings  # noqa: PLC0415
     from robot_side.simulation.scene import load_scene  # noqa: PLC0415
 
     scene = load_scene(name="table", seed=seed)
     setup = Setup(saved_model(scene), cell.width, cell.width * 3 // 4, viewpoints(scene))
-    loopback = Loopback(LoopbackSettings(), scene=scene)
+    loopback = Loopback(LoopbackSettings(), parts=robot_parts(RobotSettings(), scene))
     states = []
     for number in range(round(cell.seconds * cell.rate_hz)):
         loopback.run_until(_REST_S + number / cell.rate_hz)

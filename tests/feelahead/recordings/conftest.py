@@ -1,6 +1,5 @@
 """One recorded run of both sides in virtual time, for everything that is done with recordings."""
 
-import functools
 import io
 from collections.abc import Callable
 from pathlib import Path
@@ -36,8 +35,8 @@ def record_loopback(path: Path, duration_s: float, **settings: Any) -> None:
     notes: dict[str, list[Any]] = {"robot": [], "operator": []}
     run = Loopback(
         LoopbackSettings(robot, operator),
-        robot_side=functools.partial(robot_recorded.RecordedRobotSide, notes["robot"].append),
-        operator_side=functools.partial(operator_recorded.RecordedOperatorSide, notes["operator"].append),
+        listeners=[robot_recorded.Recorder(notes["robot"].append)],
+        operator_listeners=[operator_recorded.Recorder(notes["operator"].append)],
     )
     file = RecordingFile(path, WALL_OFFSET_S)
     content = Content(file)

@@ -22,8 +22,8 @@ from feelahead.recordings import replay as replaying
 from feelahead.recordings.comparison import Comparison, recorded_entries
 from feelahead.recordings.playback import Playback, Seen, seen
 from feelahead.recordings.replay import replay_operator, replay_robot
-from robot_side.assembly import assemble
 from robot_side.compiled.warm_up import kernel_digests
+from robot_side.parts import build_parts
 from tests.feelahead.recordings.conftest import DURATION_S
 
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("recorded run")]
@@ -51,12 +51,12 @@ def test_the_command_says_so_and_another_setting_makes_other_stiffness(
     said = capsys.readouterr().out.splitlines()
     assert said[-1] == "the same, within what is promised"
     assert "equal bit for bit" in said[0]
-    build = assemble
+    build = build_parts
 
     def other(settings: Any, *others: Any, **named: Any) -> Any:
         return build(dataclasses.replace(settings, probability=0.9), *others, **named)
 
-    monkeypatch.setattr(replaying, "assemble", other)
+    monkeypatch.setattr(replaying, "build_parts", other)
     assert replay([str(run.path), "--check"]) == 1
     assert capsys.readouterr().out.splitlines()[-1] == "NOT the same"
 

@@ -8,7 +8,7 @@ from common.protocol.codec import decode, encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import LeaseNotice, MotionCommand
 from common.protocol.session import SessionState
-from operator_side.core import INTENT_EXPIRES_S, OperatorSide
+from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.background_writes import STALL_S
 from operator_side.dualsense.hid.connection import BEAT_PERIOD_S, LOOK_PERIOD_S, Connection, ConnectionState
 from operator_side.dualsense.hid.finding import Finder
@@ -17,6 +17,7 @@ from operator_side.dualsense.reports.controller_state import Button
 from operator_side.dualsense.reports.output_report import RELEASED
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.newest import INTENT_EXPIRES_S
 from tests.helpers.felt import felt
 from tests.operator_side.dualsense.simulated_system import (
     PERIOD_S,

@@ -9,11 +9,12 @@ from common.protocol.codec import decode, decode_view, encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import StiffnessUpdate, Watch
 from common.protocol.view_messages import AnyViewMessage, SceneShapes, SceneState, VideoFrame, VideoStep
-from robot_side.assembly import Assembled, assemble
 from robot_side.cameras.exchange import Order
 from robot_side.cameras.shapes import SceneModel
+from robot_side.core import RobotSide
 from robot_side.looking import Looking
 from robot_side.outgoing_messages import Outgoing, OutgoingStream
+from robot_side.parts import build_parts
 from robot_side.scene_view import SceneView
 from robot_side.settings import RobotSettings
 from tests.helpers.fake_companion import Desk
@@ -36,14 +37,15 @@ class Table:
     begins: bool = False
 
     def __post_init__(self) -> None:
-        self.robot: Assembled = assemble(self.settings, 1, "clock")
-        self.desk = Desk(self.robot.scene)
+        self.parts = build_parts(self.settings, 1, "clock")
+        self.robot = RobotSide(self.parts)
+        self.desk = Desk(self.parts.scene)
         self.lines: dict[str, DelayLine[Outgoing]] = {
             stream: DelayLine(self.link.profile("to_operator", stream))
             for stream in ("haptics", "telemetry", "video", "scene")
         }
-        view = SceneView(SceneModel(self.robot.scene), self.robot.kinematics, self.robot.law)
-        self.looking = Looking(self.robot.core, view, self.desk.cameras, self, always=self.always)
+        view = SceneView(SceneModel(self.parts.scene), self.parts.kinematics, self.parts.explains)
+        self.looking = Looking(self.robot, view, self.desk.cameras, self, always=self.always)
         self.end = LinkEnd("operator", 5, "clock")
         self.watching: dict[str, Any] = {}
         self.ticks = 0
@@ -64,7 +66,7 @@ class Table:
         return self.ticks * TICK_S
 
     def hear(self, payload: bytes) -> None:
-        self.robot.core.receive(b"peer", payload, self.now_s)
+        self.robot.receive(b"peer", payload, self.now_s)
 
     def watch(self, **what: Any) -> None:
         self.watching = what
@@ -76,7 +78,7 @@ class Table:
                 self.hear(encode(Watch(self.end.stamp(self.now_s), **self.watching)))
             if self.ticks % 100 == 0:
                 self.hear(encode(self.end.hello(self.now_s)))
-            self._push(self.robot.core.tick(self.now_s))
+            self._push(self.robot.tick(self.now_s))
             self._push(self.looking.idle(self.now_s, self.now_s))
             self._render()
             for stream, line in self.lines.items():

@@ -10,10 +10,11 @@ from common.protocol.codec import VIEW_MAXIMUM_BYTES, decode_view
 from common.protocol.messages import Header
 from common.protocol.view_messages import SceneShapes, SceneState, Shape
 from robot_side import scene_view
-from robot_side.assembly import Assembled, assemble
 from robot_side.cameras.shapes import SceneModel
+from robot_side.core import RobotSide
 from robot_side.laws.law import Situation
 from robot_side.laws.sensed import Sensed
+from robot_side.parts import build_parts
 from robot_side.scene_view import SceneView, TickFigures
 from robot_side.settings import RobotSettings
 from robot_side.simulation.scene import Scene, load_scene
@@ -22,15 +23,16 @@ from tests.helpers.arm_models import SHAPES, STONE, planar_arm
 HEADER = Header(epoch=1, sequence=1, sent_s=0.0)
 
 
-def looked_at(settings: RobotSettings, scene: Scene | None = None) -> tuple[Assembled, SceneView]:
-    robot = assemble(settings, 1, "clock", scene=scene)
-    robot.core.tick(0.0)
-    return robot, SceneView(SceneModel(robot.scene), robot.kinematics, robot.law)
+def looked_at(settings: RobotSettings, scene: Scene | None = None) -> tuple[RobotSide, SceneView]:
+    parts = build_parts(settings, 1, "clock", scene=scene)
+    robot = RobotSide(parts)
+    robot.tick(0.0)
+    return robot, SceneView(SceneModel(parts.scene), parts.kinematics, parts.explains)
 
 
-def shapes_of(robot: Assembled, view: SceneView) -> SceneShapes:
-    assert robot.core.newest is not None
-    view.begin_shapes(HEADER, robot.core.newest[1])
+def shapes_of(robot: RobotSide, view: SceneView) -> SceneShapes:
+    assert robot.newest is not None
+    view.begin_shapes(HEADER, robot.newest[1])
     while not view.work_on_shapes():
         pass
     assert view.shapes is not None
@@ -98,10 +100,10 @@ def test_links_are_the_robots_bodies_and_their_shapes_go_with_them() -> None:
     robot, view = looked_at(RobotSettings())
     said = shapes_of(robot, view)
     assert said.links[-3:] == ("gripper", "left_finger", "right_finger")
-    sensed, situation = robot.core.newest or pytest.fail("no tick")
+    sensed, situation = robot.newest or pytest.fail("no tick")
     state = state_of(view, sensed, situation)
     links = np.frombuffer(state.link_poses, "<f4").reshape(-1, 7).astype(np.float64)
-    scene = robot.scene
+    scene = robot.parts.scene
     for shape in said.shapes:
         if shape.of_robot:
             position_m, _ = placed(shape, links[shape.owner])
@@ -125,8 +127,8 @@ def test_what_there_is_no_room_for_is_counted_and_the_nearest_is_kept(monkeypatc
     kept = {shape.owner for shape in said.shapes if not shape.of_robot}
     assert len(kept) == len(said.objects) - said.left_out
     poses = np.frombuffer(said.object_poses, "<f4").reshape(-1, 7)
-    assert robot.core.newest is not None
-    tool_m = robot.core.newest[1].pose.tool_position_m
+    assert robot.newest is not None
+    tool_m = robot.newest[1].pose.tool_position_m
     distances = np.linalg.norm(poses[:, :3] - tool_m, axis=1)
     # A mesh takes more room than what stands behind it.
     left_out = set(range(len(distances))) - kept - {said.objects.index("tetrahedron")}
@@ -140,7 +142,7 @@ def test_in_a_scene_of_many_only_what_may_move_is_said_each_time(
     path = planar_arm(tmp_path, world=SHAPES, extra_top=STONE)
     robot, view = looked_at(RobotSettings(model=path, site="tcp"))
     said = shapes_of(robot, view)
-    sensed, situation = robot.core.newest or pytest.fail("no tick")
+    sensed, situation = robot.newest or pytest.fail("no tick")
     state = state_of(view, sensed, situation)
     moving = {said.objects[index] for index in np.frombuffer(state.object_index, "<u4")}
     assert moving == {"post", "Target_egg"}
@@ -166,7 +168,7 @@ def test_what_is_moved_without_a_joint_is_said_too(monkeypatch: pytest.MonkeyPat
     path = planar_arm(tmp_path, world=SHAPES, extra_top=STONE)
     robot, view = looked_at(RobotSettings(model=path, site="tcp"))
     said = shapes_of(robot, view)
-    sensed, situation = robot.core.newest or pytest.fail("no tick")
+    sensed, situation = robot.newest or pytest.fail("no tick")
     positions_m = situation.objects.positions_m
     assert positions_m is not None
     wall = said.objects.index("wall")

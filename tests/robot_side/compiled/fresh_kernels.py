@@ -1,6 +1,6 @@
 """Kernels that are compiled in a moment, as a process has them at its start."""
 
-import robot_side.assembly  # noqa: F401  (brings the kernels)
+import robot_side.parts  # noqa: F401  (brings the kernels)
 from robot_side.compiled import kernel as compile_module
 from robot_side.compiled.kernel import Compiled, imported_kernels
 

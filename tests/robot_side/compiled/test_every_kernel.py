@@ -5,10 +5,11 @@ from typing import get_args
 
 import pytest
 
-from robot_side.assembly import assemble
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.warm_up import import_kernels, warm_up
+from robot_side.core import RobotSide
 from robot_side.laws.law import LawName
+from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 
 
@@ -44,7 +45,7 @@ def test_nothing_is_compiled_within_a_tick(law: LawName, monkeypatch: pytest.Mon
     def late(kernel: Compiled) -> None:
         raise AssertionError(f"{kernel.name} was not ready")
 
-    robot = assemble(RobotSettings(law=law), 1, "clock").core
+    robot = RobotSide(build_parts(RobotSettings(law=law), 1, "clock"))
     monkeypatch.setattr(Compiled, "prepare", late)
     for tick in range(20):
         robot.tick(0.001 * tick)

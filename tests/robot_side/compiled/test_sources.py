@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import robot_side
-import robot_side.assembly  # before a test starts: a library of the simulation starts a process as it is imported
+import robot_side.parts  # before a test starts: a library of the simulation starts a process as it is imported
 from robot_side.compiled import sources as kernel_sources
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import digest, sources

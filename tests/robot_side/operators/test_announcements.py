@@ -9,8 +9,8 @@ from common.protocol.messages import AnyMessage, Hello, LeaseNotice, StiffnessUp
 from common.protocol.session import SessionState
 from common.silence import KEEP_ALIVE_S
 from feelahead.lab.faults.session_bench import CRUISE, Bench, Operator
-from robot_side.core import OBSERVER_PERIOD_S
 from robot_side.operators.lease import MOST_OBSERVERS
+from robot_side.reports import OBSERVER_PERIOD_S
 
 
 @pytest.fixture
@@ -159,7 +159,7 @@ def cruise_beside(asks: bool) -> tuple[list[tuple[float, float]], list[Stiffness
         if asks:
             bench.robot.receive(stranger.peer, stranger.command(bench.now_s), bench.now_s)
     assert bench.robot.session.rejected == (5 if asks else 0)
-    return list(bench.arm.speeds_rad_s), owner.felt
+    return list(bench.watch.speeds_rad_s), owner.felt
 
 
 def test_whoever_drives_notices_nothing_of_a_stranger_who_asks() -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigurationError
-from robot_side.assembly import assemble
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
+from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 from robot_side.simulation import model_enums
 from robot_side.simulation.camera import MujocoCamera
@@ -178,7 +178,7 @@ KEYS = '<keyframe><key name="{first}" qpos="0.1 -0.2 0.01 0.01"/><key name="{sec
 def test_the_start_pose_is_said(tmp_path: Path, extra_bottom: str, said: str) -> None:
     model = planar_arm(tmp_path, extra_bottom=extra_bottom)
     assert load_scene(model, "tcp").start_pose.startswith(said)
-    notes = assemble(RobotSettings(model=model, site="tcp"), 1, "clock").core.notes
+    notes = build_parts(RobotSettings(model=model, site="tcp"), 1, "clock").notes
     assert notes[0].startswith(f"starts at {said}")
     assert notes[1].startswith("objects: target: target; obstacle: ")
 
@@ -186,12 +186,12 @@ def test_the_start_pose_is_said(tmp_path: Path, extra_bottom: str, said: str) ->
 def test_a_scene_without_a_target_says_how_to_name_one(tmp_path: Path) -> None:
     world = '<geom name="tin" type="sphere" size="0.1" pos="1 1 0"/><geom name="table" type="sphere" size="0.1"/>'
     model = planar_arm(tmp_path, world=world)
-    notes = assemble(RobotSettings(model=model, site="tcp"), 1, "clock").core.notes
+    notes = build_parts(RobotSettings(model=model, site="tcp"), 1, "clock").notes
     assert notes[1] == "objects: obstacle: tin; support: table"
     assert "no object is a target" in notes[2]
     assert '[roles] NAME = "target"' in notes[2]
     settings = RobotSettings(model=model, site="tcp", roles={"tin": Role.TARGET})
-    notes = assemble(settings, 1, "clock").core.notes
+    notes = build_parts(settings, 1, "clock").notes
     assert notes[1] == "objects: target: tin; support: table"
     assert not any("no object is a target" in note for note in notes)
 
@@ -203,7 +203,7 @@ def test_a_body_and_a_geom_of_one_name_are_one_object_and_that_is_said(tmp_path:
     )
     model = planar_arm(tmp_path, world=world)
     assert load_scene(model, "tcp").shared_names == ("target",)
-    notes = assemble(RobotSettings(model=model, site="tcp"), 1, "clock").core.notes
+    notes = build_parts(RobotSettings(model=model, site="tcp"), 1, "clock").notes
     assert notes[2].startswith("'target' names more than one thing")
     assert load_scene().shared_names == ()
 

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.assembly import assemble
 from robot_side.compiled.kernel import Compiled
+from robot_side.core import RobotSide
 from robot_side.field.object_class import OBSTACLE, PASSED_OVER
 from robot_side.field.total_overlap import total_overlap_m3
 from robot_side.overlap import sphere_sphere, warm_up
+from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 from robot_side.simulation.camera import MujocoCamera
 from robot_side.simulation.scene import Scene
@@ -222,10 +223,10 @@ def test_a_height_field_is_the_solid_that_rays_hit(shape: tuple[int, int], tmp_p
 def test_a_scene_without_meshes_loads_no_kernel_for_them() -> None:
     program = (
         "import feelahead.both_sides.loopback, robot_side.main\n"
-        "from robot_side.assembly import assemble\n"
+        "from robot_side.parts import build_parts\n"
         "from robot_side.compiled.kernel import imported_kernels\n"
         "from robot_side.settings import RobotSettings\n"
-        "robot = assemble(RobotSettings(), 1, 'clock').core\n"
+        "robot = RobotSide(build_parts(RobotSettings(), 1, 'clock'))\n"
         "robot.tick(0.0)\n"
         "assert not [note for note in robot.notes if 'perceived larger' in note]\n"
         "print(*(kernel.name for kernel in imported_kernels()))"
@@ -242,7 +243,7 @@ def test_nothing_is_compiled_within_a_tick_at_meshes(tmp_path: Path, monkeypatch
         raise AssertionError(f"{kernel.name} was not ready")
 
     model = planar_arm(tmp_path, world='<geom name="post" type="cylinder" size="0.05 0.1" pos="0.33 0 0.8"/>')
-    robot = assemble(RobotSettings(model=model, site="tcp"), 1, "clock").core
+    robot = RobotSide(build_parts(RobotSettings(model=model, site="tcp"), 1, "clock"))
     warm_up()
     monkeypatch.setattr(Compiled, "prepare", late)
     for tick in range(5):
@@ -251,7 +252,7 @@ def test_nothing_is_compiled_within_a_tick_at_meshes(tmp_path: Path, monkeypatch
 
 
 def notes_on_shapes(model: Path) -> list[str]:
-    notes = assemble(RobotSettings(model=model, site="tcp"), 1, "clock").core.notes
+    notes = build_parts(RobotSettings(model=model, site="tcp"), 1, "clock").notes
     return [note for note in notes if "perceived larger" in note]
 
 

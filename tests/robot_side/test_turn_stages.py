@@ -1,31 +1,25 @@
-"""The arm and the law that stand in front of the real ones do what those do, and count their time."""
+"""A core whose steps are timed does what a plain one does, and counts physics and sensing."""
 
 import numpy as np
 import pytest
 
 from common.clock import VirtualClock
 from common.realtime.stages import Stages
-from robot_side.assembly import assemble
+from robot_side.core import RobotSide
+from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
-from robot_side.timed import HELPS, STAGES, TimedArm, TimedLaw
+from robot_side.turn_stages import HELPS, STAGES, StageTiming
 
 
 def test_a_timed_core_sends_what_a_plain_one_does_and_counts_physics_and_sensing() -> None:
     stages = Stages(STAGES, VirtualClock(), Ticking())
-    settings = RobotSettings()
-    plain = assemble(settings, 1, "clock")
-    timed = assemble(
-        settings,
-        1,
-        "clock",
-        watch=lambda arm: TimedArm(arm, stages),
-        other_law=lambda law: TimedLaw(law, stages),
-    )
+    plain, timed = (build_parts(RobotSettings(), 1, "clock") for _ in range(2))
+    without, with_stages = RobotSide(plain), RobotSide(timed, [StageTiming(stages)])
     for turn in range(30):
         now_s = 1.0 + 1e-3 * turn
-        assert timed.core.tick(now_s) == plain.core.tick(now_s)
+        assert with_stages.tick(now_s) == without.tick(now_s)
         stages.end_turn()
-    assert timed.core.summary() == plain.core.summary()
+    assert with_stages.summary() == without.summary()
     assert np.array_equal(timed.scene.data.qpos, plain.scene.data.qpos)
     summary = stages.summary()
     for name in ("physics", "sensing"):

@@ -1,4 +1,4 @@
-"""Settings to a robot side that is ready to tick: the simulated arm, its camera, and everything in between."""
+"""Make the parts of a robot side from its settings: the simulated arm, its camera, and everything in between."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -11,12 +11,14 @@ from common.errors import ConfigurationError
 from common.protocol.around import MOST_JOINTS
 from common.protocol.link_end import LinkEnd
 from common.timing.ages import LoopAge
+from robot_side.arm.ability import JointLimits
 from robot_side.arm.port import Arm
+from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.compiled.kernel import Compiled, imported_kernels
-from robot_side.core import RobotSide
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
-from robot_side.figures import RunFigures
+from robot_side.figures import Observer, RunFigures
 from robot_side.gripper.held_covers import HeldCovers
+from robot_side.laws.explanation import Explains
 from robot_side.laws.law import Law
 from robot_side.laws.paper import PaperLaw
 from robot_side.laws.swept import SweptLaw
@@ -33,7 +35,7 @@ from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene, load_scene
 from robot_side.simulation.true_contact import TrueContact
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
+from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects, Role
 from robot_side.surroundings.surroundings import Surroundings
 
 _SEARCHING = "searching for spheres that cover gripper and objects, seconds for each shape; the next start is quick"
@@ -58,22 +60,36 @@ class SimulationObserver:
         """Tell `figures` the true distances and contacts."""
         figures.truth(self._truth.observe(), self._roles, now_s)
 
-    def watch(self, figures: RunFigures, since_start_s: float) -> None:
+    def watch(self, figures: RunFigures, now_s: float) -> None:
         """Tell `figures` the first contact; before it nothing can be held."""
         if not figures.touched and (onset := self._contact.update(None)) is not None:
-            figures.first_contact(onset.thing, onset.closing_speed_m_s, since_start_s)
+            figures.first_contact(onset.thing, onset.closing_speed_m_s, now_s)
 
 
 @dataclass(frozen=True)
-class Assembled:
-    """A core, and what stands around it that others look at, too."""
+class RobotParts:
+    """What a robot side is made of; `replace` one to use another arm, camera or law."""
 
-    core: RobotSide
-    scene: Scene
+    arm: Arm
     kinematics: MujocoKinematics
-    law: SweptLaw | PaperLaw
-    """The settings' own"""
-    arm: MujocoArm
+    camera: ObjectSource
+    law: Law
+    explains: Explains
+    """The settings' own law, whatever stands in for it"""
+    surroundings: Surroundings
+    session: OperatorSession
+    loop_age: LoopAge
+    limits: JointLimits
+    motion: ToolMotionSettings
+    scene: Scene
+    simulation: MujocoArm
+    truth: Observer | None
+    held_covers: HeldCovers | None
+    assists: bool
+    full_rate: bool
+    seed: int
+    notes: tuple[str, ...]
+    """What a person should know about the scene before the run"""
 
     @property
     def kernels(self) -> list[Compiled]:
@@ -88,21 +104,17 @@ class Assembled:
         ]
 
 
-def assemble(
+def build_parts(
     settings: RobotSettings,
     epoch: int,
     clock_domain: str,
-    watch: Callable[[Arm], Arm] | None = None,
     scene: Scene | None = None,
-    other_law: Callable[[Law], Law] | None = None,
     announce: Callable[[str], None] | None = None,
-    side: Callable[..., RobotSide] = RobotSide,
-) -> Assembled:
-    """Put a robot side together; ConfigurationError for a model that cannot be used.
+) -> RobotParts:
+    """Make the parts; ConfigurationError for a model that cannot be used.
 
-    `watch` may stand in front of the arm, to record what it is told and does. `scene`: instead of loading the one
-    that the settings name, so that the caller can look at it. `other_law`: makes another law of the settings' own.
-    `announce`: told once, in one line, what takes long. `side`: makes the core, as one that notes what happens to it.
+    scene: instead of loading the one that the settings name, so that the caller can look at it. announce: told once,
+    in one line, what takes long.
     """
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
@@ -138,29 +150,31 @@ def assemble(
     )
     if isinstance(law, SweptLaw):
         law.ask_around(asked=len(law.encoder_sigma_rad) <= MOST_JOINTS)
-    core = side(
-        arm if watch is None else watch(arm),
-        kinematics,
-        camera,
-        law if other_law is None else other_law(law),
-        surroundings,
-        OperatorSession(
+    return RobotParts(
+        arm=arm,
+        kinematics=kinematics,
+        camera=camera,
+        law=law,
+        explains=law,
+        surroundings=surroundings,
+        session=OperatorSession(
             lambda: LinkEnd("robot", epoch, clock_domain, settings.seed, settings.asymmetry_s()),
             Safety(settings.safety),
             settings.seed,
             Tuning(settings.probability, law.expect if settings.permit_tuning else None),
         ),
-        LoopAge(settings.assumed_delay_s),
-        joint_limits,
-        settings.motion,
-        SimulationObserver(scene),
+        loop_age=LoopAge(settings.assumed_delay_s),
+        limits=joint_limits,
+        motion=settings.motion,
+        scene=scene,
+        simulation=arm,
+        truth=SimulationObserver(scene),
+        held_covers=held_covers,
         assists=settings.assist == "speed",
+        full_rate=settings.full_rate,
         seed=settings.seed,
         notes=(*_notes(scene), *prediction_note, *_cover_notes(kinematics.cover, settings.cover_m, held_covers)),
-        held_covers=held_covers,
-        full_rate=settings.full_rate,
     )
-    return Assembled(core, scene, kinematics, law, arm)
 
 
 def _notes(scene: Scene) -> tuple[str, ...]:

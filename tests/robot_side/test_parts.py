@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigurationError
-from robot_side.assembly import assemble
 from robot_side.compiled.kernel import Compiled
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
@@ -15,6 +14,7 @@ from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
 from robot_side.laws.paper import PaperLaw
 from robot_side.laws.swept import SweptLaw
+from robot_side.parts import build_parts
 from robot_side.settings import CameraSettings, EncoderSettings, RobotSettings
 from robot_side.surroundings.perceived import Role
 from tests.helpers.arm_models import planar_arm
@@ -25,22 +25,22 @@ NOT_MEASURED = "has not been measured"
 
 
 def built(**settings: Any) -> RobotSide:
-    return assemble(RobotSettings(**settings), 1, "clock").core
+    return RobotSide(build_parts(RobotSettings(**settings), 1, "clock"))
 
 
 def knows(robot: RobotSide) -> Uncertainty:
-    found: Uncertainty = robot._law._uncertainty  # type: ignore[attr-defined]
+    found: Uncertainty = robot.parts.law._uncertainty  # type: ignore[attr-defined]
     return found
 
 
 def notes_on_prediction(robot: RobotSide) -> list[str]:
-    return [note for note in robot.notes if NOT_MEASURED in note]
+    return [note for note in robot.parts.notes if NOT_MEASURED in note]
 
 
 @pytest.mark.parametrize(("name", "law"), [("swept", SweptLaw), ("paper", PaperLaw)])
 def test_the_law_is_the_one_that_is_set(name: str, law: type) -> None:
     robot = built(law=name)
-    assert type(robot._law) is law
+    assert type(robot.parts.law) is law
     robot.tick(0.0)
 
 
@@ -85,10 +85,10 @@ def test_what_errs_is_known_to_the_law_as_it_is_to_the_simulation() -> None:
     assert known.camera_sd_m == pytest.approx(0.005)
     assert known.kinematic_mean_m == (0.0, 0.001, 0.0)
     assert known.probability == 0.9
-    error = robot._camera._error  # type: ignore[attr-defined]
+    error = robot.parts.camera._error  # type: ignore[attr-defined]
     np.testing.assert_array_equal(error.mean_m, [0.001, -0.002, 0.003])
     assert error.variance_m2 == pytest.approx(0.005**2)
-    law = robot._law
+    law = robot.parts.law
     assert isinstance(law, SweptLaw)
     np.testing.assert_allclose(law.encoder_sigma_rad, 1e-3)
 
@@ -122,7 +122,7 @@ def test_a_search_for_spheres_is_announced_once_and_only_at_the_first_start(
     model.write_text(model.read_text().replace(*palm))
     said: list[list[str]] = [[], []]
     for told in said:
-        assemble(RobotSettings(model=model, site="tcp", cover_m=0.01), 1, "clock", announce=told.append)
+        build_parts(RobotSettings(model=model, site="tcp", cover_m=0.01), 1, "clock", announce=told.append)
     first, again = said
     assert [line.partition(",")[0] for line in first] == (
         ["searching for spheres that cover gripper and objects"] if searches else []
@@ -148,8 +148,8 @@ def test_a_scene_needs_no_kernels_for_primitives_that_it_lacks(
     model.write_text(model.read_text().replace("<worldbody>", WEDGE_MESH, 1))
     roles = dict.fromkeys(("carton", "wedge"), Role(role)) if "ball" not in world else {}
     roles = {name: value for name, value in roles.items() if f'"{name}"' in world}
-    assembled = assemble(RobotSettings(model=model, site="tcp", roles=roles), 1, "clock")
-    needed = {kernel.name.rpartition(".")[2] for kernel in assembled.kernels}
+    parts = build_parts(RobotSettings(model=model, site="tcp", roles=roles), 1, "clock")
+    needed = {kernel.name.rpartition(".")[2] for kernel in parts.kernels}
     assert needed >= {"look", "sense", "drive"}
     assert ("overlap_one_box" in needed, "overlap_one_tetrahedron" in needed) == (boxes, tetrahedra)
     # Those of the library of overlaps are not for ticks.
@@ -160,9 +160,9 @@ def test_a_tick_among_boxes_runs_no_kernel_that_was_not_made_ready(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = planar_arm(tmp_path, world='<geom name="post" type="box" size="0.05 0.05 0.1" pos="0.33 0 0.8"/>')
-    assembled = assemble(RobotSettings(model=model, site="tcp"), 1, "clock")
-    warm_up(kernels=assembled.kernels)
-    ready = set(assembled.kernels)
+    robot = built(model=model, site="tcp")
+    warm_up(kernels=robot.parts.kernels)
+    ready = set(robot.parts.kernels)
 
     def run(kernel: Compiled, *arguments: Any) -> Any:
         assert kernel in ready
@@ -170,5 +170,5 @@ def test_a_tick_among_boxes_runs_no_kernel_that_was_not_made_ready(
 
     monkeypatch.setattr(Compiled, "__call__", run)
     for tick in range(50):
-        assembled.core.tick(0.001 * tick)
-    assert assembled.core.figures.summary()["overlap_mm3"]["max"] > 0.0
+        robot.tick(0.001 * tick)
+    assert robot.figures.summary()["overlap_mm3"]["max"] > 0.0

@@ -1,0 +1,24 @@
+"""What an operator side says of each call, to all who listen: recording, experiments. A listener changes nothing."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from operator_side.commanding import ToRobot
+from operator_side.dualsense.reports.output_report import OutputReport
+
+Input = Literal["received", "seen", "report", "tuned", "calibrated", "found", "lost", "stopped"]
+"""What comes in: a control payload, a view payload, a controller's report, another P or link, a calibration; that the
+controller came or went; a stop that was pressed away from it."""
+
+
+class Listener:
+    """Hears what happens to a core."""
+
+    def on_input(self, what: Input, content: object, now_s: float | None) -> None:
+        """Hear of an input, before it is judged. now_s: None for one that has no time."""
+
+    def on_motion(self, messages: Sequence[ToRobot], now_s: float) -> None:
+        """Hear what is sent to the robot side."""
+
+    def on_output(self, report: OutputReport | None, now_s: float) -> None:
+        """Hear what the controller is told; None for nothing."""

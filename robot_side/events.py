@@ -1,0 +1,94 @@
+"""What a robot side says of each turn, to all who listen: recording, timing, figures, experiments.
+
+A listener changes nothing: what it hears are the core's own values, not copies.
+"""
+
+from collections.abc import Sequence
+from typing import Final, Literal, NamedTuple
+
+from common.arrays import FloatArray
+from robot_side.arm.port import ArmState
+from robot_side.laws.law import Situation
+from robot_side.laws.sensed import Sensed
+from robot_side.operators.safety import Permission
+from robot_side.outgoing_messages import Outgoing
+from robot_side.surroundings.perceived import PerceivedObjects
+
+Step = Literal["arm", "pose", "grip", "motion", "law", "messages", "listeners", "frame", "end"]
+"""Steps of a turn, in their order. A simulated arm advances its physics in `arm`. `frame` comes after the messages have
+left. `end`: no step until the next one."""
+
+
+class Found(NamedTuple):
+    """What a tick worked out."""
+
+    permission: Permission
+    commanded_rad_s: FloatArray | None
+    """(n,) joint velocities; None: stand still"""
+    state: ArmState
+    """As measured, with estimated joint positions"""
+    situation: Situation
+    sensed: Sensed
+    holds_target: bool
+    target_m: FloatArray | None
+    """(3,) the target's centre as perceived"""
+
+
+class Tick(NamedTuple):
+    """What a tick took in, found and sent."""
+
+    now_s: float
+    measured: ArmState | None
+    frame: PerceivedObjects | None
+    command_sent_s: float
+    """When the newest accepted command was sent, on its sender's clock; NaN without one"""
+    outgoing: Sequence[Outgoing]
+    found: Found | None
+    """None of a tick that failed"""
+
+
+class Listener:
+    """Hears what happens to a core; a method that is left as it is costs nothing."""
+
+    def on_received(self, peer: bytes, payload: bytes, now_s: float) -> None:
+        """Hear of a control payload, before it is judged."""
+
+    def on_step(self, step: Step) -> None:
+        """Hear which step of the turn begins."""
+
+    def on_tick(self, tick: Tick) -> None:
+        """Hear of a tick, before its messages leave."""
+
+    def on_sent(self, now_s: float) -> None:
+        """Hear that the messages of the tick at `now_s` have left."""
+
+
+class Listeners(Listener):
+    """Tells each listener what it has a method of its own for."""
+
+    def __init__(self, listeners: Sequence[Listener]) -> None:
+        own: Final = {
+            name: [getattr(one, name) for one in listeners if getattr(type(one), name) is not getattr(Listener, name)]
+            for name in ("on_received", "on_step", "on_tick", "on_sent")
+        }
+        self._received, self._steps, self._ticks, self._sent = (tuple(found) for found in own.values())
+
+    def on_received(self, peer: bytes, payload: bytes, now_s: float) -> None:
+        """Pass it on."""
+        for hear in self._received:
+            hear(peer, payload, now_s)
+
+    def on_step(self, step: Step) -> None:
+        """Pass it on."""
+        for hear in self._steps:
+            hear(step)
+
+    def on_tick(self, tick: Tick) -> None:
+        """Pass it on."""
+        for hear in self._ticks:
+            hear(tick)
+
+    def on_sent(self, now_s: float) -> None:
+        """Pass it on."""
+        for hear in self._sent:
+            hear(now_s)

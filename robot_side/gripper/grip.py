@@ -1,0 +1,52 @@
+"""Follow what the gripper holds, from grip to release, and whether that stands on something."""
+
+from typing import Final
+
+import numpy as np
+
+from robot_side.arm.port import ArmState, GripperPose
+from robot_side.arm.touching_down import TouchingDown, carried_n
+from robot_side.gripper.held_covers import HeldCovers
+from robot_side.gripper.held_object import HeldObject, grip, gripped_object, with_held
+from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.surroundings import Surroundings
+
+_LET_GO_S: Final = 0.1
+"""Fingers that move for a moment, as they follow a slipping object, still hold it."""
+
+
+class Grip:
+    """The held object, or none."""
+
+    def __init__(self, surroundings: Surroundings, covers: HeldCovers | None = None) -> None:
+        """covers: spheres of what can be held, made beforehand; None: made when something is gripped."""
+        self.held: HeldObject | None = None
+        self.touching_down = TouchingDown()
+        self._surroundings, self._covers = surroundings, covers
+        self._held_s = -np.inf
+
+    @property
+    def index(self) -> int | None:
+        """The held object's index among the perceived ones; None for none."""
+        return None if self.held is None else self.held.index
+
+    def follow(self, objects: PerceivedObjects, pose: GripperPose, state: ArmState, rises_m_s: float) -> None:
+        """Notice when an object is gripped or released, and when it comes to stand.
+
+        rises_m_s: the tool's commanded speed upwards until now.
+        """
+        if state.gripper_holding:
+            self._held_s = state.time_s
+        if self.held is not None and state.time_s - self._held_s > _LET_GO_S:
+            self.held, self.touching_down = None, TouchingDown()
+        elif self.held is None and state.gripper_holding:
+            index = gripped_object(self._surroundings.see(objects), pose.tool_position_m, state.gripper_opening_m)
+            if index is not None:
+                self.held = grip(objects, index, pose, self._covers)
+        if self.held is not None and self.touching_down.due(state.time_s):
+            carried = carried_n(pose.tool_jacobian, state.joint_loads_nm)
+            self.touching_down.update(carried, float(pose.tool_position_m[2]), rises_m_s, state.time_s)
+
+    def joined(self, pose: GripperPose) -> GripperPose:
+        """Return the pose with the held object's spheres."""
+        return pose if self.held is None else with_held(pose, self.held)

@@ -1,0 +1,46 @@
+"""Pass the operator's motion on to the arm."""
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.arm.ability import JointLimits
+from robot_side.arm.commanded import commanded
+from robot_side.arm.port import Arm, ArmState, GripperPose
+from robot_side.arm.speed_assist import assisted
+from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.gripper.grip import Grip
+from robot_side.laws.sensed import Sensed
+from robot_side.operators.safety import Permission
+
+
+class Motion:
+    """What the arm was commanded last."""
+
+    def __init__(self, arm: Arm, limits: JointLimits, settings: ToolMotionSettings, *, assists: bool = False) -> None:
+        """assists: cap the speed along the triggers (see `speed_assist`)."""
+        self.commanded_rad_s: FloatArray | None = None
+        """(n,) joint velocities; None: stand still"""
+        self.told_m_s = self.rises_m_s = 0.0
+        """The tool's commanded speed: along the direction in which R2 advances; upwards while something is held"""
+        self._arm, self._limits, self._settings, self._assists = arm, limits, settings, assists
+        self._still: FloatArray = np.zeros(arm.joint_count)
+
+    def follow(
+        self, permission: Permission, pose: GripperPose, state: ArmState, grip: Grip, felt: Sensed | None, now_s: float
+    ) -> None:
+        """Command the arm; without permission nothing is commanded, and it stops. felt: by the tick before."""
+        command = permission.command
+        if command is None or grip.touching_down.gives_way:
+            self.commanded_rad_s, self.told_m_s, self.rises_m_s = None, 0.0, 0.0
+            # No longer valid: a command that runs out between two physics steps would let a load sink, each time anew.
+            self._arm.command(self._still, state.time_s)
+            self._arm.command_gripper(0.0, now_s)
+            return
+        if self._assists and felt is not None:
+            command = assisted(command, felt.l2, felt.r2)
+        where = pose, state.joint_positions_rad, self._limits, self._settings
+        velocity, self.told_m_s = commanded(command, *where, stands=grip.touching_down.stands)
+        self.commanded_rad_s = velocity
+        self.rises_m_s = 0.0 if grip.held is None else float(pose.tool_jacobian[2] @ velocity)
+        self._arm.command(velocity, permission.valid_until_s)
+        self._arm.command_gripper(command.gripper, permission.valid_until_s)

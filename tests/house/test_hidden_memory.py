@@ -1,0 +1,72 @@
+"""No function changes what stands at a module's top: state has an owner. Caches of pure functions are none."""
+
+import ast
+from collections.abc import Iterator
+
+import pytest
+
+from tests.helpers.repository import ROOT
+
+REGISTRIES = {
+    ("robot_side/compiled/kernel.py", "_kernels"),  # filled while modules are imported
+    ("feelahead/lab/faults/fault.py", "FAULTS"),
+}
+CHANGES = {
+    *("append", "appendleft", "extend", "insert", "add", "update", "setdefault", "fill"),
+    *("pop", "popleft", "popitem", "remove", "discard", "clear"),
+}
+CASES = {
+    "kept = []\ndef f():\n    kept.append(1)": {"kept"},
+    "kept = {}\ndef f():\n    kept['a'] = 1": {"kept"},
+    "kept = None\ndef f():\n    global kept\n    kept = 1": {"kept"},
+    "kept = []\nclass C:\n    def f(self):\n        kept[0].pop()": {"kept"},
+    "kept = []\ndef f():\n    kept = []\n    kept.append(1)": set(),
+    "kept = [1]\ndef f(kept):\n    kept.append(1)": set(),
+    "kept = [1]\ndef f():\n    return kept[0]": set(),
+}
+
+
+def changed(tree: ast.Module) -> set[str]:
+    """Names of a module's top that its functions change."""
+    top = {node.id for line in tree.body for node in _assigned(line)}
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    return {name for function in functions for name in _changed_by(function) if name in top}
+
+
+def _assigned(line: ast.stmt) -> Iterator[ast.Name]:
+    if isinstance(line, ast.Assign | ast.AnnAssign):
+        yield from (node for node in ast.walk(line) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store))
+
+
+def _changed_by(function: ast.FunctionDef | ast.AsyncFunctionDef) -> set[str]:
+    nodes = list(ast.walk(function))
+    arguments = [one.arg for node in nodes if isinstance(node, ast.arguments) for one in [*node.args, *node.kwonlyargs]]
+    own = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)} | {*arguments}
+    found = set()
+    for node in nodes:
+        if isinstance(node, ast.Subscript | ast.Attribute) and not isinstance(node.ctx, ast.Load):
+            found |= _root(node)
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in CHANGES:
+            found |= _root(node.func)
+    return (found - own) | {name for node in nodes if isinstance(node, ast.Global) for name in node.names}
+
+
+def _root(node: ast.expr) -> set[str]:
+    while isinstance(node, ast.Subscript | ast.Attribute):
+        node = node.value
+    return {node.id} if isinstance(node, ast.Name) else set()
+
+
+@pytest.mark.parametrize("source", CASES)
+def test_what_is_changed_is_found(source: str) -> None:
+    assert changed(ast.parse(source)) == CASES[source]
+
+
+def test_nothing_at_a_modules_top_is_changed_but_registries() -> None:
+    found = {
+        (path.relative_to(ROOT).as_posix(), name)
+        for package in ("common", "robot_side", "operator_side", "feelahead")
+        for path in (ROOT / package).rglob("*.py")
+        for name in changed(ast.parse(path.read_text(encoding="utf-8")))
+    }
+    assert found == REGISTRIES
