@@ -5,7 +5,7 @@ from common.command.launch import Command, launch
 
 def main() -> None:
     """Run the process."""
-    launch("feelahead-operator", _load, extra="operator")
+    launch("feelahead-operator", _load, extra="operator", has_summary=True)
 
 
 def _load() -> Command:

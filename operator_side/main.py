@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 from common.clock import MonotonicClock, ThreadClock
 from common.command.command_line import given_fields, parse_settings
+from common.command.ending import end_with, failure_of
 from common.command.live_view import Value
 from common.command.status import Status
-from common.command.stop_signal import StopSignal, ignore_broken_output
+from common.command.stop_signal import StopSignal
 from common.emulation.spec import unused_clauses
-from common.files.output_file import write_json
 from common.realtime.garbage import IdleCollection
 from common.realtime.keeping_up import KeepingUp
 from common.realtime.pacing import Pacer, wait_for_turn
@@ -117,22 +117,10 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
             travel = None if given else StoredTravel(connection, core, viewing.note)
             loop = _Loop(settings, core, sending, sockets, connection, guard, people, status, travel)
             loop.recording = recording
-            failure: Exception | None = None
-            try:
-                loop.run(stop)
-            except BrokenPipeError:
-                ignore_broken_output()
-            except Exception as error:
-                failure = error
-        errors = [] if failure is None else [str(failure)]
+            failure = failure_of(functools.partial(loop.run, stop))
         kept = {} if recording is None else {"recording": recording.close()}
-        summary = core.summary() | loop.summary() | {"triggers_released": connection.released, "errors": errors} | kept
-        try:
-            if settings.summary is not None:
-                write_json("--summary", settings.summary, summary)
-        finally:
-            if failure is not None:
-                raise failure
+        summary = core.summary() | loop.summary() | {"triggers_released": connection.released} | kept
+        end_with(summary, settings.summary, failure)
     return 0
 
 

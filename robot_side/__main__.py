@@ -6,7 +6,7 @@ from common.command.launch import Command, launch, single_threaded_algebra
 def main() -> None:
     """Run the process."""
     single_threaded_algebra()
-    launch("feelahead-robot", _load, extra="robot")
+    launch("feelahead-robot", _load, extra="robot", has_summary=True)
 
 
 def _load() -> Command:

@@ -3,16 +3,17 @@
 import secrets
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from common.clock import MonotonicClock, ThreadClock, clock_domain
 from common.command.command_line import parse_settings, run_command
+from common.command.ending import end_with, failure_of
 from common.command.live_view import SLOW
 from common.command.status import Status
-from common.command.stop_signal import StopSignal, ignore_broken_output, leave_at_once_on_signals
+from common.command.stop_signal import LeavingAtOnce, StopSignal
 from common.emulation.spec import LinkSpec, unused_clauses
 from common.emulation.tuned import tuned_link
-from common.files.output_file import write_json
 from common.protocol.view_messages import VIEW_NAMES
 from common.realtime.garbage import IdleCollection
 from common.realtime.keeping_up import KeepingUp
@@ -63,10 +64,11 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
     keys = None if settings.keys is None else RobotKeys.load(settings.keys)
     raise_descriptor_limit()
     # Nothing moves yet, and a compilation cannot be asked to stop.
-    leave_at_once_on_signals()
-    # The sockets first: a port that is taken is found out before the kernels are compiled.
+    leaving = LeavingAtOnce(settings.summary)
+    open_sockets = partial(RobotSockets, settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys)
+    # A port that is taken is said at once; nobody can connect before there is somebody to answer.
+    open_sockets().close()
     with (
-        RobotSockets(settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys) as sockets,
         Status(settings.status, "robot") as status,
         recording_to(settings.record, "robot", RobotEncoder()) as recording,
     ):
@@ -82,7 +84,9 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
         if recording is not None:
             recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": parts.notes})
             status.also = recording.note
-        with StopSignal() as stop:
+        with StopSignal() as stop, open_sockets() as sockets:
+            leaving.summary = None
+            loop = _Loop(settings, core, link, sockets, status, recording, stages)
             status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
             open_to_all = ["WITHOUT KEYS: anyone who reaches the port can move the arm"] if settings.insecure else []
             for text in open_to_all if keys is None else keys.notes():
@@ -91,25 +95,15 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
             raise_priority()
             for text in make_realtime() if settings.realtime else ():
                 status.note(text)
-            loop = _Loop(settings, core, link, sockets, status, recording, stages)
-            failure: Exception | None = None
-            try:
-                loop.run(stop)
-            except BrokenPipeError:
-                ignore_broken_output()
-            except Exception as error:
-                failure = error
+            failure = failure_of(partial(loop.run, stop))
             # A run that failed has figures, too.
-            summary = loop.summary() | core.summary() | {"errors": [] if failure is None else [str(failure)]}
+            summary = loop.summary() | core.summary()
             if recording is not None:
                 summary["recording"] = recording.close()
             try:
-                if settings.summary is not None:
-                    write_json("--summary", settings.summary, summary)
+                end_with(summary, settings.summary, failure)
             finally:
                 loop.close()
-                if failure is not None:
-                    raise failure
     return 0
 
 

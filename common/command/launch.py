@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 from types import FrameType
 
-from common.command.stop_signal import STOP_SIGNALS, leave_at_once_on_signals, say_output_failed
+from common.command.stop_signal import STOP_SIGNALS, LeavingAtOnce, say_output_failed
 
 Command = Callable[[Sequence[str]], int]
 
@@ -19,14 +19,15 @@ _OURS = ("common", "robot_side", "operator_side", "feelahead")
 _BAD_INPUT = 2
 
 
-def launch(program: str, load: Callable[[], Command], extra: str | None = None) -> None:
+def launch(program: str, load: Callable[[], Command], extra: str | None = None, *, has_summary: bool = False) -> None:
     """Import the command with `load`, run it with this process's arguments, and exit.
 
-    A stop signal ends the process with code 0 and without a traceback, whatever is being imported or built. A module
+    A stop signal ends the process with code 0 and without a traceback, whatever is being imported or built, and with a
+    summary where --summary asks for one and has_summary says that the command knows it. A module
     that is not installed becomes one line that names `extra`, the optional dependencies to install. `--version`
     needs no import at all.
     """
-    leave_at_once_on_signals()
+    LeavingAtOnce(_summary_path(sys.argv[1:]) if has_summary else None)
     _write_in_any_locale()
     if sys.argv[1:] == ["--version"]:
         try:
@@ -52,6 +53,16 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None) 
     except KeyboardInterrupt:
         # Just before or after what run_command looks after itself; unhandled, it would end us with SIGINT's status.
         sys.exit(0)
+
+
+def _summary_path(arguments: Sequence[str]) -> str | None:
+    """Find the value of --summary; nothing that could parse it is imported yet."""
+    for position, argument in enumerate(arguments):
+        if argument == "--summary" and position + 1 < len(arguments):
+            return arguments[position + 1]
+        if argument.startswith("--summary="):
+            return argument.removeprefix("--summary=")
+    return None
 
 
 def single_threaded_algebra() -> None:

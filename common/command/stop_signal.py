@@ -1,13 +1,17 @@
 """SIGINT and SIGTERM as a flag that the main loop reads, so that every exit goes the same clean way."""
 
+import json
 import os
 import select
 import signal
 import sys
+from pathlib import Path
 from types import FrameType
+from typing import Final
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """A closed terminal, too: a controller must not be left with stiff triggers."""
+_NEVER_BEGAN: Final = {"duration_s": 0.0, "ticks": 0, "stops": [], "errors": []}
 
 
 class StopSignal:
@@ -41,18 +45,25 @@ def say_output_failed(program: str, error: OSError) -> int:
     return 1
 
 
-def leave_at_once_on_signals() -> None:
-    """Let a stop signal end the process on the spot, with code 0, until a `StopSignal` opens.
+class LeavingAtOnce:
+    """Lets a stop signal end the process on the spot, with code 0, until a `StopSignal` opens.
 
     An exception could be caught by a module that is half imported, or lost in a compiler's callback, and the process
     would go on.
     """
-    for number in STOP_SIGNALS:
-        signal.signal(number, _leave)
 
+    def __init__(self, summary: str | Path | None = None) -> None:
+        self.summary = summary
+        """File for the summary of a run that never began; None: for none, as once it has begun"""
+        for number in STOP_SIGNALS:
+            signal.signal(number, self._leave)
 
-def _leave(number: int, frame: FrameType | None) -> None:
-    del number, frame
-    if os.isatty(1) and select.select([], [1], [], 0.0)[1]:
-        os.write(1, b"\x1b[?25h")  # a live line hides the cursor
-    os._exit(0)
+    def _leave(self, number: int, frame: FrameType | None) -> None:
+        del number, frame
+        try:
+            if self.summary is not None:
+                Path(self.summary).write_text(json.dumps(_NEVER_BEGAN, indent=2) + "\n", encoding="utf-8")
+        finally:
+            if os.isatty(1) and select.select([], [1], [], 0.0)[1]:
+                os.write(1, b"\x1b[?25h")  # a live line hides the cursor
+            os._exit(0)

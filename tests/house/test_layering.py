@@ -56,7 +56,7 @@ ARROWS = """
     robot_side/simulation: common common/files robot_side/arm robot_side/compiled robot_side/field robot_side/gripper
         robot_side/overlap/meshes robot_side/surroundings robot_side/surroundings/kinds
     robot_side/cameras: common common/companion common/protocol robot_side/simulation
-    robot_side: common common/command common/emulation common/files common/protocol common/rate common/realtime
+    robot_side: common common/command common/emulation common/protocol common/rate common/realtime
         common/recording common/sockets common/timing robot_side/arm robot_side/cameras robot_side/compiled
         robot_side/enlargement robot_side/gripper robot_side/laws robot_side/operators robot_side/simulation
         robot_side/surroundings
@@ -80,7 +80,7 @@ ARROWS = """
         operator_side/simulated_person
     operator_side/console: common common/command common/companion common/protocol common/video operator_side/facts.py
         operator_side/dualsense/reports
-    operator_side: common common/command common/emulation common/files common/protocol common/rate common/realtime
+    operator_side: common common/command common/emulation common/protocol common/rate common/realtime
         common/recording common/sockets operator_side/calibration operator_side/console operator_side/dualsense/effects
         operator_side/dualsense/hid operator_side/dualsense/reports operator_side/dualsense/simulated
         operator_side/facts.py operator_side/feel operator_side/hands operator_side/page_hands

@@ -1,6 +1,7 @@
 """The first and last moments of a command: signals, encodings, versions and what is not installed."""
 
 import contextlib
+import json
 import signal
 import subprocess
 import sys
@@ -43,6 +44,20 @@ def test_a_signal_while_it_starts_ends_it_quietly(code: str, number: signal.Sign
         process.send_signal(number)
         _, complaint = process.communicate(timeout=LIMIT_S)
     assert (process.returncode, complaint) == (0, "")
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("flag", [["--summary", "{}"], ["--summary={}"]])
+def test_a_run_that_never_began_has_a_summary(tmp_path: Path, flag: list[str]) -> None:
+    path = tmp_path / "summary.json"
+    given = ["command", *(word.format(path) for word in flag)]
+    code = IMPORT.replace('["command"]', repr(given)).replace("stop)", "stop, has_summary=True)")
+    with start("-c", code) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "here\n"
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(LIMIT_S) == 0
+    assert json.loads(path.read_text()) == {"duration_s": 0.0, "ticks": 0, "stops": [], "errors": []}
 
 
 BOTH = (signal.SIGINT, signal.SIGTERM)
