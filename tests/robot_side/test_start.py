@@ -1,0 +1,87 @@
+"""The first moments of the robot side's process: strangers at its ports, a stop, a port that is taken."""
+
+import contextlib
+import json
+import socket
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from feelahead.both_sides.processes import SideProcess
+from tests.helpers.python_process import LIMIT_S, ended
+
+pytestmark = pytest.mark.processes
+STRANGERS = 1400
+FEW = """
+import os, resource, sys
+resource.setrlimit(resource.RLIMIT_NOFILE, (1024, 1024))
+os.execv(sys.argv[1], sys.argv[1:])
+"""
+
+
+def free_port() -> int:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        port: int = taken.getsockname()[1]
+        return port
+
+
+class Crowd(threading.Thread):
+    """Connects as soon and as often as it can, and holds what it has."""
+
+    def __init__(self, port: int) -> None:
+        super().__init__(daemon=True)
+        self.held: list[socket.socket] = []
+        self.gone = threading.Event()
+        self._port = port
+
+    def run(self) -> None:
+        while len(self.held) < STRANGERS and not self.gone.is_set():
+            stranger = socket.socket()
+            try:
+                stranger.connect(("127.0.0.1", self._port))
+            except OSError:
+                stranger.close()
+                self.gone.wait(1e-3)
+            else:
+                self.held.append(stranger)
+
+    def leave(self) -> None:
+        self.gone.set()
+        self.join(LIMIT_S)
+        for stranger in self.held:
+            stranger.close()
+
+
+def test_strangers_at_its_port_from_the_first_moment_do_not_end_it(tmp_path: Path) -> None:
+    summary, port = tmp_path / "out.json", free_port()
+    crowd = Crowd(port)
+    crowd.start()
+    flags = [f"--bind=tcp://127.0.0.1:{port}", f"--summary={summary}"]
+    with (
+        contextlib.ExitStack() as stack,
+        SideProcess("robot_side", "robot", flags, before=[sys.executable, "-c", FEW]) as robot,
+    ):
+        stack.callback(crowd.leave)
+        robot.wait_for("listening", LIMIT_S)
+        crowd.join(LIMIT_S)
+        assert len(crowd.held) == STRANGERS
+        robot.events()
+        for _ in range(5):
+            robot.wait_for("status", LIMIT_S)
+        assert robot.stop(LIMIT_S) == 0
+    figures = json.loads(summary.read_text())
+    assert figures["ticks"] > 0
+    assert figures["strangers"]["crowded"] > 0
+
+
+def test_a_port_that_is_taken_is_said_before_anything_is_made_ready() -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        code, said, complaint = ended("-m", "robot_side", f"--bind=tcp://127.0.0.1:{port}")
+    assert (code, said) == (2, "")
+    assert f"--bind: cannot bind tcp://127.0.0.1:{port}: the port is in use" in complaint
