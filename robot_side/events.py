@@ -3,7 +3,7 @@
 A listener changes nothing: what it hears are the core's own values, not copies.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final, Literal, NamedTuple
 
 from common.arrays import FloatArray
@@ -72,6 +72,8 @@ class Listeners(Listener):
             for name in ("on_received", "on_step", "on_tick", "on_sent")
         }
         self._received, self._steps, self._ticks, self._sent = (tuple(found) for found in own.values())
+        self.begin: Callable[[Step], None] = self._steps[0] if len(self._steps) == 1 else self.on_step
+        """As `on_step`: several times in a tick, mostly for one listener"""
 
     def on_received(self, peer: bytes, payload: bytes, now_s: float) -> None:
         """Pass it on."""

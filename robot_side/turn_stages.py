@@ -23,11 +23,9 @@ class StageTiming(Listener):
     """Tells `stages` where each step belongs."""
 
     def __init__(self, stages: Stages) -> None:
-        self._stages, self._counts = stages, False
+        self._stages = stages
 
     def on_step(self, step: Step) -> None:
         """Begin the step's stage, or end the one before."""
-        name = _OF_STEPS.get(step)
-        if name is not None or self._counts:
-            self._stages.begin(name)
-            self._counts = name is not None
+        if self._stages.looks:
+            self._stages.begin(_OF_STEPS.get(step))

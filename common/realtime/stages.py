@@ -25,7 +25,9 @@ class Stages:
         self.spent_s = [0.0] * (2 * len(self.names))
         """Since the start, of each stage: wall time, then processor time, as many turns as were looked at stand for."""
         self._wall, self._processor = wall, processor
-        self._every, self._until_next, self._looks = every, 0, True
+        self._every, self._until_next = every, 0
+        self.looks = True
+        """This turn is looked at."""
         self._turn_s = [0.0] * len(self.spent_s)
         self._begun: tuple[int, float, float] | None = None
         """The stage that was begun: its place, and both clocks then"""
@@ -38,7 +40,7 @@ class Stages:
         wall, processor = self._wall.now, self._processor.now
 
         def measured(*arguments: Given.args, **others: Given.kwargs) -> Result:
-            if not self._looks:
+            if not self.looks:
                 return function(*arguments, **others)
             began_s, computed_s = wall(), processor()
             result = function(*arguments, **others)
@@ -50,8 +52,11 @@ class Stages:
         return measured
 
     def begin(self, name: str | None) -> None:
-        """What follows counts to the stage `name`, until this is called again; None: to none."""
-        if not self._looks:
+        """Count what follows to the stage `name`, until this is called again; None: to none.
+
+        Only in a turn that `looks`.
+        """
+        if name is None and self._begun is None:
             return
         wall_s, processor_s = self._wall.now(), self._processor.now()
         if self._begun is not None:
@@ -62,14 +67,14 @@ class Stages:
 
     def end_turn(self) -> None:
         """What was spent since the last call is one turn's."""
-        if self._looks:
+        if self.looks:
             self._until_next = self._every
             self._turns_s.append(self._turn_s)
             self._turn_s = [0.0] * len(self._turn_s)
             if len(self._turns_s) >= BLOCK:
                 self.take_in()
         self._until_next -= 1
-        self._looks = self._until_next == 0
+        self.looks = self._until_next == 0
 
     def take_in(self) -> None:
         """Reckon with the turns that wait, which costs each of them less."""
