@@ -12,7 +12,7 @@ from common.command.command_line import given_fields, parse_settings
 from common.command.ending import end_with, failure_of
 from common.command.live_view import Value
 from common.command.status import Status
-from common.command.stop_signal import StopSignal
+from common.command.stop_signal import LeavingAtOnce, StopSignal
 from common.emulation.spec import unused_clauses
 from common.realtime.garbage import IdleCollection
 from common.realtime.keeping_up import KeepingUp
@@ -66,6 +66,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     link = settings.link_spec()
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
+    leaving = LeavingAtOnce(settings.summary)
     with (
         OperatorSockets(
             settings.connect,
@@ -78,6 +79,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
         TerminalStatus("operator") if settings.tui else Status(settings.status, "operator") as status,
         recording_to(settings.record, "operator", OperatorEncoder()) as recording,
     ):
+        leaving.summary = None
         sending = Sending(link, sockets)
         core = build_recorded(settings, secrets.randbits(53), recording)
         if recording is not None:

@@ -84,8 +84,9 @@ def build_recorded(settings: OperatorSettings, epoch: int, recording: SideRecord
     """Make the core of `settings`, whose calls go to `recording` where there is one."""
     if recording is None:
         return build_operator_side(settings, epoch, clock_domain())
+    core = build_operator_side(settings, epoch, clock_domain(), [Recorder(recording.noted.append)])
     recording.begin(provenance(settings, epoch, clock_domain()))
-    return build_operator_side(settings, epoch, clock_domain(), [Recorder(recording.noted.append)])
+    return core
 
 
 def recorded_status(core: OperatorSide, now_s: float) -> dict[str, Any]:

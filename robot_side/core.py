@@ -41,7 +41,7 @@ class RobotSide:
         self._joints = JointEstimate()
         self._measured: ArmState | None = None
         self._found: Found | None = None
-        self._heard = Listeners((self.figures, *listeners))
+        self._heard = Listeners((*listeners, self.figures))
 
     @property
     def held(self) -> str | None:

@@ -3,6 +3,7 @@
 import secrets
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
@@ -66,7 +67,7 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
     # Nothing moves yet, and a compilation cannot be asked to stop.
     leaving = LeavingAtOnce(settings.summary)
     open_sockets = partial(RobotSockets, settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys)
-    # A port that is taken is said at once; nobody can connect before there is somebody to answer.
+    # A port that is taken is said at once.
     open_sockets().close()
     with (
         Status(settings.status, "robot") as status,
@@ -84,17 +85,21 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
         if recording is not None:
             recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": parts.notes})
             status.also = recording.note
-        with StopSignal() as stop, open_sockets() as sockets:
+        view = SceneView(SceneModel(parts.scene), parts.kinematics, parts.explains)
+        with ExitStack() as stack:
+            stop = stack.enter_context(StopSignal())
             leaving.summary = None
-            loop = _Loop(settings, core, link, sockets, status, recording, stages)
+            raise_priority()
+            for text in make_realtime() if settings.realtime else ():
+                status.note(text)
+            # Last: who connects is heard at once, and no crowd takes what is still to be opened.
+            sockets = stack.enter_context(open_sockets())
+            loop = _Loop(settings, core, view, link, sockets, status, recording, stages)
             status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
             open_to_all = ["WITHOUT KEYS: anyone who reaches the port can move the arm"] if settings.insecure else []
             for text in open_to_all if keys is None else keys.notes():
                 status.note(text)
             status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
-            raise_priority()
-            for text in make_realtime() if settings.realtime else ():
-                status.note(text)
             failure = failure_of(partial(loop.run, stop))
             # A run that failed has figures, too.
             summary = loop.summary() | core.summary()
@@ -114,6 +119,7 @@ class _Loop:
         self,
         settings: RobotSettings,
         core: RobotSide,
+        view: SceneView,
         link: LinkSpec,
         sockets: RobotSockets,
         status: Status,
@@ -138,7 +144,7 @@ class _Loop:
         self._sending = Sending(link, sockets, secrets.randbits(32))
         self._looking = Looking(
             core,
-            SceneView(SceneModel(parts.scene), parts.kinematics, parts.explains),
+            view,
             Cameras(parts.scene, settings.cameras, status.note) if settings.cameras.on else None,
             self._sending,
             always=() if recording is None else (*VIEW_NAMES, "scene"),

@@ -14,7 +14,7 @@ from robot_side.operators.safety import Permission
 
 
 class Motion:
-    """What the arm was commanded last."""
+    """Commands the arm, and keeps what it was told last."""
 
     def __init__(self, arm: Arm, limits: JointLimits, settings: ToolMotionSettings, *, assists: bool = False) -> None:
         """assists: cap the speed along the triggers (see `speed_assist`)."""

@@ -22,7 +22,7 @@ OBSERVER_PERIOD_S: Final = 0.02
 
 
 class Reports:
-    """The deadbands and schedules of one operator after another."""
+    """Deadbands and schedules of what leaves."""
 
     def __init__(self, session: OperatorSession, law: Law, *, full_rate: bool = False) -> None:
         """full_rate: a stiffness in every tick."""

@@ -9,7 +9,7 @@ from common.files.output_file import write_json
 
 
 def failure_of(run: Callable[[], None]) -> Exception | None:
-    """Run; return what went wrong. A reader of our output that is gone ends a run well."""
+    """Run, and return what went wrong. A broken pipe is no failure: the reader of our output has left."""
     try:
         run()
     except BrokenPipeError:

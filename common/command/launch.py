@@ -22,10 +22,10 @@ _BAD_INPUT = 2
 def launch(program: str, load: Callable[[], Command], extra: str | None = None, *, has_summary: bool = False) -> None:
     """Import the command with `load`, run it with this process's arguments, and exit.
 
-    A stop signal ends the process with code 0 and without a traceback, whatever is being imported or built, and with a
-    summary where --summary asks for one and has_summary says that the command knows it. A module
-    that is not installed becomes one line that names `extra`, the optional dependencies to install. `--version`
-    needs no import at all.
+    A stop signal ends the process with code 0 and without a traceback, whatever is being imported or built. With
+    `has_summary` it leaves the summary that --summary asks for, until the command opens a `StopSignal`. A module that
+    is not installed becomes one line that names `extra`, the optional dependencies to install. `--version` needs no
+    import.
     """
     LeavingAtOnce(_summary_path(sys.argv[1:]) if has_summary else None)
     _write_in_any_locale()
@@ -47,7 +47,7 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
         sys.stderr.write(f"{program}: {missing} is not installed on this machine; valid: pip install '{wanted}'\n")
         sys.exit(_BAD_INPUT)
     try:
-        for number in STOP_SIGNALS:
+        for number in () if has_summary else STOP_SIGNALS:
             signal.signal(number, _interrupt)
         run_command(program, command)
     except KeyboardInterrupt:
@@ -56,13 +56,14 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
 
 
 def _summary_path(arguments: Sequence[str]) -> str | None:
-    """Find the value of --summary; nothing that could parse it is imported yet."""
-    for position, argument in enumerate(arguments):
-        if argument == "--summary" and position + 1 < len(arguments):
-            return arguments[position + 1]
+    """Find the value of --summary, the last one; nothing that could parse it, or a --config, is imported yet."""
+    path = None
+    for argument, following in zip(arguments, [*arguments, ""][1:], strict=True):
         if argument.startswith("--summary="):
-            return argument.removeprefix("--summary=")
-    return None
+            path = argument.removeprefix("--summary=")
+        elif argument == "--summary":
+            path = following
+    return None if path is None or path in ("", "None") or path.startswith("--") else path
 
 
 def single_threaded_algebra() -> None:

@@ -54,16 +54,22 @@ class LeavingAtOnce:
 
     def __init__(self, summary: str | Path | None = None) -> None:
         self.summary = summary
-        """File for the summary of a run that never began; None: for none, as once it has begun"""
+        """File for the summary of a run that never began; None once it has begun"""
         for number in STOP_SIGNALS:
             signal.signal(number, self._leave)
 
     def _leave(self, number: int, frame: FrameType | None) -> None:
         del number, frame
-        try:
-            if self.summary is not None:
-                Path(self.summary).write_text(json.dumps(_NEVER_BEGAN, indent=2) + "\n", encoding="utf-8")
-        finally:
-            if os.isatty(1) and select.select([], [1], [], 0.0)[1]:
-                os.write(1, b"\x1b[?25h")  # a live line hides the cursor
-            os._exit(0)
+        code = 0
+        if self.summary is not None:
+            path = Path(self.summary)
+            new = path.with_name(f".feelahead-{os.getpid()}")
+            try:
+                new.write_text(json.dumps(_NEVER_BEGAN, indent=2) + "\n", encoding="utf-8")
+                new.replace(path)
+            except OSError as error:
+                os.write(2, f"--summary {path}: cannot be written: {error.strerror}; valid: a file's path\n".encode())
+                code = 2
+        if os.isatty(1) and select.select([], [1], [], 0.0)[1]:
+            os.write(1, b"\x1b[?25h")  # a live line hides the cursor
+        os._exit(code)

@@ -21,8 +21,8 @@ _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 def raise_priority() -> bool:
     """Ask for exact sleeps and a higher priority; whether the latter was granted, which takes CAP_SYS_NICE."""
     _libc().prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)  # by default sleeps may end 50 us late to save power
-    for thread in _threads():
-        with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError):
+        for thread in _threads():
             os.setpriority(os.PRIO_PROCESS, thread, _NICENESS)
     # A thread's niceness counts only within its session where Linux groups processes by session (autogroup).
     with contextlib.suppress(OSError):

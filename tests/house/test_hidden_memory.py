@@ -11,6 +11,7 @@ REGISTRIES = {
     ("robot_side/compiled/kernel.py", "_kernels"),  # filled while modules are imported
     ("feelahead/lab/faults/fault.py", "FAULTS"),
 }
+PACKAGES = ("common", "robot_side", "operator_side", "feelahead")
 CHANGES = {
     *("append", "appendleft", "extend", "insert", "add", "update", "setdefault", "fill"),
     *("pop", "popleft", "popitem", "remove", "discard", "clear"),
@@ -20,6 +21,8 @@ CASES = {
     "kept = {}\ndef f():\n    kept['a'] = 1": {"kept"},
     "kept = None\ndef f():\n    global kept\n    kept = 1": {"kept"},
     "kept = []\nclass C:\n    def f(self):\n        kept[0].pop()": {"kept"},
+    "import common.a\ndef f():\n    common.a.b = 1": {"common"},
+    "from common.a import kept\ndef f():\n    kept.append(1)": {"kept"},
     "kept = []\ndef f():\n    kept = []\n    kept.append(1)": set(),
     "kept = [1]\ndef f(kept):\n    kept.append(1)": set(),
     "kept = [1]\ndef f():\n    return kept[0]": set(),
@@ -28,14 +31,19 @@ CASES = {
 
 def changed(tree: ast.Module) -> set[str]:
     """Names of a module's top that its functions change."""
-    top = {node.id for line in tree.body for node in _assigned(line)}
+    top = {name for line in tree.body for name in _named(line)}
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
     return {name for function in functions for name in _changed_by(function) if name in top}
 
 
-def _assigned(line: ast.stmt) -> Iterator[ast.Name]:
+def _named(line: ast.stmt) -> Iterator[str]:
     if isinstance(line, ast.Assign | ast.AnnAssign):
-        yield from (node for node in ast.walk(line) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store))
+        nodes = [node for node in ast.walk(line) if isinstance(node, ast.Name)]
+        yield from (node.id for node in nodes if isinstance(node.ctx, ast.Store))
+    elif isinstance(line, ast.Import | ast.ImportFrom):
+        for one in line.names:
+            if (getattr(line, "module", None) or one.name).partition(".")[0] in PACKAGES:
+                yield one.asname or one.name.partition(".")[0]
 
 
 def _changed_by(function: ast.FunctionDef | ast.AsyncFunctionDef) -> set[str]:
@@ -65,7 +73,7 @@ def test_what_is_changed_is_found(source: str) -> None:
 def test_nothing_at_a_modules_top_is_changed_but_registries() -> None:
     found = {
         (path.relative_to(ROOT).as_posix(), name)
-        for package in ("common", "robot_side", "operator_side", "feelahead")
+        for package in PACKAGES
         for path in (ROOT / package).rglob("*.py")
         for name in changed(ast.parse(path.read_text(encoding="utf-8")))
     }

@@ -10,8 +10,10 @@ from common.realtime.stages import Stages
 from common.sockets.tcp_figures import TcpFigures
 from robot_side import main
 from robot_side.cameras.settings import CamerasSettings
+from robot_side.cameras.shapes import SceneModel
 from robot_side.core import RobotSide
 from robot_side.parts import build_parts
+from robot_side.scene_view import SceneView
 from robot_side.settings import RobotSettings
 from robot_side.turn_stages import STAGES
 
@@ -67,7 +69,9 @@ def test_the_clock_is_read_after_receiving(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(main._Loop, "_use_idle_time", lambda *_: None)
     stages = Stages(STAGES, clock, clock)
     with Status("none", "robot") as status:
-        loop = main._Loop(settings, core, LinkSpec.parse(""), SuspendedSockets(clock), status, None, stages)  # type: ignore[arg-type]
+        view = SceneView(SceneModel(core.parts.scene), core.parts.kinematics, core.parts.explains)
+        sockets: Any = SuspendedSockets(clock)
+        loop = main._Loop(settings, core, view, LinkSpec.parse(""), sockets, status, None, stages)
         loop.run(Once())  # type: ignore[arg-type]
         loop.close()
     assert heard == [(b"peer", b"payload", 101.0)]

@@ -1,4 +1,4 @@
-"""The first moments of the robot side's process: strangers at its ports, a stop, a port that is taken."""
+"""The first moments of the robot side's process: strangers at its ports, a port that is taken."""
 
 import contextlib
 import json

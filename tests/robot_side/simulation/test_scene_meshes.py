@@ -223,12 +223,13 @@ def test_a_height_field_is_the_solid_that_rays_hit(shape: tuple[int, int], tmp_p
 def test_a_scene_without_meshes_loads_no_kernel_for_them() -> None:
     program = (
         "import feelahead.both_sides.loopback, robot_side.main\n"
+        "from robot_side.core import RobotSide\n"
         "from robot_side.parts import build_parts\n"
         "from robot_side.compiled.kernel import imported_kernels\n"
         "from robot_side.settings import RobotSettings\n"
-        "robot = RobotSide(build_parts(RobotSettings(), 1, 'clock'))\n"
-        "robot.tick(0.0)\n"
-        "assert not [note for note in robot.notes if 'perceived larger' in note]\n"
+        "parts = build_parts(RobotSettings(), 1, 'clock')\n"
+        "RobotSide(parts).tick(0.0)\n"
+        "assert not [note for note in parts.notes if 'perceived larger' in note]\n"
         "print(*(kernel.name for kernel in imported_kernels()))"
     )
     root = ROOT
