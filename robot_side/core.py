@@ -6,23 +6,55 @@ arm ─▶ kinematics ─▶ law: what is ahead ─▶ stiffness fields, telemet
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from common.command.live_view import LINK_LOST, LINK_UP
+from common.timing.ages import LoopAge
+from robot_side.arm.ability import JointLimits
 from robot_side.arm.joint_estimate import JointEstimate
-from robot_side.arm.port import ArmState
+from robot_side.arm.port import Arm, ArmState, GripperKinematics
+from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.events import Found, Listener, Listeners, Tick
-from robot_side.figures import RunFigures
+from robot_side.figures import Observer, RunFigures
 from robot_side.gripper.grip import Grip
+from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.perceived_distances import perceived_distances
-from robot_side.laws.law import Situation
+from robot_side.laws.law import Law, Situation
 from robot_side.laws.sensed import Sensed
 from robot_side.motion import Motion
+from robot_side.operators.operator_session import OperatorSession
 from robot_side.outgoing_messages import SHOWN_NAME, Outgoing
-from robot_side.parts import RobotParts
 from robot_side.placing import scaled
 from robot_side.reports import Reports
-from robot_side.sight import Sight
+from robot_side.surroundings.perceived import ObjectSource
+from robot_side.surroundings.sight import Sight
+from robot_side.surroundings.surroundings import Surroundings
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotParts:
+    """What a core is made of; `replace` one to use another arm, camera or law. One core for each set of parts."""
+
+    arm: Arm
+    kinematics: GripperKinematics
+    camera: ObjectSource
+    law: Law
+    surroundings: Surroundings
+    session: OperatorSession
+    loop_age: LoopAge
+    limits: JointLimits
+    motion: ToolMotionSettings
+    truth: Observer | None = None
+    """Tells the figures what is true, where somebody knows it"""
+    held_covers: HeldCovers | None = None
+    assists: bool = False
+    """Cap the speed along the triggers (see `speed_assist`)."""
+    full_rate: bool = False
+    """Send a stiffness in every tick."""
+    seed: int = 0
+    notes: tuple[str, ...] = ()
+    """What a person should know about the scene before the run"""
 
 
 class RobotSide:
@@ -82,7 +114,7 @@ class RobotSide:
         begin("grip")
         objects = sight.see(now_s) if sight.frame is None else sight.frame
         if self.session.take_next_target() and grip.held is None:
-            sight.choose_next(objects, pose)
+            sight.choose_next(objects, pose.tool_position_m, pose.tool_rotation[:, 2])
         grip.follow(objects, pose, state, self.motion.rises_m_s)
         whole = grip.joined(pose)
         begin("motion")

@@ -29,11 +29,11 @@ from common.statistics import RunningStatistics
 from robot_side.cameras.pictures import Cameras
 from robot_side.cameras.shapes import SceneModel
 from robot_side.compiled.warm_up import warm_up
-from robot_side.core import RobotSide
+from robot_side.core import RobotParts, RobotSide
 from robot_side.events import Listener
 from robot_side.link_reporter import LinkReporter
 from robot_side.looking import Looking
-from robot_side.parts import RobotParts, build_parts
+from robot_side.parts import SimulatedParts, build_parts
 from robot_side.recorded import Recorder, RobotEncoder, recorded_status, robot_header
 from robot_side.scene_view import SceneView
 from robot_side.sending import SENT_STREAMS, Sending
@@ -94,7 +94,7 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
                 status.note(text)
             # Last: who connects is heard at once, and no crowd takes what is still to be opened.
             sockets = stack.enter_context(open_sockets())
-            loop = _Loop(settings, core, view, link, sockets, status, recording, stages)
+            loop = _Loop(settings, core, parts, view, link, sockets, status, recording, stages)
             status.note(f"listening at {sockets.control_endpoint}, view at {sockets.view_endpoint}")
             open_to_all = ["WITHOUT KEYS: anyone who reaches the port can move the arm"] if settings.insecure else []
             for text in open_to_all if keys is None else keys.notes():
@@ -119,6 +119,7 @@ class _Loop:
         self,
         settings: RobotSettings,
         core: RobotSide,
+        parts: SimulatedParts,
         view: SceneView,
         link: LinkSpec,
         sockets: RobotSockets,
@@ -126,7 +127,7 @@ class _Loop:
         recording: SideRecording | None,
         stages: Stages,
     ) -> None:
-        parts, self._recording = core.parts, recording
+        self._recording = recording
         self._duration_s = settings.duration
         self._core = core
         self._link = link

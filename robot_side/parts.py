@@ -11,15 +11,12 @@ from common.errors import ConfigurationError
 from common.protocol.around import MOST_JOINTS
 from common.protocol.link_end import LinkEnd
 from common.timing.ages import LoopAge
-from robot_side.arm.ability import JointLimits
-from robot_side.arm.port import Arm
-from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.compiled.kernel import Compiled, imported_kernels
+from robot_side.core import RobotParts
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
-from robot_side.figures import Observer, RunFigures
+from robot_side.figures import RunFigures
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.laws.explanation import Explains
-from robot_side.laws.law import Law
 from robot_side.laws.paper import PaperLaw
 from robot_side.laws.swept import SweptLaw
 from robot_side.operators.operator_session import OperatorSession
@@ -35,7 +32,7 @@ from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.simulation.kinematics import MujocoKinematics
 from robot_side.simulation.scene import Scene, load_scene
 from robot_side.simulation.true_contact import TrueContact
-from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects, Role
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
 from robot_side.surroundings.surroundings import Surroundings
 
 _SEARCHING = "searching for spheres that cover gripper and objects, seconds for each shape; the next start is quick"
@@ -66,30 +63,15 @@ class SimulationObserver:
             figures.first_contact(onset.thing, onset.closing_speed_m_s, now_s)
 
 
-@dataclass(frozen=True)
-class RobotParts:
-    """What a robot side is made of; `replace` one to use another arm, camera or law."""
+@dataclass(frozen=True, kw_only=True)
+class SimulatedParts(RobotParts):
+    """Parts in front of a simulation, and the simulation."""
 
-    arm: Arm
     kinematics: MujocoKinematics
-    camera: ObjectSource
-    law: Law
-    explains: Explains
-    """The settings' own law, whatever stands in for it"""
-    surroundings: Surroundings
-    session: OperatorSession
-    loop_age: LoopAge
-    limits: JointLimits
-    motion: ToolMotionSettings
     scene: Scene
     simulation: MujocoArm
-    truth: Observer | None
-    held_covers: HeldCovers | None
-    assists: bool
-    full_rate: bool
-    seed: int
-    notes: tuple[str, ...]
-    """What a person should know about the scene before the run"""
+    explains: Explains
+    """The settings' own law, whatever stands in for it"""
 
     @property
     def kernels(self) -> list[Compiled]:
@@ -110,7 +92,7 @@ def build_parts(
     clock_domain: str,
     scene: Scene | None = None,
     announce: Callable[[str], None] | None = None,
-) -> RobotParts:
+) -> SimulatedParts:
     """Make the parts; ConfigurationError for a model that cannot be used.
 
     scene: instead of loading the one that the settings name, so that the caller can look at it. announce: told once,
@@ -150,7 +132,7 @@ def build_parts(
     )
     if isinstance(law, SweptLaw):
         law.ask_around(asked=len(law.encoder_sigma_rad) <= MOST_JOINTS)
-    return RobotParts(
+    return SimulatedParts(
         arm=arm,
         kinematics=kinematics,
         camera=camera,

@@ -1,7 +1,7 @@
 """The first moments of a command, before anything large is imported: signals, output, and what is not installed.
 
-Only the standard library is imported here, and what itself imports nothing else, so that a Ctrl-C right after the
-start meets a handler.
+Only the standard library is imported here, and what imports nothing else, so that a Ctrl-C right after the start meets
+a handler.
 """
 
 import importlib.metadata

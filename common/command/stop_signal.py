@@ -1,6 +1,5 @@
 """SIGINT and SIGTERM as a flag that the main loop reads, so that every exit goes the same clean way."""
 
-import json
 import os
 import select
 import signal
@@ -8,6 +7,9 @@ import sys
 from pathlib import Path
 from types import FrameType
 from typing import Final
+
+from common.errors import ConfigurationError
+from common.files.output_file import write_json
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """A closed terminal, too: a controller must not be left with stiff triggers."""
@@ -62,13 +64,10 @@ class LeavingAtOnce:
         del number, frame
         code = 0
         if self.summary is not None:
-            path = Path(self.summary)
-            new = path.with_name(f".feelahead-{os.getpid()}")
             try:
-                new.write_text(json.dumps(_NEVER_BEGAN, indent=2) + "\n", encoding="utf-8")
-                new.replace(path)
-            except OSError as error:
-                os.write(2, f"--summary {path}: cannot be written: {error.strerror}; valid: a file's path\n".encode())
+                write_json("--summary", Path(self.summary), _NEVER_BEGAN)
+            except ConfigurationError as error:
+                os.write(2, f"{error}\n".encode())
                 code = 2
         if os.isatty(1) and select.select([], [1], [], 0.0)[1]:
             os.write(1, b"\x1b[?25h")  # a live line hides the cursor

@@ -24,7 +24,7 @@ change."""
 MAXIMUM_BYTES = 4096
 """The largest message is an eighth of this; a longer payload is not looked into."""
 VIEW_MAXIMUM_BYTES: Final = 4 * 1024 * 1024
-"""The same for what people look at; common/sockets refuses more, too."""
+"""The largest view message; common/sockets refuses a longer one, too."""
 
 
 _ENCODER: Final = msgspec.msgpack.Encoder()
@@ -64,7 +64,7 @@ def decode(payload: bytes) -> AnyMessage:
 
 
 def decode_view(payload: bytes) -> AnyViewMessage:
-    """As `decode`, for what people look at."""
+    """Decode a view message; errors as in `decode`."""
     return _decode(payload, _VIEW_MESSAGE, VIEW_MAXIMUM_BYTES)
 
 

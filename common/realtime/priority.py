@@ -21,8 +21,8 @@ _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 def raise_priority() -> bool:
     """Ask for exact sleeps and a higher priority; whether the latter was granted, which takes CAP_SYS_NICE."""
     _libc().prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)  # by default sleeps may end 50 us late to save power
-    with contextlib.suppress(OSError):
-        for thread in _threads():
+    for thread in _threads():
+        with contextlib.suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, thread, _NICENESS)
     # A thread's niceness counts only within its session where Linux groups processes by session (autogroup).
     with contextlib.suppress(OSError):
@@ -52,7 +52,7 @@ def schedule_realtime() -> None:
 
 
 def raise_descriptor_limit() -> None:
-    """As many open connections as the system allows this process, so that a crowd of them cannot lock others out."""
+    """Allow as many open connections as the system does, so that a crowd of strangers cannot lock others out."""
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     with contextlib.suppress(OSError, ValueError):
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))

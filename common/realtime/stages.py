@@ -1,4 +1,4 @@
-"""What the turns of a loop spend on each of a few things, in wall time and in processor time.
+"""Measure the time of each stage of a loop's turns, in wall time and in processor time.
 
 Reading four clocks takes a microsecond and a half, so one turn in seven is looked at: no period of the loop's own work,
 such as 4, 10 or 33 turns, is a multiple of that.
@@ -66,7 +66,7 @@ class Stages:
         self._begun = None if name is None else (2 * self.names.index(name), wall_s, processor_s)
 
     def end_turn(self) -> None:
-        """What was spent since the last call is one turn's."""
+        """Count the time since the last call to one turn."""
         if self.looks:
             self._until_next = self._every
             self._turns_s.append(self._turn_s)
@@ -86,7 +86,7 @@ class Stages:
         self._turns_s.clear()
 
     def summary(self) -> dict[str, dict[str, dict[str, float | None]]]:
-        """Of each stage `wall_us` and `cpu_us` of a turn, each with `p50`, `p99` and `max`."""
+        """Give `wall_us` and `cpu_us` of each stage in a turn, each with `p50`, `p99` and `max`."""
         self.take_in()
         wall, processor = ([microseconds(one) for one in self._statistics[which::2]] for which in (0, 1))
         return {name: {"wall_us": wall[place], "cpu_us": processor[place]} for place, name in enumerate(self.names)}

@@ -28,9 +28,9 @@ from operator_side.settings import OperatorSettings
 from operator_side.simulated_person.whoever import whoever
 from robot_side import events as robot_events
 from robot_side.compiled.warm_up import warm_up
-from robot_side.core import RobotSide
+from robot_side.core import RobotParts, RobotSide
 from robot_side.main import TICK_PERIOD_S
-from robot_side.parts import RobotParts, build_parts
+from robot_side.parts import SimulatedParts, build_parts
 from robot_side.settings import RobotSettings
 from robot_side.simulation.scene import Scene
 
@@ -50,7 +50,7 @@ class LoopbackSettings:
     operator: OperatorSettings = field(default_factory=OperatorSettings)
 
 
-def robot_parts(settings: RobotSettings, scene: Scene | None = None) -> RobotParts:
+def robot_parts(settings: RobotSettings, scene: Scene | None = None) -> SimulatedParts:
     """Make the robot side's parts for a virtual clock, in this scene or the one that the settings name."""
     return build_parts(settings, 1, VIRTUAL_CLOCK, scene)
 

@@ -63,15 +63,16 @@ def test_the_clock_is_read_after_receiving(monkeypatch: pytest.MonkeyPatch) -> N
     clock, heard = SteppedClock(), []
     monkeypatch.setattr(main, "MonotonicClock", lambda: clock)
     settings = RobotSettings(cameras=CamerasSettings(on=False))
-    core = RobotSide(build_parts(settings, 1, "clock"))
+    parts = build_parts(settings, 1, "clock")
+    core = RobotSide(parts)
     monkeypatch.setattr(core, "receive", lambda *message: heard.append(message))
     monkeypatch.setattr(core, "tick", lambda _: [])
     monkeypatch.setattr(main._Loop, "_use_idle_time", lambda *_: None)
     stages = Stages(STAGES, clock, clock)
     with Status("none", "robot") as status:
-        view = SceneView(SceneModel(core.parts.scene), core.parts.kinematics, core.parts.explains)
+        view = SceneView(SceneModel(parts.scene), parts.kinematics, parts.explains)
         sockets: Any = SuspendedSockets(clock)
-        loop = main._Loop(settings, core, view, LinkSpec.parse(""), sockets, status, None, stages)
+        loop = main._Loop(settings, core, parts, view, LinkSpec.parse(""), sockets, status, None, stages)
         loop.run(Once())  # type: ignore[arg-type]
         loop.close()
     assert heard == [(b"peer", b"payload", 101.0)]

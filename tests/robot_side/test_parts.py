@@ -160,9 +160,9 @@ def test_a_tick_among_boxes_runs_no_kernel_that_was_not_made_ready(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = planar_arm(tmp_path, world='<geom name="post" type="box" size="0.05 0.05 0.1" pos="0.33 0 0.8"/>')
-    robot = built(model=model, site="tcp")
-    warm_up(kernels=robot.parts.kernels)
-    ready = set(robot.parts.kernels)
+    parts = build_parts(RobotSettings(model=model, site="tcp"), 1, "clock")
+    robot, ready = RobotSide(parts), set(parts.kernels)
+    warm_up(kernels=parts.kernels)
 
     def run(kernel: Compiled, *arguments: Any) -> Any:
         assert kernel in ready

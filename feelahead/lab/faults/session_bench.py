@@ -22,10 +22,10 @@ from common.protocol.messages import (
 )
 from common.protocol.session import SessionState
 from robot_side.arm.port import ArmState
-from robot_side.core import RobotSide
+from robot_side.core import RobotParts, RobotSide
 from robot_side.events import Listener, Tick
 from robot_side.operators.safety import SafetySettings
-from robot_side.parts import RobotParts, build_parts
+from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 from robot_side.simulation.joint_reference import MotionLimits
 

@@ -23,10 +23,9 @@ import robot_side.main
 from common.command.command_line import parse_settings, run_command
 from feelahead.lab.tick.crowd import CrowdedCamera
 from feelahead.lab.tick.mixed import Mixed
-from robot_side.core import RobotSide
+from robot_side.core import RobotParts, RobotSide
 from robot_side.events import Listener, Step
 from robot_side.outgoing_messages import Outgoing
-from robot_side.parts import RobotParts
 
 PROGRAM: Final = "feelahead.lab.tick.timed_robot"
 STAGES: Final = ("physics", "look", "frame", "law", "motion", "figures", "message")

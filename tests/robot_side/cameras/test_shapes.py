@@ -97,13 +97,13 @@ def _offset(scene: Scene, poses: FloatArray, index: int) -> FloatArray:
 
 
 def test_links_are_the_robots_bodies_and_their_shapes_go_with_them() -> None:
-    robot, view = looked_at(RobotSettings())
+    scene = load_scene()
+    robot, view = looked_at(RobotSettings(), scene)
     said = shapes_of(robot, view)
     assert said.links[-3:] == ("gripper", "left_finger", "right_finger")
     sensed, situation = robot.newest or pytest.fail("no tick")
     state = state_of(view, sensed, situation)
     links = np.frombuffer(state.link_poses, "<f4").reshape(-1, 7).astype(np.float64)
-    scene = robot.parts.scene
     for shape in said.shapes:
         if shape.of_robot:
             position_m, _ = placed(shape, links[shape.owner])

@@ -1,7 +1,6 @@
 """Follow the camera's newest frame, and the target in it."""
 
 from common.arrays import FloatArray
-from robot_side.arm.port import GripperPose
 from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects, Role
 from robot_side.surroundings.surroundings import Surroundings
 from robot_side.surroundings.target import next_target, object_centers
@@ -28,10 +27,9 @@ class Sight:
             self.target_m = None if self.target is None else self._surroundings.center_m(objects, self.target)
         return objects
 
-    def choose_next(self, objects: PerceivedObjects, pose: GripperPose) -> None:
-        """Make another object the target: the next one along the approach."""
-        where = object_centers(objects), pose.tool_position_m, pose.tool_rotation[:, 2]
-        chosen = next_target(objects, self.target, *where)
+    def choose_next(self, objects: PerceivedObjects, tool_position_m: FloatArray, approach: FloatArray) -> None:
+        """Make another object the target: the next one along the unit vector `approach` (3,)."""
+        chosen = next_target(objects, self.target, object_centers(objects), tool_position_m, approach)
         if chosen is None:
             return
         if self.target is not None:
