@@ -151,6 +151,7 @@ class HandshakeWatch:
         """Whether the newest ended because the robot side does not let our key in."""
         self._keys = keys
         self._unsent_bytes = unsent_bytes
+        self._part = part
         self._events = part.get_monitor_socket(
             zmq.EVENT_CONNECTED
             | zmq.EVENT_HANDSHAKE_SUCCEEDED
@@ -175,7 +176,9 @@ class HandshakeWatch:
             self.key_refused = event == zmq.EVENT_HANDSHAKE_FAILED_AUTH
 
     def close(self) -> None:
-        """Look no more; before the socket itself is closed."""
+        """Look no more; before the watched socket is closed."""
+        # In this order: ZeroMQ's own thread would wait forever to tell an event to a watcher that is gone.
+        self._part.disable_monitor()
         self._events.close(linger=0)
 
     def _reason(self, event: int) -> str:

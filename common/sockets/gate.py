@@ -25,6 +25,7 @@ class Gate:
 
         `introduced_s` as for Crowd, `unsent_bytes` as for hold_little.
         """
+        self._part = part
         self._unsent_bytes = unsent_bytes
         self.crowd = Crowd(min(most, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 4), introduced_s)
         address = f"inproc://gate-{id(part)}"
@@ -47,5 +48,7 @@ class Gate:
         return True
 
     def close(self) -> None:
-        """Look no more."""
+        """Look no more; before the watched socket is closed."""
+        # In this order: ZeroMQ's own thread would wait forever to tell an event to a watcher that is gone.
+        self._part.disable_monitor()
         self.events.close(linger=0)
