@@ -15,17 +15,18 @@ from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import decode, encode
 from common.protocol.link_end import Arrival, LinkEnd
 from common.protocol.messages import Compensation, Hello, LeaseNotice, LinkReport, StiffnessUpdate, Telemetry
-from operator_side.commanding import STOPPING, HeldCommand, StopButton, ToRobot, motion_command
 from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.events import Input, Listener
 from operator_side.feel.blindness import Blindness, Sight
 from operator_side.feel.haptics import Haptics
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.intent import OperatorIntent
+from operator_side.hands.newest import Hands
 from operator_side.hands.travel_calibration import TravelCalibration
-from operator_side.newest import STIFFNESS_EXPIRES_S, Hands, NewestStiffness, NewestView
-from operator_side.standing import Standing
-from operator_side.tuner import Tuner
+from operator_side.robot_link.commanding import STOPPING, HeldCommand, StopButton, ToRobot, motion_command
+from operator_side.robot_link.newest import STIFFNESS_EXPIRES_S, NewestStiffness, NewestView
+from operator_side.robot_link.standing import Standing
+from operator_side.robot_link.tuner import Tuner
 
 HEARTBEAT_PERIOD_S = 0.2
 """A Hello this often while nothing else is sent: it opens the session, and then shows that we are alive."""

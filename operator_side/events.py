@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Literal
 
-from operator_side.commanding import ToRobot
 from operator_side.dualsense.reports.output_report import OutputReport
+from operator_side.robot_link.commanding import ToRobot
 
 Input = Literal["received", "seen", "report", "tuned", "calibrated", "found", "lost", "stopped"]
 """What comes in: a control payload, a view payload, a controller's report, another P or link, a calibration; that the

@@ -23,8 +23,6 @@ from common.recording.side import SideRecording, recording_to
 from common.silence import MOTION_PERIOD_S
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
-from operator_side.commanding import ToRobot
-from operator_side.console.console import Console
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.background_writes import BackgroundWrites
 from operator_side.dualsense.hid.connection import Connection
@@ -33,16 +31,18 @@ from operator_side.dualsense.hid.finding import Finder
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.search import BackgroundSearch, OpenController, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.facts_of_core import Surroundings
-from operator_side.following_pages import follow_pages, hands_facts, shared_hands
-from operator_side.page_hands.driving_page import DrivingPage
-from operator_side.page_hands.shared_hands import SharedHands
 from operator_side.recorded import OperatorEncoder, build_recorded, recorded_status
-from operator_side.sending import Sending
+from operator_side.robot_link.commanding import ToRobot
+from operator_side.robot_link.sending import Sending
 from operator_side.settings import OperatorSettings
 from operator_side.stored_travel import StoredTravel
-from operator_side.terminal_view.status import TerminalStatus
-from operator_side.viewing import Viewing, view_topics
+from operator_side.viewing.console.console import Console
+from operator_side.viewing.facts_of_core import Surroundings
+from operator_side.viewing.following_pages import follow_pages, hands_facts, shared_hands
+from operator_side.viewing.pages.driving_page import DrivingPage
+from operator_side.viewing.pages.shared_hands import SharedHands
+from operator_side.viewing.terminal.status import TerminalStatus
+from operator_side.viewing.viewing import Viewing, view_topics
 
 _HELPS = {
     "sockets": "a slower link",

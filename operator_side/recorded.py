@@ -11,10 +11,10 @@ from common.recording.entries import Kind, entry, text
 from common.recording.provenance import provenance
 from common.recording.side import SideRecording
 from operator_side.assembly import build_operator_side
-from operator_side.commanding import ToRobot
 from operator_side.core import OperatorSide
 from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
 from operator_side.events import Input, Listener
+from operator_side.robot_link.commanding import ToRobot
 from operator_side.settings import OperatorSettings
 
 _HAPTICS: Final = text(b"haptics")

@@ -13,7 +13,7 @@ from common.protocol.messages import Compensation
 from common.sockets.turns import CONNECTIONS, MOST_CONNECTIONS_EACH
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.travel_calibration import TravelCalibration
-from operator_side.simulated_person.settings import PersonSettings
+from operator_side.people.settings import PersonSettings
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from robot_side.arm.joint_estimate import JointEstimate
 from robot_side.arm.port import Arm, ArmState, GripperKinematics
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.events import Found, Listener, Listeners, Tick
-from robot_side.figures import Observer, RunFigures
 from robot_side.gripper.grip import Grip
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.perceived_distances import perceived_distances
@@ -24,9 +23,10 @@ from robot_side.laws.law import Law, Situation
 from robot_side.laws.sensed import Sensed
 from robot_side.motion import Motion
 from robot_side.operators.operator_session import OperatorSession
-from robot_side.outgoing_messages import SHOWN_NAME, Outgoing
-from robot_side.placing import scaled
-from robot_side.reports import Reports
+from robot_side.outcome.figures import Observer, RunFigures
+from robot_side.outcome.placing import scaled
+from robot_side.reporting.outgoing_messages import SHOWN_NAME, Outgoing
+from robot_side.reporting.reports import Reports
 from robot_side.surroundings.perceived import ObjectSource
 from robot_side.surroundings.sight import Sight
 from robot_side.surroundings.surroundings import Surroundings

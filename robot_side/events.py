@@ -11,7 +11,7 @@ from robot_side.arm.port import ArmState
 from robot_side.laws.law import Situation
 from robot_side.laws.sensed import Sensed
 from robot_side.operators.safety import Permission
-from robot_side.outgoing_messages import Outgoing
+from robot_side.reporting.outgoing_messages import Outgoing
 from robot_side.surroundings.perceived import PerceivedObjects
 
 Step = Literal["arm", "pose", "grip", "motion", "law", "messages", "listeners", "frame", "end"]

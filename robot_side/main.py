@@ -26,19 +26,19 @@ from common.sockets.admission import Admission
 from common.sockets.authentication import RobotKeys
 from common.sockets.robot import RobotSockets
 from common.statistics import RunningStatistics
-from robot_side.cameras.pictures import Cameras
-from robot_side.cameras.shapes import SceneModel
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotParts, RobotSide
 from robot_side.events import Listener
-from robot_side.link_reporter import LinkReporter
-from robot_side.looking import Looking
 from robot_side.parts import SimulatedParts, build_parts
-from robot_side.recorded import Recorder, RobotEncoder, recorded_status, robot_header
-from robot_side.scene_view import SceneView
-from robot_side.sending import SENT_STREAMS, Sending
+from robot_side.recording.recorder import Recorder, RobotEncoder, recorded_status, robot_header
+from robot_side.reporting.link_reporter import LinkReporter
+from robot_side.reporting.sending import SENT_STREAMS, Sending
 from robot_side.settings import RobotSettings
 from robot_side.turn_stages import HELPS, STAGES, StageTiming
+from robot_side.viewing.looking import Looking
+from robot_side.viewing.pictures import Cameras
+from robot_side.viewing.scene_view import SceneView
+from robot_side.viewing.shapes import SceneModel
 
 TICK_PERIOD_S = 1e-3
 KEYS_PERIOD_S = 0.2

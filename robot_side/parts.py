@@ -13,8 +13,16 @@ from common.protocol.link_end import LinkEnd
 from common.timing.ages import LoopAge
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core import RobotParts
+from robot_side.drivers.mujoco.arm import MujocoArm
+from robot_side.drivers.mujoco.camera import CameraError, MujocoCamera
+from robot_side.drivers.mujoco.encoders import Encoder
+from robot_side.drivers.mujoco.gripper_cover import GripperCover
+from robot_side.drivers.mujoco.ground_truth import GroundTruth
+from robot_side.drivers.mujoco.joint_reference import MotionLimits
+from robot_side.drivers.mujoco.kinematics import MujocoKinematics
+from robot_side.drivers.mujoco.scene import Scene, load_scene
+from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
-from robot_side.figures import RunFigures
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.laws.explanation import Explains
 from robot_side.laws.paper import PaperLaw
@@ -22,16 +30,8 @@ from robot_side.laws.swept import SweptLaw
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.operators.tuning import Tuning
+from robot_side.outcome.figures import RunFigures
 from robot_side.settings import RobotSettings
-from robot_side.simulation.arm import MujocoArm
-from robot_side.simulation.camera import CameraError, MujocoCamera
-from robot_side.simulation.encoders import Encoder
-from robot_side.simulation.gripper_cover import GripperCover
-from robot_side.simulation.ground_truth import GroundTruth
-from robot_side.simulation.joint_reference import MotionLimits
-from robot_side.simulation.kinematics import MujocoKinematics
-from robot_side.simulation.scene import Scene, load_scene
-from robot_side.simulation.true_contact import TrueContact
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
 from robot_side.surroundings.surroundings import Surroundings
 

@@ -30,7 +30,7 @@ class Kind(IntEnum):
     """A turn of the robot side, after its STATE and FRAME: applied f64, when the command was sent that moves the arm,
     on the operator side's clock, NaN for none."""
     STATE = 4
-    """What the arm measured (robot_side/recorded_inputs.py), where it is not what it was in the tick before."""
+    """What the arm measured (robot_side/recording/inputs.py), where it is not what it was in the tick before."""
     FRAME = 5
     """What the camera saw (the same file), where it is not what it was in the tick before."""
     SEEN = 6

@@ -22,17 +22,17 @@ from operator_side.assembly import build_operator_side
 from operator_side.dualsense.hid.connection import Connection
 from operator_side.dualsense.hid.search import OpenController, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.following_pages import follow_pages
-from operator_side.page_hands.driving_page import DrivingPage
+from operator_side.people.whoever import whoever
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.whoever import whoever
+from operator_side.viewing.following_pages import follow_pages
+from operator_side.viewing.pages.driving_page import DrivingPage
 from robot_side import events as robot_events
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotParts, RobotSide
+from robot_side.drivers.mujoco.scene import Scene
 from robot_side.main import TICK_PERIOD_S
 from robot_side.parts import SimulatedParts, build_parts
 from robot_side.settings import RobotSettings
-from robot_side.simulation.scene import Scene
 
 _WALL = MonotonicClock()
 """For how long a tick takes, and nothing else."""

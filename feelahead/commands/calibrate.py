@@ -29,7 +29,7 @@ from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.output_report import RELEASED
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
-from operator_side.simulated_person.calibrating_hands import CalibratingHands
+from operator_side.people.calibrating_hands import CalibratingHands
 
 _POLL_S = 0.002
 _SHOW_S = 0.05

@@ -28,8 +28,8 @@ from common.recording.side import Recorder
 from feelahead.both_sides.processes import SideFailedError, SideProcess
 from feelahead.both_sides.summary import both_statuses, merge_summaries, read_summary
 from feelahead.commands.open_browser import show_address
-from operator_side.facts import OperatorFacts
-from operator_side.terminal_view.status import TerminalStatus
+from operator_side.viewing.facts import OperatorFacts
+from operator_side.viewing.terminal.status import TerminalStatus
 
 _START_TIMEOUT_S = 600.0
 """The first start compiles the overlap kernels, which a busy machine takes minutes for."""

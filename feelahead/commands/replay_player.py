@@ -15,10 +15,10 @@ from common.recording.reading import Recording
 from feelahead.both_sides.summary import both_statuses
 from feelahead.commands.open_browser import show_address
 from feelahead.recordings.playback import FACTS, ROBOT, VIEW, Playback, Seen
-from operator_side.console.console import Console
-from operator_side.facts import OperatorFacts
-from operator_side.terminal_view.status import TerminalStatus
-from operator_side.viewing import SceneFigures
+from operator_side.viewing.console.console import Console
+from operator_side.viewing.facts import OperatorFacts
+from operator_side.viewing.terminal.status import TerminalStatus
+from operator_side.viewing.viewing import SceneFigures
 
 _PROGRAM: Final = "feelahead replay"
 _STEP_S: Final = 0.01

@@ -12,13 +12,13 @@ from common.arrays import FloatArray
 from feelahead.lab.figures import figure
 from feelahead.lab.table import Row, Table
 from robot_side.arm.port import ArmState, GripperPose
+from robot_side.drivers.mujoco.gripper_cover import cover_gripper, link_solids, placed_corners
+from robot_side.drivers.mujoco.gripper_measurement import open_gap
+from robot_side.drivers.mujoco.kinematics import MujocoKinematics
+from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.gripper.solids import Solid
 from robot_side.overlap.meshes.mesh import Mesh
 from robot_side.overlap.meshes.mesh_library import MeshLibrary, nearest_mesh_pairs
-from robot_side.simulation.gripper_cover import cover_gripper, link_solids, placed_corners
-from robot_side.simulation.gripper_measurement import open_gap
-from robot_side.simulation.kinematics import MujocoKinematics
-from robot_side.simulation.scene import Scene, load_scene
 
 STANDS_OUT: Final = ("stands_out_median_mm", "stands_out_p99_mm", "stands_out_mm")
 _AT_A_TIME: Final = 4096

@@ -13,13 +13,13 @@ from common.errors import ConfigurationError
 from feelahead.lab.figures import figure
 from feelahead.lab.propagation import PosedGripper
 from feelahead.lab.table import Row, Table
+from robot_side.drivers.mujoco.encoders import Encoder
+from robot_side.drivers.mujoco.posed_scene import PosedScene
+from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.enlargement.distance import standard_quantile
 from robot_side.field.field import Ahead, Along, Field
 from robot_side.field.object_class import OBSTACLE
 from robot_side.settings import CameraSettings, EncoderSettings
-from robot_side.simulation.encoders import Encoder
-from robot_side.simulation.posed_scene import PosedScene
-from robot_side.simulation.scene import load_scene
 from robot_side.surroundings.scene_table import scene_table
 
 CONVEX: Final = ("wall", "plate", "ball", "post", "rod_10mm", "rod_5mm", "rod_2mm", "wall_45")

@@ -14,9 +14,9 @@ from common.clock import MonotonicClock
 from feelahead.lab.table import Row
 from feelahead.lab.turns import in_turns, least_ns
 from robot_side.arm.port import ArmState, GripperPose
+from robot_side.drivers.mujoco.kinematics import MujocoKinematics
+from robot_side.drivers.mujoco.scene import Scene
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
-from robot_side.simulation.kinematics import MujocoKinematics
-from robot_side.simulation.scene import Scene
 
 NOISE_RAD: Final = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 """Standard deviations of every joint's error."""

@@ -11,20 +11,20 @@ from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_part
 from feelahead.lab.table import Row
 from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.dualsense.simulated.trigger_model import zone_of
+from operator_side.people.person import SimulatedOperator
+from operator_side.people.settings import PersonSettings
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.person import SimulatedOperator
-from operator_side.simulated_person.settings import PersonSettings
 from robot_side.arm.port import GripperPose
+from robot_side.drivers.mujoco.built_in_scenes import SceneName
+from robot_side.drivers.mujoco.ground_truth import GroundTruth
+from robot_side.drivers.mujoco.scene import load_scene
+from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.events import Listener
 from robot_side.laws.law import Law, Situation
 from robot_side.laws.sensed import Sensed
 from robot_side.main import TICK_PERIOD_S
-from robot_side.placing import Placing
+from robot_side.outcome.placing import Placing
 from robot_side.settings import CameraSettings, RobotSettings
-from robot_side.simulation.built_in_scenes import SceneName
-from robot_side.simulation.ground_truth import GroundTruth
-from robot_side.simulation.scene import load_scene
-from robot_side.simulation.true_contact import TrueContact
 from robot_side.surroundings.perceived import Role
 
 Arm = Literal["off", "mechanical", "reacting"]

@@ -22,7 +22,7 @@ from robot_side.arm.port import ArmState
 from robot_side.compiled.warm_up import kernel_digests, warm_up
 from robot_side.core import RobotSide
 from robot_side.parts import build_parts
-from robot_side.recorded_inputs import FrameUnpacker, unpack_state
+from robot_side.recording.inputs import FrameUnpacker, unpack_state
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.perceived import PerceivedObjects, Role
 

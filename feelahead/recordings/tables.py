@@ -19,7 +19,7 @@ from common.recording.entries import Entry, Kind, unpack_block
 from common.recording.reading import Recording
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.output_report import parse_output_report
-from robot_side.recorded_inputs import unpack_state
+from robot_side.recording.inputs import unpack_state
 
 JOINED_HZ: Final = 100.0
 _NANOSECONDS: Final = 1e-9

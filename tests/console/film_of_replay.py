@@ -11,8 +11,8 @@ from PIL import Image
 
 from common.recording.reading import open_recording
 from feelahead.recordings.playback import FACTS, VIEW, Playback
-from operator_side.console.console import Console
-from operator_side.facts import OperatorFacts
+from operator_side.viewing.console.console import Console
+from operator_side.viewing.facts import OperatorFacts
 from tests.console.browser import Page, browser
 from tests.console.pictures_of_recording import record_demo
 from tests.helpers.machines.waiting import wait_until

@@ -14,13 +14,13 @@ from common.protocol.messages import Telemetry
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.intent import OperatorIntent, operator_intent
-from operator_side.page_hands.driving_page import DrivingPage
-from operator_side.page_hands.shared_hands import SharedHands
+from operator_side.viewing.pages.driving_page import DrivingPage
+from operator_side.viewing.pages.shared_hands import SharedHands
 from tests.console.browser import Browser, Page
 from tests.helpers.repository import ROOT
 from tests.helpers.simulated_desk import VIEW
 
-_PLACE: Final = ROOT / "operator_side" / "console" / "page"
+_PLACE: Final = ROOT / "operator_side" / "viewing" / "console" / "page"
 _FRAME_MS: Final = 20
 _PAGE: Final = b"""<!doctype html><meta charset="utf-8"><title>hands</title><link rel="icon" href="data:,">
 <section id="hands"></section><section id="tuning"></section>

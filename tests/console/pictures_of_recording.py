@@ -15,8 +15,8 @@ import rich.screen
 from PIL import Image
 from rich.console import Console
 
-from operator_side.facts import OperatorFacts
-from operator_side.terminal_view.screen import Screen
+from operator_side.viewing.facts import OperatorFacts
+from operator_side.viewing.terminal.screen import Screen
 from tests.helpers.repository import ROOT
 
 _DURATION_S: Final = 18.0

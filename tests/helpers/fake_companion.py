@@ -4,10 +4,10 @@ import socket
 from collections.abc import Callable
 
 from common.companion.channel import Channel
-from robot_side.cameras.exchange import Order, Picture, Ready, Refusal, Setup, decode_to_companion, encode
-from robot_side.cameras.pictures import Cameras, Renders
-from robot_side.cameras.settings import CamerasSettings
-from robot_side.simulation.scene import Scene
+from robot_side.drivers.mujoco.scene import Scene
+from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, decode_to_companion, encode
+from robot_side.viewing.pictures import Cameras, Renders
+from robot_side.viewing.settings import CamerasSettings
 
 
 class FakeCompanion:

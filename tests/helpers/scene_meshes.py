@@ -6,7 +6,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from feelahead.lab.reference.meshes import grid_tetrahedra, surface_of
-from robot_side.simulation.scene import Scene, load_scene
+from robot_side.drivers.mujoco.scene import Scene, load_scene
 from tests.helpers.arm_models import planar_arm
 
 CELL_M = 0.04

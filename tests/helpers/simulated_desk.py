@@ -14,8 +14,8 @@ from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.hands.travel_calibration import TravelCalibration
-from operator_side.simulated_person.person import Phase, SimulatedOperator
-from operator_side.simulated_person.settings import PersonSettings
+from operator_side.people.person import Phase, SimulatedOperator
+from operator_side.people.settings import PersonSettings
 from tests.helpers.felt import telemetry
 
 TICK_S, FRAME_S = 0.004, 0.02

@@ -8,11 +8,11 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.arm.resolved_rate import joint_velocities
-from robot_side.simulation.arm import MujocoArm
-from robot_side.simulation.encoders import Encoder
-from robot_side.simulation.ground_truth import GroundTruth
-from robot_side.simulation.kinematics import MujocoKinematics
-from robot_side.simulation.scene import Scene, load_scene
+from robot_side.drivers.mujoco.arm import MujocoArm
+from robot_side.drivers.mujoco.encoders import Encoder
+from robot_side.drivers.mujoco.ground_truth import GroundTruth
+from robot_side.drivers.mujoco.kinematics import MujocoKinematics
+from robot_side.drivers.mujoco.scene import Scene, load_scene
 
 PERIOD_S = 0.004
 VALID_S = 0.05

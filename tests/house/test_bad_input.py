@@ -18,7 +18,7 @@ COMMANDS = {
     "feelahead-robot": robot_side.main.command,
     "feelahead-operator": operator_side.main.command,
 }
-ARM = ROOT / "robot_side" / "simulation" / "assets" / "arm.xml"
+ARM = ROOT / "robot_side" / "drivers" / "mujoco" / "assets" / "arm.xml"
 WALL, EMPTY = DATA / "wall.xml", DATA / "empty.xml"
 KEY = "ab" * 32
 

@@ -18,7 +18,7 @@ PACKAGES = ("common", "feelahead", "operator_side", "robot_side")
 TELLING = {
     "robot_side/py.typed",
     "robot_side/enlargement/prediction_errors.toml",
-    "robot_side/simulation/assets/arm.xml",
+    "robot_side/drivers/mujoco/assets/arm.xml",
     "operator_side/dualsense/hid/release_watchdog.py",
 }
 EXTRAS = {

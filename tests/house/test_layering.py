@@ -53,13 +53,33 @@ ARROWS = """
         robot_side/surroundings
     robot_side/gripper: common common/files robot_side/arm robot_side/compiled robot_side/overlap/meshes
         robot_side/surroundings
-    robot_side/simulation: common common/files robot_side/arm robot_side/compiled robot_side/field robot_side/gripper
-        robot_side/overlap/meshes robot_side/surroundings robot_side/surroundings/kinds
-    robot_side/cameras: common common/companion common/protocol robot_side/simulation
-    robot_side: common common/command common/emulation common/protocol common/rate common/realtime
-        common/recording common/sockets common/timing robot_side/arm robot_side/cameras robot_side/compiled
-        robot_side/enlargement robot_side/gripper robot_side/laws robot_side/operators robot_side/simulation
+    robot_side/outcome/truth.py: common
+    robot_side/drivers/mujoco: common common/files robot_side/arm robot_side/compiled robot_side/field
+        robot_side/gripper robot_side/outcome/truth.py robot_side/overlap/meshes robot_side/surroundings
+        robot_side/surroundings/kinds
+    robot_side/motion.py: common robot_side/arm robot_side/gripper robot_side/laws robot_side/operators
+    robot_side/reporting: common common/emulation common/protocol common/rate common/sockets robot_side/arm
+        robot_side/compiled robot_side/gripper robot_side/laws robot_side/motion.py robot_side/operators
         robot_side/surroundings
+    robot_side/events.py: common robot_side/arm robot_side/laws robot_side/operators robot_side/reporting
+        robot_side/surroundings
+    robot_side/outcome: common robot_side/events.py robot_side/laws robot_side/outcome/truth.py
+        robot_side/surroundings
+    robot_side/core.py: common/command common/timing robot_side/arm robot_side/events.py robot_side/gripper
+        robot_side/laws robot_side/motion.py robot_side/operators robot_side/outcome robot_side/reporting
+        robot_side/surroundings
+    robot_side/viewing: common common/companion common/protocol robot_side/core.py robot_side/drivers/mujoco
+        robot_side/laws robot_side/reporting robot_side/surroundings
+    robot_side/settings.py: common common/command robot_side/arm robot_side/drivers/mujoco robot_side/enlargement
+        robot_side/laws robot_side/operators robot_side/surroundings robot_side/viewing
+    robot_side/recording: common/recording robot_side/arm robot_side/compiled robot_side/core.py robot_side/events.py
+        robot_side/settings.py robot_side/surroundings
+    robot_side/parts.py: common common/protocol common/timing robot_side/compiled robot_side/core.py
+        robot_side/drivers/mujoco robot_side/enlargement robot_side/gripper robot_side/laws robot_side/operators
+        robot_side/outcome robot_side/settings.py robot_side/surroundings
+    robot_side: common common/command common/emulation common/protocol common/realtime common/recording common/sockets
+        robot_side/compiled robot_side/core.py robot_side/events.py robot_side/parts.py robot_side/recording
+        robot_side/reporting robot_side/settings.py robot_side/viewing
 
     operator_side/dualsense/effects:
     operator_side/dualsense/reports: common operator_side/dualsense/effects
@@ -67,24 +87,35 @@ ARROWS = """
     operator_side/dualsense/simulated: common operator_side/dualsense/effects operator_side/dualsense/reports
     operator_side/dualsense/uhid: common common/realtime operator_side/dualsense/reports
         operator_side/dualsense/simulated
-    operator_side/hands: operator_side/dualsense/effects operator_side/dualsense/reports
+    operator_side/hands: common operator_side/dualsense/effects operator_side/dualsense/reports
+    operator_side/robot_link: common common/command common/emulation common/protocol common/rate common/sockets
+        operator_side/hands
+    operator_side/events.py: operator_side/dualsense/reports operator_side/robot_link
     operator_side/feel: common common/protocol operator_side/dualsense/effects operator_side/dualsense/reports
         operator_side/hands
     operator_side/calibration: common common/files operator_side/dualsense/reports operator_side/hands
-    operator_side/simulated_person: common common/protocol operator_side/calibration operator_side/dualsense/reports
+    operator_side/people: common common/protocol operator_side/calibration operator_side/dualsense/reports
         operator_side/dualsense/simulated operator_side/hands
-    operator_side/facts.py: common/command
-    operator_side/terminal_view: common common/command common/companion operator_side/facts.py
-        operator_side/dualsense/reports
-    operator_side/page_hands: common common/protocol operator_side/dualsense/simulated operator_side/hands
-        operator_side/simulated_person
-    operator_side/console: common common/command common/companion common/protocol common/video operator_side/facts.py
-        operator_side/dualsense/reports
-    operator_side: common common/command common/emulation common/protocol common/rate common/realtime
-        common/recording common/sockets operator_side/calibration operator_side/console operator_side/dualsense/effects
-        operator_side/dualsense/hid operator_side/dualsense/reports operator_side/dualsense/simulated
-        operator_side/facts.py operator_side/feel operator_side/hands operator_side/page_hands
-        operator_side/simulated_person operator_side/terminal_view
+    operator_side/core.py: common common/command common/protocol operator_side/dualsense/reports
+        operator_side/events.py operator_side/feel operator_side/hands operator_side/robot_link
+    operator_side/settings.py: common common/command common/protocol common/sockets operator_side/feel
+        operator_side/hands operator_side/people
+    operator_side/viewing/facts.py: common/command
+    operator_side/viewing/terminal: common common/command common/companion operator_side/dualsense/reports
+        operator_side/viewing/facts.py
+    operator_side/viewing/pages: common common/protocol operator_side/dualsense/simulated operator_side/hands
+        operator_side/people
+    operator_side/viewing/console: common common/command common/companion common/protocol common/video
+        operator_side/dualsense/reports operator_side/viewing/facts.py
+    operator_side/viewing: common common/command common/protocol common/rate common/recording operator_side/core.py
+        operator_side/dualsense/effects operator_side/dualsense/reports operator_side/dualsense/simulated
+        operator_side/people operator_side/settings.py operator_side/viewing/console operator_side/viewing/facts.py
+        operator_side/viewing/pages
+    operator_side: common common/command common/emulation common/protocol common/realtime common/recording
+        common/sockets operator_side/calibration operator_side/core.py operator_side/dualsense/hid
+        operator_side/dualsense/reports operator_side/dualsense/simulated operator_side/events.py operator_side/hands
+        operator_side/robot_link operator_side/settings.py operator_side/viewing operator_side/viewing/console
+        operator_side/viewing/pages operator_side/viewing/terminal
 
     feelahead/both_sides: common/* robot_side/* operator_side/*
     feelahead/recordings: common/* robot_side/* operator_side/*
@@ -101,16 +132,16 @@ What has no row of its own counts to the room around it.
 """
 
 LIBRARIES = {
-    "viser": ("operator_side/console",),
-    "trimesh": ("operator_side/console",),
-    "websockets": ("operator_side/console",),
+    "viser": ("operator_side/viewing/console",),
+    "trimesh": ("operator_side/viewing/console",),
+    "websockets": ("operator_side/viewing/console",),
     "zmq": ("common/sockets", "feelahead/lab/link/bare.py"),
     "hid": ("operator_side/dualsense/hid/device.py",),
     "hidraw": ("operator_side/dualsense/hid/device.py",),
-    "mujoco": ("robot_side/simulation", "robot_side/cameras"),
+    "mujoco": ("robot_side/drivers/mujoco", "robot_side/viewing"),
     "numba": ("robot_side/compiled",),
     "llvmlite": ("robot_side/compiled",),
-    "av": ("common/video", "robot_side/cameras", "feelahead/lab/questions/pictures.py"),
+    "av": ("common/video", "robot_side/viewing", "feelahead/lab/questions/pictures.py"),
     "foxglove": ("common/recording",),
     "mcap": ("common/recording",),
     # A wall clock that jumps by an hour must not be there to trip over; a recording's stamps are that clock's.
@@ -129,10 +160,10 @@ LIBRARIES = {
         "common/sockets/shell.py",
         "common/recording",
         "robot_side/main.py",
-        "robot_side/cameras",
+        "robot_side/viewing",
         "robot_side/compiled/warm_up.py",
         "operator_side/main.py",
-        "operator_side/terminal_view",
+        "operator_side/viewing/terminal",
         "feelahead/lab",
         "feelahead/both_sides",
         "feelahead/commands",

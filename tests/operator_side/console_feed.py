@@ -18,8 +18,8 @@ from common.protocol.view_messages import (
     VideoFrame,
     ViewName,
 )
-from operator_side.console.console import Console
-from operator_side.facts import FACTS_PERIOD_S, DelayFacts, OperatorFacts, TriggerFacts
+from operator_side.viewing.console.console import Console
+from operator_side.viewing.facts import FACTS_PERIOD_S, DelayFacts, OperatorFacts, TriggerFacts
 
 OFFSET_S = 1000.0
 """The robot side's clock is so far ahead."""

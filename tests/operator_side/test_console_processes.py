@@ -26,7 +26,7 @@ def test_a_run_outlives_its_console() -> None:
         with SideProcess("operator_side", "operator", arguments) as operator:
             assert str(operator.wait_for("console", 60.0)["address"]).startswith("http://127.0.0.1:")
             (console,) = (
-                child for child in children(operator.process_id) if b"operator_side.console" in command(child)
+                child for child in children(operator.process_id) if b"operator_side.viewing.console" in command(child)
             )
             os.kill(console, signal.SIGKILL)
             while "console has ended" not in str((note := operator.wait_for("note", 60.0))["text"]):

@@ -9,8 +9,8 @@ from common.command.command_line import load_toml, parse_settings
 from common.errors import ConfigurationError
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
+from operator_side.people.settings import PersonSettings
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.settings import PersonSettings
 
 WITHIN_10 = ("visual_reaction_s", "touch_reaction_sd_s", "depth_error_sd_m", "grasp_depth_m", "lift_m", "carry_m")
 REFUSED: dict[type, dict[str, tuple[float, ...]]] = {

@@ -9,12 +9,12 @@ from common.protocol.messages import Header
 from common.silence import KEEP_ALIVE_S
 from feelahead.lab.faults.session_bench import QUICK, TICK_S, Bench, Operator
 from robot_side.core import RobotSide
+from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.events import Listener, Tick
 from robot_side.gripper.held_object import grip
 from robot_side.laws.law import Situation
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
-from robot_side.simulation.scene import load_scene
 from robot_side.surroundings.perceived import Role
 
 

@@ -9,13 +9,13 @@ from common.emulation.spec import LinkSpec
 from common.realtime.stages import Stages
 from common.sockets.tcp_figures import TcpFigures
 from robot_side import main
-from robot_side.cameras.settings import CamerasSettings
-from robot_side.cameras.shapes import SceneModel
 from robot_side.core import RobotSide
 from robot_side.parts import build_parts
-from robot_side.scene_view import SceneView
 from robot_side.settings import RobotSettings
 from robot_side.turn_stages import STAGES
+from robot_side.viewing.scene_view import SceneView
+from robot_side.viewing.settings import CamerasSettings
+from robot_side.viewing.shapes import SceneModel
 
 
 class SteppedClock:

@@ -12,8 +12,8 @@ import pytest
 from common.protocol.view_messages import SceneShapes, SceneState, VideoFrame, VideoStep
 from feelahead.both_sides.processes import SideProcess
 from feelahead.both_sides.summary import read_summary
-from robot_side.cameras.pictures import RETRY_S
-from tests.robot_side.cameras.viewer import Seen, Viewer, companion_of, look
+from robot_side.viewing.pictures import RETRY_S
+from tests.robot_side.viewing.viewer import Seen, Viewer, companion_of, look
 
 pytestmark = pytest.mark.processes
 PATIENCE_S = 120.0

@@ -36,7 +36,7 @@ _PURPOSES: Final = {
 }
 COMPILE: Final = "feelahead doctor --compile"
 RENDERING: Final = ("egl", "osmesa") if sys.platform == "linux" else ("",)
-"""The order of robot_side/cameras."""
+"""The order of robot_side/viewing."""
 RENDERING_PACKAGES: Final = "sudo apt-get install libegl1 libgl1-mesa-dri (or: libosmesa6)"
 PORTS: Final = {
     5555: "the control port of feelahead-robot; another one: --bind tcp://127.0.0.1:5557",
@@ -54,7 +54,7 @@ except Exception as error:
 """
 _RENDER: Final = """
 import json, sys
-from robot_side.cameras.off_screen import trouble_with
+from robot_side.viewing.off_screen import trouble_with
 print(json.dumps(trouble_with(sys.argv[1])))
 """
 _KERNELS: Final = """

@@ -15,13 +15,13 @@ from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
 from feelahead.lab.approaches.outcome import SAMPLE_S, End, Outcome, Samples, reversals, stands
 from feelahead.lab.approaches.spoilt import Spoil, controller
 from operator_side.dualsense.effects.official import MAX_STRENGTH
+from operator_side.people.pulling_hands import Pull, PullingHands, constant_force
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.pulling_hands import Pull, PullingHands, constant_force
 from robot_side.compiled.warm_up import import_kernels, warm_up
+from robot_side.drivers.mujoco.scene import load_scene
+from robot_side.drivers.mujoco.true_contact import ContactOnset, TrueContact
 from robot_side.events import Listener
 from robot_side.settings import Assist, CameraSettings, RobotSettings
-from robot_side.simulation.scene import load_scene
-from robot_side.simulation.true_contact import ContactOnset, TrueContact
 
 
 @dataclass(frozen=True)

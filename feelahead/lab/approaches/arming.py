@@ -2,7 +2,7 @@
 
 from common.errors import FeelaheadError
 from feelahead.both_sides.loopback import Loopback
-from operator_side.simulated_person.pulling_hands import PullingHands
+from operator_side.people.pulling_hands import PullingHands
 
 LONGEST_ARMING_S = 30.0
 _LOOK_S = 0.01

@@ -26,10 +26,10 @@ from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.spoilt import Spoil
 from feelahead.lab.table import Row
 from operator_side.dualsense.effects.official import MAX_STRENGTH
+from robot_side.drivers.mujoco.camera import CameraError
+from robot_side.drivers.mujoco.posed_scene import PosedScene
+from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.settings import EncoderSettings
-from robot_side.simulation.camera import CameraError
-from robot_side.simulation.posed_scene import PosedScene
-from robot_side.simulation.scene import Scene, load_scene
 
 LINKS: Final = {
     "0 ms": "",

@@ -19,6 +19,7 @@ from operator_side.feel.commands_under_way import Displacement, Report
 from operator_side.feel.path_ahead import Aside
 from operator_side.feel.rendering import RenderingSettings, TriggerRendering
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
+from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.laws.law import Law as RobotLaw
@@ -26,7 +27,6 @@ from robot_side.laws.law import Situation
 from robot_side.laws.paper import PaperLaw
 from robot_side.laws.sensed import Sensed
 from robot_side.laws.swept import SweptLaw
-from robot_side.simulation.joint_reference import MotionLimits
 from robot_side.surroundings.perceived import PerceivedObjects
 
 _TRAVEL: Final = TriggerTravel()

@@ -22,8 +22,8 @@ from operator_side.dualsense.simulated.trigger_model import (
 )
 from operator_side.hands.travel_calibration import TravelCalibration
 from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.settings import CameraSettings, EncoderSettings
-from robot_side.simulation.joint_reference import MotionLimits
 
 SCENES: Final = Path(__file__).parents[3] / "tests" / "data"
 SITE: Final = "tool"

@@ -17,8 +17,8 @@ from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.hands.travel_calibration import TriggerTravel
 from robot_side.arm.tool_motion import ToolMotionSettings
+from robot_side.drivers.mujoco.posed_scene import PosedScene, ToolPath
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
-from robot_side.simulation.posed_scene import PosedScene, ToolPath
 
 ALARM_STRENGTH: Final = 4
 CLEAR_M: Final = 0.015

@@ -6,7 +6,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from feelahead.lab.approaches.replay import Replay
-from robot_side.simulation.posed_scene import PosedScene
+from robot_side.drivers.mujoco.posed_scene import PosedScene
 
 _FASTEST_M_S = 0.45
 """Upper bound on the speed of any part of the gripper: 0.25 m/s ahead, 0.1 across, 0.5 rad/s at 0.16 m."""

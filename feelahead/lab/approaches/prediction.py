@@ -15,7 +15,7 @@ from feelahead.lab.table import Row, Table
 from operator_side.feel.commands_under_way import CommandsUnderWay, Report
 from robot_side.arm.ability import along_approach
 from robot_side.arm.port import GripperPose
-from robot_side.simulation.joint_reference import MotionLimits
+from robot_side.drivers.mujoco.joint_reference import MotionLimits
 
 Compensation = Literal["operator", "robot", "momentary"]
 COMPENSATIONS: Final[tuple[Compensation, ...]] = get_args(Compensation)

@@ -12,7 +12,7 @@ import numpy as np
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.hands.travel_calibration import StickRest, TriggerTravel
-from operator_side.simulated_person.pulling_hands import Hands, Pull
+from operator_side.people.pulling_hands import Hands, Pull
 
 PullKind = Literal["steady", "bell", "on_off", "random", "drift", "yaw", "swerve"]
 PULL_KINDS: Final[tuple[PullKind, ...]] = get_args(PullKind)

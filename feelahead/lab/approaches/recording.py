@@ -18,12 +18,12 @@ from feelahead.lab.approaches.arming import wait_for_pull
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from feelahead.lab.approaches.pulls import PullKind, make_pull
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.people.pulling_hands import PullingHands
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.pulling_hands import PullingHands
+from robot_side.drivers.mujoco.posed_scene import let_through
+from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.events import Listener
 from robot_side.settings import RobotSettings
-from robot_side.simulation.posed_scene import let_through
-from robot_side.simulation.scene import Scene, load_scene
 
 POSE_S = 0.01
 """The period at which the true pose is noted."""

@@ -15,11 +15,11 @@ from operator_side.hands.travel_calibration import TriggerTravel
 from robot_side.arm.joint_estimate import JointEstimate
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_motion
+from robot_side.drivers.mujoco.encoders import Encoder
+from robot_side.drivers.mujoco.joint_reference import MotionLimits
+from robot_side.drivers.mujoco.kinematics import MujocoKinematics
+from robot_side.drivers.mujoco.scene import Scene
 from robot_side.settings import EncoderSettings
-from robot_side.simulation.encoders import Encoder
-from robot_side.simulation.joint_reference import MotionLimits
-from robot_side.simulation.kinematics import MujocoKinematics
-from robot_side.simulation.scene import Scene
 
 _WHOLE_S = 1000.0
 """A window longer than any record."""

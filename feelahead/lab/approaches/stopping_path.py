@@ -10,8 +10,8 @@ from common.arrays import FloatArray
 from common.reaction import HORIZON_S
 from feelahead.lab.approaches.replay import Replay
 from robot_side.arm.resolved_rate import joint_velocities
-from robot_side.simulation.joint_reference import MotionLimits
-from robot_side.simulation.posed_scene import ToolPath
+from robot_side.drivers.mujoco.joint_reference import MotionLimits
+from robot_side.drivers.mujoco.posed_scene import ToolPath
 
 _STEP_S: Final = 0.005
 

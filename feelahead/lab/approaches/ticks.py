@@ -11,16 +11,16 @@ from feelahead.lab.approaches.arming import wait_for_pull
 from feelahead.lab.approaches.frozen import ASIDE, GRIPPED, SITE, frozen_scene
 from operator_side.dualsense.effects.official import MAX_STRENGTH
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.people.pulling_hands import PullingHands, constant_force
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.pulling_hands import PullingHands, constant_force
 from robot_side import events
 from robot_side.arm.port import ArmState
+from robot_side.drivers.mujoco.kinematics import MujocoKinematics
+from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.events import Listener
 from robot_side.laws.law import Situation
 from robot_side.laws.swept import SweptLaw
 from robot_side.settings import RobotSettings
-from robot_side.simulation.kinematics import MujocoKinematics
-from robot_side.simulation.scene import Scene, load_scene
 
 DEMO: Final = "demo"
 FORCE_N: Final = 2.0

@@ -23,11 +23,11 @@ from common.protocol.messages import (
 from common.protocol.session import SessionState
 from robot_side.arm.port import ArmState
 from robot_side.core import RobotParts, RobotSide
+from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.events import Listener, Tick
 from robot_side.operators.safety import SafetySettings
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
-from robot_side.simulation.joint_reference import MotionLimits
 
 TICK_S = 0.001
 COMMAND_PERIOD_TICKS = 4

@@ -18,14 +18,14 @@ from common.sockets.admission import Admission
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from common.timing.ages import LoopAge
-from operator_side.commanding import ToRobot
 from operator_side.core import OperatorSide
 from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.input_report import build_input_report
+from operator_side.robot_link.commanding import ToRobot
 from robot_side.laws.sensed import Sensed
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety, SafetySettings
-from robot_side.outgoing_messages import Outgoing, stiffness_message
+from robot_side.reporting.outgoing_messages import Outgoing, stiffness_message
 
 BYTES: Final = (169, 138)
 """Sizes of a stiffness update and of a motion command: bare ends send as much, the robot's first. All leave."""

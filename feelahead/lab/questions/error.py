@@ -35,8 +35,8 @@ from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from robot_side.arm.tool_motion import ToolMotionSettings
-from robot_side.simulation.joint_reference import MotionLimits
-from robot_side.simulation.scene import load_scene
+from robot_side.drivers.mujoco.joint_reference import MotionLimits
+from robot_side.drivers.mujoco.scene import load_scene
 
 DELAYS_MS: Final = (0, 25, 50, 100, 200, 400)
 """Each way."""

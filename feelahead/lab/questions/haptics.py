@@ -22,8 +22,8 @@ from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.lab.trial import Arm, Trial, run_trial
-from operator_side.simulated_person.settings import PersonSettings
-from robot_side.simulation.built_in_scenes import SceneName
+from operator_side.people.settings import PersonSettings
+from robot_side.drivers.mujoco.built_in_scenes import SceneName
 
 _ARMS: dict[Arm, str] = {"off": "off", "mechanical": "on, no notice taken", "reacting": "on, reacts"}
 

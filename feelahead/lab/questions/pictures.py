@@ -24,10 +24,10 @@ from common.recording.packages import require_packages
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
-from robot_side.cameras.off_screen import BACKENDS, choose
+from robot_side.viewing.off_screen import BACKENDS, choose
 
 if TYPE_CHECKING:
-    from robot_side.cameras.h264 import H264
+    from robot_side.viewing.h264 import H264
 
 Image = npt.NDArray[np.uint8]
 Encode = Callable[[Image], bytes]
@@ -120,12 +120,12 @@ def _pictures(cell: Case, seed: int) -> Iterator[Iterator[Image]]:
     """Render both views, one after the other, of the same motion."""
     choose(BACKENDS[0])
     from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts  # noqa: PLC0415  # after the choice
-    from robot_side.cameras.exchange import Setup  # noqa: PLC0415
-    from robot_side.cameras.pictures import saved_model  # noqa: PLC0415
-    from robot_side.cameras.rendering import Renderer  # noqa: PLC0415
-    from robot_side.cameras.viewpoints import viewpoints  # noqa: PLC0415
+    from robot_side.drivers.mujoco.scene import load_scene  # noqa: PLC0415
     from robot_side.settings import RobotSettings  # noqa: PLC0415
-    from robot_side.simulation.scene import load_scene  # noqa: PLC0415
+    from robot_side.viewing.exchange import Setup  # noqa: PLC0415
+    from robot_side.viewing.pictures import saved_model  # noqa: PLC0415
+    from robot_side.viewing.rendering import Renderer  # noqa: PLC0415
+    from robot_side.viewing.viewpoints import viewpoints  # noqa: PLC0415
 
     scene = load_scene(name="table", seed=seed)
     setup = Setup(saved_model(scene), cell.width, cell.width * 3 // 4, viewpoints(scene))
@@ -140,7 +140,7 @@ def _pictures(cell: Case, seed: int) -> Iterator[Iterator[Image]]:
 
 
 def _methods(cell: Case) -> dict[str, tuple[Encode, Decode]]:
-    from robot_side.cameras.h264 import H264  # noqa: PLC0415  # an extra
+    from robot_side.viewing.h264 import H264  # noqa: PLC0415  # an extra
 
     methods: dict[str, tuple[Encode, Decode]] = {}
     for quality in _JPEG:

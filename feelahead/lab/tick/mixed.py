@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.simulation.scene import load_scene
+from robot_side.drivers.mujoco.scene import load_scene
 
 _SETTLING_STEPS: Final = 3000
 """After these, what lies on the table rests or sleeps."""

@@ -25,7 +25,7 @@ from feelahead.lab.tick.crowd import CrowdedCamera
 from feelahead.lab.tick.mixed import Mixed
 from robot_side.core import RobotParts, RobotSide
 from robot_side.events import Listener, Step
-from robot_side.outgoing_messages import Outgoing
+from robot_side.reporting.outgoing_messages import Outgoing
 
 PROGRAM: Final = "feelahead.lab.tick.timed_robot"
 STAGES: Final = ("physics", "look", "frame", "law", "motion", "figures", "message")

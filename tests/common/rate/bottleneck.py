@@ -11,7 +11,7 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Watch
 from common.rate.budget import Budget, on_the_wire
 from common.rate.pieces import Joining
-from robot_side.cameras.giving_way import GivingWay
+from robot_side.viewing.giving_way import GivingWay
 
 TURN_S = 0.001
 _OTHER_CLOCK_S = 1234.5

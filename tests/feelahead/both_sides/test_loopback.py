@@ -12,10 +12,10 @@ from common.protocol.messages import Compensation
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.lab.approaches.approach import Approach, PullRun
 from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT
+from operator_side.people.person import Phase, SimulatedOperator
+from operator_side.people.pulling_hands import Hands
+from operator_side.people.settings import PersonSettings
 from operator_side.settings import OperatorSettings
-from operator_side.simulated_person.person import Phase, SimulatedOperator
-from operator_side.simulated_person.pulling_hands import Hands
-from operator_side.simulated_person.settings import PersonSettings
 from robot_side.settings import RobotSettings
 from tests.helpers.repository import DATA
 

@@ -6,11 +6,11 @@ from typing import Any
 import pytest
 
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
-from operator_side.following_pages import hands_facts, shared_hands
-from operator_side.page_hands.driving_page import DrivingPage
 from operator_side.settings import OperatorSettings
+from operator_side.viewing.following_pages import hands_facts, shared_hands
+from operator_side.viewing.pages.driving_page import DrivingPage
 from robot_side.settings import RobotSettings
-from tests.operator_side.page_hands.talking_page import AtThePage, Does, TalkingPage
+from tests.operator_side.viewing.pages.talking_page import AtThePage, Does, TalkingPage
 
 pytestmark = pytest.mark.long
 

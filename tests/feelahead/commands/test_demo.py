@@ -21,10 +21,10 @@ from feelahead.commands import demo as module
 from feelahead.commands import open_browser
 from feelahead.commands.demo import DemoSettings, demo
 from operator_side.settings import OperatorSettings
+from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.settings import RobotSettings
-from robot_side.simulation.built_in_scenes import SceneName
 from tests.helpers.python_process import start
-from tests.operator_side.terminal_view.on_terminal import OnTerminal
+from tests.operator_side.viewing.terminal.on_terminal import OnTerminal
 
 LISTENING = {"control": "tcp://127.0.0.1:1", "view": "tcp://127.0.0.1:2"}
 

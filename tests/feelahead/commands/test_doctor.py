@@ -38,8 +38,8 @@ from feelahead.commands.doctor.machine import (
 from feelahead.main import command
 from operator_side.dualsense.hid.device import HidBackend
 from operator_side.dualsense.hid.udev import RULE_FILE, RULES, installing_command
-from robot_side.cameras.off_screen import BACKENDS, REMEDY
 from robot_side.compiled import warm_up as warm_up_module
+from robot_side.viewing.off_screen import BACKENDS, REMEDY
 from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, FakeBackend, FakeHandle
 from tests.helpers.repository import ROOT
 from tests.robot_side.compiled.fresh_kernels import fresh_kernels

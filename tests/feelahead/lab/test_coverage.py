@@ -30,11 +30,11 @@ from feelahead.lab.approaches.spoilt import Spoil
 from feelahead.lab.questions.coverage import QUESTION, CoverageSettings, pooled_alarms
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Row, Table
-from operator_side.simulated_person.pulling_hands import Hands
+from operator_side.people.pulling_hands import Hands
+from robot_side.drivers.mujoco.camera import CameraError
+from robot_side.drivers.mujoco.posed_scene import PosedScene
+from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.settings import EncoderSettings
-from robot_side.simulation.camera import CameraError
-from robot_side.simulation.posed_scene import PosedScene
-from robot_side.simulation.scene import load_scene
 
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("coverage")]
 

@@ -32,9 +32,9 @@ from feelahead.lab.questions.error import QUESTION
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Row, Table
 from robot_side.arm.port import GripperPose
+from robot_side.drivers.mujoco.joint_reference import MotionLimits
+from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.enlargement.prediction_errors import load_prediction_errors
-from robot_side.simulation.joint_reference import MotionLimits
-from robot_side.simulation.scene import load_scene
 
 X = np.array([1.0, 0.0, 0.0])
 FULL_M_S = 0.25

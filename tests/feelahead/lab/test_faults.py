@@ -14,10 +14,10 @@ from common.protocol.session import SessionEvent
 from feelahead.lab.faults.fault import FAULTS
 from feelahead.lab.questions.faults import QUESTION
 from feelahead.lab.sweep import ask
+from robot_side.drivers.mujoco.joint_reference import JointReference
 from robot_side.operators.lease import Lease
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission, Safety
-from robot_side.simulation.joint_reference import JointReference
 
 pytestmark = pytest.mark.long
 

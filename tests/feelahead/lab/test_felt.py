@@ -18,7 +18,7 @@ from feelahead.lab.field import way_name
 from feelahead.lab.questions.felt import Run, run
 from feelahead.lab.table import Table
 from feelahead.lab.variants import COVER_M, COVERS_M, WAYS, Replayed, errors_mm, replay
-from robot_side.simulation.gripper_cover import GripperCover, cover_gripper
+from robot_side.drivers.mujoco.gripper_cover import GripperCover, cover_gripper
 from tests.helpers.arm_models import planar_arm
 from tests.helpers.repository import DATA
 

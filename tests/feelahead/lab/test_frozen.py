@@ -8,8 +8,8 @@ import pytest
 from common.errors import ConfigurationError
 from feelahead.lab.approaches import frozen
 from feelahead.lab.approaches.frozen import AHEAD, ASIDE, GRIPPED, PASSED, SCENES, SITE, frozen_hash, frozen_scene
+from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
-from robot_side.simulation.scene import load_scene
 from tests.helpers.repository import DATA
 
 HASH = "1ca4b26f5fb3"

@@ -7,7 +7,7 @@ from scipy.ndimage import gaussian_filter
 pytest.importorskip("av", reason="needs the extra `video`")
 from feelahead.lab.questions.pictures import _bytes_at, _mending, ssim
 from feelahead.lab.table import Table
-from robot_side.cameras.h264 import H264
+from robot_side.viewing.h264 import H264
 
 NOISE = gaussian_filter(np.random.default_rng(0).normal(0.0, 400.0, (96, 160)), 2.0)
 PICTURE = np.repeat(np.clip(128.0 + NOISE, 0, 255).astype(np.uint8)[:, :, None], 3, axis=2)

@@ -12,7 +12,7 @@ from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
-from operator_side.simulated_person.pulling_hands import Hands, Pull, constant_force
+from operator_side.people.pulling_hands import Hands, Pull, constant_force
 
 STEP_S = 0.001
 SEEDS = range(4)

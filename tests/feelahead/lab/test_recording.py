@@ -15,9 +15,9 @@ from feelahead.lab.approaches.recording import POSE_S, TICK_S, RecordedApproach,
 from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.stopping_path import stopping_path
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
+from robot_side.drivers.mujoco.posed_scene import PosedScene
+from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.settings import EncoderSettings
-from robot_side.simulation.posed_scene import PosedScene
-from robot_side.simulation.scene import load_scene
 from tests.helpers.repository import DATA
 
 pytestmark = pytest.mark.long

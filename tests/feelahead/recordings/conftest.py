@@ -20,8 +20,8 @@ from common.recording.wire import BLOCK, FACTS, HEADER, STATUS, VIEW, as_json, s
 from feelahead.both_sides.loopback import VIRTUAL_CLOCK, Loopback, LoopbackSettings
 from operator_side import recorded as operator_recorded
 from operator_side.settings import OperatorSettings
-from robot_side import recorded as robot_recorded
 from robot_side.compiled.warm_up import kernel_digests
+from robot_side.recording import recorder as robot_recorded
 from robot_side.settings import RobotSettings
 
 _BLOCK_S = 0.05

@@ -17,7 +17,7 @@ from operator_side.dualsense.reports.controller_state import Button
 from operator_side.dualsense.reports.output_report import RELEASED
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.newest import INTENT_EXPIRES_S
+from operator_side.hands.newest import INTENT_EXPIRES_S
 from tests.helpers.felt import felt
 from tests.operator_side.dualsense.simulated_system import (
     PERIOD_S,

@@ -10,11 +10,11 @@ from common.protocol.messages import Header, MotionCommand
 from robot_side.arm.ability import change_times_s
 from robot_side.arm.resolved_rate import joint_velocities
 from robot_side.arm.tool_motion import ToolMotionSettings, full_twists, tool_motion
-from robot_side.simulation.arm import MujocoArm
-from robot_side.simulation.encoders import Encoder
-from robot_side.simulation.joint_reference import MotionLimits
-from robot_side.simulation.kinematics import MujocoKinematics
-from robot_side.simulation.scene import load_scene
+from robot_side.drivers.mujoco.arm import MujocoArm
+from robot_side.drivers.mujoco.encoders import Encoder
+from robot_side.drivers.mujoco.joint_reference import MotionLimits
+from robot_side.drivers.mujoco.kinematics import MujocoKinematics
+from robot_side.drivers.mujoco.scene import load_scene
 
 STEP_S = 0.001
 MOTION, LIMITS = ToolMotionSettings(), MotionLimits(velocity_rad_s=100.0)

@@ -17,7 +17,7 @@ from robot_side.arm.commanded import commanded
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import joint_velocities
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_motion
-from robot_side.simulation.joint_reference import MotionLimits
+from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from tests.helpers.gripper_poses import free_pose
 from tests.helpers.perceived_scenes import random_rotation
 from tests.helpers.tool_driver import PERIOD_S, ToolDriver

@@ -5,7 +5,7 @@ from robot_side.compiled import kernel as compile_module
 from robot_side.compiled.kernel import Compiled, imported_kernels
 
 NAMES = (
-    "robot_side.simulation.encoders._read",
+    "robot_side.drivers.mujoco.encoders._read",
     "robot_side.arm.joint_estimate._estimate_loop",
     "robot_side.gripper.held_object._join",
 )

@@ -54,5 +54,5 @@ def test_nothing_is_compiled_within_a_tick(law: LawName, monkeypatch: pytest.Mon
 def test_they_are_found_on_a_robot_machine_without_the_extra_for_video(monkeypatch: pytest.MonkeyPatch) -> None:
     everything = import_kernels()
     monkeypatch.setitem(sys.modules, "av", None)
-    monkeypatch.delitem(sys.modules, "robot_side.cameras.h264", raising=False)
+    monkeypatch.delitem(sys.modules, "robot_side.viewing.h264", raising=False)
     assert import_kernels() == everything

@@ -10,7 +10,7 @@ from common.protocol.session import SessionState
 from common.silence import KEEP_ALIVE_S
 from feelahead.lab.faults.session_bench import CRUISE, Bench, Operator
 from robot_side.operators.lease import MOST_OBSERVERS
-from robot_side.reports import OBSERVER_PERIOD_S
+from robot_side.reporting.reports import OBSERVER_PERIOD_S
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ import numpy as np
 from websockets.asyncio.client import connect
 from websockets.typing import Origin
 
-from operator_side.console.pages import ROUND_ENDS
+from operator_side.viewing.console.pages import ROUND_ENDS
 
 _PICTURE: Final = struct.Struct("<Bd")
 """The view, and when it was captured by the clock that all processes of a machine share."""

@@ -1,0 +1,293 @@
+"""A scripted person who sees late, steers with a person's limits, and feels the triggers with their fingers.
+
+They see only what the screen shows, `visual_reaction_s` after it was shown, and the controller's warning light, and
+act only through the controller: a finger pushes with a force, and how far the trigger yields is up to its spring and
+its effect. So haptics act on this person mechanically and at once: where the trigger stiffens, the same force travels
+less, and they never push harder for it. What they feel, a trigger that yields less than usual and rumble, they may
+also believe, and go on gently from a reaction later; or let go, where a pulse says that what they hold stands.
+Figures: the operator's table of facts (McRuer's crossover model; reaction times).
+
+    wait ─▶ arm ─▶ advance ─▶ close ─▶ lift ─▶ carry ─▶ lower ─▶ release ─▶ withdraw ─▶ done
+                     ▲          │ nothing held
+                     └─ retreat ◀
+"""
+
+import math
+from collections import deque
+from typing import Final, Literal
+
+import numpy as np
+
+from common.protocol.messages import Telemetry, Vector2, Vector3
+from operator_side.dualsense.reports.controller_state import Button
+from operator_side.dualsense.reports.output_report import WARNING_LIGHT
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.hands.travel_calibration import TravelCalibration
+from operator_side.people.fingers import Cue, Fingers, within_unit_circle
+from operator_side.people.looking import Glance, NoNearer, SinksNoMore
+from operator_side.people.settings import PersonSettings
+from operator_side.people.submove import MoveAndWait
+
+FULL_TRIGGER_M_S = 0.25
+"""What a person has learnt a fully pulled trigger to do."""
+FULL_STICK_M_S = 0.1
+"""And a fully deflected stick."""
+GENTLY_M_S: Final = 0.025
+"""How fast they go on once they have felt something, and set things down."""
+_CARRY_M_S: Final = 0.05
+"""A person carries with care."""
+_PEAK_M_S: Final = 0.2
+_PEAK_ACROSS_M_S: Final = 0.08
+"""The greatest speeds of single moves."""
+_DROPPED_S = 0.5
+"""After so long without the target in the fingers they believe it."""
+_CALM_S = 0.5
+"""So long after the controller's warning light they let their hands rest."""
+_CLEAR_M: Final = 0.01
+_CLEARS_S: Final = 3.0
+"""So far they rise before they draw back, or try to for so long."""
+_BACK_M: Final = 0.1
+"""So far they draw back from what they have set down."""
+
+Phase = Literal["wait", "arm", "advance", "close", "retreat", "lift", "carry", "lower", "release", "withdraw", "done"]
+_DOING: Final[dict[Phase, str]] = {
+    "wait": "resting",
+    "arm": "arming",
+    "advance": "advancing",
+    "close": "grasping",
+    "retreat": "retreating",
+    "lift": "lifting",
+    "carry": "carrying",
+    "lower": "lowering",
+    "release": "letting go",
+    "withdraw": "drawing back",
+    "done": "done",
+}
+_REST: Final[Vector2] = (0.0, 0.0)
+
+
+class SimulatedOperator:
+    """Drives a `SimulatedDualSense` towards the target, grasps it, lifts it and sets it down."""
+
+    _ALIGNED_M = 0.006
+    _REACHED_M = 0.008
+
+    def __init__(
+        self,
+        device: SimulatedDualSense,
+        settings: PersonSettings,
+        seed: int,
+        calibration: TravelCalibration | None = None,
+        *,
+        swap_sides: bool = False,
+    ) -> None:
+        self.phase: Phase = "wait"
+        self._device = device
+        self._settings = settings
+        self._generator = np.random.default_rng(np.random.SeedSequence([seed, 0x0B5E]))
+        feeling = np.random.default_rng(np.random.SeedSequence([seed, 0xFEE1]))
+        self._stiff, self._rumble, self._pulse = (Cue(settings, feeling) for _ in range(3))
+        self._fingers = Fingers(device, calibration or TravelCalibration(), swap_sides=swap_sides)
+        self._seen: deque[tuple[float, Telemetry]] = deque()
+        self._view: Telemetry | None = None
+        self._since_s: float | None = None
+        self._attempt = 0
+        self._depth_error_m = 0.0
+        self._gently_along = self._gently_across = self._stands = False
+        self._from: Vector3 = (0.0, 0.0, 0.0)
+        self._gripped_height_m = 0.0
+        self._holding_s = 0.0
+        self._moves = MoveAndWait()
+        self._nearing, self._sinking = NoNearer(0.0), SinksNoMore()
+        self._warned_s = -math.inf
+
+    @property
+    def doing(self) -> str:
+        """Their phase in a word for people; without a target they do not seem to advance."""
+        aimless = self.phase == "advance" and self._view is not None and self._view.target_in_tool_m is None
+        return "no target" if aimless else _DOING[self.phase]
+
+    def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
+        """Look at the screen and move the hands; `delay_s` is the round trip that the person has got used to."""
+        if self._since_s is None:
+            self._since_s = now_s
+        if screen is not None and (not self._seen or self._seen[-1][1] is not screen):
+            self._seen.append((now_s, screen))
+        while self._seen and self._seen[0][0] <= now_s - self._settings.visual_reaction_s:
+            self._view = self._seen.popleft()[1]
+        self._feel(now_s)
+        if self._device.output.lightbar == WARNING_LIGHT:
+            self._warned_s = now_s
+        if self._view is None or now_s - self._warned_s < _CALM_S:
+            self._fingers.do(0.0, _REST)
+            return
+        if self._view.state != "armed" and self.phase not in ("wait", "arm", "done"):
+            self._enter("wait", now_s)
+        lag_s = self._settings.visual_reaction_s + (delay_s if self._settings.adapts_to_delay else 0.0)
+        # Crossover frequency in 1/s: as fast as the delay in the loop allows, at most 4.5.
+        gain = min(4.5, (math.pi / 2 - self._settings.phase_margin_rad) / lag_s) if lag_s > 0.0 else 4.5
+        getattr(self, f"_{self.phase}")(Glance(now_s, self._view, gain, lag_s))
+
+    def _feel(self, now_s: float) -> None:
+        """Go on gently, until the next phase, from a reaction after a cue: with the trigger, or with the stick."""
+        self._fingers.let_pass(now_s)
+        stiff = self._stiff.acted_on(now_s, self._fingers.resisted_share() > self._settings.noticeable_force)
+        rumbles = self._rumble.acted_on(now_s, self._device.rumble.left > 0.0)
+        if (stiff and not self._gently_along) or (rumbles and not self._gently_across):
+            self._moves.break_off(now_s)
+        self._gently_along |= stiff
+        self._gently_across |= rumbles
+        seeing = self._device.output.lightbar != WARNING_LIGHT
+        self._stands |= self._pulse.acted_on(now_s, seeing and self._device.rumble.right > 0.0)
+
+    def _enter(self, phase: Phase, now_s: float) -> None:
+        self.phase = phase
+        self._since_s = now_s
+        self._gently_along = self._gently_across = self._stands = False
+        self._moves.forget()
+        self._nearing, self._sinking = NoNearer(now_s), SinksNoMore()
+
+    def _elapsed_s(self, look: Glance) -> float:
+        return look.now_s - (look.now_s if self._since_s is None else self._since_s)
+
+    def _wait(self, look: Glance) -> None:
+        """Rest the hands for the healthy second that arming asks for."""
+        self._fingers.do(0.0, _REST)
+        if self._elapsed_s(look) > 1.2 + self._settings.visual_reaction_s:
+            self._enter("arm", look.now_s)
+
+    def _arm(self, look: Glance) -> None:
+        pressing = self._elapsed_s(look) < 0.2
+        self._fingers.do(0.0, _REST, {Button.OPTIONS} if pressing else set())
+        if look.view.state == "armed":
+            self._aim(look.now_s)
+        elif self._elapsed_s(look) > 2.0:
+            self._enter("wait", look.now_s)
+
+    def _aim(self, now_s: float) -> None:
+        self._judge_depth()
+        self._enter("advance", now_s)
+
+    def _judge_depth(self) -> None:
+        settings = self._settings
+        self._depth_error_m = float(self._generator.normal(settings.depth_error_mean_m, settings.depth_error_sd_m))
+
+    def _advance(self, look: Glance) -> None:
+        """Centre the target with the stick, then pull R2 until it seems to lie between the fingers."""
+        if look.view.target_in_tool_m is None:
+            self._fingers.do(0.0, _REST)
+            return
+        across = look.view.target_in_tool_m[:2]
+        depth_m = look.view.target_in_tool_m[2] + self._settings.grasp_depth_m + self._depth_error_m
+        off_m = math.hypot(*across)
+        aligned = off_m < self._ALIGNED_M
+        settled = self._settings.aiming == "servo" or self._moves.free(look.now_s, look.lag_s)
+        if settled and aligned and (abs(depth_m) < self._REACHED_M or self._nearing.see(depth_m, look)):
+            self._enter("close", look.now_s)
+            return
+        # Off the line a person slows down; far off, they centre first.
+        eagerness = max(0.0, 1.0 - off_m / (3 * self._ALIGNED_M))
+        if self._settings.aiming == "move-and-wait":
+            self._go(self._single_move(across, depth_m if eagerness > 0.0 else 0.0, look))
+            return
+        x, y = (look.gain * component for component in across)
+        self._go((x, y, eagerness * look.gain * depth_m))
+
+    def _single_move(self, across_m: tuple[float, ...], depth_m: float, look: Glance) -> Vector3:
+        """The velocity of the present move; the next one is planned once the last one's outcome is seen."""
+        if self._moves.free(look.now_s, look.lag_s):
+            x, y = across_m
+            across_m_s = GENTLY_M_S if self._gently_across else _PEAK_ACROSS_M_S
+            along_m_s = GENTLY_M_S if self._gently_along else _PEAK_M_S
+            self._moves.begin(look.now_s, (x, y, depth_m), across_m_s, along_m_s)
+        return self._moves.velocity_m_s(look.now_s)
+
+    def _close(self, look: Glance) -> None:
+        self._fingers.do(0.0, _REST, {Button.CROSS})
+        if look.view.holding and self._elapsed_s(look) > 0.3:
+            self._from, self._holding_s = look.view.tool_position_m, look.now_s
+            self._gripped_height_m = look.view.tool_position_m[2]
+            self._enter("lift", look.now_s)
+        elif self._elapsed_s(look) > 2.5 + 2 * self._settings.visual_reaction_s:
+            self._attempt += 1
+            self._enter("retreat" if self._attempt < self._settings.attempts else "done", look.now_s)
+
+    def _retreat(self, look: Glance) -> None:
+        """Open, draw back a little, and look again."""
+        self._fingers.do(-0.4, _REST, {Button.SQUARE})
+        if self._elapsed_s(look) > 1.0:
+            self._aim(look.now_s)
+
+    def _dropped(self, look: Glance) -> bool:
+        """Whether they have given up what they held, as it is not between the fingers any more."""
+        if look.view.holding:
+            self._holding_s = look.now_s
+        if look.now_s - self._holding_s <= _DROPPED_S:
+            return False
+        self._enter("done", look.now_s)
+        return True
+
+    def _lift(self, look: Glance) -> None:
+        """Move against gravity, whichever way the tool points."""
+        up = look.view.up_in_tool
+        if not self._dropped(look) and math.dist(look.view.tool_position_m, self._from) > self._settings.lift_m:
+            self._from = look.view.tool_position_m
+            self._enter("carry", look.now_s)
+        # Half speed: a person carries with care.
+        self._fingers.do(0.5 * up[2], (0.5 * up[0], -0.5 * up[1]), {Button.CROSS})
+
+    def _carry(self, look: Glance) -> None:
+        """Back towards the robot, level; a tool that points straight up or down has no back."""
+        if self._dropped(look):
+            return
+        up = look.view.up_in_tool
+        back = (up[2] * up[0], up[2] * up[1], up[2] * up[2] - 1.0)
+        level = math.hypot(*back)
+        left_m = level * self._settings.carry_m - math.dist(look.view.tool_position_m[:2], self._from[:2])
+        if left_m < self._REACHED_M:
+            self._judge_depth()
+            self._from = look.view.tool_position_m
+            self._enter("lower", look.now_s)
+            left_m = 0.0
+        speed = min(_CARRY_M_S, max(look.gain * left_m, 0.0)) / max(level, self._REACHED_M)
+        self._go((speed * back[0], speed * back[1], speed * back[2]), {Button.CROSS})
+
+    def _lower(self, look: Glance) -> None:
+        """Down to where it should stand, gently near there and once that is felt, until it is felt or seen to stand."""
+        if self._dropped(look):
+            return
+        height_m = look.view.tool_position_m[2]
+        if self._sinking.see(height_m, GENTLY_M_S, look) or self._stands:
+            self._from = look.view.tool_position_m
+            self._enter("release", look.now_s)
+        left_m = height_m - self._gripped_height_m + self._depth_error_m
+        x, y, z = (-min(_CARRY_M_S, max(look.gain * left_m, GENTLY_M_S)) * part for part in look.view.up_in_tool)
+        self._go((x, y, z), {Button.CROSS})
+
+    def _release(self, look: Glance) -> None:
+        """Open, and rise a little out of where they have pressed it down; what stands stays."""
+        risen_m = look.view.tool_position_m[2] - self._from[2]
+        if not look.view.holding and (risen_m > _CLEAR_M or self._elapsed_s(look) > _CLEARS_S + look.lag_s):
+            self._from = look.view.tool_position_m
+            self._enter("withdraw", look.now_s)
+        rises = 0.0 if look.view.holding or self._elapsed_s(look) < 0.6 else GENTLY_M_S
+        x, y, z = (rises * part for part in look.view.up_in_tool)
+        self._go((x, y, z), {Button.SQUARE})
+
+    def _withdraw(self, look: Glance) -> None:
+        back_m = math.dist(look.view.tool_position_m, self._from)
+        if back_m > _BACK_M:
+            self._enter("done", look.now_s)
+        self._go((0.0, 0.0, -_CARRY_M_S), {Button.SQUARE} if back_m < 0.5 * _BACK_M else set())
+
+    def _done(self, look: Glance) -> None:
+        self._fingers.do(0.0, _REST, {Button.CROSS} if look.view.holding else set())
+
+    def _go(self, velocity_m_s: Vector3, buttons: set[Button] | None = None) -> None:
+        """Pull and push what gives the tool this velocity in its own frame, or less where they go gently; its y axis
+        points down the screen.
+        """
+        across, along = (GENTLY_M_S if gently else math.inf for gently in (self._gently_across, self._gently_along))
+        x, y, z = (min(max(v, -most), most) for v, most in zip(velocity_m_s, (across, across, along), strict=True))
+        stick = within_unit_circle(x / FULL_STICK_M_S, -y / FULL_STICK_M_S)
+        self._fingers.do(z / FULL_TRIGGER_M_S, stick, buttons or set())

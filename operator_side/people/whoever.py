@@ -1,0 +1,23 @@
+"""The hands on the simulated controller: the person of the scripted task, or a finger that only pulls."""
+
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.hands.travel_calibration import TravelCalibration
+from operator_side.people.person import SimulatedOperator
+from operator_side.people.pulling_hands import PullingHands, constant_force
+from operator_side.people.settings import PersonSettings
+
+Whoever = SimulatedOperator | PullingHands
+
+
+def whoever(
+    device: SimulatedDualSense,
+    settings: PersonSettings,
+    seed: int,
+    calibration: TravelCalibration | None = None,
+    *,
+    swap_sides: bool = False,
+) -> Whoever:
+    """Make the hands that `settings` ask for, at `device`."""
+    if settings.pull_n is not None:
+        return PullingHands(device, constant_force(settings.pull_n))
+    return SimulatedOperator(device, settings, seed, calibration, swap_sides=swap_sides)

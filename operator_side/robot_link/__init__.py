@@ -1,0 +1,1 @@
+"""Towards the robot side: commands, lease, wishes, and the way out."""

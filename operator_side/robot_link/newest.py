@@ -1,0 +1,68 @@
+"""The newest that came from the robot side: stiffness and view."""
+
+from typing import Final
+
+from common.protocol.link_end import Arrival
+from common.protocol.messages import StiffnessUpdate, Telemetry
+from common.statistics import RunningStatistics
+
+STIFFNESS_EXPIRES_S: Final = 0.2
+"""Triggers are released, and the hands move nothing, this long after the last stiffness that was received."""
+
+
+class NewestStiffness:
+    """The newest stiffness, until it expires."""
+
+    def __init__(self, seed: int = 0) -> None:
+        self.update: StiffnessUpdate | None = None
+        """None before the first and once it has expired"""
+        self.received_s = 0.0
+        self.count = 0
+        self.has_been_armed = False
+        self.driving_delay = RunningStatistics(seed)
+        """One-way delay in seconds of what an armed robot side sent: a link's first moments are not in it."""
+        self.applied_age = RunningStatistics(seed)
+
+    def note(self, update: StiffnessUpdate, arrival: Arrival) -> None:
+        """Count a message that is no copy of another."""
+        self.count += 1
+        if update.state == "armed" and arrival.one_way_s is not None:
+            self.driving_delay.add(arrival.one_way_s)
+
+    def apply(self, update: StiffnessUpdate, arrival: Arrival, now_s: float) -> None:
+        """Take a fresh one."""
+        self.update, self.received_s = update, now_s
+        self.has_been_armed |= update.state == "armed"
+        if arrival.one_way_s is not None:
+            self.applied_age.add(arrival.one_way_s)
+
+    def expired(self, now_s: float) -> bool:
+        """Forget a stiffness that is too old; tell whether it just was."""
+        if self.update is None or now_s - self.received_s <= STIFFNESS_EXPIRES_S:
+            return False
+        self.update = None
+        return True
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the arm was armed and is so no more, as far as is known."""
+        return self.has_been_armed and (self.update is None or self.update.state != "armed")
+
+    def within(self, age_s: float, now_s: float) -> bool:
+        """Tell whether there is one that is not older."""
+        return self.update is not None and now_s - self.received_s <= age_s
+
+
+class NewestView:
+    """The newest telemetry of one robot side."""
+
+    def __init__(self) -> None:
+        self.telemetry: Telemetry | None = None
+        """None before the first"""
+        self._order = (-1, -1)
+
+    def take(self, message: Telemetry) -> None:
+        """Keep it unless it was overtaken."""
+        order = (message.header.epoch, message.header.sequence)
+        if order[0] != self._order[0] or order[1] > self._order[1]:
+            self.telemetry, self._order = message, order

@@ -1,0 +1,73 @@
+"""What the person at this side wants to be different in the run: asked for until the robot side has heard it."""
+
+import math
+from collections import deque
+from typing import Any, Final
+
+from common.emulation.tuned import tunable_profile
+from common.errors import ConfigurationError
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import LeaseNotice, Tune
+from operator_side.robot_link.standing import Standing
+
+_REPEATED_S: Final = 0.1
+_REMEMBERED: Final = 1000
+
+
+class Tuner:
+    """Keeps the newest wish; a wish for P and one for the link are kept together."""
+
+    def __init__(self) -> None:
+        self.refused = 0
+        """Wishes that were no use to send."""
+        self.why = ""
+        """Of the last one of them, in one line."""
+        self.link: str | None = None
+        """The link that was asked for last; None while nothing was."""
+        self._number = 0
+        self._probability: float | None = None
+        self._words: str | None = None
+        self._own: str | None = None
+        self._sent_s = -math.inf
+        self._asked: deque[dict[str, Any]] = deque(maxlen=_REMEMBERED)
+
+    def ask(self, probability: float | None, link: str | None, standing: Standing, now_s: float) -> None:
+        """A wish; one that the run does not permit, or that no link or P can be, is refused whole."""
+        lease = standing.lease
+        try:
+            if lease is None or not standing.owns or not lease.may_tune:
+                why = "the run does not permit it (--permit-tuning)" if standing.owns else "only the owner may"
+                raise ConfigurationError(f"tuning refused: {why}")
+            if probability is not None and not 0.0 < probability < 1.0:
+                raise ConfigurationError(f"probability = {probability}; valid: above 0 to below 1")
+            if link is not None:
+                tunable_profile(link)
+        except ConfigurationError as error:
+            self.refused += 1
+            self.why = str(error)
+            return
+        if self._number <= lease.tuned:
+            self._probability = self._words = None
+        self._probability = self._probability if probability is None else probability
+        self._words = self._words if link is None else link
+        self._number, self._sent_s = max(self._number, lease.tuned) + 1, -math.inf
+        if link is not None:
+            self._own = self.link = link
+        self.why = ""
+        self._asked.append({"at_s": now_s, "probability": probability, "link": link})
+
+    def due(self, lease: LeaseNotice | None, link_end: LinkEnd, now_s: float) -> Tune | None:
+        """What to send now; None while there is nothing to ask for, or the robot side has heard it."""
+        if lease is None or not lease.may_tune or self._number <= lease.tuned or now_s - self._sent_s < _REPEATED_S:
+            return None
+        self._sent_s = now_s
+        return Tune(link_end.stamp(now_s), self._number, self._probability, self._words)
+
+    def take_link(self) -> str | None:
+        """The link that was asked for since the last call, for this side's own line; None for none."""
+        words, self._own = self._own, None
+        return words
+
+    def summary(self) -> dict[str, Any]:
+        """What was asked for when, on this machine's clock, and how often that was refused."""
+        return {"asked": list(self._asked), "refused": self.refused}

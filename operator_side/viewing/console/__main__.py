@@ -1,0 +1,220 @@
+"""The console's own process: what comes from the operator side goes to viser and to the pages, and back.
+
+operator side ──▶ here    f facts, v a view payload as it came, n a note, r what does not change in a run,
+                          p where in a recording we are
+here ──▶ operator side    a the address, w how many pages are open, s what a page said, e why there is none,
+                          l which pictures in H.264 are lacking: said once where they can be shown, and at each change
+"""
+
+import contextlib
+import logging
+import math
+import os
+import secrets
+import socket
+import struct
+import sys
+import threading
+from typing import Any, Final
+
+import msgspec
+
+from common.command.live_view import live_view
+from common.companion.channel import Channel
+from common.companion.process import companion_channel
+from common.errors import RemoteProtocolError
+from common.protocol.codec import decode_view
+from common.protocol.view_messages import (
+    VIEW_NAMES,
+    AnyViewMessage,
+    EnlargementTerms,
+    SceneShapes,
+    SceneState,
+    VideoFrame,
+    VideoStep,
+)
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.viewing.facts import OperatorFacts
+
+_NICENESS: Final = 5
+"""Behind both sides."""
+_FRAME: Final = struct.Struct("<Bd")
+"""Before a picture: its view, and when it was taken, on the robot side's clock."""
+_MOST_LISTED: Final = 6
+_SLOW_PERIOD_S: Final = 0.25
+"""Between two drawings for a browser without a graphics processor."""
+_LASTING: Final = {b"r": "run", b"p": "player"}
+_ROLES: Final = ("obstacle", "target", "support", "ignored")
+
+
+class _Process:
+    """Everything but the first and last moment happens in the server's thread."""
+
+    def __init__(self, channel: Channel) -> None:
+        self._channel = channel
+        self._facts: OperatorFacts | None = None
+        self._shapes: SceneShapes | None = None
+        self._ended = threading.Event()
+        self._drawing: Any = None
+        self._pages: Any = None
+        self._drawn_s = -math.inf
+        self._steps: Any = None
+        self._lacks: tuple[int, int] | None = None
+
+    def run(self, port: int) -> None:
+        """Serve until the channel ends; what makes it impossible is said through it."""
+        try:
+            from operator_side.viewing.console.drawing import Drawing  # noqa: PLC0415  # an extra, and slow to import
+            from operator_side.viewing.console.gate import Gate  # noqa: PLC0415
+            from operator_side.viewing.console.pages import Pages  # noqa: PLC0415
+            from operator_side.viewing.console.proof import prove  # noqa: PLC0415
+            from operator_side.viewing.console.server import Server  # noqa: PLC0415
+        except ModuleNotFoundError as error:
+            missing = (error.name or "").partition(".")[0]
+            self._give_up(f"{missing} is not installed on this machine; valid: pip install 'feelahead[operator]'")
+            return
+        part = socket.socket()
+        part.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            part.bind(("127.0.0.1", port))
+        except OSError as error:
+            self._give_up(f"--console-port {port}: {error.strerror}; valid: 0 for any port that is free")
+            return
+        token, port = secrets.token_urlsafe(24), part.getsockname()[1]
+        gate = Gate(token, port)
+        self._pages = Pages(lambda count: self._say("w", b"%d" % count), self._say)
+        try:
+            server = Server(gate, self._pages, part)
+        except RuntimeError as error:
+            self._give_up(str(error))
+            return
+        self._drawing = Drawing(server.viser)
+        if (hole := prove(port, token)) is not None:
+            self._give_up(f"its gate is not tight: {hole}")
+            return
+        assert server.loop is not None  # noqa: S101  # Server sees to it
+        server.loop.call_soon_threadsafe(self._begin, server.loop, gate.address)
+        # Only now, as it takes up to a second: until then pictures come as JPEG, and without it for good.
+        with contextlib.suppress(ImportError, ValueError):
+            from common.video.steps import Steps  # noqa: PLC0415  # an extra
+
+            server.loop.call_soon_threadsafe(self._follow, Steps())
+        self._ended.wait()
+
+    def _begin(self, loop: Any, address: str) -> None:
+        self._say("a", address.encode())
+        loop.add_reader(self._channel.fileno(), self._receive)
+
+    def _follow(self, steps: Any) -> None:
+        self._steps = steps
+        self._say_what_lacks()
+
+    def _say(self, kind: str, content: bytes) -> None:
+        self._channel.send(kind.encode(), content)
+
+    def _give_up(self, why: str) -> None:
+        self._say("e", why.encode())
+        while self._channel.waiting and not self._channel.ended:
+            self._channel.flush()
+
+    def _receive(self) -> None:
+        try:
+            state: SceneState | None = None
+            for message in self._channel.receive():
+                state = self._take(message[:1], message[1:]) or state
+            if state is not None:
+                self._show_scene(state)
+        except Exception as error:  # it would come again with every message
+            self._give_up(f"the console failed: {error!r}")
+            self._ended.set()
+        if self._channel.ended:
+            self._ended.set()
+
+    def _take(self, kind: bytes, content: bytes) -> SceneState | None:
+        """One message; a scene's state is left to the caller, as only the newest counts."""
+        if kind == b"f":
+            self._facts = facts = msgspec.msgpack.decode(content, type=OperatorFacts)
+            at = [None if trigger.raw is None else SENSED_TRAVEL * trigger.raw for trigger in (facts.l2, facts.r2)]
+            shown = {"kind": "facts", "facts": facts, "view": live_view(facts.status), "fingers": at}
+            self._pages.show("facts", msgspec.json.encode(shown).decode())
+        elif kind == b"n":
+            note = {"kind": "note", "text": content.decode("utf-8", "replace")}
+            self._pages.note(msgspec.json.encode(note).decode())
+        elif kind in _LASTING:
+            lasting = {"kind": _LASTING[kind], **msgspec.msgpack.decode(content)}
+            self._pages.show(_LASTING[kind], msgspec.json.encode(lasting).decode(), lasting=True)
+        elif kind == b"v":
+            with contextlib.suppress(RemoteProtocolError):
+                return self._view(content)
+        return None
+
+    def _view(self, payload: bytes) -> SceneState | None:
+        seen: AnyViewMessage | None = decode_view(payload)
+        if isinstance(seen, VideoStep):
+            seen = None if self._steps is None else self._steps.follow(seen)
+            self._say_what_lacks()
+        if isinstance(seen, VideoFrame):
+            before = _FRAME.pack(VIEW_NAMES.index(seen.view), seen.captured_s)
+            self._pages.show(seen.view, before + seen.jpeg)
+        elif isinstance(seen, SceneShapes):
+            self._shapes = seen
+            self._drawing.shapes(seen)
+        elif isinstance(seen, SceneState):
+            return seen
+        return None
+
+    def _say_what_lacks(self) -> None:
+        if self._steps is not None and self._steps.lacks != self._lacks:
+            self._lacks = self._steps.lacks
+            self._say("l", msgspec.msgpack.encode(self._lacks))
+
+    def _show_scene(self, state: SceneState) -> None:
+        facts, names = self._facts, () if self._shapes is None else self._shapes.objects
+        if not self._pages.slow or abs(state.taken_s - self._drawn_s) >= _SLOW_PERIOD_S:
+            self._drawn_s = state.taken_s
+            needed_m = (None, None) if facts is None else (facts.l2.needed_m, facts.r2.needed_m)
+            self._drawing.state(state, needed_m, "R2" if facts is None else facts.advancing)
+        total_l2, total_r2 = (sum(row[column] for row in state.overlaps) for column in (1, 2))
+        listed = sorted(state.overlaps, key=lambda row: -max(row[1], row[2]))[:_MOST_LISTED]
+        known = {index for index, _, _ in listed}
+        listed += [(index, 0.0, 0.0) for index, role in enumerate(state.roles) if role == 1 and index not in known]
+        scene = {
+            "kind": "scene",
+            "taken_s": state.taken_s,
+            "overlap_mm3": (1e9 * total_l2, 1e9 * total_r2),
+            "objects": [
+                {
+                    "name": names[index] if index < len(names) else f"object {index}",
+                    "role": _ROLES[state.roles[index]] if index < len(state.roles) else _ROLES[0],
+                    "overlap_mm3": (1e9 * by_l2, 1e9 * by_r2),
+                }
+                for index, by_l2, by_r2 in listed
+            ],
+            "left_out": 0 if self._shapes is None else self._shapes.left_out,
+            "sigma_mm": (1e3 * state.l2.sigma_m, 1e3 * state.r2.sigma_m),
+            "terms": {"l2": _terms_mm(state.l2), "r2": _terms_mm(state.r2)},
+            "tick_us": (state.tick_p50_us, state.tick_p99_us),
+            "overruns": state.overruns,
+        }
+        self._pages.show("scene", msgspec.json.encode(scene).decode())
+
+
+def _terms_mm(terms: EnlargementTerms) -> dict[str, float]:
+    """Those of eq. 9-10, for people."""
+    return {
+        name: 1e3 * getattr(terms, f"{name}_m")
+        for name in ("sigma", "mean", "kinematic_sd", "camera_sd", "prediction_sd", "displacement")
+    }
+
+
+def main() -> None:
+    """The companion: its arguments are the channel's number and the port."""
+    channel, (port,) = companion_channel(sys.argv[1:])
+    os.nice(_NICENESS)
+    logging.getLogger("websockets").setLevel(logging.CRITICAL)  # whoever is refused is not worth a line each
+    _Process(channel).run(int(port))
+    os._exit(0)  # viser's thread would be waited for
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,225 @@
+"""The robot side's scene in viser: the robot as believed, the objects, and the gripper where it would be felt.
+
+Only what changed is sent: a batch of poses for all shapes that share a mesh.
+"""
+
+from typing import Any, Final
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from common.protocol.view_messages import SceneShapes, SceneState, Shape
+from operator_side.viewing.console.solids import Solid, solid_of, sphere
+
+Floats = NDArray[np.float64]
+"""Poses are rows of x, y, z and the quaternion w, x, y, z."""
+
+ROLES: Final = ("obstacle", "target", "support", "ignored")
+_ROLE_COLORS: Final = np.array([(150, 150, 156), (245, 240, 225), (104, 108, 118), (200, 200, 204)], np.float64)
+L2_COLOR: Final = (0, 114, 189)
+R2_COLOR: Final = (230, 130, 0)
+"""Blue and orange, which every eye tells apart; the page's style has the same."""
+_HALF_TINTED_M3: Final = 2e-6
+"""An overlap that colours an object half."""
+_GHOST_OPACITY: Final = 0.16
+_SEEN_FROM_M: Final = (0.42, -0.5, 0.34)
+"""The first look at the tool is from here, relative to it."""
+_LIGHT_FROM: Final = (0.4, -1.0, 1.5)
+_FIELD_OF_VIEW: Final = 0.9
+"""The angle in radians."""
+_STILL: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+_GONE: Final = 1e-6
+"""The size of what is not to be seen."""
+
+
+def compose(outer: Floats, inner: Floats) -> Floats:
+    """Poses (n, 7): `inner`, in the frame of `outer`, in the frame that that is in."""
+    turn, inner_turn = (Rotation.from_quat(poses[:, 3:], scalar_first=True) for poses in (outer, inner))
+    turns = (turn * inner_turn).as_quat(scalar_first=True)
+    return np.concatenate([outer[:, :3] + turn.apply(inner[:, :3]), turns], axis=1)
+
+
+class _Batch:
+    """Shapes that share a mesh."""
+
+    def __init__(self, scene: viser.SceneApi, name: str, solid: Solid, members: list[tuple[Shape, Any]]) -> None:
+        shapes = [shape for shape, _ in members]
+        self.of_robot = np.array([shape.of_robot for shape in shapes])
+        self.owner = np.array([shape.owner for shape in shapes])
+        self._inner = np.array([shape.pose for shape in shapes], np.float64)
+        self._colors = (255.0 * np.array([shape.color[:3] for shape in shapes])).astype(np.uint8)
+        self._handle = scene.add_batched_meshes_simple(
+            name,
+            solid.vertices,
+            solid.triangles,
+            batched_wxyzs=np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (len(members), 1)),
+            batched_positions=np.zeros((len(members), 3)),
+            batched_scales=np.array([scale for _, scale in members]),
+            batched_colors=self._colors,
+            flat_shading=solid.flat,
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        self._poses = np.full((len(members), 7), np.nan, np.float32)
+
+    def place(self, links: Floats, objects: Floats, object_colors: NDArray[np.uint8]) -> None:
+        """Move and colour them; poses (n, 7) of the owners."""
+        outer = np.empty((len(self.owner), 7))
+        outer[self.of_robot] = links[self.owner[self.of_robot]]
+        outer[~self.of_robot] = objects[self.owner[~self.of_robot]]
+        poses = compose(outer, self._inner).astype(np.float32)
+        if not np.array_equal(poses[:, :3], self._poses[:, :3]):
+            self._handle.batched_positions = poses[:, :3]
+        if not np.array_equal(poses[:, 3:], self._poses[:, 3:]):
+            self._handle.batched_wxyzs = poses[:, 3:]
+        self._poses = poses
+        colors = self._colors.copy()
+        colors[~self.of_robot] = object_colors[self.owner[~self.of_robot]]
+        if not np.array_equal(colors, self._colors):
+            self._colors = colors
+            self._handle.batched_colors = colors
+
+    def remove(self) -> None:
+        self._handle.remove()
+
+
+class _Ghost:
+    """The gripper's spheres where one trigger makes them felt."""
+
+    def __init__(self, scene: viser.SceneApi, name: str, color: tuple[int, int, int]) -> None:
+        self._scene, self._name, self._color = scene, name, color
+        self._handle: viser.BatchedMeshHandle | None = None
+        self._count = 0
+        self._radii: NDArray[np.float32] = np.zeros(0, np.float32)
+
+    def place(self, spheres: NDArray[np.float32], moved_m: Floats | None, inflated_m: float) -> None:
+        """Spheres (m, 4), moved by (3,) and inflated; None: they are felt nowhere."""
+        moved: NDArray[np.float32] = (spheres[:, :3] + (0.0 if moved_m is None else moved_m)).astype(np.float32)
+        radii = np.full(len(spheres), _GONE, np.float32) if moved_m is None else spheres[:, 3] + np.float32(inflated_m)
+        if self._handle is None or self._count != len(spheres):
+            if self._handle is not None:
+                self._handle.remove()
+            ball, self._count = sphere(1), len(spheres)
+            self._handle = self._scene.add_batched_meshes_simple(
+                self._name,
+                ball.vertices,
+                ball.triangles,
+                batched_wxyzs=np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (len(spheres), 1)),
+                batched_positions=moved,
+                batched_scales=radii,
+                batched_colors=self._color,
+                opacity=_GHOST_OPACITY,
+                lod="off",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+        else:
+            self._handle.batched_positions = moved
+            if not np.array_equal(radii, self._radii):
+                self._handle.batched_scales = radii
+        self._radii = radii
+
+
+class Drawing:
+    """The scene as last told."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._shapes: SceneShapes | None = None
+        self._batches: list[_Batch] = []
+        self._objects: Floats = np.zeros((0, 7))
+        self._label: viser.LabelHandle | None = None
+        self._looked = False
+        self._ghosts = (
+            _Ghost(server.scene, "/felt by L2", L2_COLOR),
+            _Ghost(server.scene, "/felt by R2", R2_COLOR),
+        )
+        server.gui.configure_theme(show_logo=False, show_share_button=False)
+        server.scene.configure_default_lights(enabled=False)
+        server.scene.configure_environment_map(None)
+        server.scene.add_light_ambient("/light", intensity=0.9)
+        server.scene.add_light_directional("/light from above", intensity=1.3, position=_LIGHT_FROM)
+
+    def shapes(self, shapes: SceneShapes) -> None:
+        """Build what there is, unless it is there."""
+        if self._shapes is not None and self._shapes.version == shapes.version:
+            return
+        for batch in self._batches:
+            batch.remove()
+        self._shapes, self._looked = shapes, False
+        self._objects = np.tile(np.array(_STILL), (len(shapes.objects), 1))
+        alike: dict[Any, tuple[Solid, list[tuple[Shape, Any]]]] = {}
+        for shape in shapes.shapes:
+            if shape.owner < len(shapes.links if shape.of_robot else shapes.objects):
+                key, solid, scale = solid_of(shape)
+                alike.setdefault(key, (solid, []))[1].append((shape, scale))
+        self._batches = [
+            _Batch(self._server.scene, f"/scene/{number}", solid, members)
+            for number, (solid, members) in enumerate(alike.values())
+        ]
+
+    def state(self, state: SceneState, needed_m: tuple[float | None, float | None], advancing: str) -> None:
+        """Move everything; `needed_m`: D of L2 and R2. What belongs to other shapes is passed over."""
+        shapes = self._shapes
+        if shapes is None or shapes.version != state.version:
+            return
+        links = np.frombuffer(state.link_poses, np.float32).reshape(-1, 7).astype(np.float64)
+        index = np.frombuffer(state.object_index, np.uint32)
+        if len(links) != len(shapes.links) or (len(index) and index.max() >= len(self._objects)):
+            return
+        self._objects[index] = np.frombuffer(state.object_poses, np.float32).reshape(-1, 7)
+        roles = np.zeros(len(shapes.objects), np.uint8)
+        told = np.frombuffer(state.roles, np.uint8)[: len(roles)]
+        roles[: len(told)] = np.minimum(told, len(ROLES) - 1)
+        colors = _colors(roles, state)
+        with self._server.atomic():
+            for batch in self._batches:
+                batch.place(links, self._objects, colors)
+            self._place_label(shapes, roles)
+            spheres = np.frombuffer(state.spheres, np.float32).reshape(-1, 4)
+            along = Rotation.from_quat(state.tool_pose[3:], scalar_first=True).apply([0.0, 0.0, 1.0])
+            for ghost, name, ahead_m, terms in zip(
+                self._ghosts, ("L2", "R2"), needed_m, (state.l2, state.r2), strict=True
+            ):
+                sign = 1.0 if name == advancing else -1.0
+                ghost.place(spheres, None if ahead_m is None else sign * ahead_m * along, terms.sigma_m)
+        if not self._looked:
+            self._looked = True
+            tool = np.array(state.tool_pose[:3])
+            self._server.initial_camera.look_at = tool
+            self._server.initial_camera.position = tool + np.array(_SEEN_FROM_M)
+            self._server.initial_camera.fov = _FIELD_OF_VIEW
+
+    def _place_label(self, shapes: SceneShapes, roles: NDArray[np.uint8]) -> None:
+        targets = np.flatnonzero(roles == ROLES.index("target"))
+        if len(targets) == 0:
+            if self._label is not None:
+                self._label.visible = False
+            return
+        text, position = f"target: {shapes.objects[targets[0]]}", self._place_of(int(targets[0]))
+        if self._label is None:
+            self._label = self._server.scene.add_label("/target", text, position=position, anchor="bottom-center")
+        elif self._label.text != text or not np.array_equal(self._label.position, position):
+            self._label.text, self._label.position, self._label.visible = text, position, True
+
+    def _place_of(self, index: int) -> Floats:
+        """The middle (3,) of an object's first shape: its own frame may be anywhere."""
+        shapes = () if self._shapes is None else self._shapes.shapes
+        pose = next((shape.pose for shape in shapes if shape.owner == index and not shape.of_robot), _STILL)
+        return compose(self._objects[index : index + 1], np.array([pose]))[0, :3]
+
+
+def _colors(roles: NDArray[np.uint8], state: SceneState) -> NDArray[np.uint8]:
+    """Colours by role; towards a trigger's colour the more of it that one's gripper overlaps."""
+    colors = _ROLE_COLORS[roles]
+    for index, by_l2_m3, by_r2_m3 in state.overlaps:
+        if 0 <= index < len(roles):
+            strongest_m3 = max(by_l2_m3, by_r2_m3)
+            tint = np.array(L2_COLOR if by_l2_m3 > by_r2_m3 else R2_COLOR)
+            share = strongest_m3 / (strongest_m3 + _HALF_TINTED_M3) if strongest_m3 > 0.0 else 0.0
+            colors[index] += share * (tint - colors[index])
+    tinted: NDArray[np.uint8] = colors.astype(np.uint8)
+    return tinted

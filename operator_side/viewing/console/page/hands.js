@@ -1,0 +1,261 @@
+// Keyboard, pointer and gamepad of this page as a second-class controller, and the emergency stop.
+//
+// watching ─▶ resting ─▶ ready ─▶ running       resting: all keys up for a second; ready: hold-to-run counts
+//     ▲          ▲         │         │
+//     └──────────┴─────────┴─────────┘  a key up, a blurred or hidden page, a stop, silence: everything is released
+//
+// The operator side judges the same by itself (operator_side/viewing/pages/driving_page.py); this is to show it.
+import { atRest, both, Grips, Keys, readGamepads, REST } from "./inputs.js";
+import { Panel } from "./panel.js";
+import { Tuning } from "./tuning.js";
+
+const PERIOD_MS = 20;
+const REST_MS = 1000;
+const HELD_UP_MS = 150; // a page that was held up for so long releases, as the operator side does
+const SILENCE_MS = 500; // without facts for so long nobody knows what the arm does
+const AGREES_MS = 500; // until what we say shows in the facts
+const STOP_MS = 200;
+const STOP_TRIES_MS = 5000;
+const EDITS = "input:not([type=button]), select, textarea, [contenteditable=true]";
+
+export class Hands {
+  #send;
+  #document;
+  #panel;
+  #tuning;
+  #keys = new Keys();
+  #grips = new Grips(() => this.#step());
+  #page = crypto.getRandomValues(new Uint32Array(2)).join("-");
+  #number = 0;
+  #state = "watching";
+  #sinceMs = 0; // in this state
+  #drivingSinceMs = null;
+  #upSinceMs = null;
+  #steppedMs = performance.now();
+  #sent = "";
+  #sentMs = 0;
+  #facts = null;
+  #factsMs = 0;
+  #stopMs = null; // when the stop was pressed last
+  #stopHeld = new Set();
+  #giveBack = false;
+  #why = "";
+  #timer;
+
+  constructor(document, send) {
+    this.#document = document;
+    this.#send = send;
+    this.#panel = new Panel(document, {
+      drive: () => (this.#state === "watching" ? this.#begin() : this.#end("You let go.")),
+      stop: (held) => this.#stop("pointer", held),
+      giveBack: () => this.#giveBackNow(),
+    });
+    this.#panel.grip(this.#grips);
+    this.#tuning = new Tuning(document, send);
+    const view = document.defaultView;
+    view.addEventListener("keydown", (event) => this.#keyDown(event), true);
+    view.addEventListener("keyup", (event) => this.#keyUp(event), true);
+    view.addEventListener("blur", () => this.#left());
+    view.addEventListener("pagehide", () => this.#end("The page was left."));
+    document.addEventListener("visibilitychange", () => {
+      if (document.visibilityState === "hidden") this.#release("The tab was hidden.");
+    });
+    document.addEventListener("focusin", ({ target }) => {
+      if (target.matches?.(EDITS)) this.#release("A field has the keys.");
+    });
+    this.#timer = setInterval(() => this.#step(), PERIOD_MS);
+  }
+
+  show(facts) {
+    this.#facts = facts;
+    this.#factsMs = performance.now();
+    this.#agree();
+    this.#tuning.show(facts);
+    this.#draw();
+  }
+
+  get #hands() {
+    return this.#facts?.page ?? null;
+  }
+
+  get #armed() {
+    return this.#facts?.status.state === "armed";
+  }
+
+  // Armed by the operator side's own hands, which may know it later than the status line.
+  get #moves() {
+    return this.#armed && this.#hands?.doing === "running";
+  }
+
+  #keyDown(event) {
+    if (event.code === "Escape") {
+      event.preventDefault();
+      this.#stop("Escape", true);
+      return;
+    }
+    if (event.target.matches?.(EDITS)) return;
+    if (event.ctrlKey || event.altKey || event.metaKey) {
+      this.#release("A key for the browser was pressed."); // whose keys up it may keep to itself
+      return;
+    }
+    // While we only watch, too: a key that is down already has to come up first.
+    if (!this.#keys.press(event.code) || this.#state === "watching") return;
+    event.preventDefault(); // no scrolling, and no button pressed by Space
+    if (!event.repeat) this.#step();
+  }
+
+  #keyUp(event) {
+    if (event.code === "Escape") this.#stop("Escape", false);
+    if (this.#state !== "watching" && event.code === "Space" && !event.target.matches?.(EDITS)) event.preventDefault();
+    this.#keys.lift(event.code);
+    this.#step();
+  }
+
+  // The window has lost the focus, or the scene has it, which is another site's: its keys never reach us.
+  #left() {
+    this.#release("The page lost the focus.");
+    this.#stopHeld.delete("Escape");
+    setTimeout(() => {
+      const active = this.#document.activeElement;
+      if (active?.tagName === "IFRAME") active.blur();
+      if (active?.tagName === "IFRAME") this.#document.defaultView.focus();
+    });
+  }
+
+  #begin() {
+    this.#drivingSinceMs = performance.now();
+    this.#enter("resting", "");
+    this.#panel.focus();
+    this.#step();
+  }
+
+  #end(why) {
+    this.#clear();
+    if (this.#state === "watching") return;
+    this.#enter("watching", why);
+    this.#say(REST);
+  }
+
+  // Whatever is held is held no more; a second of rest follows.
+  #release(why) {
+    this.#clear();
+    if (this.#state === "watching") return;
+    if (this.#state !== "resting") this.#enter("resting", why);
+    this.#upSinceMs = null;
+    this.#say(REST);
+  }
+
+  #clear() {
+    this.#keys.clear();
+    this.#grips.clear();
+  }
+
+  #enter(state, why) {
+    if (state !== "ready") this.#upSinceMs = null;
+    this.#state = state;
+    this.#sinceMs = performance.now();
+    this.#why = why;
+    this.#draw();
+  }
+
+  #stop(by, held) {
+    if (held && !this.#stopHeld.has(by)) {
+      this.#stopHeld.add(by);
+      this.#stopMs = performance.now();
+      this.#release("You pressed the emergency stop.");
+      this.#step();
+    } else if (!held) this.#stopHeld.delete(by);
+  }
+
+  #giveBackNow() {
+    this.#end("The scripted person goes on.");
+    this.#giveBack = true;
+    this.#say(REST);
+    this.#giveBack = false;
+    this.#say(REST);
+  }
+
+  get #stops() {
+    if (this.#stopMs === null) return false;
+    const sinceMs = performance.now() - this.#stopMs;
+    const goesOn = this.#facts?.status.state !== "stopped" && sinceMs < STOP_TRIES_MS;
+    return this.#stopHeld.size > 0 || sinceMs < STOP_MS || goesOn;
+  }
+
+  #step() {
+    const nowMs = performance.now();
+    const passedMs = nowMs - this.#steppedMs;
+    this.#steppedMs = nowMs;
+    const pads = readGamepads(this.#facts?.advancing === "L2");
+    const there = this.#document.hasFocus();
+    this.#stop("gamepad", there && pads.stop);
+    this.#panel.showGamepad(pads, there);
+    if (this.#state !== "watching") {
+      if (passedMs > HELD_UP_MS) this.#release("This page was held up.");
+      if (nowMs - this.#factsMs > SILENCE_MS) this.#release("Nothing is heard from the operator side.");
+    }
+    const moves = this.#state === "running" && this.#moves;
+    const keys = this.#keys.read(passedMs / 1000, moves);
+    let hands = both(keys.hands, this.#grips.read());
+    if (there) hands = both(hands, pads.hands);
+    // Without the focus no key is known to be up.
+    this.#follow(hands, there && atRest(hands) && !keys.pressed && !this.#stops, nowMs);
+    this.#say(this.#state === "running" ? hands : REST);
+    this.#draw();
+  }
+
+  #follow(hands, allUp, nowMs) {
+    if (this.#state === "resting") {
+      this.#upSinceMs = allUp ? this.#upSinceMs ?? nowMs : null;
+      const agreed = this.#hands?.driver === this.#page && this.#hands.readiness === "ready";
+      if (allUp && agreed && nowMs - this.#upSinceMs >= REST_MS) this.#enter("ready", "");
+    } else if (this.#state === "ready" && !allUp) {
+      if (hands.run && !this.#stops) this.#enter("running", "");
+      else this.#enter("resting", "Hold-to-run comes first.");
+    } else if (this.#state === "running" && (!hands.run || this.#stops)) {
+      this.#enter("resting", "Hold-to-run was let go.");
+    }
+  }
+
+  // What the operator side says of us counts more than what we think.
+  #agree() {
+    const known = this.#hands;
+    if (this.#state === "watching" || known === null) return;
+    const nowMs = performance.now();
+    if (!known.may_drive) this.#end("A real controller drives.");
+    else if (known.driver !== null && known.driver !== this.#page && nowMs - this.#drivingSinceMs > AGREES_MS)
+      this.#end("Another page drives.");
+    else if (known.readiness === "all keys up first" && this.#state !== "resting" && nowMs - this.#sinceMs > AGREES_MS) {
+      this.#enter("resting", this.#armed ? "" : "The arm was disarmed or stopped.");
+    }
+  }
+
+  // At once when anything changes, and 50 times a second while we drive or stop.
+  #say(hands) {
+    const stop = this.#stops;
+    const driving = this.#state !== "watching";
+    const said = { ...hands, driving, stop, give_back: this.#giveBack };
+    const text = JSON.stringify(said);
+    const nowMs = performance.now();
+    const changed = text !== this.#sent;
+    if (!changed && (!(driving || stop) || nowMs - this.#sentMs < PERIOD_MS - 2)) return;
+    if (this.#sent === "" && !driving && !stop && !this.#giveBack) return; // there is nothing to say yet
+    this.#sent = text;
+    this.#sentMs = nowMs;
+    this.#send({ hands: { page: this.#page, number: this.#number++, ...said } });
+  }
+
+  #draw() {
+    const restMs = this.#upSinceMs === null ? REST_MS : Math.max(0, REST_MS - (performance.now() - this.#upSinceMs));
+    this.#panel.show({
+      state: this.#state, why: this.#why, restMs, moves: this.#moves, facts: this.#facts, hands: this.#hands,
+      mine: this.#hands?.driver === this.#page, level: this.#keys.level,
+      stop: this.#stopMs === null ? null : { sinceMs: performance.now() - this.#stopMs, goesOn: this.#stops },
+    });
+  }
+
+  close() {
+    clearInterval(this.#timer);
+    this.#end("The page was left.");
+  }
+}

@@ -1,0 +1,94 @@
+"""What a person may want to see, put together from the core: made only while somebody looks."""
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Final, cast
+
+import msgspec
+
+from common.command.live_view import Value, number
+from operator_side.core import OperatorSide
+from operator_side.dualsense.effects.official import ZONE_COUNT, Off
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.viewing.facts import DelayFacts, HandsFacts, OperatorFacts, Ten, TriggerFacts
+
+_RECENT_S: Final = 1.0
+_TAIL: Final = 0.99
+
+
+class Surroundings(msgspec.Struct, frozen=True):
+    """What the core itself does not know."""
+
+    hands: str
+    """As OperatorFacts.hands"""
+    asked_to_robot: str = ""
+    """The profile that this side emulates, in the grammar's words"""
+    swap_sides: bool = False
+    page: HandsFacts | None = None
+
+
+def operator_facts(
+    core: OperatorSide, status: Mapping[str, Value], surroundings: Surroundings, now_s: float
+) -> OperatorFacts:
+    """The facts of `now_s`; `status`: `core.status(now_s)`, and what else the status line is made of."""
+    felt, written, lease = core.stiffness, core.haptics.written, core.lease
+    pulled = [number(status.get(f"{name}_pulled")) for name in ("L2", "R2")]
+    order = -1 if surroundings.swap_sides else 1
+    needed: list[float | None] = [None, None]
+    fields = [None, None] if felt is None else [felt.l2, felt.r2][::order]
+    if felt is not None:
+        back, forth = (travel or 0.0 for travel in pulled[::order])
+        needed = list(core.haptics.needed_m(felt, (back, forth), now_s)[::order])
+    raw = (0.0, 0.0) if core.intent is None else core.intent.raw
+    triggers = []
+    for k, (effect, rendered) in enumerate(
+        ((written.l2, core.haptics.rendering.l2), (written.r2, core.haptics.rendering.r2))
+    ):
+        zones, field, travel = cast(Ten, (effect or Off()).zone_strengths), fields[k], pulled[k]
+        triggers.append(
+            TriggerFacts(
+                travel=travel,
+                raw=None if travel is None else raw[k],
+                zones=zones,
+                meets=0 if travel is None else zones[min(int(ZONE_COUNT * SENSED_TRAVEL * raw[k]), ZONE_COUNT - 1)],
+                free=rendered.free_travel,
+                stiffness=None if field is None else field.stiffness,
+                needed_m=needed[k],
+                fast_m=() if field is None else field.fast_m,
+                slow_m=() if field is None else field.slow_m,
+            )
+        )
+    recent = [arrival for arrival in core.link.recent if now_s - arrival[0] <= _RECENT_S]
+    offset = core.link.clock_offset
+    return OperatorFacts(
+        now_s=now_s,
+        offset_s=offset.offset_s,
+        status=dict(status),
+        l2=triggers[0],
+        r2=triggers[1],
+        rumble=0.0 if written.rumble is None else max(written.rumble.left, written.rumble.right),
+        advancing="L2" if surroundings.swap_sides else "R2",
+        to_operator=_delay("", (there for _, there, _ in recent)),
+        to_robot=_delay(surroundings.asked_to_robot, (_back(there, both) for _, there, both in recent)),
+        round_trip_ms=None if offset.round_trip_s is None else 1e3 * offset.round_trip_s,
+        field_age_ms=1e3 * (now_s - core.felt.received_s) if core.felt.count else None,
+        hands=surroundings.hands,
+        may_tune=lease is not None and lease.may_tune,
+        probability=None if lease is None else lease.probability,
+        page=surroundings.page,
+    )
+
+
+def _back(there_s: float | None, both_s: float | None) -> float | None:
+    """The way to the robot: what the round trip leaves, or half of it while the way from there cannot be told."""
+    if both_s is None:
+        return None
+    return both_s / 2.0 if there_s is None else max(0.0, both_s - there_s)
+
+
+def _delay(asked: str, samples_s: Iterable[float | None]) -> DelayFacts:
+    known_ms = [1e3 * sample for sample in samples_s if sample is not None]
+    if not known_ms:
+        return DelayFacts(asked, None, None, None)
+    nearest_rank = math.ceil(_TAIL * len(known_ms)) - 1
+    return DelayFacts(asked, sum(known_ms) / len(known_ms), sorted(known_ms)[nearest_rank], known_ms[-1])

@@ -1,0 +1,138 @@
+"""A whole screen of one moment: it grows wider with the room, and a low screen loses its end."""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from typing import Final
+
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from common.command.live_line import UNKNOWN, millimetres, percent
+from common.command.live_view import LiveView, live_view, number, printable
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.viewing.facts import OperatorFacts
+
+SILENT_AFTER_S: Final = 0.5
+_KEPT: Final = 200
+"""Facts that the curves show: 20 s of them, at ten a second; and notes."""
+_CURVES: Final = (("delay", "ms"), ("stiffness", ""), ("overlap", "mm³"), ("tick p99", "µs"))
+_BLOCKS: Final = " ▁▂▃▄▅▆▇█"
+_ALARM, _ARMED, _QUIET = "bold white on red", "bold black on bright_cyan", "reverse"
+_FAINT, _TITLE, _PULL, _FELT = "bright_black", "bold", "bright_cyan", "bold bright_yellow"
+
+
+class Screen:
+    """Remembers what the terminal shows."""
+
+    def __init__(self) -> None:
+        self.facts: OperatorFacts | None = None
+        self.notes: deque[str] = deque(maxlen=_KEPT)
+        self._history: deque[tuple[float, ...]] = deque(maxlen=_KEPT)
+
+    def add(self, facts: OperatorFacts) -> None:
+        """Show these facts, and their figures in the curves; 0 for unknown."""
+        self.facts, stiffest = facts, max(facts.l2.stiffness or 0.0, facts.r2.stiffness or 0.0)
+        figures = (facts.to_operator.newest_ms, stiffest, *map(facts.status.get, ("overlap_mm3", "tick_p99_us")))
+        self._history.append(tuple(number(value) or 0.0 for value in figures))
+
+    def lines(self, age_s: float, width: int) -> Group:
+        """Draw at most `width` columns, the most important lines first. `age_s`: time since the facts came."""
+        facts, view = self.facts, live_view({} if self.facts is None else self.facts.status)
+        drawn: list[RenderableType] = [_banner(view, 0.0 if facts is None else age_s, width)]
+        if facts is not None:
+            triggers = Table.grid("", "", padding=(0, 2, 0, 0), expand=True)
+            triggers.add_row(*(_trigger(facts, name, (width - 18) // 20) for name in ("L2", "R2")))
+            past = zip(*self._history, strict=True)
+            curves = (_curve(*curve, values, width) for curve, values in zip(_CURVES, past, strict=True))
+            drawn += [*_standing(facts, view), triggers, *curves]
+        rule = _line(("── notes, the newest first ".ljust(width, "─"), _FAINT))
+        return Group(*drawn, rule, *(Text(printable(note)) for note in reversed(self.notes)))
+
+
+def _line(*pieces: str | tuple[str, str], style: str = "") -> Text:
+    """One line of plain or styled pieces; control characters of a peer do not reach the terminal."""
+    styled = [(piece, "") if isinstance(piece, str) else piece for piece in pieces]
+    safe = ((printable(text), look) for text, look in styled)
+    return Text.assemble(*safe, style=style, no_wrap=True, overflow="ellipsis")
+
+
+def _named(**said: object) -> Text:
+    words = ((f"{name.replace('_', ' ')} ", (str(word or UNKNOWN), _TITLE), "   ") for name, word in said.items())
+    return _line(*(piece for pieces in words for piece in pieces))
+
+
+def _banner(view: LiveView, age_s: float, width: int) -> Text:
+    """The state in words and signs that need no colour; only an alarm fills the whole line."""
+    text = view.phase if view.reason is None else f"{view.phase}: {view.reason}"
+    if (old := age_s > SILENT_AFTER_S) or view.alarm:
+        return _line(f"!!! {f'NO NEWS for {age_s:.1f} s' if old else text} ".ljust(width, "!"), style=_ALARM)
+    if view.state in ("armed", "disarmed"):
+        text = f"{view.state.upper()}  {'' if view.phase == view.state else view.phase}".rstrip()
+    sign = ">" if view.armed else "-" if view.state == "disarmed" else "."
+    return _line(f"{3 * sign} {text} {3 * sign}".ljust(width), style=_ARMED if view.armed else _QUIET)
+
+
+def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
+    """Show what both sides say of the link, over the last second, and of what is ahead and in the hand."""
+    link, lease, feel, controller = map(facts.status.get, ("link", "owner", "feel", "controller"))
+    lines = [_named(link=link, lease=lease, hands=facts.hands, feel=feel, controller=controller)]
+    for name, delay in (("to operator", facts.to_operator), ("to robot   ", facts.to_robot)):
+        mean, p99, newest = (_figure(value, 5) for value in (delay.mean_ms, delay.p99_ms, delay.newest_ms))
+        asked = delay.asked and f"  asked: {delay.asked}"
+        lines.append(_line(f"{name}  mean {mean}  p99 {p99}  now {newest} ms{asked}"))
+    said = facts.status
+    rate, queue, lost = (_figure(number(said.get(name))) for name in ("rate_kbit_s", "queue_ms", "lost_percent"))
+    rates = {"rate": f"{rate} kbit/s", "queue": f"{queue} ms", "lost": f"{lost} %"}
+    lines.append(_named(**rates, pictures=said.get("pictures"), held_back=said.get("held_back")))
+    ages = (facts.round_trip_ms, facts.field_age_ms, number(facts.status.get("loop_age_ms")))
+    round_trip, field_age, loop_age = (f"{_figure(age)} ms" for age in ages)
+    target = UNKNOWN if view.has_target is None else "none"
+    if view.has_target:
+        centre, way_mm = ("", view.target_mm) if view.target_mm is not None else ("centre ", view.target_centre_mm)
+        target = f"{facts.status.get('target')} {centre}at {millimetres(way_mm)}"
+    nearest = f"{view.nearest or 'nearest thing'} at {millimetres(view.nearest_mm)}"
+    asked = "" if facts.probability is None else f"   P {facts.probability:g}"
+    grown = f"enlargement {_figure(number(facts.status.get('enlargement_mm')))} mm   rumble {_figure(facts.rumble)}"
+    return [
+        *(*lines, _named(round_trip=round_trip, field_age=field_age, loop_age=loop_age)),
+        _named(
+            nearest=nearest, target=target, holding=f"{view.holding or 'nothing'}{', it stands' if view.stands else ''}"
+        ),
+        _line(grown, asked, "" if view.haptics else "   haptics off"),
+    ]
+
+
+def _trigger(facts: OperatorFacts, name: str, cells: int) -> Group:
+    """The finger's place, the strengths along its way, and the distances at which they begin; `cells` for a zone."""
+    trigger, does = facts.l2 if name == "L2" else facts.r2, "advances" if facts.advancing == name else "retreats"
+    raw, metres, cells = number(trigger.raw), number(trigger.needed_m), max(1, cells)
+    reached = math.ceil(min(1.0, max(0.0, (raw or 0.0) * SENSED_TRAVEL)) * cells * 10)
+    rest = (UNKNOWN if raw is None else "·") * (cells * 10 - reached)
+    travel, free = percent(number(trigger.travel), 3), percent(number(trigger.free))
+    meets = (f"{trigger.meets} of 8", _FELT if trigger.meets else "")
+    return Group(
+        _line((f"{name} {does}", _TITLE), f"  {travel} %, free {free} %"),
+        _line("finger  ", ("━" * (reached - 1) + "┫" * (reached > 0), _PULL), (rest, _FAINT)),
+        _line("zones   ", *((f"{zone or '.'}".ljust(cells), _FELT if zone else "") for zone in trigger.zones)),
+        _line("meets   ", meets, f"  stiffness {_figure(trigger.stiffness)}"),
+        _line("D       ", (f"{UNKNOWN if metres is None else f'{1e3 * metres:z.0f}'} mm", _TITLE), " ahead"),
+        _line("fast mm ", " ".join(f"{1e3 * way:z.0f}" for way in trigger.fast_m) or UNKNOWN),
+        _line("slow mm ", " ".join(f"{1e3 * way:z.0f}" for way in trigger.slow_m) or UNKNOWN),
+    )
+
+
+def _curve(name: str, unit: str, past: Sequence[float], width: int) -> Text:
+    """One figure over the last `_KEPT` facts as blocks, each the largest of a few; and its newest and largest value."""
+    few, top = math.ceil(_KEPT / max(1, width - 34)), max(1.0, *past)
+    highest = (max(past[max(0, end - few) : end]) for end in range(len(past), 0, -few))
+    blocks = "".join(_BLOCKS[round(8 * max(0.0, value) / top)] for value in highest)[::-1].rjust(math.ceil(_KEPT / few))
+    return _line(f"{name:<9}", (blocks, _PULL), f" {_figure(past[-1])} of {_figure(top)} {unit}")
+
+
+def _figure(value: float | None, width: int = 0) -> str:
+    """A figure with as many digits as say something."""
+    if (known := number(value)) is None:
+        return f"{UNKNOWN:>{width}}"
+    return f"{known:{width}.{0 if abs(known) >= 100.0 else 1 if abs(known) >= 1.0 else 2}f}"

@@ -1,0 +1,117 @@
+"""The terminal view in the place of the status line: the same calls, drawn by a process that nobody waits for.
+
+`python -m operator_side.viewing.terminal.status FD` is that process. It may wait for the terminal; facts that came
+meanwhile are passed over. It ends when the other end of the channel does, and puts the terminal back.
+"""
+
+import contextlib
+import os
+import select
+import sys
+import termios
+from collections.abc import Mapping
+from typing import Any, Final, Self
+
+import msgspec
+from rich.console import Console
+from rich.live import Live
+
+from common.clock import MonotonicClock
+from common.command.live_view import Value
+from common.command.status import Status
+from common.companion.channel import Channel
+from common.companion.process import Companion, companion_channel
+from common.errors import ConfigurationError
+from operator_side.viewing.facts import OperatorFacts
+from operator_side.viewing.terminal.screen import Screen
+
+_PERIOD_S: Final = 0.1
+_END_LIMIT_S: Final = 0.5
+_LEAVE: Final = b"\x1b[0m\x1b[?25h\x1b[?1049l"  # to the first screen and its cursor
+_INPUT, _LOCAL, _LETTERS = 0, 3, 6
+
+
+class TerminalStatus(Status):
+    """Shows facts on the whole terminal while the context is open; notes after it are results, written as ever."""
+
+    wants_facts: Final = True
+    _companion: Companion | None = None
+
+    def __init__(self, program: str) -> None:
+        """ConfigurationError unless standard output is a terminal."""
+        super().__init__("line", program)
+        if not sys.stdout.isatty() or os.environ.get("TERM", "dumb") == "dumb":
+            raise ConfigurationError("--tui: no terminal with a cursor; valid: a terminal and its TERM, or no --tui")
+
+    def __enter__(self) -> Self:
+        self._before = termios.tcgetattr(sys.stdout)
+        self._companion = Companion("operator_side.viewing.terminal.status", output=sys.stdout.fileno())
+        return self
+
+    def __exit__(self, *ended: Any) -> None:
+        """End the process that draws, and put the terminal back where it could not do so itself."""
+        companion, self._companion = self._companion, None
+        if companion is not None:
+            companion.close(_END_LIMIT_S)
+            _put_back(self._before)
+
+    def show(self, now_s: float, values: Mapping[str, Value]) -> None:
+        """Show nothing: the same values are in the facts."""
+        del values
+        self._next_s = now_s + _PERIOD_S
+
+    def show_facts(self, facts: OperatorFacts | str) -> None:
+        """Have them drawn, or dropped while the terminal stalls; a note, too."""
+        if self._companion is not None:
+            self._companion.channel.send(msgspec.msgpack.encode(facts))
+            if self._companion.channel.ended:
+                self.__exit__()
+
+    def note(self, text: str) -> None:
+        """Show a line for a while; after the context, for good."""
+        (super().note if self._companion is None else self.show_facts)(text)
+
+
+def _put_back(attributes: list[Any]) -> None:
+    """Bring the first screen back, with the cursor; what was typed meanwhile is dropped. A closed one is left alone."""
+    with contextlib.suppress(termios.error, OSError):
+        termios.tcsetattr(sys.stdout, termios.TCSAFLUSH, attributes)
+        os.write(sys.stdout.fileno(), _LEAVE)
+
+
+def main() -> None:
+    """Draw until the channel ends, or the terminal: the program that started us gets its own signal then."""
+    channel, _ = companion_channel(sys.argv[1:])
+    before, changed = termios.tcgetattr(sys.stdout), termios.tcgetattr(sys.stdout)
+    # Ctrl-Z would leave an arm to itself, and Ctrl-S an old screen that looks like a new one.
+    changed[_LETTERS][termios.VSUSP] = b"\x00"
+    changed[_INPUT] &= ~termios.IXON
+    changed[_LOCAL] &= ~termios.ECHO
+    output = os.fdopen(sys.stdout.fileno(), "w", encoding="utf-8")
+    console = Console(file=output, _environ=os.environ | {"COLUMNS": "", "LINES": ""})  # the terminal's own size
+    try:
+        termios.tcsetattr(sys.stdout, termios.TCSANOW, changed)
+        with contextlib.suppress(OSError), Live(console=console, screen=True, auto_refresh=False) as live:
+            _draw_on(channel, live)
+    finally:
+        _put_back(before)
+
+
+def _draw_on(channel: Channel, live: Live) -> None:
+    clock, decoder = MonotonicClock(), msgspec.msgpack.Decoder(OperatorFacts | str)
+    screen, came_s, next_s = Screen(), clock.now(), clock.now()
+    while not channel.ended:
+        select.select([channel], [], [], max(0.0, next_s - clock.now()))
+        for message in channel.receive():
+            if isinstance(said := decoder.decode(message), str):
+                screen.notes.append(said)
+            else:
+                screen.add(said)
+                came_s = clock.now()
+        if (now_s := clock.now()) >= next_s:
+            next_s = now_s + _PERIOD_S
+            live.update(screen.lines(now_s - came_s, live.console.width), refresh=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,154 @@
+"""Whoever looks at a run from this side: the console, and what the robot side is asked to render for it."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from common.command.live_view import Value
+from common.command.status import Status
+from common.errors import RemoteProtocolError
+from common.protocol.codec import VIEW_MAXIMUM_BYTES, claims_to_be, decode_view, encode
+from common.protocol.messages import Watch
+from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC, SceneState
+from common.rate.pieces import PIECE, Joining
+from common.recording.entries import Kind
+from common.recording.side import SideRecording
+from operator_side.core import OperatorSide
+from operator_side.settings import OperatorSettings
+from operator_side.viewing.console.console import Console
+from operator_side.viewing.facts import FACTS_PERIOD_S
+from operator_side.viewing.facts_of_core import Surroundings, operator_facts
+from operator_side.viewing.following_pages import hear_pages
+from operator_side.viewing.pages.driving_page import DrivingPage
+
+_WATCH_PERIOD_S: Final = 0.25
+_TELEMETRY_TOPIC: Final = b"telemetry"
+
+
+def view_topics(settings: OperatorSettings) -> tuple[bytes, ...]:
+    """What to subscribe to: pictures only where they could be shown."""
+    scene = (SCENE_TOPIC,) if settings.console or settings.tells_facts else ()
+    return (_TELEMETRY_TOPIC, *scene, *((VIDEO_TOPIC,) if settings.console else ()))
+
+
+class SceneFigures:
+    """Overlaps and ticks of the robot side's scene, as words: unpacked from the newest bytes when somebody asks."""
+
+    def __init__(self) -> None:
+        self._newest: bytes | None = None
+        self._figures: dict[str, Value] = {}
+
+    def take(self, payload: bytes) -> None:
+        """One payload of the topic `scene`; shapes, which are large, are passed over."""
+        if claims_to_be("scene", payload):
+            self._newest = payload
+
+    def figures(self) -> dict[str, Value]:
+        """As status values; empty before the first."""
+        payload, self._newest = self._newest, None
+        if payload is not None:
+            try:
+                state = decode_view(payload)
+            except RemoteProtocolError:
+                return self._figures
+            if isinstance(state, SceneState):
+                by_trigger = zip(*((l2, r2) for _, l2, r2 in state.overlaps), strict=True)
+                self._figures = {
+                    "overlap_mm3": 1e9 * max(map(sum, by_trigger), default=0.0),
+                    "tick_us": state.tick_p50_us,
+                    "tick_p99_us": state.tick_p99_us,
+                    "overruns": state.overruns,
+                }
+        return self._figures
+
+
+class Viewing:
+    """Feeds who looks; asks for nothing while nobody does."""
+
+    def __init__(
+        self,
+        core: OperatorSide,
+        surroundings: Callable[[float], Surroundings],
+        status: Status,
+        pages: DrivingPage,
+        console: Console | None,
+        recording: SideRecording | None = None,
+    ) -> None:
+        """`surroundings`: those of a moment. `pages`: are told what the console's say."""
+        self.console = console
+        self._pages = pages
+        self._recording = recording
+        self._core = core
+        self._surroundings = surroundings
+        self._status = status
+        self._figures = SceneFigures()
+        self._joining = {topic: Joining(VIEW_MAXIMUM_BYTES) for topic in (VIDEO_TOPIC, SCENE_TOPIC)}
+        self._told: str | None = None
+        self._asked = False
+        """Whether the newest Watch asks for a whole picture"""
+        self._watch_s = self._facts_s = -math.inf
+
+    def note(self, text: str) -> None:
+        """Say it to everybody: a line that stays."""
+        self._status.note(text)
+        if self.console is not None:
+            self.console.note(text)
+
+    def take(self, topic: bytes, payload: bytes) -> bool:
+        """Whether a view payload is for those who look, and not for the core; pieces are put together first."""
+        of, is_piece, _ = topic.partition(PIECE)
+        if of not in self._joining:
+            return False
+        if is_piece:
+            whole = self._joining[of].take(payload)
+            return whole is None or self.take(of, whole)
+        if topic == SCENE_TOPIC and self._status.wants_facts:
+            self._figures.take(payload)
+        if self.console is not None:
+            self.console.view(payload, video=topic == VIDEO_TOPIC)
+        return True
+
+    def requests(self, now_s: float) -> list[bytes]:
+        """What to send to the robot side now: what is looked at, while anything is."""
+        if self.console is not None:
+            hear_pages(self.console, self._pages, now_s)
+        pages = self.console is not None and self.console.pages > 0
+        lacks = None if self.console is None else self.console.lacks
+        stands_still = lacks is not None and any(lacks) and not self._asked
+        if not (pages or self._status.wants_facts) or (now_s - self._watch_s < _WATCH_PERIOD_S and not stands_still):
+            return []
+        self._watch_s, self._asked = now_s, lacks is not None and any(lacks)
+        watch = Watch(self._core.link.stamp(now_s), overview=pages, first_person=pages, scene=True, lacks=lacks)
+        if self._recording is not None:
+            self._recording.noted.append((Kind.WATCHED, now_s, b""))
+        return [encode(watch)]
+
+    def facts_due(self, now_s: float) -> bool:
+        """Whether to call `show`."""
+        shown = self.console is not None and self._looks_at_console(self.console)
+        return (shown or self._recording is not None) and now_s - self._facts_s >= FACTS_PERIOD_S
+
+    def _looks_at_console(self, console: Console) -> bool:
+        for text in console.take_notes():
+            self._status.note(text)
+        if console.address not in (None, self._told):
+            self._told = console.address
+            if not self._status.event("console", address=self._told):
+                self._status.note(f"console: {self._told}")
+        return console.pages > 0
+
+    def show(self, status: Mapping[str, Value], now_s: float) -> None:
+        """Show and record the facts of `now_s`; `status`: what the status line is made of."""
+        self._facts_s = now_s if now_s - self._facts_s > 2 * FACTS_PERIOD_S else self._facts_s + FACTS_PERIOD_S
+        facts = operator_facts(self._core, status, self._surroundings(now_s), now_s)
+        if self.console is not None:
+            self.console.facts(facts)
+        if self._recording is not None:
+            self._recording.facts(now_s, facts)
+
+    def tell(self, status: Mapping[str, Value], now_s: float) -> None:
+        """Tell the status of `now_s`, and the facts where somebody wants them."""
+        self._status.show(now_s, status)
+        if self._status.wants_facts:
+            known = {**status, **self._figures.figures()}
+            self._status.show_facts(operator_facts(self._core, known, self._surroundings(now_s), now_s))

@@ -1,0 +1,206 @@
+"""The simulated arm: physics on a clock of its own, commands that run out, and sensors."""
+
+import math
+from typing import Final
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+
+from common.arrays import FloatArray
+from common.clock import Clock
+from common.errors import FeelaheadError
+from robot_side.arm.port import ArmState
+from robot_side.drivers.mujoco.encoders import Encoder
+from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GRIPPER_INPUT, GripperDrive
+from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
+from robot_side.drivers.mujoco.joint_reference import JointReference, MotionLimits
+from robot_side.drivers.mujoco.plant import LIMITS, PLANT, Plant, drive, inertia_table, sense
+from robot_side.drivers.mujoco.scene import Scene
+
+_LONGEST_ADVANCE_S = 2.0
+LONGEST_TURN_S: Final = 0.02
+"""Physics that takes longer than real time gives way to messages, stops and leases this often."""
+_LIMIT_MARGIN_RAD = 0.005
+# Bad positions, velocities and accelerations, which are neighbours among MuJoCo's warnings.
+_UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
+
+
+class MujocoArm:
+    """An Arm in MuJoCo: it goes on, decelerates and stops by its own physics clock, ticked or not.
+
+    It advances the scene's one live state, so that there is one arm to a scene.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        encoder: Encoder,
+        limits: MotionLimits | None = None,
+        gripper_stroke_time_s: float = 0.6,
+    ) -> None:
+        """Stand where the scene starts, with the gripper open.
+
+        ConfigurationError for a gripper actuator whose range of inputs is not known.
+        """
+        self._model, self._data, self._robot = scene.model, scene.data, scene.robot
+        self._encoder = encoder
+        model, data, robot = self._model, self._data, self._robot
+        self._step_s = float(model.opt.timestep)
+        self._origin_s: float | None = None
+        self._steps = 0
+        self._skipped = 0
+        self._taken = 0, 0
+        self._clock: Clock | None = None
+        self._state: ArmState | None = None
+
+        travel = measure_gripper(scene)
+        self._gripper = None if travel is None else GripperDrive(travel, gripper_stroke_time_s)
+        if travel is not None:
+            data.qpos[robot.finger_positions] = travel.open_fingers
+        start = data.qpos[robot.arm_positions].copy()
+        # A servo that stops at full deceleration runs over a little; at the model's own limit it would hit a stop.
+        self.ends_rad = (
+            np.minimum(robot.lower_rad + _LIMIT_MARGIN_RAD, start),
+            np.maximum(robot.upper_rad - _LIMIT_MARGIN_RAD, start),
+        )
+        """Where the joints (n,) end, lowest and highest"""
+        limits = limits or MotionLimits()
+        self._reference = JointReference(start, *self.ends_rad, limits, robot.drives.windup_rad(limits.windup_rad))
+        mujoco.mj_forward(model, data)
+        # MuJoCo's arrays stay where they are as long as the state lives: asking for one costs more than a step's use.
+        self._unstable = data.warning.number[_UNSTABLE]
+        self._borne_nm = data.qfrc_constraint
+        gripper = self._gripper
+        measured = int(robot.gripper_actuators[0]) if gripper is not None else 0
+        self._plant = Plant(
+            self._reference.joints,
+            robot.drives.table(model.dof_damping[robot.arm_velocities]),
+            inertia_table(model, robot.arm_velocities),
+            np.zeros(0, GRIPPER) if gripper is None else gripper.drive,
+            np.zeros((0, 3)) if gripper is None else gripper.samples,
+            np.zeros(0, GRIPPER_INPUT) if gripper is None else gripper.inputs(robot.gripper_controls),
+            robot.arm_positions.astype(np.int64),
+            robot.finger_positions.astype(np.int64),
+            robot.arm_velocities.astype(np.int64),
+            robot.arm_controls.astype(np.int64),
+            data.qpos,
+            data.qvel,
+            data.M,
+            data.qfrc_bias,
+            data.qfrc_gravcomp,
+            data.qfrc_spring,
+            data.actuator_length[measured:],
+            data.actuator_velocity[measured:],
+            data.ctrl,
+            np.array([(limits.velocity_rad_s, limits.acceleration_rad_s2, limits.deceleration_rad_s2)], LIMITS),
+        )
+        self._addresses = PLANT.bundle(self._plant)
+
+    @property
+    def joint_count(self) -> int:
+        """The number n of joints between the base and the tool."""
+        return len(self._robot.arm_joints)
+
+    def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
+        """Follow `joint_velocity_rad_s` (n,) until `valid_until_s`, then decelerate from the measured state.
+
+        Velocities are scaled as a whole to the arm's limit. ValueError for a wrong shape or a value that is not
+        finite: nothing of it is applied.
+        """
+        self._reference.command(joint_velocity_rad_s, valid_until_s)
+
+    def command_gripper(self, closing: float, valid_until_s: float) -> None:
+        """Close (+1), hold (0) or open (-1) at that share of the gripper's speed until `valid_until_s`.
+
+        An arm without a gripper ignores it. ValueError for a value outside [-1, 1] or a time that is not finite.
+        """
+        if self._gripper is not None:
+            self._gripper.command(closing, valid_until_s)
+
+    def give_way(self, clock: Clock) -> None:
+        """From now on let no `state` last more than LONGEST_TURN_S, and a step, by `clock`, however much is due.
+
+        What there was no time for is skipped: the simulation falls behind real time.
+        """
+        self._clock = clock
+
+    def state(self, now_s: float) -> ArmState:
+        """The measured state after the physics that `now_s` has made due; the first call sets the clocks together.
+
+        At most 2 s are simulated at once: after a longer gap the rest is skipped, as if the world had paused.
+        FeelaheadError when the simulation has become unstable, or MuJoCo gives up.
+        """
+        if self._origin_s is None:
+            self._origin_s = now_s
+        # A little grace, so that a tick of the timestep's own period never misses its step by rounding.
+        due = math.floor((now_s - self._time_s) / self._step_s + 1e-6)
+        run = self._advance(min(due, round(_LONGEST_ADVANCE_S / self._step_s)))
+        if run > 0:
+            self._origin_s += (due - run) * self._step_s
+            self._skipped += due - run
+            self._require_stable()
+        if run > 0 or self._state is None:
+            self._state = self._measure()
+        return self._state
+
+    @property
+    def share_of_real_time(self) -> float:
+        """How much of the time since the first `state` has been simulated: 1 unless the physics is too slow."""
+        return _share(self._steps, self._skipped)
+
+    def take_share_of_real_time(self) -> float:
+        """The same since this was last asked for."""
+        (steps, skipped), self._taken = self._taken, (self._steps, self._skipped)
+        return _share(self._steps - steps, self._skipped - skipped)
+
+    @property
+    def _time_s(self) -> float:
+        """The physics' present time on the caller's clock."""
+        return (self._origin_s or 0.0) + self._steps * self._step_s
+
+    def _advance(self, due: int) -> int:
+        """Simulate up to `due` steps, and at least one if any is due; how many there was time for."""
+        clock, ends_s = self._clock, 0.0
+        if clock is not None and due > 1:
+            ends_s = clock.now() + LONGEST_TURN_S
+        try:
+            for step in range(1, due + 1):
+                self._advance_one_step()
+                if clock is not None and step < due and clock.now() >= ends_s:
+                    return step
+        except mujoco.FatalError as error:
+            raise FeelaheadError(f"MuJoCo gave up: {' '.join(str(error).split())}") from error
+        return max(due, 0)
+
+    def _advance_one_step(self) -> None:
+        time_s = self._time_s
+        closing = 0.0 if self._gripper is None else self._gripper.moving(time_s)
+        drive(self._addresses, *self._reference.follows(time_s), closing, self._step_s)
+        mujoco.mj_step(self._model, self._data)
+        self._steps += 1
+
+    def _measure(self) -> ArmState:
+        plant, gripper, encoder = self._plant, self._gripper, self._encoder
+        positions, fingers = encoder.noise(plant.positions.size), encoder.noise(plant.fingers.size)
+        velocities = np.empty(plant.velocities.size)
+        sense(self._addresses, encoder.sigma_rad, encoder.resolution_rad, positions, velocities, fingers)
+        return ArmState(
+            time_s=self._time_s,
+            joint_positions_rad=positions,
+            joint_velocities_rad_s=velocities,
+            finger_positions=fingers,
+            gripper_opening_m=0.0 if gripper is None else gripper.opening_m,
+            gripper_holding=gripper is not None and gripper.holding,
+            joint_loads_nm=-self._borne_nm[plant.velocities],
+        )
+
+    def _require_stable(self) -> None:
+        # MuJoCo resets an unstable simulation to its start, which must not pass for a motion of the arm.
+        if np.count_nonzero(self._unstable):
+            raise FeelaheadError(
+                f"the simulation became unstable at {self._data.time:.3f} s; a smaller timestep in the model may help"
+            )
+
+
+def _share(steps: int, skipped: int) -> float:
+    return steps / (steps + skipped) if steps + skipped else 1.0

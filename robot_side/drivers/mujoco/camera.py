@@ -1,0 +1,130 @@
+"""What a camera sees of the simulated world, wrong by its own error (eq. 1-2)."""
+
+import math
+import zlib
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from common.arrays import FloatArray
+from robot_side.drivers.mujoco.object_primitives import MovingPrimitives
+from robot_side.drivers.mujoco.scene import Scene
+from robot_side.surroundings.kinds.layout import VELOCITY
+from robot_side.surroundings.movers import Movers
+from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.velocities import ObjectVelocities
+
+_FRAME_PERIOD_S = 1.0 / 30.0
+
+
+class CameraError:
+    """The error e_c ~ N(μ_c, σ_c²) per axis of each object's position (eq. 1-2), world frame: perceived = true - e_c.
+
+    One part stays with the object for the whole run, as a calibration or segmentation error does; an optional
+    part with mean 0 is drawn anew in each frame. What an object gets depends on the seed and its own name
+    alone, so that adding or removing other objects changes nothing.
+    """
+
+    def __init__(
+        self,
+        names: tuple[str, ...],
+        mean_m: float | tuple[float, float, float] = 0.0,
+        standard_deviation_m: float = 0.0,
+        frame_standard_deviation_m: float = 0.0,
+        seed: int = 0,
+    ) -> None:
+        """Draw the lasting part for `names` (k); mean_m: of every axis, or of each."""
+        self.mean_m: FloatArray = np.broadcast_to(np.asarray(mean_m, dtype=np.float64), (3,)).copy()
+        """(3,) μ_c"""
+        self.variance_m2 = standard_deviation_m**2 + frame_standard_deviation_m**2
+        """σ_c² of eq. 2 for a single frame: both parts together."""
+        self._frame_standard_deviation_m = frame_standard_deviation_m
+        generators = [np.random.default_rng([seed, zlib.crc32(name.encode())]) for name in names]
+        self._lasting = self.mean_m + standard_deviation_m * _draw(generators)
+        self._generators = [] if self.lasts else generators
+        self._offsets = -self._lasting
+
+    @property
+    def lasts(self) -> bool:
+        """Whether it is the same in all frames."""
+        return self._frame_standard_deviation_m == 0.0
+
+    def next_frame(self) -> FloatArray:
+        """Offsets -e_c (k, 3) to add to the true positions in the next frame, metres, in the order of the names."""
+        if self.lasts:
+            return self._offsets
+        offsets: FloatArray = -(self._lasting + self._frame_standard_deviation_m * _draw(self._generators))
+        return offsets
+
+
+def _draw(generators: Sequence[np.random.Generator]) -> FloatArray:
+    draws: FloatArray = np.array([generator.standard_normal(3) for generator in generators])
+    return draws.reshape(-1, 3)
+
+
+class MujocoCamera:
+    """An ObjectSource: the simulated objects as a camera with segmentation reports them, frame by frame."""
+
+    def __init__(self, scene: Scene, error: CameraError | None = None) -> None:
+        """Look at `scene` with `error`, drawn for its objects' names in their order; no error when None."""
+        self._scene = scene
+        self._error = error or CameraError(tuple(thing.name for thing in scene.objects))
+        self._origin_s: float | None = None
+        self._frame_number = -1
+        self._newest: PerceivedObjects | None = None
+        self._velocities = ObjectVelocities()
+        fixed = scene.fixed if self._error.lasts else frozenset()
+        self._things = np.array([k for k, thing in enumerate(scene.objects) if thing.name not in fixed], dtype=np.int64)
+        """What may be elsewhere in the next frame"""
+        self._first_geoms = np.array([thing.geoms[0] for thing in scene.objects], dtype=np.int64)
+        self._moving: tuple[Movers, MovingPrimitives] | None = None
+        self._roles: tuple[Role, ...] = ()
+
+    def perceive(self, now_s: float) -> PerceivedObjects:
+        """The newest frame at `now_s`; the same object is returned until a newer frame is there."""
+        if self._origin_s is None:
+            self._origin_s = now_s
+        # A frame is due on the grid of the first one, so that the rate does not sink with the tick's period.
+        number = math.floor((now_s - self._origin_s) / _FRAME_PERIOD_S + 1e-9)
+        if self._newest is None or number > self._frame_number:
+            self._frame_number = number
+            self._newest = self._frame(now_s)
+        return self._newest
+
+    def _frame(self, now_s: float) -> PerceivedObjects:
+        data, offsets_m = self._scene.data, self._error.next_frame()
+        if self._moving is None:
+            return self._whole(now_s, offsets_m)
+        movers, primitives = self._moving
+        numbers = primitives.numbers(offsets_m, data.geom_xpos, data.geom_xmat)
+        of_objects = numbers[len(numbers) - len(self._things) :]
+        of_objects[:, VELOCITY : VELOCITY + 3] = self._velocities.see(now_s, of_objects[:, :3].copy())
+        return movers.frame(now_s, numbers, self._roles)
+
+    def _whole(self, now_s: float, offsets_m: FloatArray) -> PerceivedObjects:
+        """A frame of all objects, since which others say what is new."""
+        scene, data, things = self._scene, self._scene.data, self._things
+        positions_m = data.geom_xpos[self._first_geoms] + offsets_m
+        velocities_m_s: FloatArray = np.zeros((len(scene.objects), 3))
+        velocities_m_s[things] = self._velocities.see(now_s, positions_m[things])
+        whole = replace(
+            scene.primitives.place(now_s, scene.roles, offsets_m, data.geom_xpos, data.geom_xmat),
+            positions_m=positions_m,
+            rotations=data.geom_xmat[self._first_geoms].reshape(-1, 3, 3),
+            velocities_m_s=velocities_m_s,
+        )
+        self._moving = Movers(whole, things), scene.primitives.moving(things, scene.roles)
+        self._roles = whole.roles
+        return whole
+
+    def set_role(self, name: str, role: Role) -> None:
+        """Change what the object `name` is to the task, from the next frame on. ValueError for an unknown name."""
+        roles = self._scene.roles
+        if name not in roles:
+            raise ValueError(f"name = {name!r} is no object; valid: {', '.join(roles)}")
+        if Role.IGNORED in (role, roles[name]):
+            # Other primitives are there from now on.
+            self._moving = None
+        roles[name] = role
+        self._roles = tuple(roles[thing.name] for thing in self._scene.objects)

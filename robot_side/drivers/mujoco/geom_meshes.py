@@ -1,0 +1,121 @@
+"""Closed meshes for the geoms that no simpler primitive describes, prepared once when a scene is loaded.
+
+Only a scene that needs them imports this module, and so compiles the mesh kernels.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+# A scene that has meshes is looked at by these kernels, too, and they must be there to be warmed up.
+import robot_side.surroundings.placed_meshes  # noqa: F401
+from robot_side.drivers.mujoco.mesh_arrays import height_field_surface, mesh_triangles, mesh_vertices
+from robot_side.drivers.mujoco.model_enums import GeomKind
+from robot_side.overlap.meshes.closed_surface import signed_volume
+from robot_side.overlap.meshes.mesh import Mesh
+from robot_side.overlap.meshes.mesh_library import MeshLibrary
+from robot_side.overlap.meshes.mesh_shapes import (
+    ShapeMesh,
+    capsule_mesh,
+    convex_hull_mesh,
+    cylinder_mesh,
+    ellipsoid_mesh,
+)
+
+_LARGEST_VOLUME_ERROR = 0.01
+"""The share by which a mesh around a round shape is larger, at most."""
+_STANDS_OUT_M = 5e-4
+"""And how far it stands out, at most, unless that takes more than the most of what follows."""
+_SEGMENTS = range(8, 129, 4)
+_SUBDIVISIONS = range(4, 25)
+_BY_NUMBER = {GeomKind.MESH, GeomKind.HFIELD}
+"""What the model has a list of, so that geoms of the same number have the same shape."""
+
+
+@dataclass(frozen=True)
+class GeomMesh:
+    """A mesh in the frame of the geoms that have this shape."""
+
+    mesh: Mesh
+    volume_error: float
+    """The share of the shape's volume by which the mesh's is greater; infinite where the shape encloses none."""
+    stands_out_m: float
+    """How far the mesh reaches beyond the shape; infinite where the shape encloses nothing."""
+
+
+class GeomMeshes:
+    """The meshes of a model's geoms; geoms of the same shape share one."""
+
+    def __init__(self, model: Any) -> None:
+        """For the geoms of a compiled MuJoCo model."""
+        self._model = model
+        self._shapes: dict[tuple[Any, ...], tuple[int, GeomMesh] | None] = {}
+
+    def add(self, geom: int) -> tuple[int, GeomMesh] | None:
+        """The geom's mesh and its index into `mesh_library`; None where no mesh can be made.
+
+        A round shape gets a mesh around it. A height field is itself. A mesh geom is itself where its surface is closed
+        and each part of it is oriented consistently, else its convex hull, as it is in the simulation's contacts.
+        """
+        kind = GeomKind(self._model.geom_type[geom])
+        size = tuple(self._model.geom_size[geom].tolist())
+        key = (kind, int(self._model.geom_dataid[geom])) if kind in _BY_NUMBER else (kind, *size)
+        if key not in self._shapes:
+            made = self._make(geom, kind, size)
+            count = sum(shape is not None for shape in self._shapes.values())
+            self._shapes[key] = None if made is None else (count, made)
+        return self._shapes[key]
+
+    def _make(self, geom: int, kind: GeomKind, size: tuple[float, ...]) -> GeomMesh | None:
+        if kind is GeomKind.HFIELD:
+            return GeomMesh(Mesh(*height_field_surface(self._model, geom)), 0.0, 0.0)
+        return _mesh_geom(self._model, geom) if kind is GeomKind.MESH else _round_geom(kind, size)
+
+    def mesh_library(self) -> MeshLibrary | None:
+        """All the meshes so far; None for none."""
+        meshes = [shape[1].mesh for shape in self._shapes.values() if shape is not None]
+        return MeshLibrary(meshes) if meshes else None
+
+
+def _round_geom(kind: GeomKind, size: tuple[float, ...]) -> GeomMesh | None:
+    """The coarsest mesh around the shape that is larger by no more than it may be, or the finest that there is."""
+    finenesses = _SEGMENTS if kind is GeomKind.CYLINDER else _SUBDIVISIONS
+    for fineness in finenesses:
+        if (made := _around(kind, size, fineness)) is None:
+            return None
+        small = made.excess <= _LARGEST_VOLUME_ERROR and made.stands_out_m <= _STANDS_OUT_M
+        if small or fineness == finenesses[-1]:
+            try:
+                return GeomMesh(Mesh(made.vertices, made.triangles), made.excess, made.stands_out_m)
+            except ValueError:
+                # So thin that its vertices fall together.
+                return None
+    return None
+
+
+def _around(kind: GeomKind, size: tuple[float, ...], fineness: int) -> ShapeMesh | None:
+    match kind:
+        case GeomKind.CYLINDER:
+            return cylinder_mesh(size[0], size[1], fineness)
+        case GeomKind.CAPSULE:
+            return capsule_mesh(size[0], size[1], fineness)
+        case GeomKind.ELLIPSOID:
+            return ellipsoid_mesh(size, fineness)
+        case _:
+            return None
+
+
+def _mesh_geom(model: Any, geom: int) -> GeomMesh | None:
+    vertices, triangles = mesh_vertices(model, geom), mesh_triangles(model, geom)
+    if signed_volume(vertices[triangles]) < 0.0:
+        triangles = triangles[:, ::-1]
+    try:
+        return GeomMesh(Mesh(vertices, triangles), 0.0, 0.0)
+    except ValueError:
+        pass
+    try:
+        hull = convex_hull_mesh(vertices)
+        return GeomMesh(Mesh(hull.vertices, hull.triangles), math.inf, math.inf)
+    except ValueError:
+        # All in one plane.
+        return None

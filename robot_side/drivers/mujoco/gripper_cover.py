@@ -1,0 +1,168 @@
+"""The spheres that cover a simulated gripper: its geoms as they collide, in the frames of their links."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from common.arrays import FloatArray, IntArray
+from robot_side.drivers.mujoco.mesh_arrays import mesh_vertices
+from robot_side.drivers.mujoco.model_enums import GeomKind
+from robot_side.gripper.capsule_cover import cover_capsule
+from robot_side.gripper.kept_covers import kept_cover
+from robot_side.gripper.solids import Solid, capsule, convex_solid, cylinder, ellipsoid
+from robot_side.gripper.spheres import cover_boxes
+from robot_side.gripper.surface_cover import cover_surface
+
+_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+_WITH_ROWS = (GeomKind.SPHERE, GeomKind.CAPSULE, GeomKind.BOX)
+"""Kinds whose cover is written down, with the fewest spheres; any other is searched for."""
+
+
+@dataclass(frozen=True)
+class GripperCover:
+    """Spheres that contain the surface of every geom, but for what lies within another geom of the same link."""
+
+    centers_m: FloatArray
+    """(m, 3) in the frame of the sphere's link"""
+    radii_m: FloatArray
+    """(m,)"""
+    bodies: IntArray
+    """(m,) the link of each"""
+    stand_out_m: float
+    """How far out of the geoms the spheres stand at most"""
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A geom in the frame of its link's first geom; hashable, so that links of the same shape share one cover."""
+
+    kind: int
+    size: tuple[float, ...]
+    position_m: tuple[float, ...]
+    quaternion: tuple[float, ...]
+    points: bytes
+    """A mesh's vertices (v, 3)"""
+
+
+def cover_gripper(
+    model: Any, geoms: IntArray, stand_out_m: float = 0.003, searching: Callable[[], None] | None = None
+) -> GripperCover:
+    """Cover the colliding geoms `geoms` (k,) of a compiled MuJoCo model.
+
+    A mesh counts as its convex hull, which is what collides. No sphere stands out of its link's geoms by more than
+    `stand_out_m`, unless a geom would need more than 2000 spheres. Links of the same shape get the same spheres.
+    searching: called before each search, but not for what was found before.
+    """
+    centers, radii, bodies, stand_outs = [], [], [], []
+    # Sorted, as a set has no order of its own.
+    for body in sorted(set(model.geom_bodyid[geoms].tolist())):
+        of_body = geoms[model.geom_bodyid[geoms] == body].tolist()
+        # In the first geom's frame, which is the same wherever the link's frame was put.
+        first = Rotation.from_quat(model.geom_quat[of_body[0]], scalar_first=True)
+        origin = model.geom_pos[of_body[0]]
+        parts = tuple(_part(model, geom, first, origin) for geom in of_body)
+        found, found_radii, stand_out = _cover_link(parts, stand_out_m, searching)
+        centers.append(first.apply(found) + origin)
+        radii.append(found_radii)
+        bodies.append(np.full(len(found_radii), body, dtype=np.int64))
+        stand_outs.append(stand_out)
+    return GripperCover(np.concatenate(centers), np.concatenate(radii), np.concatenate(bodies), max(stand_outs))
+
+
+def _part(model: Any, geom: int, first: Rotation, origin_m: FloatArray) -> _Part:
+    kind = int(model.geom_type[geom])
+    turn = first.inv() * Rotation.from_quat(model.geom_quat[geom], scalar_first=True)
+    points = mesh_vertices(model, geom) if kind == GeomKind.MESH else _box_corners(model.geom_aabb[geom])
+    return _Part(
+        kind=kind,
+        size=tuple(model.geom_size[geom].round(9).tolist()),
+        position_m=tuple((first.inv().apply(model.geom_pos[geom] - origin_m).round(9) + 0.0).tolist()),
+        quaternion=tuple((turn.as_quat(canonical=True).round(9) + 0.0).tolist()),
+        points=points.astype(np.float64).tobytes(),
+    )
+
+
+def _box_corners(box: FloatArray) -> FloatArray:
+    corners: FloatArray = box[:3] + _CORNERS * box[3:]
+    return corners
+
+
+@lru_cache(maxsize=64)
+def _cover_link(
+    parts: tuple[_Part, ...], stand_out_m: float, searching: Callable[[], None] | None
+) -> tuple[FloatArray, FloatArray, float]:
+    rotations = [Rotation.from_quat(part.quaternion).as_matrix() for part in parts]
+    positions = [np.array(part.position_m) for part in parts]
+    solids = [] if all(part.kind in _WITH_ROWS for part in parts) else [_solid(part) for part in parts]
+    if solids and all(solid is not None for solid in solids):
+        placed = [
+            solid.placed(rotation, position)
+            for solid, rotation, position in zip(solids, rotations, positions, strict=True)
+            if solid is not None
+        ]
+        return kept_cover(
+            repr((parts, stand_out_m)).encode(),
+            lambda: cover_surface(placed, stand_out_m, rotations),
+            searching=searching,
+        )
+    centers, radii, stand_outs = [], [], []
+    for part, rotation, position in zip(parts, rotations, positions, strict=True):
+        found, found_radii, stand_out = _with_rows(part, stand_out_m)
+        centers.append(found @ rotation.T + position)
+        radii.append(found_radii)
+        stand_outs.append(stand_out)
+    return np.concatenate(centers), np.concatenate(radii), max(stand_outs)
+
+
+def _solid(part: _Part) -> Solid | None:
+    """None for what encloses nothing."""
+    match part.kind:
+        case GeomKind.CYLINDER:
+            return cylinder(part.size[0], part.size[1])
+        case GeomKind.CAPSULE:
+            return capsule(part.size[0], part.size[1])
+        case GeomKind.SPHERE:
+            return ellipsoid(np.full(3, part.size[0]))
+        case GeomKind.ELLIPSOID:
+            return ellipsoid(np.array(part.size))
+        case _:
+            return convex_solid(_points(part))
+
+
+def _points(part: _Part) -> FloatArray:
+    return np.frombuffer(part.points).reshape(-1, 3)
+
+
+def _with_rows(part: _Part, stand_out_m: float) -> tuple[FloatArray, FloatArray, float]:
+    if part.kind in (GeomKind.SPHERE, GeomKind.CAPSULE):
+        return cover_capsule(part.size[0], part.size[1] if part.kind == GeomKind.CAPSULE else 0.0, stand_out_m)
+    lowest, highest = _points(part).min(axis=0), _points(part).max(axis=0)
+    middle, half = 0.5 * (lowest + highest), 0.5 * (highest - lowest)
+    cover = cover_boxes(middle[None], np.eye(3)[None], half[None], stand_out_m)
+    return cover.centers_m, cover.radii_m, float(cover.stand_out_m.max())
+
+
+def link_solids(model: Any, geoms: Sequence[int]) -> list[Solid]:
+    """The true shapes of geoms of one link, in its frame, as polyhedra; what encloses nothing is left out."""
+    identity, origin, solids = Rotation.identity(), np.zeros(3), []
+    for geom in geoms:
+        part = _part(model, geom, identity, origin)
+        solid = _solid(part)
+        if solid is not None:
+            solids.append(solid.placed(Rotation.from_quat(part.quaternion).as_matrix(), np.array(part.position_m)))
+    return solids
+
+
+def placed_corners(model: Any, data: Any, geoms: IntArray) -> FloatArray:
+    """The triangles (t, 3, 3) of the geoms' shapes in the world, as the simulation's state `data` has them."""
+    placed = []
+    for geom in geoms.tolist():
+        body = int(model.geom_bodyid[geom])
+        placed += [
+            solid.corners_m @ data.xmat[body].reshape(3, 3).T + data.xpos[body] for solid in link_solids(model, [geom])
+        ]
+    return np.concatenate([np.empty((0, 3, 3)), *placed])

@@ -1,0 +1,143 @@
+"""The gripper's drive: a reference that opens and closes at a bounded speed and force, and what it can feel."""
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import building_block, inlined
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
+
+# Beyond this share of the stroke between where the drive would stand freely and where it stands, and below this
+# share of the stroke per second, for this long, something stops the fingers.
+_BLOCKED_LAG = 0.02
+_STANDING_SPEED_1_S = 0.05
+_STANDING_TIME_S = 0.05
+# Stiff fingers chatter on what they grip: the speed is averaged over this time.
+_SPEED_TIME_CONSTANT_S = 0.05
+# Fingers this near to each other have closed on nothing.
+_CLOSED_OPENING_M = 1e-3
+
+GRIPPER: Final = np.dtype(
+    [
+        ("reference", np.float64),
+        ("closure", np.float64),
+        ("speed", np.float64),
+        ("standing_s", np.float64),
+        ("opening_m", np.float64),
+        ("told_to_close", np.int64),
+        ("open_length", np.float64),
+        ("stroke", np.float64),
+        ("stroke_time_s", np.float64),
+        ("force_lead", np.float64),
+        ("lag_s", np.float64),
+    ]
+)
+"""A gripper's drive. reference and closure: where it should be and is, from open, 0, to closed, 1; speed: of the
+closure, 1/s, averaged. standing_s: for how long something has stopped it. The others: see `GripperTravel`."""
+GRIPPER_INPUT: Final = np.dtype([("place", np.int64), ("open", np.float64), ("closed", np.float64)])
+"""One actuator of the gripper: its place in ctrl, and its input at either end."""
+
+
+class GripperDrive:
+    """A reference between open, 0, and closed, 1, and whether something is held."""
+
+    def __init__(self, travel: GripperTravel, stroke_time_s: float = 0.6) -> None:
+        """Start open. `stroke_time_s`: at full speed; 85 mm at 150 mm/s for a Robotiq 2F-85 (its manual)."""
+        stroke = float(travel.lengths[-1] - travel.lengths[0])
+        self.drive: np.ndarray = np.zeros(1, GRIPPER)
+        """(1,) of GRIPPER"""
+        for name, value in (
+            ("opening_m", travel.openings_m[0]),
+            ("open_length", travel.lengths[0]),
+            ("stroke", stroke),
+            ("stroke_time_s", stroke_time_s),
+            ("force_lead", travel.force_lead),
+            ("lag_s", travel.lag_s),
+        ):
+            self.drive[name] = value
+        self.samples: FloatArray = np.column_stack(
+            [(travel.lengths - travel.lengths[0]) / stroke, travel.references, travel.openings_m]
+        )
+        """(k, 3) closures, references and openings of the travel"""
+        self._travel = travel
+        self._opening_m, self._standing_s = self.drive["opening_m"], self.drive["standing_s"]
+        self._command = 0.0
+        self._valid_until_s = -math.inf
+
+    def inputs(self, places: IntArray) -> np.ndarray:
+        """(g,) of GRIPPER_INPUT, of the actuators whose inputs are at `places` (g,) in ctrl."""
+        inputs = np.zeros(places.shape, GRIPPER_INPUT)
+        inputs["place"], inputs["open"], inputs["closed"] = (
+            places,
+            self._travel.open_control,
+            self._travel.closed_control,
+        )
+        return inputs
+
+    def command(self, closing: float, valid_until_s: float) -> None:
+        """Close (+1) or open (-1) at that share of the full speed until `valid_until_s`; 0 holds.
+
+        ValueError for a value outside [-1, 1] or a time that is not finite: nothing of it is applied.
+        """
+        if not -1.0 <= closing <= 1.0:
+            raise ValueError(f"closing = {closing}; valid: from -1 (open) to +1 (close)")
+        if not math.isfinite(valid_until_s):
+            raise ValueError(f"valid_until_s = {valid_until_s}; valid: a finite time")
+        self._command = closing
+        self._valid_until_s = valid_until_s
+
+    def moving(self, time_s: float) -> float:
+        """What it is told at `time_s`: close (+1), hold (0) or open (-1)."""
+        return self._command if time_s < self._valid_until_s else 0.0
+
+    @property
+    def opening_m(self) -> float:
+        """The free gap between the fingers at the last measured length, metres."""
+        return float(self._opening_m[0])
+
+    @property
+    def holding(self) -> bool:
+        """Whether the fingers were told to close and something between them has stopped them."""
+        return bool(self._standing_s[0] >= _STANDING_TIME_S and self._opening_m[0] > _CLOSED_OPENING_M)
+
+
+@inlined
+def _at_closure(samples: Any, closure: float, column: int) -> Any:
+    """A column of the samples (k, 3) at `closure`, between the two nearest; the end's beyond an end."""
+    if not closure > samples[0, 0]:
+        return samples[0, column]
+    for k in range(1, samples.shape[0]):
+        if closure < samples[k, 0]:
+            slope = (samples[k, column] - samples[k - 1, column]) / (samples[k, 0] - samples[k - 1, 0])
+            return slope * (closure - samples[k - 1, 0]) + samples[k - 1, column]
+    return samples[samples.shape[0] - 1, column]
+
+
+@building_block
+def advance_gripper(
+    gripper: Any, samples: FloatArray, moving: float, step_s: float, length: float, length_speed: float
+) -> None:
+    """Move one gripper's reference on by `step_s`; the drive measures its own length and its change per second.
+
+    moving: see `GripperDrive.moving`.
+    """
+    gripper.closure = (length - gripper.open_length) / gripper.stroke
+    gripper.opening_m = _at_closure(samples, gripper.closure, 2)
+    gripper.speed += (length_speed / gripper.stroke - gripper.speed) * min(step_s / _SPEED_TIME_CONSTANT_S, 1.0)
+    free = _at_closure(samples, gripper.closure, 1)
+    if moving != 0.0:
+        gripper.told_to_close = 1 if moving > 0.0 else 0
+        moved = gripper.reference + moving * step_s / gripper.stroke_time_s
+        # The servo's damping holds a moving drive behind its reference without any force on the fingers. Only
+        # on the side that it is told to go to may the reference lead, so that a grip is let go at once.
+        center = free + gripper.lag_s * gripper.speed
+        lead = math.copysign(gripper.force_lead, moving)
+        moved = min(max(moved, center + min(lead, 0.0)), center + max(lead, 0.0))
+        gripper.reference = min(max(moved, 0.0), 1.0)
+
+    blocked = gripper.reference - free > min(_BLOCKED_LAG, 0.5 * gripper.force_lead)
+    standing = abs(gripper.speed) < _STANDING_SPEED_1_S
+    stopped = blocked and standing and gripper.told_to_close == 1
+    gripper.standing_s = gripper.standing_s + step_s if stopped else 0.0

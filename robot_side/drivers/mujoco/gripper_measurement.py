@@ -1,0 +1,210 @@
+"""Measure how far a simulated gripper opens, by driving it, and the gap that the spheres leave of that."""
+
+import copy
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+
+from common.arrays import BoolArray, FloatArray, IntArray
+from common.errors import ConfigurationError
+from robot_side.drivers.mujoco.gripper_cover import GripperCover, link_solids
+from robot_side.drivers.mujoco.scene import Scene
+
+_GRIPPER_SAMPLES = 9
+_SHORTEST_SETTLING_S, _LONGEST_SETTLING_S = 0.05, 2.0
+_FARTHEST_GAP_M = 0.5
+_ALIKE_M = 1e-4
+# A servo without a force limit leads a blocked drive by this share of the stroke at most.
+_DEFAULT_FORCE_LEAD = 0.3
+# Surfaces that come within this of the nearest pair when the gripper is closed take part in the grasp.
+_GRASP_BAND_M = 2e-3
+_SMALLEST_STROKE_M = 1e-3
+
+
+@dataclass(frozen=True)
+class GripperSweep:
+    """A gripper's places of rest at k evenly spaced inputs, from one end to the other."""
+
+    controls: FloatArray
+    """(k, g) the actuators' inputs"""
+    fingers: FloatArray
+    """(k, f) positions of the fingers' joints"""
+    lengths: FloatArray
+    """(k,) the first actuator's own position, in its transmission's unit"""
+    gaps_m: FloatArray
+    """(k, p) distances between pairs of the gripper's geoms, negative where they overlap"""
+
+    @property
+    def stroke_m(self) -> float:
+        """The change of the gap that changes most."""
+        return float(np.ptp(self.gaps_m, axis=0).max(initial=0.0))
+
+
+@dataclass(frozen=True)
+class GripperTravel:
+    """The way from open to closed."""
+
+    open_control: FloatArray
+    """(g,) the actuators' inputs at which it is open"""
+    closed_control: FloatArray
+    """(g,) and closed"""
+    open_fingers: FloatArray
+    """(f,) positions of the fingers' joints when it is open"""
+    references: FloatArray
+    """(k,) shares of the way from the open to the closed input, increasing from 0"""
+    lengths: FloatArray
+    """(k,) where the first actuator stands then, increasing or decreasing"""
+    openings_m: FloatArray
+    """(k,) and the free gap between the fingers"""
+    force_lead: float
+    """The share of the stroke by which the reference leads a blocked drive at the largest allowed force."""
+    lag_s: float
+    """By how many shares of the stroke a moving drive lags behind its reference, for each share per second."""
+
+
+def measure_gripper(scene: Scene) -> GripperTravel | None:
+    """Drive a copy of the gripper of `scene` to both ends in empty space: how it opens and closes.
+
+    None without a gripper, or with one whose fingers' geoms do not come nearer to each other.
+    ConfigurationError for a gripper actuator whose range of inputs is not known.
+    """
+    robot, actuators = scene.robot, scene.robot.gripper_actuators
+    if actuators.size == 0:
+        return None
+    model = copy.copy(scene.model)
+    unknown = actuators[~model.actuator_ctrllimited[actuators].astype(bool)]
+    if unknown.size:
+        raise ConfigurationError(
+            f"model: the gripper's actuator {model.actuator(int(unknown[0])).name!r} has no ctrlrange; valid: its open"
+            " and its closed input"
+        )
+    # The copy hangs in empty space, and its arm is left limp and put back after every step.
+    model.opt.gravity[:] = 0.0
+    elsewhere = model.body_rootid[model.geom_bodyid] != robot.root_body
+    model.geom_contype[elsewhere] = model.geom_conaffinity[elsewhere] = 0
+    idle = np.setdiff1d(np.arange(model.nu), actuators)
+    model.actuator_gainprm[idle] = model.actuator_biasprm[idle] = 0.0
+    ranges = model.actuator_ctrlrange[actuators]
+    sweeps = [_sweep_gripper(model, scene, *ends) for ends in candidate_ends(ranges[:, 0], ranges[:, 1])]
+    sweep = max(sweeps, key=lambda one: one.stroke_m)
+    limits = np.where(
+        model.actuator_forcelimited[actuators], np.abs(model.actuator_forcerange[actuators]).min(axis=1), np.inf
+    )
+    # force = gain u - stiffness l - damping dl/dt
+    stiffness, damping = -model.actuator_biasprm[actuators, 1], -model.actuator_biasprm[actuators, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        leads = limits / np.abs(model.actuator_gainprm[actuators, 0] * (sweep.controls[-1] - sweep.controls[0]))
+        lags = np.where(stiffness > 0.0, damping / stiffness, 0.0)
+    return travel_from_sweep(sweep, min(_DEFAULT_FORCE_LEAD, float(leads.min())), float(lags.max()))
+
+
+def _sweep_gripper(model: Any, scene: Scene, first: FloatArray, last: FloatArray) -> GripperSweep:
+    robot, data = scene.robot, mujoco.MjData(model)
+    data.qpos[:] = scene.data.qpos
+    held = scene.data.qpos[robot.arm_positions].copy()
+    pairs = jaw_pairs(robot.gripper_geoms, model.geom_bodyid[robot.gripper_geoms], robot.geom_on_finger)
+    samples = []
+    for share in np.linspace(0.0, 1.0, _GRIPPER_SAMPLES):
+        control = first + share * (last - first)
+        data.ctrl[robot.gripper_controls] = control
+        for step in range(round(_LONGEST_SETTLING_S / model.opt.timestep)):
+            mujoco.mj_step(model, data)
+            data.qpos[robot.arm_positions] = held
+            data.qvel[robot.arm_velocities] = 0.0
+            resting = np.abs(data.qvel[robot.finger_velocities]).max(initial=0.0) < 1e-3
+            if resting and step * model.opt.timestep > _SHORTEST_SETTLING_S:
+                break
+        mujoco.mj_forward(model, data)
+        gaps = [mujoco.mj_geomDistance(model, data, *pair, _FARTHEST_GAP_M, None) for pair in pairs]
+        fingers = data.qpos[robot.finger_positions].copy()
+        samples.append((control, fingers, float(data.actuator_length[robot.gripper_actuators[0]]), gaps))
+    return GripperSweep(*(np.array(column) for column in zip(*samples, strict=True)))
+
+
+def candidate_ends(lower: FloatArray, upper: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+    """The pairs of inputs (g,) between which a gripper may open and close, from its actuators' ranges (g,).
+
+    Two actuators may run the same way or against each other; more than two are taken to run the same way.
+    """
+    count = lower.size
+    choices = product((False, True), repeat=count - 1) if count <= 2 else [(False,) * (count - 1)]
+    swapped = [np.array((False, *choice)) for choice in choices]
+    return [(np.where(swap, upper, lower), np.where(swap, lower, upper)) for swap in swapped]
+
+
+def jaw_pairs(geoms: IntArray, bodies: IntArray, on_finger: BoolArray) -> list[tuple[int, int]]:
+    """The pairs of a gripper's geoms between which something can be gripped; all arguments (k,).
+
+    At least one of the two is on a finger, and they are on different bodies.
+    """
+    return [
+        (int(geoms[a]), int(geoms[b]))
+        for a in range(geoms.size)
+        for b in range(a)
+        if (on_finger[a] or on_finger[b]) and bodies[a] != bodies[b]
+    ]
+
+
+def travel_from_sweep(sweep: GripperSweep, force_lead: float, lag_s: float) -> GripperTravel | None:
+    """The gripper's travel; None when no gap changes or the drive does not move.
+
+    The free gap is between those surfaces that move far and are nearest to each other when it is closed.
+    """
+    stroke_m, lengths = sweep.stroke_m, sweep.lengths
+    if stroke_m < _SMALLEST_STROKE_M or lengths[0] == lengths[-1]:
+        return None
+    jaws = sweep.gaps_m[:, np.ptp(sweep.gaps_m, axis=0) > 0.5 * stroke_m]
+    controls, fingers = sweep.controls, sweep.fingers
+    if jaws[0].min() < jaws[-1].min():
+        controls, fingers, lengths, jaws = controls[::-1], fingers[::-1], lengths[::-1], jaws[::-1]
+    jaws = jaws[:, jaws[-1] <= jaws[-1].min() + _GRASP_BAND_M]
+    openings = np.maximum(jaws.min(axis=1), 0.0)
+    closures = (lengths - lengths[0]) / (lengths[-1] - lengths[0])
+    # Fingers that press on each other stop the drive before its input ends.
+    highest_before = np.concatenate([[-np.inf], np.maximum.accumulate(closures)[:-1]])
+    moving = closures > highest_before + 1e-3
+    return GripperTravel(
+        open_control=controls[0],
+        closed_control=controls[-1],
+        open_fingers=fingers[0],
+        references=np.linspace(0.0, 1.0, len(lengths))[moving],
+        lengths=lengths[moving],
+        openings_m=openings[moving],
+        force_lead=force_lead,
+        lag_s=lag_s,
+    )
+
+
+def open_gap(scene: Scene, cover: GripperCover) -> tuple[float, float] | None:
+    """(m between the geoms that grip, the least m between their spheres), open; None without fingers."""
+    travel, model, robot = measure_gripper(scene), scene.model, scene.robot
+    if travel is None:
+        return None
+    data = mujoco.MjData(model)
+    data.qpos[:] = scene.data.qpos
+    data.qpos[robot.finger_positions] = travel.open_fingers
+    mujoco.mj_forward(model, data)
+    bodies = model.geom_bodyid[robot.gripper_geoms]
+    gaps = {
+        pair: mujoco.mj_geomDistance(model, data, *pair, _FARTHEST_GAP_M, None)
+        for pair in jaw_pairs(robot.gripper_geoms, bodies, robot.geom_on_finger)
+    }
+    opening_m = min(gaps.values(), key=lambda gap: abs(gap - travel.openings_m[0]))
+    kept_m = opening_m
+    for pair in (pair for pair, gap in gaps.items() if abs(gap - opening_m) < _ALIKE_M):
+        one, other = (_spheres_of(scene, cover, data, geom) for geom in pair)
+        apart = np.linalg.norm(one[0][:, None] - other[0], axis=2) - one[1][:, None] - other[1]
+        kept_m = min(kept_m, float(apart.min(initial=np.inf)))
+    return float(opening_m), max(kept_m, 0.0)
+
+
+def _spheres_of(scene: Scene, cover: GripperCover, data: Any, geom: int) -> tuple[FloatArray, FloatArray]:
+    """Centres (m, 3) in the world and radii (m,) of the spheres whose centres are in a geom."""
+    link = int(scene.model.geom_bodyid[geom])
+    own = np.flatnonzero(cover.bodies == link)
+    for solid in link_solids(scene.model, [geom]):
+        own = own[solid.depth_m(cover.centers_m[own]) >= -1e-9]
+    return data.xpos[link] + cover.centers_m[own] @ data.xmat[link].reshape(3, 3).T, cover.radii_m[own]

@@ -1,0 +1,136 @@
+"""What is true of the simulated world, for summaries and tests alone."""
+
+import math
+from collections.abc import Iterator
+from typing import Any, Final
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.drivers.mujoco.model_enums import GeomKind
+from robot_side.drivers.mujoco.scene import Scene
+from robot_side.outcome.truth import TargetTruth, Truth
+from robot_side.surroundings.perceived import Role
+
+_FARTHEST_SUPPORT_M: Final = 1.0
+_FEW: Final = 64
+
+
+class GroundTruth:
+    """Watches the simulation itself, for the summary and for tests."""
+
+    def __init__(self, scene: Scene, farthest_m: float = 1.0) -> None:
+        """Look for objects up to `farthest_m` from the gripper."""
+        self._scene = scene
+        self._farthest_m = farthest_m
+        model = scene.model
+        self._gripper = {int(geom): model.geom(geom).name or f"geom{geom}" for geom in scene.robot.gripper_geoms}
+        self._object_of = {geom: thing.name for thing in scene.objects for geom in thing.geoms}
+        self._roles: list[Role] = []
+        self._of_roles: dict[tuple[Role, ...], IntArray] = {}
+        # What points upwards at the start, in each body's own frame.
+        self._up: FloatArray = scene.data.xmat[:, 6:].copy()
+
+    def observe(self) -> Truth:
+        """The distances and contacts at the simulation's present state."""
+        to_obstacles = self._distance(self._geoms(Role.OBSTACLE), self._farthest_m)
+        to_any = min(to_obstacles, self._distance(self._geoms(Role.TARGET, Role.IGNORED), to_obstacles))
+        return Truth(
+            min_distance_m=to_any if to_any < self._farthest_m else None,
+            min_obstacle_distance_m=to_obstacles if to_obstacles < self._farthest_m else None,
+            contacts=self._contacts(),
+            target=self.target(),
+        )
+
+    def target(self) -> TargetTruth | None:
+        """Where the target really is at the present state; None without one."""
+        model, data, mine = self._scene.model, self._scene.data, self._geoms(Role.TARGET)
+        if not mine.size:
+            return None
+        gap_m = least_distance(model, data, mine, self._geoms(Role.SUPPORT), _FARTHEST_SUPPORT_M)
+        body = int(model.geom_bodyid[mine[0]])
+        twist: FloatArray = np.zeros(6)
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)
+        upright = float(data.xmat[body].reshape(3, 3)[2] @ self._up[body])
+        return TargetTruth(
+            position_m=data.xpos[body].copy(),
+            support_gap_m=gap_m,
+            sinking_m_s=-float(twist[5]),
+            tilt_rad=math.acos(min(max(upright, -1.0), 1.0)),
+        )
+
+    def _geoms(self, *wanted: Role) -> IntArray:
+        """Those of the objects with these roles, now."""
+        roles = list(self._scene.roles.values())
+        if roles != self._roles:
+            # Of many objects few change.
+            self._roles, self._of_roles = roles, {}
+        if wanted not in self._of_roles:
+            geoms = [geom for geom, name in self._object_of.items() if self._scene.roles[name] in wanted]
+            self._of_roles[wanted] = np.array(geoms, dtype=np.int64)
+        return self._of_roles[wanted]
+
+    def _distance(self, theirs: IntArray, farthest_m: float) -> float:
+        """The smallest signed distance between the gripper and some geoms, at most `farthest_m`."""
+        mine = np.array(list(self._gripper), dtype=np.int64)
+        return least_distance(self._scene.model, self._scene.data, mine, theirs, farthest_m)
+
+    def _contacts(self) -> frozenset[tuple[str, str]]:
+        found = set()
+        for first, second in self._scene.data.contact.geom:
+            for mine, other in ((int(first), int(second)), (int(second), int(first))):
+                if mine in self._gripper and other in self._object_of:
+                    found.add((self._gripper[mine], self._object_of[other]))
+        return frozenset(found)
+
+
+def least_distance(model: Any, data: Any, mine: IntArray, theirs: IntArray, farthest_m: float) -> float:
+    """The smallest signed distance from geoms `mine` to geoms `theirs`, metres; at most `farthest_m`."""
+    theirs = _within(model, data, mine, theirs, farthest_m)
+    if mine.size == 0 or theirs.size == 0:
+        return farthest_m
+    apart = np.linalg.norm(data.geom_xpos[mine][:, None] - data.geom_xpos[theirs][None], axis=2)
+    # No pair is nearer than its bounding spheres; a plane has none and is always looked at.
+    bound = np.where(model.geom_rbound[theirs] > 0.0, apart - model.geom_rbound[theirs], -np.inf)
+    bound -= model.geom_rbound[mine][:, None]
+    nearest = farthest_m
+    for pair in _rising(bound.ravel(), farthest_m):
+        first, second = np.unravel_index(pair, bound.shape)
+        if bound[first, second] >= nearest:
+            break
+        distance = geom_distance(model, data, int(mine[first]), int(theirs[second]), max(nearest, 0.0))
+        nearest = min(nearest, distance)
+    return nearest
+
+
+def _within(model: Any, data: Any, mine: IntArray, theirs: IntArray, farthest_m: float) -> IntArray:
+    """Those of `theirs` that bounds do not show to be farther off; all where they are few."""
+    if mine.size == 0 or theirs.size <= _FEW:
+        return theirs
+    middle = data.geom_xpos[mine].mean(axis=0)
+    around_m = (np.linalg.norm(data.geom_xpos[mine] - middle, axis=1) + model.geom_rbound[mine]).max()
+    apart = np.linalg.norm(data.geom_xpos[theirs] - middle, axis=1) - model.geom_rbound[theirs]
+    near: IntArray = theirs[(apart <= around_m + farthest_m) | (model.geom_rbound[theirs] == 0.0)]
+    return near
+
+
+def _rising(bounds: FloatArray, farthest_m: float) -> Iterator[int]:
+    """The places of those below `farthest_m`, the least first; of many, only as many are put in order as are asked."""
+    places = np.flatnonzero(bounds < farthest_m)
+    if places.size > _FEW:
+        first = np.argpartition(bounds[places], _FEW)[:_FEW]
+        yield from places[first[np.argsort(bounds[places[first]])]].tolist()
+        places = np.delete(places, first)
+    yield from places[np.argsort(bounds[places])].tolist()
+
+
+def geom_distance(
+    model: Any, data: Any, mine: int, other: int, farthest_m: float, ends: FloatArray | None = None
+) -> float:
+    """The signed distance between two geoms, at most `farthest_m`; `ends` (6,) say nothing of a height field."""
+    found = mujoco.mj_geomDistance(model, data, mine, other, farthest_m, ends)
+    # Of a height field MuJoCo sees the first 50 prisms within that distance, which need not be the nearest.
+    while model.geom_type[other] == GeomKind.HFIELD and 0.0 < found < farthest_m:
+        farthest_m, found = found, mujoco.mj_geomDistance(model, data, mine, other, found, ends)
+    return float(found)

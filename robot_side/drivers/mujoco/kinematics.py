@@ -1,0 +1,113 @@
+"""Where encoder readings put the gripper (eq. 4)."""
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from common.arrays import FloatArray, IntArray
+from common.errors import ConfigurationError
+from robot_side.arm.forward_kinematics import JOINT, LINK, POINT, LinkTree, Records, place
+from robot_side.arm.port import ArmState, GripperPose
+from robot_side.drivers.mujoco.gripper_cover import cover_gripper
+from robot_side.drivers.mujoco.model_enums import JointKind
+from robot_side.drivers.mujoco.robot_model import RobotModel
+from robot_side.drivers.mujoco.scene import Scene
+from robot_side.field.scratch import CLUSTER
+from robot_side.gripper.near_order import near_order
+
+
+class MujocoKinematics:
+    """GripperKinematics: the gripper where the encoders say it is, without the simulation and without its objects."""
+
+    def __init__(self, scene: Scene, stand_out_m: float = 0.003, searching: Callable[[], None] | None = None) -> None:
+        """Cover the gripper's geoms with spheres that stand out of them by `stand_out_m` at most.
+
+        searching: called before each search for these, but not for what was found before.
+        ConfigurationError when the robot has nothing at the tool that could touch anything.
+        """
+        model, robot = scene.model, scene.robot
+        geoms = robot.gripper_geoms
+        if geoms.size == 0:
+            raise ConfigurationError("model: nothing at the tool can touch anything; valid: 1 or more colliding geoms")
+        data = mujoco.MjData(model)
+        data.qpos[:] = scene.data.qpos
+        mujoco.mj_kinematics(model, data)
+        # The gripper is covered in the frames of its links, in which its geoms do not move.
+        self.cover = cover_gripper(model, geoms, stand_out_m, searching)
+        # Spheres that are near each other follow each other: the search looks at several at once.
+        on_link = np.einsum("mij,mj->mi", data.xmat[self.cover.bodies].reshape(-1, 3, 3), self.cover.centers_m)
+        order = near_order(data.xpos[self.cover.bodies] + on_link, CLUSTER)
+        bodies = self.cover.bodies[order]
+        self._radii_m = self.cover.radii_m[order]
+        self._on_finger = np.isin(bodies, model.geom_bodyid[geoms[robot.geom_on_finger]])
+        self.has_fingers = bool(self._on_finger.any())
+        # Every pose shares these two.
+        self._radii_m.setflags(write=False)
+        self._on_finger.setflags(write=False)
+        own = np.flatnonzero(model.body_rootid == robot.root_body)
+        self._link_of = np.zeros(model.nbody, dtype=np.int64)
+        self._link_of[own] = 1 + np.arange(own.size)
+        self._tree = _link_tree(
+            model, data, robot, self._link_of, _points(self._link_of[bodies], self.cover.centers_m[order])
+        )
+        self._link_poses: FloatArray = np.zeros((1 + own.size, 7))
+
+    def body_poses(self, bodies: IntArray) -> FloatArray:
+        """Where the newest `pose` put `bodies` (n,) of the robot: positions and quaternions (n, 7), w first."""
+        poses: FloatArray = self._link_poses[self._link_of[bodies]]
+        return poses
+
+    def pose(self, state: ArmState) -> GripperPose:
+        """The gripper at the encoder readings of `state` (eq. 4); the fingers' own motion is not in its Jacobians."""
+        placed = place(self._tree, state.joint_positions_rad, state.finger_positions, self._link_poses)
+        return GripperPose(*placed, self._radii_m, self._on_finger)
+
+
+def _link_tree(model: Any, data: Any, robot: RobotModel, link_of: IntArray, points: Records) -> LinkTree:
+    """The robot without what is around it. What no reading moves stays as `data` has it, whatever its joints are."""
+    arm, fingers = robot.arm_positions.tolist(), robot.finger_positions.tolist()
+    links = np.zeros(int(link_of.max()) + 1, dtype=LINK)
+    joints: list[tuple[Any, ...]] = []
+    links["quaternion"][0, 0] = 1.0
+    for body in np.flatnonzero(link_of).tolist():
+        link, parent = links[link_of[body]], int(model.body_parentid[body])
+        link["parent"], link["first_joint"] = link_of[parent], len(joints)
+        first = int(model.body_jntadr[body])
+        for joint in range(first, first + int(model.body_jntnum[body])):
+            address = int(model.jnt_qposadr[joint])
+            if address in arm or address in fingers:
+                joints.append(
+                    (
+                        arm.index(address) if address in arm else fingers.index(address),
+                        address in arm,
+                        model.jnt_type[joint] == JointKind.SLIDE,
+                        model.qpos0[address],
+                        model.jnt_pos[joint],
+                        model.jnt_axis[joint],
+                    )
+                )
+        link["end_joint"] = len(joints)
+        moved = link["end_joint"] - link["first_joint"] == model.body_jntnum[body]
+        if moved and model.body_mocapid[body] < 0:
+            link["position"], link["quaternion"] = model.body_pos[body], model.body_quat[body]
+        else:
+            link["position"] = data.xmat[parent].reshape(3, 3).T @ (data.xpos[body] - data.xpos[parent])
+            turns = [Rotation.from_quat(data.xquat[one], scalar_first=True) for one in (parent, body)]
+            link["quaternion"] = (turns[0].inv() * turns[1]).as_quat(scalar_first=True)
+    site = robot.site
+    return LinkTree(
+        links,
+        np.array(joints, dtype=JOINT),
+        _points(link_of[model.site_bodyid[[site]]], model.site_pos[[site]]),
+        model.site_quat[site].copy(),
+        points,
+    )
+
+
+def _points(links: IntArray, positions_m: FloatArray) -> Records:
+    points = np.empty(len(links), dtype=POINT)
+    points["link"], points["position"] = links, positions_m
+    return points

@@ -1,0 +1,229 @@
+"""The primitives of a scene's objects: which geoms are spheres, boxes, tetrahedra, meshes, half-spaces; and where."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.compiled.kernel import compiled, input_array, input_indices, output_array
+from robot_side.compiled.vectors import add, load
+from robot_side.drivers.mujoco.mesh_arrays import mesh_vertices
+from robot_side.drivers.mujoco.model_enums import GeomKind
+from robot_side.surroundings.kinds.kind import by_kind
+from robot_side.surroundings.kinds.layout import MESH, NUMBERS, rows, write_pose
+from robot_side.surroundings.kinds.mesh import of_library
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
+
+if TYPE_CHECKING:
+    from robot_side.drivers.mujoco.geom_meshes import GeomMesh
+    from robot_side.overlap.meshes.mesh_library import MeshLibrary
+
+_EXACT: Final[Mapping[GeomKind, str]] = {
+    GeomKind.SPHERE: "sphere",
+    GeomKind.BOX: "box",
+    GeomKind.PLANE: "half_space",
+    GeomKind.ELLIPSOID: "ellipsoid",
+}
+_MESHES = {GeomKind.CAPSULE, GeomKind.CYLINDER, GeomKind.MESH, GeomKind.HFIELD}
+"""What a mesh describes, unless it is a tetrahedron."""
+_SIZES: Final[Mapping[str, Callable[[Any, IntArray], tuple[FloatArray, ...]]]] = {
+    "sphere": lambda model, geoms: (model.geom_size[geoms, 0],),
+    "box": lambda model, geoms: (model.geom_aabb[geoms],),
+    "tetrahedron": lambda model, geoms: (
+        np.array([mesh_vertices(model, geom) for geom in geoms.tolist()], dtype=np.float64).reshape(-1, 12),
+    ),
+    "half_space": lambda _model, geoms: (np.empty((len(geoms), 0)),),
+    "ellipsoid": lambda model, geoms: (model.geom_size[geoms],),
+}
+"""By kind but meshes the sizes of geoms (k,) in their own frames, as `Kind.placed` takes them."""
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """A thing in the scene that is not the robot: one tree of bodies, or one geom that is fixed to the world."""
+
+    name: str
+    geoms: tuple[int, ...]
+    """Those that can touch something."""
+
+
+class ObjectPrimitives:
+    """The objects' shapes in their geoms' frames, ready to be placed in the world once for each frame.
+
+    A sphere, a box, a plane, an ellipsoid, a closed mesh and a height field are exact. A cylinder and a capsule stand
+    for meshes around them, a mesh that is not closed for its convex hull, and any other shape for its bounding box.
+    """
+
+    def __init__(self, model: Any, objects: Sequence[SceneObject]) -> None:
+        """Read the shapes of `objects` from a compiled MuJoCo model."""
+        self._names = tuple(thing.name for thing in objects)
+        geoms = [(geom, index) for index, thing in enumerate(objects) for geom in thing.geoms]
+        of_kind: dict[str, list[tuple[int, int]]] = {kind.name: [] for kind in KINDS}
+        wanted: list[tuple[int, int]] = []
+        for geom, index in geoms:
+            kind = _primitive_kind(model, geom)
+            (wanted if kind is None else of_kind[kind]).append((geom, index))
+        self._mesh_library, meshes, boxes = _meshes(model, [geom for geom, _ in wanted])
+        of_kind["box"] += [(geom, index) for geom, index in wanted if geom in boxes]
+        of_kind["mesh"] = [(geom, index) for geom, index in wanted if geom in meshes]
+        volume_errors: dict[str, float] = {}
+        stands_out_m: dict[str, float] = {}
+        for geom, index in wanted:
+            name, mesh = self._names[index], meshes[geom][1] if geom in meshes else None
+            if mesh is None or mesh.volume_error > 0.0:
+                share, distance_m = (mesh.volume_error, mesh.stands_out_m) if mesh else (math.inf, math.inf)
+                volume_errors[name] = max(share, volume_errors.get(name, 0.0))
+                stands_out_m[name] = max(distance_m, stands_out_m.get(name, 0.0))
+        self.volume_errors: Mapping[str, float] = volume_errors
+        """Of each object that is seen larger than it is, the greatest share by which a part's volume is greater.
+
+        Infinite for what has no known volume of its own, and stands for its convex hull or bounding box.
+        """
+        self.stands_out_m: Mapping[str, float] = stands_out_m
+        """And how far what is seen of it reaches beyond it, at most."""
+
+        mesh_index = np.array([meshes[geom][0] for geom, _ in of_kind["mesh"]], dtype=np.int64)
+        self._mesh_index: IntArray = mesh_index
+        pairs = [pair for kind in KINDS for pair in of_kind[kind.name]]
+        own, owners = np.array(pairs, dtype=np.int64).reshape(-1, 2).T.copy()
+        kinds = np.repeat(np.arange(len(KINDS)), [len(of_kind[kind.name]) for kind in KINDS])
+        sizes = [
+            _SIZES[kind.name](model, own[kinds == number])
+            if kind.name in _SIZES
+            else (of_library(self._mesh_library, mesh_index),)
+            for number, kind in enumerate(KINDS)
+        ]
+        of_each = np.concatenate([rows(*columns, width=NUMBERS) for columns in sizes])
+        self._primitives = _Primitives(kinds, own, owners, of_each)
+        """All of them, a kind after another"""
+        self._first_geoms = np.array([thing.geoms[0] for thing in objects], dtype=np.int64)
+
+    def _seen(self, roles: Mapping[str, Role]) -> BoolArray:
+        """Which primitives (n,) belong to objects that are not ignored."""
+        seen = np.array([roles[name] is not Role.IGNORED for name in self._names], dtype=np.bool_)
+        return seen[self._primitives.owners]
+
+    def moving(self, things: IntArray, roles: Mapping[str, Role]) -> "MovingPrimitives":
+        """Those of some of the objects, things (m,), rising, in the order of `movers`; ignored ones have none."""
+        owners = self._primitives.owners
+        kept = np.flatnonzero(self._seen(roles) & np.isin(owners, things))
+        kept = kept[np.argsort(owners[kept], kind="stable")]
+        return MovingPrimitives(self._primitives.only(kept), things, self._first_geoms[things])
+
+    def place(
+        self,
+        time_s: float,
+        roles: Mapping[str, Role],
+        offsets_m: FloatArray,
+        geom_positions_m: FloatArray,
+        geom_rotations: FloatArray,
+    ) -> PerceivedObjects:
+        """The objects in the world, each moved by its row of `offsets_m` (k, 3); ignored ones without primitives.
+
+        geom_positions_m (g, 3) and geom_rotations (g, 9) are the model's geoms in the world frame.
+        """
+        kept = np.flatnonzero(self._seen(roles))
+        primitives = self._primitives.only(kept)
+        seen = MovingPrimitives(primitives, np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))
+        numbers = seen.numbers(offsets_m, geom_positions_m, geom_rotations)
+        meshes = np.flatnonzero(self._primitives.kinds == MESH)
+        arrays: dict[str, Any] = {"mesh_index": self._mesh_index[np.isin(meshes, kept)]}
+        for number, kind in enumerate(KINDS):
+            mine = primitives.kinds == number
+            arrays[kind.owner] = primitives.owners[mine]
+            for name, (part, row) in kind.parts.items():
+                arrays[name] = numbers[mine, part].reshape(-1, *row)
+        return PerceivedObjects(
+            time_s=time_s,
+            names=self._names,
+            roles=tuple(roles[name] for name in self._names),
+            mesh_library=self._mesh_library,
+            **arrays,
+        )
+
+
+class _Primitives(NamedTuple):
+    """Primitives (n) in the frames of their geoms."""
+
+    kinds: IntArray
+    geoms: IntArray
+    owners: IntArray
+    """Among all objects"""
+    sizes: FloatArray
+    """(n, 20) as `Kind.placed` takes them"""
+
+    def only(self, places: IntArray) -> "_Primitives":
+        """Those at these places."""
+        return _Primitives(self.kinds[places], self.geoms[places], self.owners[places], self.sizes[places])
+
+
+class MovingPrimitives(NamedTuple):
+    """Primitives of some objects (m), ready to be put where MuJoCo has their geoms."""
+
+    primitives: _Primitives
+    things: IntArray
+    first_geoms: IntArray
+    """(m,)"""
+
+    def numbers(self, offsets_m: FloatArray, geom_positions_m: FloatArray, geom_rotations: FloatArray) -> FloatArray:
+        """Their numbers (n + m, 20) as in `movers`, velocities 0; the arguments as for `place`."""
+        primitives, things, first_geoms = self
+        numbers: FloatArray = np.empty((len(primitives.kinds) + len(things), NUMBERS))
+        _place(geom_positions_m, geom_rotations, offsets_m, *primitives, things, first_geoms, numbers)
+        return numbers
+
+
+_placed = by_kind([kind.placed for kind in KINDS])
+
+
+@compiled(
+    *(input_array(2), input_array(2), input_array(2)),
+    *(input_indices(), input_indices(), input_indices(), input_array(2), input_indices(), input_indices()),
+    output_array(2),
+)
+def _place(
+    positions: FloatArray,
+    turns: FloatArray,
+    offsets: FloatArray,
+    kinds: IntArray,
+    geoms: IntArray,
+    owners: IntArray,
+    sizes: FloatArray,
+    things: IntArray,
+    first_geoms: IntArray,
+    numbers: FloatArray,
+) -> None:
+    numbers[:] = 0.0
+    for k in range(kinds.size):
+        position = add(load(positions, geoms[k]), load(offsets, owners[k]))
+        _placed(kinds[k], sizes, k, position, turns, geoms[k], numbers, k)
+    for k in range(things.size):
+        geom = first_geoms[k]
+        write_pose(add(load(positions, geom), load(offsets, things[k])), turns, geom, numbers, kinds.size + k)
+
+
+def _primitive_kind(model: Any, geom: int) -> str | None:
+    kind = int(model.geom_type[geom])
+    if kind == GeomKind.MESH:
+        # An open surface of four vertices has no more inside than any other.
+        mesh = model.geom_dataid[geom]
+        return "tetrahedron" if model.mesh_vertnum[mesh] == 4 and model.mesh_facenum[mesh] == 4 else None
+    return _EXACT.get(GeomKind(kind)) if kind in set(GeomKind) else None
+
+
+def _meshes(
+    model: Any, geoms: Sequence[int]
+) -> tuple["MeshLibrary | None", dict[int, tuple[int, "GeomMesh"]], frozenset[int]]:
+    """The library, (mesh index, mesh) of each geom that has a mesh, and the geoms that have none."""
+    candidates = [geom for geom in geoms if int(model.geom_type[geom]) in _MESHES]
+    if not candidates:
+        return None, {}, frozenset(geoms)
+    # A scene without meshes does not load the kernels for them.
+    from robot_side.drivers.mujoco.geom_meshes import GeomMeshes  # noqa: PLC0415
+
+    shapes = GeomMeshes(model)
+    found = {geom: shape for geom in candidates if (shape := shapes.add(geom)) is not None}
+    return shapes.mesh_library(), found, frozenset(geoms) - found.keys()

@@ -1,0 +1,134 @@
+"""What is worked out around a step of the physics, in one kernel before it and one after it."""
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.columns import BUNDLE, INDICES, NUMBERS, Declared, records, rows
+from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, output_array
+from robot_side.drivers.mujoco.encoders import reading
+from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GRIPPER_INPUT, advance_gripper
+from robot_side.drivers.mujoco.joint_drives import DRIVE, control, motor_acceleration
+from robot_side.drivers.mujoco.joint_reference import REFERENCE, advance_references
+
+INERTIA: Final = np.dtype([("place", np.int64), ("row", np.int64), ("column", np.int64)])
+"""One element of the arm's inertia matrix on or below its diagonal, by joints: its place in what MuJoCo keeps of it."""
+LIMITS: Final = np.dtype([("velocity", np.float64), ("acceleration", np.float64), ("deceleration", np.float64)])
+"""What the arm's own controller allows each joint, rad and s."""
+
+
+class Plant(NamedTuple):
+    """What the kernels before and after a step read and write; MuJoCo's arrays stay where they are while it lives."""
+
+    joints: np.ndarray
+    """(n,) of REFERENCE"""
+    drives: np.ndarray
+    """(n,) of DRIVE"""
+    inertia: np.ndarray
+    """(k,) of INERTIA: the arm's elements of `mass`"""
+    grippers: np.ndarray
+    """(g,) of GRIPPER: one or none"""
+    samples: FloatArray
+    """(s, 3) of its travel"""
+    inputs: np.ndarray
+    """(i,) of GRIPPER_INPUT"""
+    positions: IntArray
+    """(n,) the joints' places in qpos"""
+    fingers: IntArray
+    """(f,) and those of the fingers'"""
+    velocities: IntArray
+    """(n,) the joints' places in qvel"""
+    controls: IntArray
+    """(n,) and in ctrl"""
+    qpos: FloatArray
+    qvel: FloatArray
+    mass: FloatArray
+    """MuJoCo's inertia matrix"""
+    bias: FloatArray
+    """(nv,) the forces of gravity and velocity"""
+    compensated: FloatArray
+    """(nv,) what compensates gravity"""
+    sprung: FloatArray
+    """(nv,) the forces of springs"""
+    gripper_length: FloatArray
+    """Of the gripper's first actuator, in front"""
+    gripper_speed: FloatArray
+    ctrl: FloatArray
+    """(nu,) the actuators' inputs"""
+    limits: np.ndarray
+    """(1,) of LIMITS"""
+
+
+def inertia_table(model: Any, velocities: IntArray) -> np.ndarray:
+    """The elements (k,) of INERTIA that joints at `velocities` (n,) among the degrees of freedom share."""
+    joint_of = {int(velocity): joint for joint, velocity in enumerate(velocities)}
+    found = [
+        (place, joint, joint_of[int(model.M_colind[place])])
+        for velocity, joint in joint_of.items()
+        for place in range(model.M_rowadr[velocity], model.M_rowadr[velocity] + model.M_rownnz[velocity])
+        if int(model.M_colind[place]) in joint_of
+    ]
+    return np.array(found, INERTIA)
+
+
+PLANT: Final = Declared(
+    Plant,
+    *(records(REFERENCE), records(DRIVE), records(INERTIA), records(GRIPPER), rows(3), records(GRIPPER_INPUT)),
+    *(INDICES,) * 4,
+    *(NUMBERS,) * 9,
+    records(LIMITS),
+)
+_plant_at = PLANT.at
+
+
+@compiled(BUNDLE, TRUTH, TRUTH, NUMBER, NUMBER)
+def drive(bundle: IntArray, following: bool, ended: bool, closing: float, step_s: float) -> None:
+    """Move the references on by `step_s` and turn them into the actuators' inputs."""
+    plant = _plant_at(bundle)
+    joints, drives, inertia, limits = plant.joints, plant.drives, plant.inertia, plant.limits[0]
+    for j in range(joints.size):
+        joints[j].measured_position = plant.qpos[plant.positions[j]]
+        joints[j].measured_velocity = plant.qvel[plant.velocities[j]]
+    advance_references(joints, following, ended, step_s, limits.velocity, limits.acceleration, limits.deceleration)
+    for j in range(joints.size):
+        joint, drive, place = joints[j], drives[j], plant.velocities[j]
+        position_error = joint.position - joint.measured_position
+        velocity_error = joint.velocity - joint.measured_velocity
+        drive.acceleration = joint.acceleration + motor_acceleration(drive, position_error, velocity_error)
+        forces = plant.bias[place] - plant.compensated[place] - plant.sprung[place]
+        drive.load = forces + drive.friction * joint.velocity
+    for k in range(inertia.size):
+        row, column = inertia[k].row, inertia[k].column
+        element = plant.mass[inertia[k].place]
+        drives[row].load += element * drives[column].acceleration
+        if row != column:
+            drives[column].load += element * drives[row].acceleration
+    for j in range(joints.size):
+        joint, drive = joints[j], drives[j]
+        position_error = joint.position - joint.measured_position
+        plant.ctrl[plant.controls[j]] = control(drive, position_error, joint.position, joint.velocity, drive.load)
+    for g in range(plant.grippers.size):
+        gripper = plant.grippers[g]
+        advance_gripper(gripper, plant.samples, closing, step_s, plant.gripper_length[g], plant.gripper_speed[g])
+        for i in range(plant.inputs.size):
+            one = plant.inputs[i]
+            plant.ctrl[one.place] = one.open + gripper.reference * (one.closed - one.open)
+
+
+@compiled(BUNDLE, NUMBER, NUMBER, output_array(1), output_array(1), output_array(1))
+def sense(
+    bundle: IntArray,
+    sigma: float,
+    resolution: float,
+    positions: FloatArray,
+    velocities: FloatArray,
+    fingers: FloatArray,
+) -> None:
+    """Make readings of the noise in positions (n,) and fingers (f,), and fill velocities (n,)."""
+    plant = _plant_at(bundle)
+    for j in range(positions.size):
+        positions[j] = reading(positions[j], plant.qpos[plant.positions[j]], sigma, resolution)
+        velocities[j] = plant.qvel[plant.velocities[j]]
+    for f in range(fingers.size):
+        fingers[f] = reading(fingers[f], plant.qpos[plant.fingers[f]], sigma, resolution)

@@ -1,0 +1,236 @@
+"""Which parts of a compiled model are the arm, its gripper and their actuators, found from the tool's site alone."""
+
+import hashlib
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from common.arrays import BoolArray, FloatArray, IntArray
+from common.errors import ConfigurationError
+from robot_side.drivers.mujoco.joint_drives import JointDrives
+from robot_side.drivers.mujoco.model_enums import BiasKind, GainKind, JointKind, TransmissionKind, WrappedKind
+
+_TURNING_OR_SLIDING = (JointKind.HINGE, JointKind.SLIDE)
+
+
+@dataclass(frozen=True)
+class RobotModel:
+    """Indices into a model's arrays. The robot is the whole tree of bodies that carries the tool's site."""
+
+    site: int
+    root_body: int
+    arm_joints: IntArray
+    """(n,) the joints on the chain from the world to the site"""
+    arm_positions: IntArray
+    """(n,) into qpos"""
+    arm_velocities: IntArray
+    """(n,) into qvel and other arrays of degrees of freedom"""
+    lower_rad: FloatArray
+    """(n,) position limits, infinite where there are none"""
+    upper_rad: FloatArray
+    arm_controls: IntArray
+    """(n,) into ctrl"""
+    drives: JointDrives
+    finger_positions: IntArray
+    """(f,) into qpos: the joints beyond the last arm joint"""
+    finger_velocities: IntArray
+    """(f,) into qvel"""
+    gripper_actuators: IntArray
+    """(g,) the actuators that move those joints"""
+    gripper_controls: IntArray
+    """(g,) into ctrl"""
+    fingerprint: str
+    """Twelve digits that tell an arm by its joints, links and limits, wherever it stands"""
+    gripper_geoms: IntArray
+    """(k,) the geoms that can touch something, beyond the last arm link, or on it where there are none beyond"""
+    geom_on_finger: BoolArray
+    """(k,) whether a finger joint moves the geom"""
+
+
+def find_robot(model: Any, site_name: str | None) -> RobotModel:
+    """Find the arm that carries the site `site_name` in a compiled MuJoCo model.
+
+    ConfigurationError, one line each: an unknown site, no actuators, no joint between the world and the site, a
+    joint that is neither hinge nor slide, an arm joint without an actuator or with one of an unsupported kind.
+    """
+    site = _find_site(model, site_name)
+    if model.nu == 0:
+        raise ConfigurationError("model: it has no actuators; valid: one for each arm joint")
+    chain = _chain(model, int(model.site_bodyid[site]))
+    joints = np.array([joint for body in chain for joint in _joints(model, body)], dtype=np.int64)
+    if joints.size == 0:
+        raise ConfigurationError(
+            f"site: {site_name!r} hangs on no joint{_moved_by_mocap(model, chain)}; valid: a site that 1 or more joints"
+            " move, of " + ", ".join(_site_names(model))
+        )
+    _require_simple(model, joints)
+    actuators = np.array([_actuator_of(model, int(joint)) for joint in joints])
+
+    last_link = int(model.jnt_bodyid[joints[-1]])
+    beyond = [body for body in range(model.nbody) if body != last_link and last_link in _chain(model, body)]
+    fingers = np.array([joint for body in beyond for joint in _joints(model, body)], dtype=np.int64)
+    _require_simple(model, fingers)
+    gripper_actuators = np.array(
+        [actuator for actuator in range(model.nu) if _moves_any(model, actuator, fingers)], dtype=np.int64
+    )
+    geoms = _touching_geoms(model, beyond)
+    if geoms.size == 0:
+        geoms = _touching_geoms(model, [last_link])
+    moved = {int(body) for body in beyond if set(_chain(model, body)) & set(model.jnt_bodyid[fingers].tolist())}
+    limited = model.jnt_limited[joints].astype(bool)
+    return RobotModel(
+        site=site,
+        root_body=chain[0],
+        arm_joints=joints,
+        arm_positions=model.jnt_qposadr[joints].astype(np.int64),
+        arm_velocities=model.jnt_dofadr[joints].astype(np.int64),
+        lower_rad=np.where(limited, model.jnt_range[joints, 0], -np.inf),
+        upper_rad=np.where(limited, model.jnt_range[joints, 1], np.inf),
+        arm_controls=model.actuator_ctrladr[actuators].astype(np.int64),
+        drives=JointDrives(
+            gear=model.actuator_gear[actuators, 0].copy(),
+            gain=model.actuator_gainprm[actuators, 0].copy(),
+            offset=model.actuator_biasprm[actuators, 0].copy(),
+            stiffness=-model.actuator_biasprm[actuators, 1],
+            damping=-model.actuator_biasprm[actuators, 2],
+            strongest=_strongest(model, actuators),
+        ),
+        finger_positions=model.jnt_qposadr[fingers].astype(np.int64),
+        finger_velocities=model.jnt_dofadr[fingers].astype(np.int64),
+        gripper_actuators=gripper_actuators,
+        gripper_controls=model.actuator_ctrladr[gripper_actuators].astype(np.int64),
+        fingerprint=_fingerprint(model, joints, site),
+        gripper_geoms=geoms,
+        geom_on_finger=np.array([int(model.geom_bodyid[geom]) in moved for geom in geoms], dtype=bool),
+    )
+
+
+def _strongest(model: Any, actuators: IntArray) -> FloatArray:
+    """The greatest torque or force at the joint (n,) that `actuators` (n,) give; infinite without a limit."""
+    most: FloatArray = np.abs(model.actuator_gear[actuators, 0]) * model.actuator_forcerange[actuators, 1]
+    return np.where(model.actuator_forcelimited[actuators].astype(bool), most, np.inf)
+
+
+def _fingerprint(model: Any, joints: IntArray, site: int) -> str:
+    bodies = model.jnt_bodyid[joints]
+    parts = (
+        model.jnt_type[joints],
+        model.jnt_axis[joints],
+        model.jnt_pos[joints],
+        model.jnt_range[joints],
+        model.body_pos[bodies[1:]],
+        model.body_quat[bodies[1:]],
+        model.site_pos[site],
+        model.site_quat[site],
+    )
+    rounded = np.concatenate([np.asarray(part, dtype=np.float64).ravel() for part in parts]).round(6) + 0.0
+    return hashlib.sha256(rounded.tobytes()).hexdigest()[:12]
+
+
+def can_touch(model: Any, geom: int) -> bool:
+    """Whether a geom takes part in collisions; one that does not is there to be looked at."""
+    return bool(model.geom_contype[geom]) or bool(model.geom_conaffinity[geom])
+
+
+def _site_names(model: Any) -> list[str]:
+    return [model.site(site).name for site in range(model.nsite) if model.site(site).name]
+
+
+def _moved_by_mocap(model: Any, chain: list[int]) -> str:
+    mocap = bool(chain) and bool((model.body_mocapid[chain] >= 0).any())
+    return ": a mocap body carries it, which no real robot has" if mocap else ""
+
+
+def _find_site(model: Any, site_name: str | None) -> int:
+    names = _site_names(model)
+    if not names:
+        raise ConfigurationError("site: the model has no named site; valid: one at the tool, its z axis the approach")
+    if site_name not in names:
+        said = "none was named" if site_name is None else f"the model has no site {site_name!r}"
+        raise ConfigurationError(f"site: {said}; valid: {', '.join(names)}")
+    return int(model.site(site_name).id)
+
+
+def _chain(model: Any, body: int) -> list[int]:
+    """The bodies from the child of the world down to `body`."""
+    chain: list[int] = []
+    while body != 0:
+        chain.insert(0, body)
+        body = int(model.body_parentid[body])
+    return chain
+
+
+def _joints(model: Any, body: int) -> range:
+    first = int(model.body_jntadr[body])
+    return range(first, first + int(model.body_jntnum[body]))
+
+
+def _require_simple(model: Any, joints: IntArray) -> None:
+    for joint in joints:
+        if model.jnt_type[joint] not in _TURNING_OR_SLIDING:
+            kind = JointKind(int(model.jnt_type[joint])).name.lower()
+            why = "the robot's base must stand fixed" if kind == "free" else "no single motor moves such a joint"
+            raise ConfigurationError(f"model: {_joint_name(model, joint)} is {kind}: {why}; valid: hinge or slide")
+
+
+def _joint_name(model: Any, joint: int) -> str:
+    """Words by which a person finds the joint in the model."""
+    if name := model.joint(joint).name:
+        return f"joint {name!r}"
+    body = int(model.jnt_bodyid[joint])
+    return f"unnamed joint {joint} of body {model.body(body).name or str(body)!r}"
+
+
+def _why_no_actuator(model: Any, joint: int) -> str:
+    """What moves a joint that has no actuator of its own."""
+    if any(_moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu)):
+        return "it is pulled by a tendon that it shares"
+    if model.nmocap > 0:
+        return "the model is moved by a mocap body, which no real robot has"
+    return "nothing would hold or move it"
+
+
+def _actuator_of(model: Any, joint: int) -> int:
+    """The first actuator on `joint`, of a kind that can be driven."""
+    for actuator in range(model.nu):
+        on_joint = model.actuator_trntype[actuator] in (TransmissionKind.JOINT, TransmissionKind.JOINT_IN_PARENT)
+        if not on_joint or model.actuator_trnid[actuator, 0] != joint:
+            continue
+        # A state of its own between input and force, such as an integrator's, is not followed here.
+        simple = (
+            model.actuator_dyntype[actuator] == 0
+            and model.actuator_gaintype[actuator] == GainKind.FIXED
+            and model.actuator_biastype[actuator] in (BiasKind.NONE, BiasKind.AFFINE)
+            and model.actuator_ctrlnum[actuator] == 1
+            and model.actuator_gainprm[actuator, 0] != 0.0
+            and model.actuator_gear[actuator, 0] != 0.0
+            and (model.actuator_biasprm[actuator, 1:3] <= 0.0).all()
+        )
+        if not simple:
+            raise ConfigurationError(
+                f"model: the actuator {model.actuator(actuator).name!r} of {_joint_name(model, joint)} is of an"
+                " unsupported kind; valid: position, velocity, motor"
+            )
+        return actuator
+    raise ConfigurationError(
+        f"model: the arm's {_joint_name(model, joint)} has no actuator of its own: {_why_no_actuator(model, joint)};"
+        " valid: a position, velocity or motor actuator on each joint from the base to the site"
+    )
+
+
+def _moves_any(model: Any, actuator: int, joints: IntArray) -> bool:
+    kind, target = int(model.actuator_trntype[actuator]), int(model.actuator_trnid[actuator, 0])
+    if kind in {TransmissionKind.JOINT, TransmissionKind.JOINT_IN_PARENT}:
+        return target in joints
+    if kind == TransmissionKind.TENDON:
+        first = int(model.tendon_adr[target])
+        wrapped = slice(first, first + int(model.tendon_num[target]))
+        is_joint = model.wrap_type[wrapped] == WrappedKind.JOINT
+        return bool(np.isin(model.wrap_objid[wrapped][is_joint], joints).any())
+    return False
+
+
+def _touching_geoms(model: Any, bodies: list[int]) -> IntArray:
+    on_bodies = np.flatnonzero(np.isin(model.geom_bodyid, bodies))
+    return np.array([geom for geom in on_bodies if can_touch(model, int(geom))], dtype=np.int64)

@@ -1,0 +1,238 @@
+"""The simulated world: from MJCF to an arm among objects."""
+
+import logging
+import math
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+
+from common.arrays import FloatArray
+from common.errors import ConfigurationError
+from common.files.input_file import require_input_file
+from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
+from robot_side.drivers.mujoco.model_enums import GeomKind
+from robot_side.drivers.mujoco.object_primitives import ObjectPrimitives, SceneObject
+from robot_side.drivers.mujoco.robot_model import RobotModel, can_touch, find_robot
+from robot_side.surroundings.perceived import Role
+from robot_side.surroundings.roles import assign_roles
+
+_LOG = logging.getLogger(__name__)
+_ASSETS = Path(__file__).parent / "assets"
+# MuJoCo wants a prefix for what is attached; objects are named without it.
+_TABLE_PREFIX = "table_scene/"
+_START_KEY = "feelahead_start"
+# With longer ones the arm's own servos swing; with shorter ones no machine keeps up with real time.
+_SHORTEST_STEP_S, _LONGEST_STEP_S = 1e-5, 0.02
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A compiled model and its one live state, which the arm advances and everybody else only reads."""
+
+    model: Any
+    """mujoco.MjModel"""
+    data: Any
+    """mujoco.MjData"""
+    robot: RobotModel
+    objects: tuple[SceneObject, ...]
+    roles: dict[str, Role]
+    """Each object's present role; `MujocoCamera.set_role` changes it."""
+    primitives: ObjectPrimitives
+    start_pose: str
+    """Where the arm starts, in words for people."""
+    shared_names: tuple[str, ...]
+    """Names of a body and of a geom of the world, or the like: each is one object."""
+    warnings: tuple[str, ...]
+    """What MuJoCo had to say about the model."""
+
+    @property
+    def fixed(self) -> frozenset[str]:
+        """Names of the objects that no joint lets move, and nobody else does."""
+        model = self.model
+        movable = (model.body_weldid != 0) | (model.body_mocapid[model.body_rootid] >= 0)
+        moves = movable[model.geom_bodyid]
+        return frozenset(thing.name for thing in self.objects if not any(moves[geom] for geom in thing.geoms))
+
+    def step(self) -> None:
+        """Advance the state by one step, whoever drives the arm."""
+        mujoco.mj_step(self.model, self.data)
+
+
+def load_scene(
+    model_path: Path | None = None,
+    site: str | None = None,
+    roles: Mapping[str, Role] | None = None,
+    name: SceneName = "table",
+    seed: int = 0,
+) -> Scene:
+    """Load the built-in arm at its table, or the MJCF file `model_path` whose tool is the site `site`.
+
+    A file with nothing but a robot and planes gets the built-in scene `name`, as drawn from `seed`, in front of it.
+    The arm starts at the keyframe `home`, else the first keyframe, else the middle of its joints' ranges.
+    `roles` overrides what the objects' names tell. ConfigurationError, one line, for what cannot be used.
+    """
+    mujoco.set_mju_user_warning(_log_warning)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        if model_path is None:
+            spec, site = _read(_ASSETS / "arm.xml"), site or "tool"
+        else:
+            spec = _read(model_path)
+        model = _compile(spec)
+        robot = find_robot(model, site)
+        start, start_pose = _start_configuration(model, robot)
+        if all(model.geom_type[geom] == GeomKind.PLANE for thing in _objects(model, robot)[0] for geom in thing.geoms):
+            # Attaching extends the keyframes by what is attached, so that one carries the configuration over.
+            start_key = _START_KEY
+            while any(model.key(key).name == start_key for key in range(model.nkey)):
+                start_key += "_"
+            spec.add_key(name=start_key, qpos=start)
+            surroundings = _read(_ASSETS / f"{name}_scene.xml")
+            furnish(surroundings, name, seed)
+            _attach(surroundings, spec, model, robot, start)
+            model = _compile(spec)
+            robot = find_robot(model, site)
+            start = model.key(start_key).qpos
+    if not _SHORTEST_STEP_S <= model.opt.timestep <= _LONGEST_STEP_S:
+        raise ConfigurationError(
+            f"model: timestep = {model.opt.timestep}; valid: {_SHORTEST_STEP_S:g} to {_LONGEST_STEP_S:g} s, such as"
+            " 0.002"
+        )
+    data = mujoco.MjData(model)
+    data.qpos[:] = start
+    data.qvel[:] = _start_velocities(model, robot)
+    try:
+        mujoco.mj_forward(model, data)
+    except mujoco.FatalError as error:
+        raise ConfigurationError(
+            f"model: MuJoCo cannot simulate it: {' '.join(str(error).split())}; valid: a model that fits its memory"
+        ) from error
+    for geom in np.flatnonzero(~np.isfinite(data.geom_xpos).all(axis=1)):
+        stray = model.geom(int(geom)).name or f"geom{geom}"
+        raise ConfigurationError(f"model: {stray!r} stands at {data.geom_xpos[geom]}; valid: finite positions")
+    objects, shared_names = _objects(model, robot)
+    return Scene(
+        model=model,
+        data=data,
+        robot=robot,
+        objects=objects,
+        roles=assign_roles([thing.name for thing in objects], roles or {}),
+        primitives=ObjectPrimitives(model, objects),
+        start_pose=start_pose,
+        shared_names=shared_names,
+        warnings=tuple(" ".join(str(warning.message).split()) for warning in said),
+    )
+
+
+def _log_warning(message: str) -> None:
+    # MuJoCo's own handler writes a file into the working directory.
+    _LOG.info("MuJoCo: %s", message)
+
+
+def _read(model_path: Path) -> Any:
+    try:
+        require_input_file("--model", model_path, "an MJCF file")
+    except ValueError as error:
+        raise ConfigurationError(str(error)) from None
+    try:
+        return mujoco.MjSpec.from_file(str(model_path))
+    except (ValueError, mujoco.FatalError) as error:
+        raise _unusable(error) from error
+
+
+def _compile(spec: Any) -> Any:
+    try:
+        return spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        raise _unusable(error) from error
+
+
+def _unusable(error: Exception) -> ConfigurationError:
+    return ConfigurationError(f"model: {' '.join(str(error).split())}; valid: an MJCF file that MuJoCo compiles")
+
+
+def _start_key(model: Any) -> int | None:
+    """Which keyframe the arm starts from: `home`, else the first one; None where there is none."""
+    keyframes = [model.key(key).name for key in range(model.nkey)]
+    if not keyframes:
+        return None
+    return keyframes.index("home") if "home" in keyframes else 0
+
+
+def _start_configuration(model: Any, robot: RobotModel) -> tuple[FloatArray, str]:
+    """qpos (nq,) of the keyframe that the arm starts from, else the middle of the ranges; and which, in words."""
+    start: FloatArray
+    key = _start_key(model)
+    if key is not None:
+        start, name = _finite(model, key, "qpos"), model.key(key).name
+        if name == "home":
+            return start, "the keyframe 'home'"
+        return start, f"the first keyframe, {name!r} (a keyframe named 'home' would come before it)"
+    start = model.qpos0.copy()
+    limited = np.isfinite(robot.lower_rad)
+    start[robot.arm_positions[limited]] = 0.5 * (robot.lower_rad[limited] + robot.upper_rad[limited])
+    return start, "the middle of the joints' ranges, as there is no keyframe (to choose: a keyframe named 'home')"
+
+
+def _start_velocities(model: Any, robot: RobotModel) -> FloatArray:
+    """qvel (nv,) of the keyframe that the arm starts from, for what is not the robot: that starts at rest."""
+    key = _start_key(model)
+    if key is None:
+        return np.zeros(model.nv)
+    velocities = _finite(model, key, "qvel")
+    velocities[model.body_rootid[model.dof_bodyid] == robot.root_body] = 0.0
+    return velocities
+
+
+def _finite(model: Any, key: int, part: str) -> FloatArray:
+    """A copy of a keyframe's `part`, qpos or qvel; ConfigurationError where it is not finite."""
+    values: FloatArray = getattr(model, f"key_{part}")[key].copy()
+    if not np.isfinite(values).all():
+        raise ConfigurationError(f"model: keyframe {model.key(key).name!r} holds NaN or infinity; valid: finite {part}")
+    return values
+
+
+def _objects(model: Any, robot: RobotModel) -> tuple[tuple[SceneObject, ...], tuple[str, ...]]:
+    """What is not the robot and can touch something, in the order of its first geom; and the names that are shared."""
+    geoms_of: dict[str, list[int]] = {}
+    parts_of: dict[str, set[tuple[str, int]]] = {}
+    for geom in range(model.ngeom):
+        root = int(model.body_rootid[model.geom_bodyid[geom]])
+        if root == robot.root_body or not can_touch(model, geom):
+            continue
+        # What is fixed to the world is a thing of its own; a tree of bodies is one thing.
+        kind, index, named = ("geom", geom, model.geom(geom)) if root == 0 else ("body", root, model.body(root))
+        name = named.name.removeprefix(_TABLE_PREFIX) or f"{kind}{index}"
+        geoms_of.setdefault(name, []).append(geom)
+        parts_of.setdefault(name, set()).add((kind, index))
+    shared = tuple(name for name, parts in parts_of.items() if len(parts) > 1)
+    return tuple(SceneObject(name, tuple(geoms)) for name, geoms in geoms_of.items()), shared
+
+
+def _attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatArray) -> None:
+    """Put the table scene under the tool's start, at the height of the robot's base and the way the tool is."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = start
+    mujoco.mj_kinematics(model, data)
+    base, tool = data.xpos[robot.root_body], data.site_xpos[robot.site]
+    ahead = tool[:2] - base[:2]
+    # A tool straight above the base has no side of its own.
+    yaw = math.atan2(ahead[1], ahead[0]) if np.hypot(*ahead) > 0.05 else 0.0
+    home_x, home_y, _ = table.site("tool_home").pos
+    if model.geom_type[model.geom_type == GeomKind.PLANE].size:
+        table.delete(table.geom("floor"))
+    turned_x = math.cos(yaw) * home_x - math.sin(yaw) * home_y
+    turned_y = math.sin(yaw) * home_x + math.cos(yaw) * home_y
+    spec.attach(
+        table,
+        prefix=_TABLE_PREFIX,
+        frame=spec.worldbody.add_frame(
+            pos=[tool[0] - turned_x, tool[1] - turned_y, base[2]],
+            quat=[math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0)],
+        ),
+    )

@@ -1,0 +1,184 @@
+"""When the true gripper, with what it holds, first touches something, how fast, and how far it still is: for
+experiments alone.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+
+from common.arrays import BoolArray, FloatArray, IntArray
+from robot_side.drivers.mujoco.ground_truth import geom_distance, least_distance
+from robot_side.drivers.mujoco.model_enums import GeomKind
+from robot_side.drivers.mujoco.scene import Scene
+from robot_side.surroundings.perceived import Role
+
+_TOUCHING_M = 1e-5
+_MOST_STEPS = 200
+
+
+@dataclass(frozen=True)
+class ContactOnset:
+    """The first touch after none."""
+
+    thing: str
+    """The object's name."""
+    gripper_part: str
+    """The gripper's geom, or the held object's."""
+    closing_speed_m_s: float
+    """How fast the two points came together along the contact's normal, just before the physics knew of it."""
+
+
+class TrueContact:
+    """Watches one scene's physics from turn to turn; it changes nothing."""
+
+    def __init__(self, scene: Scene, *, supports: bool = True) -> None:
+        """`supports`: whether touching one of them counts."""
+        self._scene = scene
+        self._model, self._data = scene.model, scene.data
+        self._object_of = {
+            geom: thing.name
+            for thing in scene.objects
+            if supports or scene.roles[thing.name] is not Role.SUPPORT
+            for geom in thing.geoms
+        }
+        self._gripper = frozenset(int(geom) for geom in scene.robot.gripper_geoms)
+        self._ours: tuple[str | None, BoolArray] = None, self._geoms_of(None)
+        # Nobody simulates this one: it holds the state before the last step, or a gripper moved in thought.
+        self._before = mujoco.MjData(self._model)
+        self._thought = mujoco.MjData(self._model)
+        self._held: str | None = None
+        self._touched = frozenset(self._object_of[theirs] for _, _, theirs, _ in self._touching(None))
+        self._remember()
+
+    def update(self, held: str | None) -> ContactOnset | None:
+        """The contact that the steps since the last call have found; of several the fastest. None for none.
+
+        held: the object that the gripper holds, which counts as a part of it.
+        """
+        if self._data.time == self._seen_s:
+            return None
+        touching = self._touching(held)
+        # What touched at the last look has had its onset; so has what something touched before it was gripped.
+        names = frozenset(self._object_of[theirs] for _, _, theirs, _ in touching)
+        known = self._touched if held == self._held else names
+        new = [pair for pair in touching if self._object_of[pair[2]] not in known]
+        found = self._onsets(new) if new else []
+        self._touched, self._held = names, held
+        self._remember()
+        return max(found, key=lambda onset: onset.closing_speed_m_s, default=None)
+
+    def approach(self) -> tuple[FloatArray, float]:
+        """The tool's approach axis (3,), unit, in the world frame, and the tool's true speed along it in m/s."""
+        site = self._scene.robot.site
+        axis: FloatArray = self._data.site_xmat[site].reshape(3, 3)[:, 2].copy()
+        twist: FloatArray = np.zeros(6)
+        mujoco.mj_objectVelocity(self._model, self._data, mujoco.mjtObj.mjOBJ_SITE, site, twist, 0)
+        return axis, float(twist[3:] @ axis)
+
+    @property
+    def touched(self) -> frozenset[str]:
+        """The objects that the gripper, or what it holds, touched at the last look."""
+        return self._touched
+
+    def gap_m(self, held: str | None, farthest_m: float = 1.0) -> float:
+        """The least distance from the gripper to anything that it does not hold, at most `farthest_m`."""
+        mine, theirs = self._parts(held)
+        return least_distance(self._model, self._data, mine, theirs, farthest_m)
+
+    def way_left_m(self, direction: FloatArray, held: str | None, farthest_m: float = 1.0) -> float:
+        """How far the gripper could go along the unit vector `direction` (3,) until it touches; at most `farthest_m`.
+
+        See `free_way`.
+        """
+        model, thought = self._model, self._thought
+        thought.qpos[:] = self._data.qpos
+        mujoco.mj_kinematics(model, thought)
+        mine, theirs = self._parts(held)
+        return free_way(model, thought, mine, theirs, direction, farthest_m)
+
+    def _parts(self, held: str | None) -> tuple[IntArray, IntArray]:
+        carried = [geom for geom, name in self._object_of.items() if name == held]
+        others = [geom for geom, name in self._object_of.items() if name != held]
+        return np.array([*self._gripper, *carried], dtype=np.int64), np.array(others, dtype=np.int64)
+
+    def _geoms_of(self, held: str | None) -> BoolArray:
+        """Which geoms are the gripper's or the held object's."""
+        ours = np.zeros(self._model.ngeom, dtype=bool)
+        ours[[*self._gripper, *(geom for geom, name in self._object_of.items() if name == held)]] = True
+        return ours
+
+    def _touching(self, held: str | None) -> list[tuple[Any, int, int, float]]:
+        if self._ours[0] != held:
+            self._ours = held, self._geoms_of(held)
+        contacts = self._data.contact
+        # A look at each single contact takes as long as a step of the physics, and most are none of the gripper's.
+        rows = np.flatnonzero(self._ours[1][contacts.geom].any(axis=1))
+        return [pair for row in rows if (pair := self._pair(contacts[row], held)) is not None]
+
+    def _pair(self, contact: Any, held: str | None) -> tuple[Any, int, int, float] | None:
+        """The contact, the gripper's and the other geom, and the sign by which the normal leads to the other."""
+        first, second = (int(geom) for geom in contact.geom)
+        for mine, theirs, sign in ((first, second, 1.0), (second, first, -1.0)):
+            thing = self._object_of.get(theirs)
+            ours = mine in self._gripper or (held is not None and self._object_of.get(mine) == held)
+            if contact.dist <= 0.0 and ours and thing is not None and thing != held:
+                return contact, mine, theirs, sign
+        return None
+
+    def _onsets(self, touching: list[tuple[Any, int, int, float]]) -> list[ContactOnset]:
+        model, before = self._model, self._before
+        mujoco.mj_kinematics(model, before)
+        mujoco.mj_comPos(model, before)
+        mujoco.mj_comVel(model, before)
+        onsets = []
+        for contact, mine, theirs, sign in touching:
+            # A contact's normal points from its first geom to its second.
+            normal, point = sign * np.asarray(contact.frame[:3]), np.asarray(contact.pos)
+            closing = (self._velocity(mine, point) - self._velocity(theirs, point)) @ normal
+            part = model.geom(mine).name or f"geom{mine}"
+            onsets.append(ContactOnset(self._object_of[theirs], part, float(closing)))
+        return onsets
+
+    def _velocity(self, geom: int, point_m: FloatArray) -> FloatArray:
+        """Of the geom's body at `point_m` (3,), before the last step, in the world frame (3,) in m/s."""
+        body = int(self._model.geom_bodyid[geom])
+        twist: FloatArray = np.zeros(6)
+        mujoco.mj_objectVelocity(self._model, self._before, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)
+        lever: FloatArray = point_m - self._before.xpos[body]
+        velocity: FloatArray = twist[3:] + np.cross(twist[:3], lever)
+        return velocity
+
+    def _remember(self) -> None:
+        self._seen_s = float(self._data.time)
+        self._before.qpos[:] = self._data.qpos
+        self._before.qvel[:] = self._data.qvel
+
+
+def free_way(
+    model: Any, data: Any, mine: IntArray, theirs: IntArray, direction: FloatArray, farthest_m: float
+) -> float:
+    """How far geoms `mine` could be moved along `direction` (3,) until they touch `theirs`; at most `farthest_m`.
+
+    Moves `mine` in `data`, whose kinematics must be up to date: give a copy.
+    """
+    start = data.geom_xpos[mine].copy()
+    moved_m, ends = 0.0, np.zeros(6)
+    for _ in range(_MOST_STEPS):
+        step_m = farthest_m - moved_m
+        for first in mine:
+            for second in theirs:
+                gap_m = geom_distance(model, data, int(first), int(second), farthest_m, ends)
+                if gap_m <= _TOUCHING_M:
+                    return moved_m
+                # Convex geoms are apart by a slab of this width, through which they come at this part of the way.
+                convex = model.geom_type[second] != GeomKind.HFIELD
+                towards = float((ends[3:] - ends[:3]) @ direction) / gap_m if convex and gap_m < farthest_m else 1.0
+                if towards * step_m > gap_m:
+                    step_m = gap_m / towards
+        moved_m += step_m
+        if moved_m >= farthest_m:
+            return farthest_m
+        data.geom_xpos[mine] = start + moved_m * direction
+    return moved_m

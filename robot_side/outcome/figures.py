@@ -1,0 +1,206 @@
+"""The robot side's figures of one run, gathered tick by tick for the summary."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from common.arrays import FloatArray
+from common.statistics import BLOCK, RunningStatistics
+from robot_side.events import Listener, Tick
+from robot_side.laws.sensed import (
+    ENLARGEMENT,
+    L2,
+    NUMBERS,
+    OF_A_SIDE,
+    OVERLAP,
+    R2,
+    RUMBLE,
+    STIFFNESS,
+    TOOL_SPEED,
+    Sensed,
+)
+from robot_side.outcome.placing import Placing, scaled
+from robot_side.surroundings.perceived import Role
+
+if TYPE_CHECKING:
+    from robot_side.outcome.truth import Truth
+
+TRUTH_PERIOD_S = 0.01
+MOVING_M_S = 0.01
+"""A tool faster than this counts as moving."""
+_CONTACT_REST_S = 0.1
+"""A contact with an object that comes back within this time, on any part of the gripper, is the same one: a sliding
+touch chatters, and two fingers do not close at the same instant."""
+
+
+_L2_STIFFNESS, _R2_STIFFNESS = L2 * OF_A_SIDE + STIFFNESS, R2 * OF_A_SIDE + STIFFNESS
+_MOST_ROWS = 8 * BLOCK
+"""That many ticks wait at most to be reckoned with, if nobody asks for it between ticks."""
+
+
+class RunFigures(Listener):
+    """Statistics over the ticks; nothing here is read back by the control."""
+
+    def __init__(self, seed: int = 0, truth: Observer | None = None) -> None:
+        """truth: sees what really happens, where there is a simulation to see it in."""
+        self.ticks = 0
+        self._observer = truth
+        self._start_s: float | None = None
+        self._next_truth_s = -np.inf
+        self._loop_age = RunningStatistics(seed)
+        self._rows: list[tuple[FloatArray, bool]] = []
+        """Of the newest ticks: the numbers of `Sensed`, and whether the arm was armed."""
+        self._enlargement = RunningStatistics(seed)
+        self._enlargement_moving = RunningStatistics(seed)
+        self._overlap = RunningStatistics(seed)
+        self._l2 = RunningStatistics(seed)
+        self._r2 = RunningStatistics(seed)
+        self._min_distance_m: float | None = None
+        self._min_obstacle_distance_m: float | None = None
+        self._first_contact: dict[str, Any] | None = None
+        self._touched_s: dict[str, float] = {}
+        self._contacts: dict[str, int] = {}
+        self._obstacle_contacts = 0
+        self._armed_s: float | None = None
+        self._grasped_s: float | None = None
+        self._rest_height_m: float | None = None
+        self._lifted_m = 0.0
+        self._placing = Placing()
+        self._held = False
+        self._newest: FloatArray = np.zeros(NUMBERS)
+
+    def on_tick(self, tick: Tick) -> None:
+        """Take in one tick; one that failed found nothing."""
+        if self._start_s is None:
+            self._start_s = tick.now_s
+        if (found := tick.found) is None:
+            return
+        armed = found.permission.state == "armed"
+        if found.situation.loop_age_known:
+            self._loop_age.add(found.situation.loop_age_s)
+        self.tick(found.sensed, armed=armed)
+        self.task(armed, found.holds_target, found.target_m, tick.now_s)
+
+    def on_sent(self, now_s: float) -> None:
+        """Reckon with a block of ticks at once, which costs each of them less, and see what is true."""
+        if len(self._rows) >= BLOCK:
+            self._take_in()
+        if self._observer is not None:
+            self._observer.watch(self, now_s)
+            if now_s >= self._next_truth_s:
+                self._next_truth_s = now_s + TRUTH_PERIOD_S
+                self._observer.observe(self, now_s)
+
+    def since_start_s(self, time_s: float) -> float:
+        """Return the time since the first tick."""
+        return time_s - (self._start_s or 0.0)
+
+    def tick(self, sensed: Sensed, *, armed: bool = True) -> None:
+        """One tick's enlargement, overlap and stiffness; nobody feels any while the arm is not armed."""
+        self._newest = sensed.numbers
+        self._rows.append((sensed.numbers, armed))
+        self.ticks += 1
+        if len(self._rows) == _MOST_ROWS:
+            self._take_in()
+
+    def _take_in(self) -> None:
+        if not self._rows:
+            return
+        numbers, armed = np.array([row for row, _ in self._rows]), np.array([armed for _, armed in self._rows])
+        self._rows.clear()
+        enlargement_m = numbers[:, ENLARGEMENT]
+        self._enlargement.extend(enlargement_m.tolist())
+        self._enlargement_moving.extend(enlargement_m[numbers[:, TOOL_SPEED] > MOVING_M_S].tolist())
+        self._overlap.extend(numbers[:, OVERLAP].tolist())
+        self._l2.extend((armed * numbers[:, _L2_STIFFNESS]).tolist())
+        self._r2.extend((armed * numbers[:, _R2_STIFFNESS]).tolist())
+
+    def truth(self, truth: Truth, roles: dict[str, Role], now_s: float) -> None:
+        """What really happened, from the simulation: distances and contact onsets."""
+        self._min_distance_m = _smaller(self._min_distance_m, truth.min_distance_m)
+        self._min_obstacle_distance_m = _smaller(self._min_obstacle_distance_m, truth.min_obstacle_distance_m)
+        for name in {name for _, name in truth.contacts}:
+            if now_s - self._touched_s.get(name, -np.inf) > _CONTACT_REST_S:
+                self._contacts[name] = self._contacts.get(name, 0) + 1
+                self._obstacle_contacts += roles[name] is Role.OBSTACLE
+            self._touched_s[name] = now_s
+        if truth.target is not None:
+            warned = self._newest[[RUMBLE, _L2_STIFFNESS, _R2_STIFFNESS]].max() > 0.0
+            self._placing.observe(truth.target, self._held, bool(warned), now_s)
+
+    @property
+    def touched(self) -> bool:
+        """Whether the first contact has been."""
+        return self._first_contact is not None
+
+    def first_contact(self, thing: str, closing_speed_m_s: float, now_s: float) -> None:
+        """Note the gripper's first contact with something that is no support."""
+        speed_mm_s = 1e3 * closing_speed_m_s
+        self._first_contact = {"with": thing, "speed_mm_s": speed_mm_s, "time_s": self.since_start_s(now_s)}
+
+    def task(self, armed: bool, held: bool, target_center_m: FloatArray | None, now_s: float) -> None:
+        """How far the task has come: armed, grasped, lifted; the target's centre (3,) as perceived."""
+        self._held = held
+        if armed and self._armed_s is None:
+            self._armed_s = now_s
+        if held and self._grasped_s is None:
+            self._grasped_s = now_s
+        if target_center_m is not None:
+            height_m = float(target_center_m[2])
+            # Where it last stood by itself: another target, or this one after a push, stands elsewhere.
+            if not held or self._rest_height_m is None:
+                self._rest_height_m = height_m
+            self._lifted_m = max(self._lifted_m, height_m - self._rest_height_m)
+
+    def summary(self) -> dict[str, Any]:
+        """The summary's keys that come from here, in the units of their names."""
+        self._take_in()
+        grasp_s = None
+        if self._grasped_s is not None and self._armed_s is not None:
+            grasp_s = self._grasped_s - self._armed_s
+        return {
+            "ticks": self.ticks,
+            "enlargement_mm": {
+                "min": scaled(self._enlargement.minimum, 1e3),
+                "mean": scaled(self._enlargement.mean, 1e3),
+                "max": scaled(self._enlargement.maximum, 1e3),
+                "mean_moving": scaled(self._enlargement_moving.mean, 1e3),
+            },
+            "overlap_mm3": {"max": scaled(self._overlap.maximum, 1e9), "mean": scaled(self._overlap.mean, 1e9)},
+            "stiffness": {
+                "l2": {"mean": self._l2.mean, "max": self._l2.maximum},
+                "r2": {"mean": self._r2.mean, "max": self._r2.maximum},
+            },
+            "min_distance_mm": scaled(self._min_distance_m, 1e3),
+            "contacts": sum(self._contacts.values()),
+            "first_contact": self._first_contact,
+            "loop_age_ms": self._loop_age.summary_ms(),
+            "task": {
+                "time_to_grasp_s": grasp_s,
+                "lifted_mm": 1e3 * self._lifted_m,
+                "placing": self._placing.summary(self._armed_s),
+                "obstacle_contacts": self._obstacle_contacts,
+                "contacts_by_object": dict(sorted(self._contacts.items())),
+                "min_obstacle_distance_mm": scaled(self._min_obstacle_distance_m, 1e3),
+            },
+        }
+
+
+class Observer(Protocol):
+    """Sees what really happens, where there is a simulation to see it in."""
+
+    def observe(self, figures: RunFigures, now_s: float) -> None:
+        """Tell `figures` the true distances and contacts."""
+        ...
+
+    def watch(self, figures: RunFigures, now_s: float) -> None:
+        """Tell `figures` the first contact, in every turn."""
+        ...
+
+
+def _smaller(one: float | None, other: float | None) -> float | None:
+    if one is None or other is None:
+        return one if other is None else other
+    return min(one, other)

@@ -1,0 +1,1 @@
+"""A run recorded: what the core hears, as entries of a file."""

@@ -1,0 +1,80 @@
+"""Note every input of the core and what it sent, so that a replay makes them again bit for bit.
+
+In a tick this costs an append; bytes are made of it in the idle time (common/recording/side.py).
+"""
+
+import struct
+from collections.abc import Callable
+from typing import Any, Final
+
+from common.recording.entries import Kind, entry, text
+from common.recording.provenance import provenance
+from robot_side.arm.port import ArmState
+from robot_side.compiled.warm_up import kernel_digests
+from robot_side.core import RobotSide
+from robot_side.events import Listener, Tick
+from robot_side.recording.inputs import FramePacker, pack_state
+from robot_side.settings import RobotSettings
+from robot_side.surroundings.perceived import PerceivedObjects
+
+_HAPTICS: Final = "haptics"
+
+
+class Recorder(Listener):
+    """Passes to `note` what arrives and each tick."""
+
+    def __init__(self, note: Callable[[Any], None]) -> None:
+        self._note = note
+
+    def on_received(self, peer: bytes, payload: bytes, now_s: float) -> None:
+        """Note a payload."""
+        self._note((now_s, peer, payload))
+
+    def on_tick(self, tick: Tick) -> None:
+        """Note a tick, and one that failed."""
+        self._note(tick)
+
+
+class RobotEncoder:
+    """Turns these notes into entries."""
+
+    def __init__(self) -> None:
+        self._frames = FramePacker()
+        self._state: ArmState | None = None
+        self._frame: PerceivedObjects | None = None
+
+    def begin_anew(self) -> None:
+        """Tell state and frame whole the next time."""
+        self._frames.begin_anew()
+        self._state = self._frame = None
+
+    def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
+        """When it happened, and its entries; telemetry goes to `views`."""
+        if not isinstance(noted, Tick):
+            now_s, peer, payload = noted
+            return now_s, entry(Kind.RECEIVED, now_s, text(peer), payload)
+        now_s, state, frame, sent_s, outgoing, _ = noted
+        parts = []
+        if state is not None and state is not self._state:
+            self._state = state
+            parts.append(entry(Kind.STATE, now_s, pack_state(state)))
+        if frame is not None and frame is not self._frame:
+            self._frame = frame
+            parts.append(entry(Kind.FRAME, now_s, self._frames.pack(frame)))
+        parts.append(entry(Kind.TICK, now_s, struct.pack("<d", sent_s)))
+        for message in outgoing:
+            if message.stream == _HAPTICS:
+                parts.append(entry(Kind.SENT, now_s, text(_HAPTICS.encode()), text(message.peer), message.payload))
+            else:
+                views(now_s, message.payload)
+        return now_s, b"".join(parts)
+
+
+def robot_header(settings: RobotSettings, epoch: int, clock_domain: str) -> dict[str, Any]:
+    """What the core was made from; to be told once its kernels are there."""
+    return provenance(settings, epoch, clock_domain) | {"kernels": kernel_digests()}
+
+
+def recorded_status(core: RobotSide, now_s: float) -> dict[str, Any]:
+    """What a person is shown, and the offset of the operator side's clock."""
+    return core.status(now_s) | {"offset_s": core.session.link.clock_offset.offset_at(now_s)}

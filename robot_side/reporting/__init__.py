@@ -1,0 +1,1 @@
+"""What leaves for the operator side: which message, when, and by which way."""

@@ -1,0 +1,102 @@
+"""The way out of the robot side: through one budget, the emulated link, and the sockets."""
+
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple, Protocol
+
+from common.emulation.delay_line import BitFlip, DelayLine, link_summary
+from common.emulation.spec import LinkSpec, Stream
+from common.rate.budget import Budget
+from common.rate.outgoing_queue import OutgoingQueue
+from common.rate.pieces import PIECE
+from robot_side.reporting.outgoing_messages import TOPICS, Outgoing, OutgoingStream
+
+SENT_STREAMS: Final[tuple[Stream, ...]] = ("haptics", "telemetry", "video", "scene")
+_PACED: Final[tuple[OutgoingStream, ...]] = ("video", "scene")
+
+
+class Sockets(Protocol):
+    """The sockets, as far as messages leave by them."""
+
+    def send(self, peer: bytes, payload: bytes, *, everywhere: bool) -> bool:
+        """Send to one peer."""
+        ...
+
+    def publish(self, topic: bytes, payload: bytes) -> None:
+        """Send to all who look."""
+        ...
+
+
+class _Leaving(NamedTuple):
+    message: Outgoing
+    topic: bytes
+
+
+def _corrupted(leaving: _Leaving, flip: BitFlip) -> _Leaving:
+    return leaving._replace(message=leaving.message._replace(payload=flip(leaving.message.payload)))
+
+
+class Sending:
+    """Haptics leave at once, telemetry where there is room, pictures and the scene piece by piece between the ticks."""
+
+    def __init__(self, link: LinkSpec, sockets: Sockets, first_number: int) -> None:
+        """first_number: of what leaves in pieces; another one in each run."""
+        self.budget: Budget[OutgoingStream] = Budget(_PACED, first_number)
+        self._sockets = sockets
+        self._lines: dict[Stream, DelayLine[_Leaving]] = {
+            stream: DelayLine(link.profile("to_operator", stream), corrupt=_corrupted) for stream in SENT_STREAMS
+        }
+
+    def push(self, messages: Sequence[Outgoing], now_s: float) -> None:
+        """Take in what the core or who looks made."""
+        for message in messages:
+            size_bytes = len(message.payload)
+            if message.stream in _PACED:
+                self.budget.offer(message.stream, message.payload, now_s)
+            elif message.stream == "haptics":
+                self.budget.spend("haptics", size_bytes, now_s)
+                self._enter(message, b"", now_s)
+            elif self.budget.may_tell(size_bytes, now_s):
+                self._enter(message, TOPICS[message.stream], now_s)
+
+    def send(self, queue: OutgoingQueue | None, now_s: float) -> None:
+        """Let go of what is due. queue: in front of the owner's messages; None while there is no owner."""
+        self.budget.hear(queue, now_s)
+        for stream, payload, is_piece in self.budget.take(now_s):
+            topic = TOPICS[stream] + (PIECE if is_piece else b"")
+            self._enter(Outgoing(stream, b"", payload), topic, now_s)
+        for line in self._lines.values():
+            for message, topic in line.pop(now_s):
+                if message.stream == "haptics":
+                    self._sockets.send(message.peer, message.payload, everywhere=message.everywhere)
+                else:
+                    self._sockets.publish(topic, message.payload)
+
+    def _enter(self, message: Outgoing, topic: bytes, now_s: float) -> None:
+        self._lines[message.stream].push(now_s, _Leaving(message, topic), len(message.payload))
+
+    def change(self, link: LinkSpec) -> None:
+        """From now on do to messages what `link` says."""
+        for stream, line in self._lines.items():
+            line.change(link.profile("to_operator", stream))
+
+    def next_due(self) -> float | None:
+        """When the next message is due in the emulated link; None while nothing waits there."""
+        return min((due_s for line in self._lines.values() if (due_s := line.next_due()) is not None), default=None)
+
+    @property
+    def left_bit_s(self) -> float:
+        """Bits a second that haptics and telemetry leave."""
+        return self.budget.left_bit_s
+
+    @property
+    def begins(self) -> bool:
+        """Whether the link has shown no limit yet."""
+        return self.budget.controller.begins
+
+    def backlog_s(self, stream: OutgoingStream, now_s: float) -> float:
+        """Seconds that a message made for `stream` now would wait, for the budget or in the emulated link."""
+        return max(self.budget.waiting_s(stream), self._lines[stream].backlog_s(now_s))
+
+    def summary(self) -> dict[str, Any]:
+        """`link`, as it was emulated."""
+        return link_summary("to_operator", {name: line for name, line in self._lines.items() if line.figures.sent})

@@ -1,0 +1,129 @@
+"""The process that renders: `python -m robot_side.viewing.companion FD [TROUBLE ...]`, started by `Cameras`.
+
+TROUBLE: what was wrong with the ways to render that were tried before, one each.
+"""
+
+import contextlib
+import importlib.util
+import os
+import select
+import sys
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from common.clock import MonotonicClock
+from common.companion.channel import Channel
+from common.companion.process import companion_channel
+from common.protocol.view_messages import ViewName
+from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, decode_to_companion, encode
+from robot_side.viewing.off_screen import BACKENDS, REMEDY, silenced, trouble_with
+
+if TYPE_CHECKING:
+    from robot_side.viewing.h264 import H264
+    from robot_side.viewing.rendering import Renderer
+
+_LATER = 5
+"""By so much niceness behind the process that ticks."""
+
+
+def main() -> None:
+    """Serve until the robot side is gone."""
+    channel, troubles = companion_channel(sys.argv[1:])
+    _step_back()
+    if (trouble := trouble_with(BACKENDS[len(troubles)])) is not None:
+        troubles.append(trouble)
+        if len(troubles) < len(BACKENDS):
+            again = [sys.executable, "-P", "-m", "robot_side.viewing.companion", sys.argv[1], *troubles]
+            os.execv(sys.executable, again)  # noqa: S606
+        _refuse(channel, f"{'; '.join(troubles)}; to mend it: {REMEDY}")
+        return
+    try:
+        import simplejpeg  # noqa: F401, PLC0415  # may be missing
+    except ImportError as error:
+        _refuse(channel, f"{error}; to mend it: pip install 'feelahead[robot]'")
+        return
+    _serve(channel)
+
+
+def _step_back() -> None:
+    """What the robot side's own priority and real-time scheduling are for is not this."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    with contextlib.suppress(OSError):
+        os.nice(_LATER)
+
+
+def _refuse(channel: Channel, reason: str) -> None:
+    channel.send(encode(Refusal(reason)))
+    while channel.waiting and not channel.ended:
+        select.select([], [channel], [])
+        channel.flush()
+
+
+def _serve(channel: Channel) -> None:
+    drawing: _Drawing | None = None
+    clock = MonotonicClock()
+    while not channel.ended:
+        select.select([channel], [channel] if channel.waiting else [], [])
+        for payload in channel.receive():
+            began_s = clock.now()
+            message = decode_to_companion(payload)
+            if isinstance(message, Setup):
+                drawing = _Drawing(message)
+                channel.send(encode(drawing.ready))
+            elif drawing is not None:
+                (height, width, _), content, number, whole = drawing.picture(message)
+                place = message.view, message.captured_s, width, height
+                channel.send(encode(Picture(*place, content, clock.now() - began_s, number, whole)))
+
+
+def _renderer_of(setup: Setup) -> "Renderer":
+    from robot_side.viewing.rendering import Renderer  # noqa: PLC0415  # after the choice of a way to render
+
+    with silenced():
+        return Renderer(setup)
+
+
+class _Drawing:
+    def __init__(self, setup: Setup) -> None:
+        self._renderer = _renderer_of(setup)
+        self._h264: dict[ViewName, H264] = {}
+        self.ready = _tried() if setup.h264 else Ready(h264=False)
+
+    def picture(self, order: Order) -> tuple[tuple[int, ...], bytes, int, bool]:
+        """Its shape, its bytes, its number, 0 for JPEG, and whether it is a whole one."""
+        import simplejpeg  # noqa: PLC0415  # may be missing, which `main` says
+
+        from robot_side.viewing.rendering import halved  # noqa: PLC0415  # after the choice of a way to render
+
+        picture = self._renderer.picture(order.view, order.positions, order.mocap_poses)
+        if order.halved:
+            picture = halved(picture)
+        if order.h264:
+            from robot_side.viewing.h264 import H264  # noqa: PLC0415  # an extra
+
+            # H.264 has one colour for two pixels by two: an odd last row or column is left out.
+            picture = picture[: len(picture) & ~1, : picture.shape[1] & ~1]
+            encoder = self._h264.setdefault(order.view, H264())
+            content, whole = encoder.encode(picture, order.quality, whole=order.whole)
+            return picture.shape, content, encoder.number, whole
+        jpeg: bytes = simplejpeg.encode_jpeg(picture, order.quality, colorspace="RGB", colorsubsampling="420")
+        return picture.shape, jpeg, 0, True
+
+
+def _tried() -> Ready:
+    """Whether H.264 can be made, by making some: this imports PyAV before the first order, too."""
+    if importlib.util.find_spec("av") is None:
+        return Ready(h264=False)
+    try:
+        from robot_side.viewing.h264 import H264  # noqa: PLC0415  # an extra
+
+        H264().encode(np.zeros((16, 16, 3), np.uint8), 75)
+    except Exception as error:  # of PyAV's own kind, or of its import; JPEG is there
+        return Ready(h264=False, trouble=f"{type(error).__name__}: {error}")
+    return Ready(h264=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,200 @@
+"""What people look at, made in the time between ticks, and only while somebody does: pictures and the scene's state."""
+
+import math
+from collections import deque
+from collections.abc import Collection
+from typing import Any, Final, Protocol
+
+from common.protocol.codec import VIEW_MAXIMUM_BYTES, encode
+from common.protocol.view_messages import VIEW_NAMES, ViewName
+from common.statistics import RunningStatistics
+from robot_side.core import RobotSide
+from robot_side.reporting.outgoing_messages import Outgoing, OutgoingStream
+from robot_side.viewing.pictures import Cameras
+from robot_side.viewing.scene_view import SceneView, TickFigures
+
+SCENE_PERIOD_S: Final = 1.0 / 30.0
+SHAPES_PERIOD_S: Final = 3.0
+_SHAPES_BYTES_PER_S: Final = 400_000.0
+_SHAPES_SHARE: Final = 0.1
+"""Large shapes are repeated less often, so that they take no more of a link than this, in bytes and as a share."""
+_BACKLOG_S: Final = 0.03
+"""While that much waits to leave, nothing more is made: the newest is worth more than the next."""
+_SEEN_TO_S: Final = 0.1
+_FIGURES_S: Final = 1.0
+
+
+class Room(Protocol):
+    """The room that a link has for what is made here."""
+
+    @property
+    def left_bit_s(self) -> float:
+        """Bits a second that are left for it."""
+        ...
+
+    @property
+    def begins(self) -> bool:
+        """Whether the link has shown no limit yet."""
+        ...
+
+    def backlog_s(self, stream: OutgoingStream, now_s: float) -> float:
+        """Seconds that a message made for `stream` now would wait for those before it."""
+        ...
+
+
+class Looking:
+    """Decides what is to be made in each turn; never more of one kind than the rate, never what nobody looks at."""
+
+    def __init__(
+        self,
+        core: RobotSide,
+        scene_view: SceneView,
+        cameras: Cameras | None,
+        room: Room,
+        *,
+        always: Collection[str] = (),
+        seed: int = 0,
+    ) -> None:
+        """always: of `overview`, `first_person` and `scene`, what is made although nobody looks: it is recorded."""
+        self._core = core
+        self._scene_view = scene_view
+        self._cameras = cameras
+        self._room = room
+        self._always = frozenset(always)
+        self._ticks_s: deque[float] = deque(maxlen=1000)
+        self._ticks = TickFigures()
+        self._next_figures_s = self._next_look_s = -math.inf
+        self._next_s: dict[str, float] = {}
+        self._late: set[str] = set()
+        self._next_shapes_s = -math.inf
+        self._begun = -1
+        self._counts = {name: {"sent": 0, "nobody_looks": 0, "behind": 0} for name in (*VIEW_NAMES, "scene")}
+        self._shapes_sent = 0
+        self._frame_age = RunningStatistics(seed)
+
+    def ticked(self, took_s: float, overruns: int) -> None:
+        """Take note of a tick, for SceneState."""
+        self._ticks_s.append(took_s)
+        self._ticks.overruns = overruns
+
+    def idle(self, now_s: float, taken_s: float) -> list[Outgoing]:
+        """What to send now. `taken_s`: when the newest tick was, whose state is shown."""
+        looked_at = self._core.session.watchers.looked_at(now_s) | self._always
+        if not looked_at and now_s < self._next_look_s:
+            return []
+        self._next_look_s = now_s + _SEEN_TO_S
+        due = set()
+        for name, counts in self._counts.items():
+            turns = self._turns(name, now_s)
+            if name not in looked_at:
+                counts["nobody_looks"] += turns
+            elif turns:
+                due.add(name)
+        outgoing = self._pictures(now_s, taken_s, due, looked_at)
+        if "scene" in looked_at:
+            outgoing += self._scene(now_s, taken_s, is_due="scene" in due)
+        return outgoing
+
+    def summary(self) -> dict[str, Any]:
+        """`looked_at`: of each view and of the scene what was sent and what was not, and why."""
+        cameras, counts = self._cameras, {name: dict(counts) for name, counts in self._counts.items()}
+        counts["scene"]["shapes"] = self._shapes_sent
+        took_s = sorted(cameras.took_s) if cameras is not None else []
+        middle = 1e3 * took_s[len(took_s) // 2] if took_s else None
+        starts = 0 if cameras is None else cameras.starts
+        age = {f"p{q}": None if (s := self._frame_age.quantile(q / 100)) is None else 1e3 * s for q in (50, 99)}
+        return counts | {"companion": {"starts": starts, "picture_ms": middle, "picture_age_ms": age}}
+
+    @property
+    def pictures(self) -> dict[str, float | int] | None:
+        """Pictures as they are made now: `rate_hz`, `quality`, `size` (share of the width); None without cameras."""
+        if self._cameras is None:
+            return None
+        step = self._cameras.giving_way.step
+        return {"rate_hz": step.rate_hz, "quality": step.quality, "size": 0.5 if step.halved else 1.0}
+
+    def close(self) -> None:
+        """End the companion."""
+        if self._cameras is not None:
+            self._cameras.close()
+
+    def _turns(self, name: str, now_s: float) -> int:
+        """How often something has become due since this was last asked; 0 for not yet."""
+        rate_hz = None if name == "scene" or self._cameras is None else self._cameras.giving_way.step.rate_hz
+        period_s = SCENE_PERIOD_S if rate_hz is None else 1.0 / rate_hz
+        # The views take turns, so that neither waits for the other.
+        next_s = self._next_s.setdefault(name, now_s + (0.5 * period_s if name == VIEW_NAMES[1] else 0.0))
+        if now_s < next_s:
+            return 0
+        turns = 1 + math.floor((now_s - next_s) / period_s)
+        self._next_s[name] = next_s + turns * period_s
+        return turns
+
+    def _pictures(
+        self, now_s: float, taken_s: float, due: Collection[str], looked_at: frozenset[str]
+    ) -> list[Outgoing]:
+        cameras = self._cameras
+        if cameras is None:
+            return []
+        views = len(looked_at & set(VIEW_NAMES))
+        # What is recorded is JPEG: replay and export begin anywhere.
+        lacks = None if self._always else self._core.session.watchers.lacks(now_s)
+        h264 = cameras.makes_h264(lacks)
+        cameras.giving_way.update(self._room.left_bit_s, views, now_s, eager=self._room.begins, h264=h264)
+        wanted: list[ViewName] = []
+        full = self._room.backlog_s("video", now_s) > _BACKLOG_S
+        # A late view comes as soon as there is room: at its next turn, the other one could again be before it.
+        self._late &= looked_at
+        for name in VIEW_NAMES:
+            if cameras.works and (name in due or name in self._late):
+                if cameras.busy(name) or full:
+                    self._counts[name]["behind"] += name in due
+                    self._late.add(name)
+                else:
+                    self._late.discard(name)
+                    wanted.append(name)
+        outgoing = []
+        for picture in cameras.update(now_s, taken_s, wanted, lacks):
+            self._counts[picture.view]["sent"] += 1
+            self._frame_age.add(now_s - picture.captured_s)
+            frame = cameras.message(picture, self._core.session.shown_header(now_s))
+            outgoing.append(Outgoing("video", b"", encode(frame)))
+        return outgoing
+
+    def _scene(self, now_s: float, taken_s: float, *, is_due: bool) -> list[Outgoing]:
+        newest, view, session = self._core.newest, self._scene_view, self._core.session
+        if newest is None:
+            return []
+        sensed, situation = newest
+        if self._begun != session.watchers.scene_begun:
+            self._begun = session.watchers.scene_begun
+            self._next_shapes_s = now_s
+            if not view.complete:
+                view.begin_shapes(session.shown_header(now_s), situation)
+        if not view.work_on_shapes() or view.shapes is None:
+            return []
+        if now_s >= self._next_shapes_s:
+            most_bytes_per_s = min(_SHAPES_BYTES_PER_S, _SHAPES_SHARE * self._room.left_bit_s / 8.0)
+            self._next_shapes_s = now_s + max(SHAPES_PERIOD_S, view.shapes_bytes / most_bytes_per_s)
+            if view.shapes_bytes > VIEW_MAXIMUM_BYTES:
+                return []
+            self._shapes_sent += 1
+            return [Outgoing("scene", b"", view.shapes.under(session.shown_header(now_s)))]
+        if is_due and self._room.backlog_s("scene", now_s) > _BACKLOG_S:
+            self._counts["scene"]["behind"] += 1
+        elif is_due:
+            view.begin_state(sensed, situation, taken_s)
+            return []
+        state = view.work_on_state(lambda: session.shown_header(now_s), self._ticks)
+        if state is None:
+            return []
+        self._counts["scene"]["sent"] += 1
+        self._work_out_figures(now_s)
+        return [Outgoing("scene", b"", encode(state))]
+
+    def _work_out_figures(self, now_s: float) -> None:
+        if now_s >= self._next_figures_s and self._ticks_s:
+            self._next_figures_s = now_s + _FIGURES_S
+            latest_s = sorted(self._ticks_s)
+            self._ticks.p50_us = 1e6 * latest_s[len(latest_s) // 2]
+            self._ticks.p99_us = 1e6 * latest_s[len(latest_s) * 99 // 100]

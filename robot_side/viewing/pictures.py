@@ -1,0 +1,268 @@
+"""The robot side's end of rendering: orders pictures of a companion and takes them, without ever waiting for it."""
+
+import math
+import threading
+from collections.abc import Callable, Collection
+from typing import Final, Protocol
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+
+from common.companion.channel import MESSAGE_LIMIT_BYTES, Channel
+from common.companion.process import Companion
+from common.protocol.messages import Header
+from common.protocol.view_messages import VIEW_NAMES, VideoFrame, VideoStep, ViewName
+from robot_side.drivers.mujoco.scene import Scene
+from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, decode_from_companion, encode
+from robot_side.viewing.giving_way import GivingWay, Step
+from robot_side.viewing.settings import CamerasSettings
+from robot_side.viewing.viewpoints import viewpoints
+
+MODULE: Final = "robot_side.viewing.companion"
+IDLE_S: Final = 60.0
+"""A companion that nobody has needed for so long is ended."""
+RETRY_S: Final = 5.0
+"""One that has died is started again no sooner."""
+_SILENT_S: Final = 30.0
+"""An order that is not answered within this: it hangs. A slow machine takes a while to start."""
+_ENDING_S: Final = 5.0
+_WHOLE_S: Final = 0.5
+"""Whole pictures in H.264 are ordered no more often, as a viewer that asks for many takes the share of others."""
+_SETUP: Final = "setup"
+"""Among the orders, as it is answered like one"""
+_NEVER_BEGAN: Final = 2
+"""After so many starts in a row that came to no picture, no other one follows."""
+
+
+def saved_model(scene: Scene) -> bytes:
+    """Save the model of a scene as MuJoCo does, for `Setup`."""
+    saved = np.zeros(mujoco.mj_sizeModel(scene.model), dtype=np.uint8)
+    mujoco.mj_saveModel(scene.model, None, saved)
+    return saved.tobytes()
+
+
+class Renders(Protocol):
+    """A `Companion`, as far as it is needed here."""
+
+    channel: Channel
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended yet."""
+        ...
+
+    def close(self, limit_s: float = ...) -> bool:
+        """End it."""
+        ...
+
+
+Start = Callable[[Callable[[Renders | str], None]], None]
+"""Starts a companion, and hands it, or why there is none, to the function that it is given, at once or later."""
+
+
+def start_beside(done: Callable[[Renders | str], None]) -> None:
+    """In a thread, as starting a process takes milliseconds; what is waited for there holds nobody up."""
+
+    def begin() -> None:
+        try:
+            done(Companion(MODULE))
+        except OSError as error:
+            done(f"no process can be started: {error.strerror}")
+
+    threading.Thread(target=begin, daemon=True).start()
+
+
+class Cameras:
+    """Keeps one order of each view under way while it is wanted; starts the companion when it is needed first."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        settings: CamerasSettings,
+        note: Callable[[str], None],
+        start: Start = start_beside,
+    ) -> None:
+        """note: told in one line what does not work, and what would help."""
+        self._h264 = settings.codec == "auto"
+        """Whether the companion makes H.264; believed until it says no"""
+        shape = settings.width, settings.height
+        self._setup = encode(Setup(saved_model(scene), *shape, viewpoints(scene), self._h264))
+        self.giving_way = GivingWay(settings.rate_hz, settings.quality)
+        """Chooses how often and how well pictures are made"""
+        self.starts = 0
+        self.took_s: list[float] = []
+        """How long the companion was at the newest pictures, at most a thousand."""
+        self._whole: dict[ViewName, tuple[int, float]] = {}
+        """The number of the newest whole picture in H.264, and when it came"""
+        self._data = scene.data
+        self._note = note
+        self._start = start
+        self._starting = False
+        self._handed_over: list[Renders | str] = []
+        self._companion: Renders | None = None
+        self._ended: list[tuple[Renders, float]] = []
+        """Those that may take until then to end by themselves."""
+        self._ordered_s: dict[str, float] = {}
+        self._ordered_as: dict[ViewName, Step] = {}
+        self._wanted_s = -math.inf
+        self._not_before_s = -math.inf
+        self._failures = 0
+        self._has_worked = False
+        self._hopeless = not settings.on
+        if len(self._setup) > MESSAGE_LIMIT_BYTES:
+            self._give_up(f"the model takes {len(self._setup) >> 20} MB; valid: up to {MESSAGE_LIMIT_BYTES >> 20}")
+
+    @property
+    def works(self) -> bool:
+        """False once it is known that nothing can be rendered, or where nothing is to be."""
+        return not self._hopeless
+
+    @property
+    def process(self) -> Renders | None:
+        """The companion, while there is one."""
+        return self._companion
+
+    def busy(self, view: ViewName) -> bool:
+        """Whether an order of `view` is under way."""
+        return view in self._ordered_s
+
+    def makes_h264(self, lacks: tuple[int, int] | None) -> bool:
+        """Whether pictures are H.264 for those who lack `lacks`, as in `Watch`; None: they show JPEG alone."""
+        return self._h264 and lacks is not None
+
+    def message(self, picture: Picture, header: Header) -> VideoFrame | VideoStep:
+        """Make what is published of a picture."""
+        place = header, picture.view, picture.captured_s, picture.width, picture.height
+        if picture.number == 0:
+            return VideoFrame(*place, picture.content)
+        return VideoStep(*place, picture.number, picture.whole, picture.content)
+
+    def update(
+        self, now_s: float, captured_s: float, wanted: Collection[ViewName], lacks: tuple[int, int] | None = None
+    ) -> list[Picture]:
+        """Order the `wanted` views that are not under way, of the state as it is; what has been finished.
+
+        lacks: as `makes_h264`'s, the newest of all who look. captured_s: when that state was so. To be
+        called in every turn while `wanted` is not empty, and now and then otherwise.
+        """
+        if wanted:
+            self._wanted_s = now_s
+        self._follow_ends(now_s)
+        companion = self._companion
+        if companion is None:
+            if wanted and not self._hopeless and not self._starting and now_s >= self._not_before_s:
+                self._starting = True
+                self.starts += 1
+                self._start(self._handed_over.append)
+            self._take_started(now_s)
+            return []
+        pictures = self._receive(companion, now_s)
+        if self._companion is None:
+            return pictures
+        if self._ordered_s and now_s - min(self._ordered_s.values()) > _SILENT_S:
+            self._died(now_s, f"has not answered for {_SILENT_S:g} s")
+        elif now_s - self._wanted_s > IDLE_S:
+            self._end(companion, now_s)
+        else:
+            for view in wanted:
+                self._order(companion, view, now_s, captured_s, lacks)
+        return pictures
+
+    def close(self) -> None:
+        """End the companion, within a moment."""
+        self._hopeless = True
+        if self._companion is not None:
+            self._end(self._companion, -math.inf)
+        for part in (*self._handed_over, *(companion for companion, _ in self._ended)):
+            if not isinstance(part, str):
+                part.close(0.2)
+        self._ended.clear()
+        self._handed_over.clear()
+
+    def _take_started(self, now_s: float) -> None:
+        if not self._handed_over:
+            return
+        started, self._starting = self._handed_over.pop(), False
+        if isinstance(started, str):
+            self._failed(now_s, started)
+            return
+        self._companion = started
+        started.channel.send(self._setup)
+        self._ordered_s[_SETUP] = now_s
+
+    def _order(
+        self, companion: Renders, view: ViewName, now_s: float, captured_s: float, lacks: tuple[int, int] | None
+    ) -> None:
+        if view in self._ordered_s or _SETUP in self._ordered_s:
+            return
+        data = self._data
+        mocap = np.concatenate([data.mocap_pos, data.mocap_quat], axis=1).tobytes() if len(data.mocap_pos) else b""
+        step, h264 = self.giving_way.step, self.makes_h264(lacks)
+        number, came_s = self._whole.get(view, (0, -math.inf))
+        # One that was lost is newer than the newest whole one.
+        lost = lacks is not None and lacks[VIEW_NAMES.index(view)] > number
+        whole = h264 and lost and now_s - came_s >= _WHOLE_S
+        positions = data.qpos.tobytes()
+        order = Order(view, captured_s, positions, mocap, step.quality, step.halved, h264, whole)
+        if companion.channel.send(encode(order)):
+            self._ordered_s[view], self._ordered_as[view] = now_s, step
+
+    def _receive(self, companion: Renders, now_s: float) -> list[Picture]:
+        pictures: list[Picture] = []
+        for payload in companion.channel.receive():
+            message = decode_from_companion(payload)
+            if isinstance(message, Refusal):
+                self._give_up(message.reason)
+                self._end(companion, now_s)
+                return pictures
+            if isinstance(message, Ready):
+                self._ready(message)
+                continue
+            self._ordered_s.pop(message.view, None)
+            self._failures, self._has_worked = 0, True
+            if message.number and message.whole:
+                # Seldom, and ten times a step: it says nothing of those that follow.
+                self._whole[message.view] = message.number, now_s
+            else:
+                step = self._ordered_as[message.view]
+                self.giving_way.made(len(message.content), step, h264=message.number > 0)
+            self.took_s = [*self.took_s[-999:], message.took_s]
+            pictures.append(message)
+        if companion.channel.ended:
+            self._died(now_s, "has ended unexpectedly")
+        return pictures
+
+    def _ready(self, message: Ready) -> None:
+        self._ordered_s.pop(_SETUP, None)
+        self._h264 &= message.h264
+        if message.trouble and not self._has_worked:
+            self._note(f"cameras: pictures are JPEG, ten times the bytes: PyAV makes no H.264: {message.trouble}")
+
+    def _died(self, now_s: float, how: str) -> None:
+        if self._companion is not None:
+            self._end(self._companion, now_s)
+        self._failed(now_s, f"the process that renders {how}")
+
+    def _failed(self, now_s: float, why: str) -> None:
+        self._failures += 1
+        if self._failures >= _NEVER_BEGAN and not self._has_worked:
+            self._give_up(f"{why}, {self._failures} times in a row; what is missing says: feelahead doctor")
+        else:
+            self._not_before_s = now_s + RETRY_S
+            self._note(f"cameras: {why}; it is started again in {RETRY_S:g} s, the arm goes on")
+
+    def _give_up(self, why: str) -> None:
+        self._hopeless = True
+        self._note(f"cameras: no pictures, the arm goes on without: {why}")
+
+    def _end(self, companion: Renders, now_s: float) -> None:
+        companion.channel.close()
+        self._ended.append((companion, now_s + _ENDING_S))
+        self._companion = None
+        self._ordered_s.clear()
+        self._whole.clear()
+
+    def _follow_ends(self, now_s: float) -> None:
+        """See those off that have been told to end; who does not is killed."""
+        if self._ended and (not self._ended[0][0].running or now_s >= self._ended[0][1]):
+            self._ended.pop(0)[0].close(0.0)

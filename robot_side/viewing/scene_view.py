@@ -1,0 +1,219 @@
+"""The scene as the robot side believes it is, as messages for whoever looks: what there is, where, and what it adds."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from common.arrays import FloatArray, IntArray
+from common.protocol.codec import VIEW_MAXIMUM_BYTES, Prepared
+from common.protocol.messages import Header
+from common.protocol.view_messages import SceneShapes, SceneState, Shape
+from robot_side.drivers.mujoco.kinematics import MujocoKinematics
+from robot_side.laws.explanation import Explains, Trigger, TriggerExplained
+from robot_side.laws.law import Situation
+from robot_side.laws.sensed import Sensed
+from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.viewing.shapes import SceneModel, bytes_of
+
+_ROLES: Final = {Role.OBSTACLE: 0, Role.TARGET: 1, Role.SUPPORT: 2, Role.IGNORED: 3}
+_TRIGGERS: Final[tuple[Trigger, Trigger]] = ("l2", "r2")
+_FEW: Final = 64
+"""So many objects have their poses in every SceneState, whether they move or not."""
+_STANDS_M: Final = 1e-6
+_MOST_SHAPES_BYTES: Final = VIEW_MAXIMUM_BYTES - 65536
+_ENTRY_BYTES: Final = 40
+"""What an object takes beside its name and its shapes."""
+_SHAPES_AT_ONCE: Final = 4
+
+
+@dataclass
+class TickFigures:
+    """How long the latest ticks took, and how many were not taken."""
+
+    p50_us: float = 0.0
+    p99_us: float = 0.0
+    overruns: int = 0
+
+
+@dataclass(frozen=True)
+class _Begun:
+    """A SceneState that is not finished yet."""
+
+    sensed: Sensed
+    situation: Situation
+    taken_s: float
+    version: int
+    link_poses: bytes
+    object_index: IntArray
+    object_poses: bytes
+    explained: dict[Trigger, TriggerExplained] = field(default_factory=dict)
+
+
+class SceneView:
+    """Makes SceneShapes and SceneState. What it says of shapes stays as it is until `begin_shapes` is called."""
+
+    def __init__(self, model: SceneModel, kinematics: MujocoKinematics, law: Explains) -> None:
+        self.version = 0
+        self.shapes: Prepared | None = None
+        """SceneShapes, once `work_on_shapes` has finished it"""
+        self.shapes_bytes = 0
+        self.left_out = 0
+        self._model = model
+        self._kinematics = kinematics
+        self._law = law
+        self._links: tuple[tuple[Shape, ...], int] | None = None
+        self._base: PerceivedObjects | None = None
+        """As they stood when the shapes were made"""
+        self._making: Iterator[None] | None = None
+        self._begun: _Begun | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether there are shapes, and of everything."""
+        return self.shapes is not None and self.left_out == 0
+
+    def begin_shapes(self, header: Header, situation: Situation) -> None:
+        """Begin to put SceneShapes together anew, the objects nearest to the tool first."""
+        self._making = self._make_shapes(header, situation.objects, situation.pose.tool_position_m)
+
+    def work_on_shapes(self) -> bool:
+        """Go on with what was begun, for a fraction of a millisecond; whether it is finished."""
+        if self._making is None:
+            return self.shapes is not None
+        for _ in range(_SHAPES_AT_ONCE):
+            if next(self._making, self) is self:
+                self._making = None
+                return True
+        return False
+
+    def begin_state(self, sensed: Sensed, situation: Situation, taken_s: float) -> None:
+        """Begin a SceneState of the newest tick, which found `sensed` in `situation` at `taken_s`."""
+        links = _row_bytes(self._kinematics.body_poses(self._model.bodies))
+        index = self._moved(situation.objects)
+        poses = object_poses(situation.objects, index)
+        self._begun = _Begun(sensed, situation, taken_s, self.version, links, index, _row_bytes(poses))
+
+    def work_on_state(self, header: Callable[[], Header], ticks: TickFigures) -> SceneState | None:
+        """Go on with what was begun, for some 200 us: an explanation, or at last the message under a new header."""
+        begun = self._begun
+        if begun is None:
+            return None
+        for trigger in _TRIGGERS:
+            if trigger not in begun.explained:
+                begun.explained[trigger] = self._law.explain(trigger, begun.situation, begun.sensed)
+                return None
+        self._begun = None
+        return self._state(header(), begun, ticks)
+
+    def _state(self, header: Header, begun: "_Begun", ticks: TickFigures) -> SceneState:
+        objects, pose = begun.situation.objects, begun.situation.pose
+        l2, r2 = begun.explained["l2"], begun.explained["r2"]
+        touched = sorted(l2.overlaps_m3.keys() | r2.overlaps_m3.keys())
+        return SceneState(
+            header,
+            version=begun.version,
+            taken_s=begun.taken_s,
+            link_poses=begun.link_poses,
+            object_index=begun.object_index.astype("<u4").tobytes(),
+            object_poses=begun.object_poses,
+            roles=bytes([_ROLES[role] for role in objects.roles]),
+            tool_pose=_pose(pose.tool_position_m, pose.tool_rotation),
+            spheres=_row_bytes(np.column_stack([pose.sphere_centers_m, pose.sphere_radii_m])),
+            overlaps=tuple(
+                (thing, l2.overlaps_m3.get(thing, 0.0), r2.overlaps_m3.get(thing, 0.0)) for thing in touched
+            ),
+            l2=l2.terms,
+            r2=r2.terms,
+            tick_p50_us=ticks.p50_us,
+            tick_p99_us=ticks.p99_us,
+            overruns=ticks.overruns,
+        )
+
+    def _moved(self, objects: PerceivedObjects) -> IntArray:
+        """The objects whose poses have to be said."""
+        if len(objects.names) <= _FEW:
+            return np.arange(len(objects.names))
+        if self._base is None:
+            return self._model.may_move
+        (positions_m, rotations), (at_first_m, turned_first) = _frames(objects), _frames(self._base)
+        moved = np.abs(positions_m - at_first_m).max(axis=1) > _STANDS_M
+        moved |= np.abs(rotations - turned_first).max(axis=(1, 2)) > _STANDS_M
+        moved[self._model.may_move] = True
+        return np.flatnonzero(moved)
+
+    def _make_shapes(self, header: Header, objects: PerceivedObjects, tool_m: FloatArray) -> Iterator[None]:
+        model = self._model
+        links, room = self._links or ((), _MOST_SHAPES_BYTES)
+        if self._links is None:
+            made = []
+            for shape in model.link_shapes():
+                kept = shape if bytes_of(shape) <= room // 2 else _boxed(shape)
+                made.append(kept)
+                room -= bytes_of(kept)
+                yield
+            links = tuple(made)
+            self._links = links, room
+        poses = object_poses(objects, np.arange(len(objects.names)))
+        room -= sum(len(name) + _ENTRY_BYTES for name in model.objects)
+        shapes, left_out = list(links), 0
+        distances_m = np.linalg.norm(poses[:, :3] - tool_m, axis=1)
+        for index in np.argsort(distances_m, kind="stable").tolist():
+            mine = tuple(model.object_shapes(index))
+            taken = sum(map(bytes_of, mine))
+            if taken <= room:
+                shapes += mine
+                room -= taken
+            else:
+                left_out += 1
+            yield
+        self.version += 1
+        self._base, self.left_out = objects, left_out
+        said = SceneShapes(header, self.version, model.links, model.objects, tuple(shapes), left_out, _row_bytes(poses))
+        self.shapes = Prepared(said)
+        self.shapes_bytes = len(self.shapes.under(header))
+
+
+def object_poses(objects: PerceivedObjects, index: IntArray) -> FloatArray:
+    """Where the objects of `index` (n,) are perceived (n, 7): positions and quaternions, w first.
+
+    ValueError where nobody knows.
+    """
+    positions_m, rotations = _frames(objects)
+    if index.size == 0:
+        return np.empty((0, 7))
+    turned = Rotation.from_matrix(rotations[index]).as_quat(scalar_first=True)
+    return np.concatenate([positions_m[index], turned], axis=1)
+
+
+def _frames(objects: PerceivedObjects) -> tuple[FloatArray, FloatArray]:
+    if objects.positions_m is None or objects.rotations is None:
+        raise ValueError("objects.positions_m is None; valid: objects of a camera that knows their poses")
+    return objects.positions_m, objects.rotations
+
+
+def _boxed(shape: Shape) -> Shape:
+    """A box around a mesh that there is no room for."""
+    vertices_m = np.frombuffer(shape.vertices_m, "<f4").reshape(-1, 3).astype(np.float64)
+    low, high = vertices_m.min(axis=0), vertices_m.max(axis=0)
+    x, y, z, *quaternion = shape.pose
+    rotation = Rotation.from_quat(quaternion, scalar_first=True)
+    middle = np.array([x, y, z]) + rotation.apply(0.5 * (low + high))
+    half_x, half_y, half_z = (0.5 * (high - low)).tolist()
+    return Shape(
+        *(shape.owner, shape.of_robot, "box", (half_x, half_y, half_z)),
+        pose=_pose(middle, rotation.as_matrix()),
+        color=shape.color,
+    )
+
+
+def _pose(position_m: FloatArray, rotation: FloatArray) -> tuple[float, float, float, float, float, float, float]:
+    x, y, z = position_m.tolist()
+    w, i, j, k = Rotation.from_matrix(rotation).as_quat(scalar_first=True).tolist()
+    return (x, y, z, w, i, j, k)
+
+
+def _row_bytes(rows: FloatArray) -> bytes:
+    return rows.astype("<f4").tobytes()

@@ -1,0 +1,98 @@
+"""The shapes of a scene's links and objects for whoever draws them: what MuJoCo's geoms are."""
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from common.arrays import FloatArray, IntArray
+from common.protocol.view_messages import Shape, ShapeKind
+from robot_side.drivers.mujoco.mesh_arrays import height_field_surface, mesh_triangles, mesh_vertices
+from robot_side.drivers.mujoco.model_enums import GeomKind
+from robot_side.drivers.mujoco.scene import Scene
+
+_KINDS: Final[dict[GeomKind, ShapeKind]] = {
+    GeomKind.PLANE: "plane",
+    GeomKind.SPHERE: "sphere",
+    GeomKind.CAPSULE: "capsule",
+    GeomKind.ELLIPSOID: "ellipsoid",
+    GeomKind.CYLINDER: "cylinder",
+    GeomKind.BOX: "box",
+}
+_SHOWN_GROUPS: Final = 3
+"""MuJoCo's viewers show geoms of these groups; collision shapes below visual ones are in later groups."""
+_SIZES: Final = {"sphere": 1, "capsule": 2, "cylinder": 2, "plane": 2, "box": 3, "ellipsoid": 3}
+"""How many of a geom's three sizes mean something."""
+
+
+class SceneModel:
+    """Which links and objects there are, and their shapes in frames of their own."""
+
+    def __init__(self, scene: Scene) -> None:
+        model, robot = scene.model, scene.robot
+        of_robot = np.flatnonzero(model.body_rootid[model.geom_bodyid] == robot.root_body)
+        shown = of_robot[model.geom_group[of_robot] < _SHOWN_GROUPS]
+        self._link_geoms = shown if shown.size else of_robot
+        self.bodies: IntArray = np.unique(model.geom_bodyid[self._link_geoms]).astype(np.int64)
+        """(n,) of the links"""
+        self.links = tuple(model.body(int(body)).name or f"body{body}" for body in self.bodies)
+        self.objects = tuple(thing.name for thing in scene.objects)
+        fixed = scene.fixed
+        self.may_move: IntArray = np.array(
+            [index for index, name in enumerate(self.objects) if name not in fixed], dtype=np.int64
+        )
+        """Objects that a joint lets move"""
+        self._model = model
+        self._geoms = [thing.geoms for thing in scene.objects]
+        self._start = scene.data.geom_xpos.copy(), scene.data.geom_xmat.reshape(-1, 3, 3).copy()
+
+    def link_shapes(self) -> Iterator[Shape]:
+        """Of the robot, in the frames of its bodies."""
+        model, owners = self._model, {int(body): index for index, body in enumerate(self.bodies)}
+        for geom in self._link_geoms:
+            owner = owners[int(model.geom_bodyid[geom])]
+            yield self._shape(int(geom), owner, True, model.geom_pos[geom], model.geom_quat[geom])
+
+    def object_shapes(self, index: int) -> Iterator[Shape]:
+        """Of one object, in the frame of its first geom; whatever joints it has inside count as they stood at first."""
+        positions_m, rotations = self._start
+        first = self._geoms[index][0]
+        yield self._shape(first, index, False, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+        for geom in self._geoms[index][1:]:
+            position_m = rotations[first].T @ (positions_m[geom] - positions_m[first])
+            turned = Rotation.from_matrix(rotations[first].T @ rotations[geom]).as_quat(scalar_first=True)
+            yield self._shape(geom, index, False, position_m, turned)
+
+    def _shape(self, geom: int, owner: int, of_robot: bool, position_m: FloatArray, quaternion: FloatArray) -> Shape:
+        model = self._model
+        pose = (*position_m.tolist(), *quaternion.tolist())
+        color = tuple(_color(model, geom).tolist())
+        number = int(model.geom_type[geom])
+        kind = _KINDS.get(GeomKind(number)) if number in set(GeomKind) else "box"
+        if kind is not None:
+            size = model.geom_aabb[geom, 3:] if number not in set(GeomKind) else model.geom_size[geom]
+            known = _SIZES[kind]
+            size_m = tuple(size[:known].tolist() + [0.0] * (3 - known))
+            return Shape(owner, of_robot, kind, size_m, pose, color)
+        vertices_m, triangles = (
+            height_field_surface(model, geom)
+            if number == GeomKind.HFIELD
+            else (mesh_vertices(model, geom), mesh_triangles(model, geom))
+        )
+        return Shape(
+            *(owner, of_robot, "mesh", (1.0, 1.0, 1.0), pose, color),
+            vertices_m=vertices_m.astype("<f4").tobytes(),
+            triangles=triangles.astype("<u4").tobytes(),
+        )
+
+
+def bytes_of(shape: Shape) -> int:
+    """How much a shape takes in a message, at most."""
+    return len(shape.vertices_m) + len(shape.triangles) + 160
+
+
+def _color(model: Any, geom: int) -> FloatArray:
+    material = int(model.geom_matid[geom])
+    color: FloatArray = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
+    return color.astype(np.float64)

@@ -1,0 +1,94 @@
+"""From where the two views of §4.3 are seen: the model's own cameras, or places that any arm has."""
+
+import numpy as np
+
+from common.arrays import FloatArray
+from common.protocol.view_messages import ViewName
+from robot_side.drivers.mujoco.scene import Scene
+from robot_side.viewing.exchange import Triple, Viewpoint
+
+_OVERVIEW = "overview"
+_DOWN_DEG, _ASIDE_DEG = 55.0, 20.0
+"""The overview looks down over the arm's shoulder, so that ahead is up and the arm hides little."""
+_SHORTEST_REACH_M = 0.3
+_LEAST_ALONG = 0.5
+"""Cosine: a camera that looks within 60° of the approach sees what is ahead."""
+_CLEARANCE_M = 0.05
+_WIDE_DEG = 70.0
+
+
+def viewpoints(scene: Scene) -> dict[ViewName, Viewpoint]:
+    """Both, for a scene at its start."""
+    return {"overview": _overview(scene), "first_person": _first_person(scene)}
+
+
+def _overview(scene: Scene) -> Viewpoint:
+    model, data, robot = scene.model, scene.data, scene.robot
+    for camera in range(model.ncam):
+        if model.camera(camera).name.rpartition("/")[2] == _OVERVIEW:
+            return Viewpoint(camera=camera)
+    base_m, tool_m = data.xpos[robot.root_body], data.site_xpos[robot.site]
+    ahead = (tool_m - base_m)[:2]
+    reach_m = max(float(np.linalg.norm(tool_m - base_m)), _SHORTEST_REACH_M)
+    yaw = np.arctan2(ahead[1], ahead[0]) if np.linalg.norm(ahead) > 0.05 * reach_m else 0.0
+    looked_at_m = np.array([*tool_m[:2], 0.5 * (base_m[2] + tool_m[2])])
+    looked_at_m[:2] += 0.1 * reach_m * np.array([np.cos(yaw), np.sin(yaw)])
+    down, around = np.radians(_DOWN_DEG), yaw + np.radians(_ASIDE_DEG)
+    across = np.array([np.cos(around), np.sin(around), 0.0])
+    forward = np.cos(down) * across - np.sin(down) * np.array([0.0, 0.0, 1.0])
+    up = np.sin(down) * across + np.cos(down) * np.array([0.0, 0.0, 1.0])
+    return Viewpoint(
+        position_m=_triple(looked_at_m - 2.3 * reach_m * forward), forward=_triple(forward), up=_triple(up)
+    )
+
+
+def _first_person(scene: Scene) -> Viewpoint:
+    """The gripper's own camera, else one behind the palm and beside it, where fingers that close do not hide it."""
+    model, data, robot = scene.model, scene.data, scene.robot
+    tool_m, tool = data.site_xpos[robot.site], data.site_xmat[robot.site].reshape(3, 3)
+    carriers = {int(model.site_bodyid[robot.site]), *model.geom_bodyid[robot.gripper_geoms].tolist()}
+    for camera in range(model.ncam):
+        # A camera looks along its own -z.
+        looks_ahead = -data.cam_xmat[camera].reshape(3, 3)[:, 2] @ tool[:, 2] > _LEAST_ALONG
+        if looks_ahead and int(model.cam_bodyid[camera]) in carriers:
+            return Viewpoint(camera=camera)
+    low_m, high_m = _extent(scene, tool_m, tool)
+    # On the gripper's thin side: fingers close along the wide one.
+    axis = int(np.argmin((high_m - low_m)[:2]))
+    side = 1.0 if tool[2, axis] >= 0.0 else -1.0
+    aside_m = max(abs(high_m[axis] if side > 0.0 else low_m[axis]), 0.02) + _CLEARANCE_M
+    up = np.zeros(3)
+    up[axis] = side
+    length_m = max(float(-low_m[2]), 0.05)
+    place_m = aside_m * up - np.array([0.0, 0.0, 1.6 * length_m])
+    # Towards a point that is as far ahead as the palm is behind, so that fingers and what is ahead are seen alike.
+    forward = np.array([0.0, 0.0, length_m]) - place_m
+    forward /= np.linalg.norm(forward)
+    up -= (up @ forward) * forward
+    up /= np.linalg.norm(up)
+    body = int(model.site_bodyid[robot.site])
+    rotation = data.xmat[body].reshape(3, 3)
+    return Viewpoint(
+        body=body,
+        position_m=_triple(rotation.T @ (tool_m + tool @ place_m - data.xpos[body])),
+        forward=_triple(rotation.T @ tool @ forward),
+        up=_triple(rotation.T @ tool @ up),
+        fovy_deg=_WIDE_DEG,
+    )
+
+
+def _extent(scene: Scene, tool_m: FloatArray, tool: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The lowest and highest corner (3,) of a box around the gripper's geoms, in the tool's frame."""
+    model, data, geoms = scene.model, scene.data, scene.robot.gripper_geoms
+    if geoms.size == 0:
+        return np.full(3, -0.05), np.full(3, 0.05)
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
+    corners = model.geom_aabb[geoms, None, :3] + signs * model.geom_aabb[geoms, None, 3:]
+    in_world = data.geom_xpos[geoms, None] + np.einsum("gij,gcj->gci", data.geom_xmat[geoms].reshape(-1, 3, 3), corners)
+    seen = ((in_world - tool_m) @ tool).reshape(-1, 3)
+    return seen.min(axis=0), seen.max(axis=0)
+
+
+def _triple(values: FloatArray) -> Triple:
+    x, y, z = values.tolist()
+    return (x, y, z)

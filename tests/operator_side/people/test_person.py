@@ -1,0 +1,331 @@
+"""The scripted person alone: hand-made views of a robot that is not there, and what the hands do."""
+
+import dataclasses
+import math
+
+import pytest
+
+from common.protocol.messages import Telemetry, Vector3
+from operator_side.dualsense.effects.official import Off
+from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
+from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, Color, OutputReport, Rumble
+from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
+from operator_side.people.person import FULL_STICK_M_S, FULL_TRIGGER_M_S, GENTLY_M_S
+from operator_side.people.settings import PersonSettings
+from tests.helpers.felt import feedback
+from tests.helpers.simulated_desk import (
+    CALIBRATION,
+    CLEAR_SIGHTED,
+    FRAME_S,
+    GRASP_M,
+    TICK_S,
+    VIEW,
+    Desk,
+    Hands,
+    armed,
+    crossover,
+    habitual_force_n,
+    view,
+)
+
+# Seeing
+
+
+@pytest.mark.parametrize("reaction_s", [0.0, 0.1, 0.25, 0.5])
+def test_nothing_is_answered_before_the_reaction_time(reaction_s: float) -> None:
+    settings = PersonSettings(depth_error_sd_m=0.0, visual_reaction_s=reaction_s)
+    desk = Desk(settings)
+    desk.arm(armed(None))
+    desk.watch(armed(None), 1.0)
+    assert desk.hands[-1].r2_n == 0.0
+    appeared_s = desk.now_s
+    seen = desk.watch(armed((0.0, 0.0, 0.2)), 1.0)
+    acted_s = next(hands.now_s for hands in seen if hands.r2_n > 0.0)
+    assert reaction_s - 1e-9 <= acted_s - appeared_s <= reaction_s + TICK_S
+
+
+# The phases
+
+UP_AT_M = 0.41
+"""Where a thing that was gripped with the tool at 0.3 m is carried."""
+
+
+def at_height(height_m: float, back_m: float = 0.44, *, holding: bool = True) -> Telemetry:
+    return armed(holding=holding, tool_position_m=(back_m, 0.0, height_m))
+
+
+def carried(settings: PersonSettings = CLEAR_SIGHTED) -> Desk:
+    """Up to where the person begins to lower what they hold."""
+    desk = Desk(settings)
+    desk.arm()
+    desk.until("lift", armed(holding=True), 3.0)
+    desk.until("carry", at_height(UP_AT_M, 0.5), 1.0)
+    desk.until("lower", at_height(UP_AT_M), 1.0)
+    return desk
+
+
+def sinks(desk: Desk, from_m: float, to_m: float, speed_m_s: float) -> None:
+    """The screen shows the tool sinking."""
+    height_m = from_m
+    while height_m > to_m:
+        desk.watch(at_height(height_m), FRAME_S)
+        height_m -= speed_m_s * FRAME_S
+
+
+def stick_speed_m_s(hands: Hands) -> float:
+    """Downwards."""
+    return -FULL_STICK_M_S * CALIBRATION.left_stick.deflection(hands.left)[1]
+
+
+def test_the_task_from_waiting_to_withdrawing() -> None:
+    desk = Desk(start_s=1e6)
+    for hands in desk.watch(None, 0.5):
+        assert (hands.l2_n, hands.r2_n, hands.left, hands.buttons) == (0.0, 0.0, (0.0, 0.0), frozenset({Button.L1}))
+        assert hands.phase == "wait"
+    # The first picture takes a reaction time, and resting the hands as long as arming asks for.
+    assert 0.7 < desk.until("arm", VIEW, 3.0) < 1.3
+    assert all(hands.buttons == {Button.L1, Button.OPTIONS} for hands in desk.watch(VIEW, 0.1))
+    desk.until("advance", armed((0.0, 0.0, 0.3)), 0.5)
+    assert desk.watch(armed((0.0, 0.0, 0.3)), 1.0)[-1].r2_n > 0.0
+    assert desk.person.doing == "advancing"
+    desk.until("close", armed(), 0.5)
+    closing = desk.watch(armed(), 0.2)
+    assert all(Button.CROSS in hands.buttons for hands in closing)
+    assert closing[-1].r2_n == closing[-1].l2_n == 0.0
+    desk.until("lift", armed(holding=True), 1.0)
+    desk.watch(armed(holding=True), 1.0)
+    # They carry it back, level, and no farther than they meant.
+    desk.until("carry", at_height(UP_AT_M, 0.5), 0.5)
+    back = desk.watch(at_height(UP_AT_M, 0.5), 0.5)[-1]
+    assert (back.l2_n > 0.0, back.r2_n, back.left, Button.CROSS in back.buttons) == (True, 0.0, (0.0, 0.0), True)
+    assert 0.0 < desk.watch(at_height(UP_AT_M, 0.46), 1.0)[-1].l2_n < back.l2_n
+    desk.until("lower", at_height(UP_AT_M), 0.5)
+    # What sags before it is lowered does not stand yet.
+    sinks(desk, UP_AT_M, UP_AT_M - 0.004, 0.01)
+    lowering = desk.watch(at_height(UP_AT_M - 0.004), 1.0)[-1]
+    assert lowering.phase == "lower"
+    assert stick_speed_m_s(lowering) == pytest.approx(0.05, abs=1e-6)
+    sinks(desk, UP_AT_M, 0.32, 0.05)
+    assert desk.person.phase == "lower"
+    desk.until("release", at_height(0.32), 1.0)
+    assert all(hands.buttons == {Button.L1, Button.SQUARE} for hands in desk.watch(at_height(0.32), 0.5)[1:])
+    # Out of where they have pressed it down, before they draw back.
+    rising = desk.watch(at_height(0.32, holding=False), 1.0)[-1]
+    assert (rising.phase, stick_speed_m_s(rising) < 0.0) == ("release", True)
+    desk.until("withdraw", at_height(0.335, holding=False), 0.5)
+    assert desk.watch(at_height(0.335, holding=False), 0.5)[-1].l2_n > 0.0
+    desk.until("done", at_height(0.335, 0.33, holding=False), 0.5)
+    for hands in desk.watch(at_height(0.335, 0.33, holding=False), 1.0):
+        assert (hands.l2_n, hands.r2_n, hands.left, hands.buttons) == (0.0, 0.0, (0.0, 0.0), frozenset({Button.L1}))
+    assert all(Button.L1 in hands.buttons and hands.right == (0.0, 0.0) for hands in desk.hands)
+
+
+@pytest.mark.parametrize("trust", [0.0, 1.0])
+def test_who_believes_what_rumbles_lowers_gently_a_reaction_later_and_until_it_stands(trust: float) -> None:
+    desk = carried(dataclasses.replace(CLEAR_SIGHTED, trust=trust))
+    sinks(desk, UP_AT_M, 0.38, 0.05)
+    desk.tell(OutputReport(rumble=Rumble(left=0.25)))
+    felt_s = desk.now_s
+    sinks(desk, 0.38, 0.35, 0.05)
+    eased = [h.now_s for h in desk.hands if h.now_s >= felt_s and stick_speed_m_s(h) < 1.01 * GENTLY_M_S]
+    assert bool(eased) == bool(trust)
+    assert all(eased_s - felt_s > 0.15 for eased_s in eased)
+    # It stays gentle, as what was felt is still there.
+    desk.tell(OutputReport(rumble=Rumble()))
+    assert (stick_speed_m_s(desk.watch(at_height(0.35), 0.3)[-1]) < 1.01 * GENTLY_M_S) == bool(trust)
+
+
+@pytest.mark.parametrize("state", ["disarmed", "stopped"])
+def test_a_robot_that_stopped_makes_them_let_go_and_begin_anew(state: str) -> None:
+    desk = Desk()
+    desk.arm()
+    assert desk.watch(armed((0.0, 0.0, 0.3)), 1.0)[-1].r2_n > 0.0
+    stopped = desk.watch(view(state=state), 1.0)
+    assert [hands.r2_n == 0.0 for hands in stopped].index(True) * TICK_S == pytest.approx(0.25, abs=2 * TICK_S)
+    assert stopped[-1].phase == "wait"
+    desk.until("arm", view(state=state), 2.0)
+
+
+# Steering
+
+
+@pytest.mark.parametrize(("depth_m", "trigger"), [(0.05, "r2_n"), (0.2, "r2_n"), (-0.03, "l2_n"), (-0.3, "l2_n")])
+@pytest.mark.parametrize(("delay_s", "adapts"), [(0.0, True), (0.2, True), (1.0, True), (1.0, False)])
+def test_they_pull_as_far_as_distance_and_delay_ask_for(
+    depth_m: float, trigger: str, delay_s: float, adapts: bool
+) -> None:
+    desk = Desk(dataclasses.replace(CLEAR_SIGHTED, adapts_to_delay=adapts))
+    desk.arm()
+    pulled = desk.watch(armed((0.0, 0.0, depth_m - GRASP_M)), 1.0, delay_s)[-1]
+    meant = min(1.0, crossover(0.25 + adapts * delay_s) * abs(depth_m) / FULL_TRIGGER_M_S)
+    assert getattr(pulled, trigger) == pytest.approx(habitual_force_n(meant))
+    assert min(pulled.l2_n, pulled.r2_n) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("across_m", "direction"),
+    [((0.05, 0.0), (1.0, 0.0)), ((-0.05, 0.0), (-1.0, 0.0)), ((0.0, 0.05), (0.0, -1.0)), ((0.0, -0.05), (0.0, 1.0))],
+)
+def test_the_stick_goes_to_where_the_target_is_seen(
+    across_m: tuple[float, float], direction: tuple[float, float]
+) -> None:
+    """The tool's y axis points down the screen, the stick's up."""
+    desk = Desk()
+    desk.arm()
+    hands = desk.watch(armed((*across_m, 0.2)), 1.0)[-1]
+    length = math.hypot(*hands.left)
+    assert length > CALIBRATION.left_stick.dead_zone
+    assert (hands.left[0] / length, hands.left[1] / length) == pytest.approx(direction)
+    # So far off the line they centre first.
+    assert hands.r2_n == 0.0
+
+
+def test_they_close_only_when_the_target_is_in_line_and_in_reach() -> None:
+    for place, closes in (((0.0, 0.0, 0.0), True), ((0.0, 0.0, 0.05), False), ((0.02, 0.0, 0.0), False)):
+        desk = Desk()
+        desk.arm()
+        x, y, z = place
+        desk.watch(armed((x, y, z - GRASP_M)), 1.0)
+        assert (desk.person.phase == "close") is closes
+
+
+@pytest.mark.parametrize("up", [(0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.6, 0.0, -0.8)])
+def test_lifting_goes_up_whichever_way_the_tool_points(up: Vector3) -> None:
+    desk = Desk()
+    desk.arm()
+    screen = armed(holding=True, up_in_tool=up)
+    desk.until("lift", screen, 3.0)
+    hands = desk.watch(screen, 1.0)[-1]
+    x, y = CALIBRATION.left_stick.deflection(hands.left)
+    # Right, down and forward of the tool frame, each as a share of its full speed.
+    assert (x, -y) == pytest.approx((0.5 * up[0], 0.5 * up[1]), abs=1e-9)
+    for side, force_n in ((1, hands.r2_n), (-1, hands.l2_n)):
+        meant = max(0.0, 0.5 * side * up[2])
+        assert force_n == pytest.approx(habitual_force_n(meant) if meant > 0.0 else 0.0)
+    assert Button.CROSS in hands.buttons
+
+
+# Trying again and giving up
+
+
+def test_between_attempts_they_open_and_draw_back_and_in_the_end_they_give_up() -> None:
+    desk = Desk(dataclasses.replace(CLEAR_SIGHTED, attempts=2))
+    desk.arm()
+    desk.until("retreat", armed(), 5.0)
+    for hands in desk.watch(armed(), 0.5)[1:]:
+        assert hands.buttons == {Button.L1, Button.SQUARE}
+        assert hands.l2_n >= habitual_force_n(0.4)
+        assert hands.r2_n == 0.0
+    assert desk.until("advance", armed(), 1.0) == pytest.approx(0.5, abs=3 * TICK_S)
+    desk.until("done", armed(), 12.0)
+    phases = [hands.phase for hands in desk.hands]
+    assert sum(pair == ("close", "advance") for pair in zip(phases[1:], phases, strict=False)) == 2
+    assert {hands.buttons for hands in desk.watch(armed(), 3.0)[1:]} == {frozenset({Button.L1})}
+
+
+# Feeling
+
+
+UNMOVED = dataclasses.replace(CLEAR_SIGHTED, trust=0.0)
+"""Feels mechanics alone: believes no cue."""
+STIFF = feedback(0, 8)
+TOWARDS = armed((0.0, 0.0, 0.06))
+MEANT = crossover(0.25) * (0.06 + GRASP_M) / FULL_TRIGGER_M_S
+
+
+@pytest.mark.parametrize(
+    ("strength", "noticeable", "eases"), [(0, 0.07, False), (1, 0.07, True), (8, 0.07, True), (1, 0.5, False)]
+)
+def test_who_notices_and_believes_a_stiffer_trigger_eases_off_a_reaction_later(
+    strength: int, noticeable: float, eases: bool
+) -> None:
+    desk = Desk(dataclasses.replace(CLEAR_SIGHTED, noticeable_force=noticeable))
+    desk.arm()
+    desk.watch(TOWARDS, 1.0)
+    force_n, felt_s = desk.hands[-1].r2_n, desk.now_s
+    desk.resist(feedback(0, strength) if strength else Off())
+    eased = [hands.now_s for hands in desk.watch(TOWARDS, 0.6) if hands.r2_n < force_n]
+    assert bool(eased) is eases
+    if eased:
+        assert 0.15 < eased[0] - felt_s < 0.5
+        assert desk.hands[-1].r2_n == pytest.approx(habitual_force_n(GENTLY_M_S / FULL_TRIGGER_M_S))
+
+
+PULSE = OutputReport(rumble=Rumble(left=1.0, right=0.7))
+
+
+@pytest.mark.parametrize(("trust", "light"), [(1.0, USUAL_LIGHT), (0.0, USUAL_LIGHT), (1.0, WARNING_LIGHT)])
+def test_who_feels_the_pulse_of_what_stands_lets_go_a_reaction_later(trust: float, light: Color) -> None:
+    desk = carried(dataclasses.replace(CLEAR_SIGHTED, trust=trust))
+    desk.watch(at_height(UP_AT_M), 0.5)
+    desk.tell(dataclasses.replace(PULSE, lightbar=light))
+    seen = desk.watch(at_height(UP_AT_M), 0.08)
+    desk.tell(OutputReport(rumble=Rumble()))
+    seen += desk.watch(at_height(UP_AT_M), 0.5)
+    let_go = [step * TICK_S for step, hands in enumerate(seen) if Button.SQUARE in hands.buttons]
+    assert bool(let_go) is (trust == 1.0 and light == USUAL_LIGHT)
+    if let_go:
+        assert 0.15 < let_go[0] < 0.5
+        assert seen[-1].left == (0.0, 0.0)
+
+
+def test_a_target_that_comes_no_nearer_is_taken_for_as_near_as_it_gets() -> None:
+    desk = Desk(UNMOVED)
+    desk.arm()
+    desk.resist(STIFF)
+    assert 2.5 < desk.until("close", armed((0.0, 0.0, 0.03)), 4.0) < 3.5
+
+
+def test_at_the_warning_light_they_rest_their_hands_and_go_on_a_moment_after_it() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.watch(TOWARDS, 1.0)
+    desk.tell(OutputReport(lightbar=WARNING_LIGHT))
+    for hands in desk.watch(TOWARDS, 1.0):
+        assert (hands.l2_n, hands.r2_n, hands.left) == (0.0, 0.0, (0.0, 0.0))
+        assert hands.buttons == {Button.L1}
+    desk.tell(OutputReport(lightbar=USUAL_LIGHT))
+    pulled = [hands.r2_n > 0.0 for hands in desk.watch(TOWARDS, 1.0)]
+    assert pulled.index(True) * TICK_S == pytest.approx(0.5, abs=2 * TICK_S)
+    assert all(pulled[pulled.index(True) :])
+
+
+# Moving and waiting
+
+
+def test_who_moves_and_waits_moves_as_far_as_it_is_and_looks_again_only_after_the_delay() -> None:
+    desk = Desk(dataclasses.replace(CLEAR_SIGHTED, aiming="move-and-wait"))
+    desk.arm(armed((0.0, 0.0, 0.2)))
+    delay_s, seen = 0.4, desk.watch(armed((0.0, 0.0, 0.2)), 6.0, 0.4)
+    pulled = [hands.r2_n > 0.0 for hands in seen]
+    first, ends = pulled.index(True), pulled.index(False, pulled.index(True))
+    again = pulled.index(True, ends)
+    assert (again - ends) * TICK_S == pytest.approx(delay_s + 0.25, abs=0.1)
+    # The way of a minimum-jerk move, by what was meant and not by where a finger with its own time constant is.
+    meant = [habitual_travel(hands.r2_n) * FULL_TRIGGER_M_S * TICK_S for hands in seen[first:ends]]
+    assert sum(meant) == pytest.approx(0.2 + GRASP_M, rel=0.02)
+
+
+# Chance
+
+
+def habitual_travel(force_n: float) -> float:
+    """What a free trigger's calibrated travel is at that force."""
+    return (
+        0.0 if force_n == 0.0 else CALIBRATION.r2.travel((force_n - SPRING_PRELOAD_N) / SPRING_RISE_N / SENSED_TRAVEL)
+    )
+
+
+def test_misjudged_distances_spread_as_they_are_said_to() -> None:
+    errors_m = []
+    for seed in range(60):
+        desk = Desk(PersonSettings(depth_error_sd_m=0.01, grasp_depth_m=GRASP_M), seed)
+        desk.arm()
+        force_n = desk.watch(armed((0.0, 0.0, 0.1)), 0.3)[-1].r2_n
+        free = ((force_n - SPRING_PRELOAD_N) / SPRING_RISE_N) / SENSED_TRAVEL
+        errors_m.append(CALIBRATION.r2.travel(free) * FULL_TRIGGER_M_S / crossover(0.25) - 0.1 - GRASP_M)
+    mean = sum(errors_m) / 60
+    sd = math.sqrt(sum((error - mean) ** 2 for error in errors_m) / 59)
+    # Three standard errors.
+    assert abs(mean) < 3 * 0.01 / math.sqrt(60)
+    assert sd == pytest.approx(0.01, rel=3 / math.sqrt(2 * 59))

@@ -1,0 +1,68 @@
+"""Which commands leave: what the robot side holds is what the hands mean, within what no finger does on purpose."""
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from common.silence import LONGEST_HELD_S, MOTION_PERIOD_S
+from operator_side.hands.intent import OperatorIntent
+from operator_side.robot_link.commanding import STOPPING, HeldCommand
+from robot_side.operators.safety import SafetySettings
+
+REST = replace(STOPPING, emergency_stop=False, run=True)
+travel, stick = st.floats(0.0, 1.0), st.floats(-1.0, 1.0)
+intents = st.builds(
+    lambda l2, r2, lateral, turning, run: replace(REST, l2=l2, r2=r2, lateral=lateral, turning=turning, run=run),
+    *(travel, travel, st.tuples(stick, stick), st.tuples(stick, stick), st.booleans()),
+)
+
+
+def moved(intent: OperatorIntent) -> tuple[float, ...]:
+    return (intent.l2, intent.r2, *intent.lateral, *intent.turning)
+
+
+@given(st.lists(st.tuples(intents | st.just(REST), st.integers(1, 12), st.floats(-0.005, 0.005)), max_size=12))
+@settings(max_examples=100)
+def test_what_is_held_is_what_is_meant(steps: Any) -> None:
+    held = HeldCommand()
+    known, known_s, now_s = None, 0.0, 0.0
+    for meant, turns, drift in steps:
+        for turn in range(turns):
+            now_s += MOTION_PERIOD_S
+            intent = replace(meant, r2=min(max(meant.r2 + turn * drift, 0.0), 1.0))
+            if held.due(intent, 7, now_s) is not None:
+                known, known_s = intent, now_s
+            assert known is not None
+            assert known.run == intent.run
+            assert max(abs(a - b) for a, b in zip(moved(known), moved(intent), strict=True)) <= 0.01
+            assert any(moved(intent)) or not any(moved(known))
+            assert now_s - known_s < LONGEST_HELD_S - 1e-9
+
+
+def test_a_hand_that_holds_still_is_heard_every_16_ms_and_at_full_rate_each_time() -> None:
+    for full_rate, period_s in ((False, LONGEST_HELD_S), (True, MOTION_PERIOD_S)):
+        held = HeldCommand(full_rate=full_rate)
+        sent = [turn * MOTION_PERIOD_S for turn in range(250) if held.due(REST, 7, turn * MOTION_PERIOD_S) is not None]
+        assert [later - earlier for earlier, later in pairwise(sent)] == pytest.approx([period_s] * (len(sent) - 1))
+
+
+def test_five_commands_of_resting_hands_may_come_late_before_the_robot_side_stops_the_arm() -> None:
+    """So many connections next to each other may each wait for a lost packet; a turn may be late by 3 ms."""
+    held = HeldCommand()
+    sent = [turn * MOTION_PERIOD_S for turn in range(250) if held.due(REST, 7, turn * MOTION_PERIOD_S) is not None]
+    gap_s = SafetySettings().gap_s
+    assert all(later - earlier < gap_s - 0.003 for earlier, later in zip(sent, sent[6:], strict=False))
+
+
+def test_what_nobody_holds_any_more_is_said_again_everywhere() -> None:
+    held = HeldCommand()
+    assert held.due(REST, 7, 0.0) is not None
+    assert held.due(REST, 7, 0.004) is None
+    held.forget()
+    said = held.due(REST, 7, 0.008)
+    assert said is not None
+    assert said.everywhere

@@ -1,0 +1,289 @@
+"""The console as a process: its gate from outside, what a page of it gets, and its ends."""
+
+import asyncio
+import os
+import signal
+import socket
+import struct
+import urllib.error
+import urllib.request
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
+from websockets.typing import Origin, Subprotocol
+
+from common.clock import MonotonicClock
+from common.protocol.codec import encode
+from common.protocol.messages import Header
+from common.protocol.view_messages import VIEW_NAMES, VideoStep
+from operator_side.viewing.console.console import Console
+from operator_side.viewing.console.pages import MOST_PAGES, ROUND_ENDS
+from tests.helpers.repository import ROOT
+from tests.operator_side.console_feed import OBJECTS, Feed
+
+pytestmark = pytest.mark.processes
+LIMIT_S = 60.0
+CLOCK = MonotonicClock()
+
+
+@pytest.fixture(scope="module")
+def started() -> Iterator[Console]:
+    with Console("a test") as console:
+        until(console, lambda: console.address is not None)
+        yield console
+
+
+@pytest.fixture
+def console(started: Console) -> Console:
+    until(started, lambda: started.pages == 0)
+    started.words.clear()
+    return started
+
+
+def until(console: Console, so: Callable[[], bool], feed: Feed | None = None) -> None:
+    end_s = CLOCK.now() + LIMIT_S
+    while not so():
+        assert CLOCK.now() < end_s, console.take_notes()
+        (console.receive if feed is None else lambda: feed.step(CLOCK.now()))()
+
+
+def address_of(console: Console) -> str:
+    assert console.address is not None
+    return console.address
+
+
+def status_of(address: str, **headers: str) -> int:
+    try:
+        with urllib.request.urlopen(urllib.request.Request(address, headers=headers)) as answer:  # noqa: S310
+            return int(answer.status)
+    except urllib.error.HTTPError as refused:
+        return refused.code
+
+
+def page(console: Console, place: str = "live") -> connect:
+    address = address_of(console)
+    protocols = [Subprotocol(f"viser-v{viser.__version__}")] if place == "scene" else None
+    ours = Origin("http://" + urlsplit(address).netloc)
+    return connect(address.replace("http", "ws") + place, origin=ours, subprotocols=protocols)
+
+
+async def fed(console: Console, feed: Feed | None, ends: asyncio.Event) -> None:
+    while not ends.is_set():
+        if feed is None:
+            console.receive()
+        else:
+            feed.step(CLOCK.now())
+        await asyncio.sleep(0.002)
+
+
+def test_steps_become_pictures_and_a_gap_is_told(console: Console) -> None:
+    pytest.importorskip("av", reason="needs the extra `video`")
+    from robot_side.viewing.h264 import H264  # noqa: PLC0415  # only now it is known to be there
+
+    encoder, gray = H264(), np.full((48, 64, 3), 128, np.uint8)
+
+    def step(*, whole: bool = False) -> bytes:
+        content, is_whole = encoder.encode(gray, 75, whole=whole)
+        place = Header(1, 2, 3.0), "first_person", 1.5, 64, 48
+        return encode(VideoStep(*place, encoder.number, is_whole, content))  # type: ignore[arg-type]
+
+    async def story() -> None:
+        ends = asyncio.Event()
+        feeding = asyncio.create_task(fed(console, None, ends))
+        async with asyncio.timeout(LIMIT_S), page(console) as opened:
+            while console.pages == 0 or console.lacks is None:
+                await asyncio.sleep(0.002)
+            assert console.lacks == (0, 0)
+            for lost, whole, lacks in ((False, False, 0), (True, False, 0), (False, False, 3), (False, True, 0)):
+                payload = step(whole=whole)
+                if lost:
+                    continue
+                console.view(payload, video=True)
+                while console.lacks != (0, lacks):
+                    await asyncio.sleep(0.002)
+                while lacks == 0:
+                    message = await opened.recv()
+                    if message == ROUND_ENDS:
+                        await opened.send('{"taken":true}')
+                    elif isinstance(message, bytes):
+                        assert struct.unpack_from("<Bd", message) == (1, 1.5)
+                        assert message[9:11] == b"\xff\xd8"
+                        break
+        ends.set()
+        await feeding
+
+    asyncio.run(story())
+
+
+def test_the_gate_keeps_out_who_is_not_ours(console: Console) -> None:
+    address = address_of(console)
+    parts = urlsplit(address)
+    here, token = f"http://{parts.netloc}", parts.path.strip("/")
+    assert (parts.hostname, len(token) >= 32) == ("127.0.0.1", True)
+    assert [status_of(address + place) for place in ("", "app.js", "style.css", "scene/")] == [200] * 4
+    assert status_of(address, Origin=here) == 200
+    assert status_of(address.replace("127.0.0.1", "localhost")) == 200
+    refused = [f"{here}/", f"{here}/scene/", f"{here}/{token[:-1]}/", f"{here}/{token}", f"{address}../scene/"]
+    tricks = ("live", "gate.py", "../gate.py", "..%2fgate.py", "scene/..%2f..%2f_viser.py")
+    refused += [address + trick for trick in tricks]
+    assert {status_of(place) for place in refused} == {404}
+    for headers in ({"Origin": "http://example.com"}, {"Origin": "null"}, {"Host": "example.com"}):
+        assert status_of(address, **headers) == status_of(address + "scene/", **headers) == 404
+
+
+def test_pages_get_facts_pictures_and_the_scene_as_they_are_fed(console: Console) -> None:
+    async def watch(opened: ClientConnection) -> tuple[Counter[str], dict[str, object]]:
+        counts: Counter[str] = Counter()
+        newest: dict[str, object] = {}
+        # As many of each as come in a second and more.
+        while min(counts[kind] for kind in ("facts", "scene", *VIEW_NAMES)) < 40:
+            message = await opened.recv()
+            if isinstance(message, bytes):
+                view, _ = struct.unpack_from("<Bd", message)
+                counts[VIEW_NAMES[view]] += 1
+                assert message[9:11] == b"\xff\xd8"
+            else:
+                said = msgspec.json.decode(message)
+                counts[said["kind"]] += 1
+                newest[said["kind"]] = said
+                if message == ROUND_ENDS:
+                    await opened.send('{"taken":true}')
+        return counts, newest
+
+    async def story() -> None:
+        ends = asyncio.Event()
+        feeding = asyncio.create_task(fed(console, Feed(console), ends))
+        async with asyncio.timeout(LIMIT_S), page(console) as first, page(console) as second:
+            for counts, newest in await asyncio.gather(watch(first), watch(second)):
+                assert counts["run"] == 1
+                facts, scene = newest["facts"], newest["scene"]
+                assert isinstance(facts, dict)
+                assert isinstance(scene, dict)
+                assert (facts["view"]["phase"], facts["facts"]["advancing"]) == ("advancing", "R2")
+                assert {row["name"] for row in scene["objects"]} <= set(OBJECTS)
+            assert console.pages == 2
+            await first.send('{"hands": {"Space": true}}')
+            while not console.words:
+                await asyncio.sleep(0.002)
+            assert console.words.popleft()[1] == {"hands": {"Space": True}}
+        while console.pages:
+            await asyncio.sleep(0.002)
+        ends.set()
+        await feeding
+
+    asyncio.run(story())
+
+
+def test_the_hands_of_a_console_that_is_killed_are_gone_and_the_run_goes_on() -> None:
+    async def story(console: Console) -> None:
+        ends = asyncio.Event()
+        feeding = asyncio.create_task(fed(console, None, ends))
+        async with asyncio.timeout(LIMIT_S), page(console) as first, page(console):
+            await first.send('{"hands": {"Space": true}}')
+            while not console.words:
+                await asyncio.sleep(0.002)
+            assert console.words.popleft()[1] == {"hands": {"Space": True}}
+            os.kill(console.process_id, signal.SIGKILL)
+            while not console.gone:
+                await asyncio.sleep(0.002)
+        ends.set()
+        await feeding
+
+    with Console("a test") as console:
+        until(console, lambda: console.address is not None)
+        asyncio.run(story(console))
+        assert list(console.words) == [(1, None)]
+        assert (console.pages, console.address) == (0, None)
+        assert console.take_notes() == ["the console has ended; the run goes on without it"]
+        feed = Feed(console)
+        for _ in range(100):
+            feed.step(CLOCK.now())
+        console.note("to nobody")
+        assert (console.take_notes(), console.pages) == ([], 0)
+
+
+def test_a_message_that_is_too_large_ends_its_page_alone(console: Console) -> None:
+    async def story() -> None:
+        ends = asyncio.Event()
+        feeding = asyncio.create_task(fed(console, None, ends))
+        async with asyncio.timeout(LIMIT_S), page(console) as greedy, page(console) as modest:
+            await greedy.send('{"hands": {"x": "' + "x" * 100_000 + '"}}')
+            await greedy.wait_closed()
+            assert greedy.close_code == 1009
+            await modest.send('{"tune": {"probability": 0.5}}')
+            while not console.words:
+                await asyncio.sleep(0.002)
+        ends.set()
+        await feeding
+
+    asyncio.run(story())
+    assert [said for _, said in console.words if said is not None] == [{"tune": {"probability": 0.5}}]
+
+
+def test_no_more_scenes_than_pages_are_drawn_for(console: Console) -> None:
+    async def story() -> None:
+        opened = [await page(console, "scene") for _ in range(MOST_PAGES)]
+        async with asyncio.timeout(LIMIT_S):
+            another = await page(console, "scene")
+            with pytest.raises(ConnectionClosed):
+                await another.recv()
+            for scene in opened:
+                await scene.close()
+
+    asyncio.run(story())
+
+
+def test_it_outlives_ctrl_c_and_ends_with_whoever_feeds_it() -> None:
+    with Console("a test") as console:
+        until(console, lambda: console.address is not None)
+        port = urlsplit(address_of(console)).port
+        os.kill(console.process_id, signal.SIGINT)
+        os.kill(console.process_id, signal.SIGTERM)
+        assert status_of(address_of(console)) == 200
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", port or 0))
+
+
+def notes_of(console: Console) -> list[str]:
+    """What it says first."""
+    with console:
+        until(console, lambda: console.gone)
+        return console.take_notes()
+
+
+def test_a_port_that_is_taken_is_said() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        notes = notes_of(Console("a test", port=port))
+    assert notes == [f"no console: --console-port {port}: Address already in use; valid: 0 for any port that is free"]
+
+
+@pytest.mark.parametrize(
+    ("module", "note"),
+    [
+        (
+            "raise ModuleNotFoundError('No module', name='viser')",
+            "no console: viser is not installed on this machine; valid: pip install 'feelahead[operator]'",
+        ),
+        (
+            # As a viser that opens its server in another way would.
+            "class ViserServer:\n    def __init__(self, **options): pass\n    def get_port(self): return 1\n"
+            "SceneApi = BatchedMeshHandle = LabelHandle = None",
+            "no console: this viser opens its server in another way than viser 1.1 does",
+        ),
+    ],
+)
+def test_without_the_viser_that_we_know_there_is_none_which_is_said(
+    module: str, note: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "viser.py").write_text(module)
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{ROOT}")
+    assert notes_of(Console("a test")) == [note]

@@ -1,0 +1,56 @@
+"""A page of the console that talks, without a browser."""
+
+from collections.abc import Callable
+from typing import Any
+
+from common.protocol.messages import Telemetry
+from operator_side.people.whoever import Whoever
+from operator_side.viewing.pages.driving_page import DrivingPage
+from operator_side.viewing.pages.shared_hands import SharedHands
+
+PERIOD_S = 0.02
+
+
+class TalkingPage:
+    """One page, by its number and its word."""
+
+    def __init__(self, pages: DrivingPage, page: int = 1) -> None:
+        self.pages = pages
+        self.page = page
+        self.word = f"page{page}"
+        self.number = 0
+
+    def content(self, **hands: Any) -> dict[str, Any]:
+        """The next message, as it comes out of JSON."""
+        self.number += 1
+        return {"hands": {"page": self.word, "number": self.number, "driving": True} | hands}
+
+    def say(self, now_s: float, **hands: Any) -> None:
+        self.pages.receive(self.page, self.content(**hands), now_s)
+
+    def go_on(self, now_s: float, for_s: float, **hands: Any) -> float:
+        """Say the same 50 times a second; when the next message is due."""
+        for step in range(round(for_s / PERIOD_S)):
+            self.say(now_s + step * PERIOD_S, **hands)
+        return now_s + round(for_s / PERIOD_S) * PERIOD_S
+
+
+Does = Callable[[float], dict[str, Any] | None]
+"""What the hands at the page do at a time; None says nothing."""
+
+
+class AtThePage:
+    """Whoever has the controller, and somebody at a page who does as told: for whole runs."""
+
+    def __init__(self, page: TalkingPage, whoever: Whoever | SharedHands, does: Does) -> None:
+        self.page = page
+        self.whoever = whoever
+        self.does = does
+        self._next_s = 0.0
+
+    def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
+        if now_s >= self._next_s:
+            self._next_s += PERIOD_S
+            if (hands := self.does(now_s)) is not None:
+                self.page.say(now_s, **hands)
+        self.whoever.tick(now_s, screen, delay_s)

@@ -1,0 +1,161 @@
+"""A browser's hands on a simulated controller, and who has it: the person, the page, or nobody."""
+
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from common.protocol.messages import Telemetry
+from operator_side.dualsense.reports.controller_state import Button, ControllerState
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.output_report import OutputReport
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.hands.intent import OperatorIntent, operator_intent
+from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
+from operator_side.people.pulling_hands import PullingHands, constant_force
+from operator_side.viewing.pages.driving_page import DrivingPage
+from operator_side.viewing.pages.shared_hands import BROWSER, PERSON, SharedHands
+from tests.helpers.felt import feedback
+from tests.helpers.simulated_desk import VIEW, armed
+from tests.operator_side.viewing.pages.talking_page import PERIOD_S, TalkingPage
+
+TICK_S = 0.004
+WORN = TravelCalibration(
+    TriggerTravel(0.2, 0.9), TriggerTravel(0.0, 0.7), StickRest(0.1, -0.05, 0.2), StickRest(-0.1, 0.1, 0.05)
+)
+
+
+class Desk:
+    """A page, a controller, and a screen that the test sets."""
+
+    def __init__(self, calibration: TravelCalibration | None = None, *, swap_sides: bool = False, person: bool = False):
+        self.calibration = calibration or TravelCalibration()
+        self.swap_sides = swap_sides
+        self.device = SimulatedDualSense()
+        self.pages = DrivingPage()
+        self.page = TalkingPage(self.pages)
+        self.screen: Telemetry | None = VIEW
+        self.people = 0
+        self.hands = SharedHands(
+            self.device, self.pages, self.new_person if person else None, calibration, swap_sides=swap_sides
+        )
+        self.ticks = 0
+
+    def new_person(self) -> PullingHands:
+        self.people += 1
+        return PullingHands(self.device, constant_force(3.0))
+
+    @property
+    def now_s(self) -> float:
+        return self.ticks * TICK_S
+
+    def let_pass(self, for_s: float, says: bool = True, **hands: Any) -> list[OperatorIntent]:
+        """The page says the same, or nothing; what the controller's reports mean."""
+        meant = []
+        for step in range(round(for_s / TICK_S)):
+            if says and step % round(PERIOD_S / TICK_S) == 0:
+                self.page.say(self.now_s, **hands)
+            self.hands.tick(self.now_s, self.screen, 0.0)
+            if (report := self.device.read(self.now_s)) is not None:
+                state = parse_input_report(report)
+                meant.append(operator_intent(state, self.calibration, swap_sides=self.swap_sides))
+            self.ticks += 1
+        return meant
+
+    def arm(self) -> None:
+        self.let_pass(1.1)
+        assert any(one.arm for one in self.let_pass(0.1, run=True))
+        self.screen = armed()
+        assert not self.let_pass(0.1, run=True)[-1].arm
+
+
+@pytest.mark.parametrize("calibration", [None, WORN])
+@pytest.mark.parametrize("swap_sides", [False, True])
+def test_travel_and_sticks_arrive_as_given(calibration: TravelCalibration | None, swap_sides: bool) -> None:
+    desk = Desk(calibration, swap_sides=swap_sides)
+    desk.arm()
+    given: dict[str, Any] = {"l2": 0.25, "r2": 0.75, "lateral": (0.3, -0.4), "turning": (-1.0, 0.0), "gripper": -1}
+    meant = desk.let_pass(0.1, run=True, **given)[-1]
+    assert (meant.l2, meant.r2) == pytest.approx((0.25, 0.75), abs=0.005)
+    assert meant.lateral == pytest.approx((0.3, -0.4), abs=0.02)
+    assert meant.turning == pytest.approx((-1.0, 0.0), abs=0.02)
+    assert (meant.run, meant.gripper, meant.emergency_stop) == (True, -1, False)
+
+
+def test_what_the_trigger_was_told_takes_nothing_from_the_travel() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.device.write(OutputReport(l2=feedback(0, 8), r2=feedback(0, 8)), desk.now_s)
+    assert desk.let_pass(0.1, run=True, r2=1.0)[-1].r2 == 1.0
+
+
+def test_silence_releases_everything() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.let_pass(0.02, run=True, r2=1.0, lateral=(1.0, 0.0))
+    after = desk.let_pass(1.0, says=False)
+    assert {(one.r2, one.lateral, one.run) for one in after[round(0.16 / TICK_S) :]} == {(0.0, (0.0, 0.0), False)}
+    assert after[round(0.1 / TICK_S)].run
+
+
+def test_what_was_pulled_before_the_arm_was_armed_counts_once_it_was_let_go() -> None:
+    desk = Desk()
+    desk.let_pass(1.1)
+    assert {one.r2 for one in desk.let_pass(0.5, run=True, r2=1.0)} == {0.0}
+    desk.screen = armed()
+    assert {one.r2 for one in desk.let_pass(0.5, run=True, r2=1.0)} == {0.0}
+    desk.let_pass(0.04, run=True)
+    assert desk.let_pass(0.1, run=True, r2=1.0)[-1].r2 == 1.0
+
+
+def test_the_arming_button_is_pressed_anew_until_the_arm_is_armed_and_not_again_in_the_same_press() -> None:
+    desk = Desk()
+    desk.let_pass(1.1)
+    levels = [one.arm for one in desk.let_pass(1.6, run=True)]
+    assert sum(not before and after for before, after in pairwise(levels)) >= 3
+    desk.screen = armed()
+    desk.let_pass(0.1, run=True)
+    desk.screen = VIEW
+    assert not any(one.arm or one.run for one in desk.let_pass(3.0, run=True)[1:])
+    desk.let_pass(1.1)
+    assert any(one.arm for one in desk.let_pass(0.1, run=True))
+
+
+def test_the_person_lets_go_when_a_page_drives_and_silence_gives_nothing_back() -> None:
+    desk = Desk(person=True)
+    desk.let_pass(1.4, says=False)
+    desk.screen = armed()
+    desk.let_pass(1.0, says=False)
+    assert (desk.hands.hands, desk.hands.doing) == (PERSON, "pulling")
+    assert desk.let_pass(0.004, says=False)[-1].r2 > 0.5
+    after = desk.let_pass(0.1)
+    assert {(one.r2, one.run) for one in after[1:]} == {(0.0, False)}
+    silent = desk.let_pass(5.0, says=False)
+    assert {(one.r2, one.run) for one in silent} == {(0.0, False)}
+    assert (desk.hands.hands, desk.people) == (BROWSER, 1)
+    desk.page.say(desk.now_s, driving=False, give_back=True)
+    first = desk.let_pass(0.1, says=False)
+    assert (desk.hands.hands, desk.hands.doing, desk.people) == (PERSON, "resting", 2)
+    assert (first[0].r2, first[0].run) == (0.0, False)
+
+
+def test_a_stop_takes_the_controller_from_the_person_for_good_and_nobody_goes_on_where_there_is_nobody() -> None:
+    desk = Desk(person=True)
+    desk.let_pass(1.3, says=False)
+    desk.page.say(desk.now_s, driving=False, stop=True)
+    assert not any(one.arm for one in desk.let_pass(10.0, says=False)[1:])
+    assert desk.hands.hands == BROWSER
+    alone = Desk()
+    alone.page.say(0.0, driving=False, give_back=True)
+    assert not any(one.run for one in alone.let_pass(3.0, says=False))
+    assert (alone.hands.hands, alone.hands.has_person) == (BROWSER, False)
+
+
+def test_the_hands_press_no_button_that_was_not_asked_for() -> None:
+    desk = Desk()
+    desk.screen = armed()
+    [first, *_] = desk.let_pass(0.02, says=False)
+    assert first == operator_intent(ControllerState())
+    desk.let_pass(1.1)
+    held = desk.let_pass(0.02, run=True, next_target=True, hand_over=True)[-1]
+    assert held == operator_intent(ControllerState(pressed=frozenset({Button.L1, Button.TRIANGLE, Button.CREATE})))

@@ -1,0 +1,228 @@
+"""Which page drives, and when its hands count: by example, and for whatever pages say and do not say."""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from operator_side.viewing.pages.driving_page import REST_S, SILENCE_S, DrivingPage, Readiness
+from operator_side.viewing.pages.page_messages import PageHands, TuneWish, read_page_message
+from tests.operator_side.viewing.pages.talking_page import PERIOD_S, TalkingPage
+
+NO_HANDS: list[object] = [
+    None,
+    "hands",
+    {"hands": 1},
+    {"hands": {"page": "a"}},
+    {"hands": {"page": "", "number": 1}},
+    {"hands": {"page": "a", "number": -1}},
+    {"hands": {"page": "a", "number": 1.5}},
+    {"hands": {"page": "a", "number": 1, "r2": 1.01}},
+    {"hands": {"page": "a", "number": 1, "r2": math.nan}},
+    {"hands": {"page": "a", "number": 1, "l2": math.inf}},
+    {"hands": {"page": "a", "number": 1, "lateral": [0.0, -1.1]}},
+    {"hands": {"page": "a", "number": 1, "turning": [0.0]}},
+    {"hands": {"page": "a", "number": 1, "gripper": 2}},
+    {"hands": {"page": "a", "number": 1, "run": 1}},
+    {"hands": {"page": "a", "number": 1, "arm": True}},
+    {"hand": {"page": "a", "number": 1}},
+    {"tune": {"probability": 1.0}},
+    {"tune": {"probability": math.nan}},
+    {"tune": {"link": "x" * 201}},
+    {"tune": {"delay": 1}},
+]
+
+
+@pytest.fixture
+def pages() -> DrivingPage:
+    return DrivingPage()
+
+
+@pytest.mark.parametrize("content", NO_HANDS, ids=str)
+def test_what_is_no_message_is_refused_whole_and_counted(pages: DrivingPage, content: object) -> None:
+    pages.receive(1, content, 0.0)
+    assert (pages.rejected, pages.driver, pages.take_wish()) == (1, None, None)
+    assert not pages.stopping(0.0)
+
+
+def test_hold_to_run_counts_after_a_full_second_of_rest_and_until_it_is_let_go(pages: DrivingPage) -> None:
+    page = TalkingPage(pages)
+    now_s = page.go_on(0.0, REST_S)
+    assert pages.readiness is Readiness.RESTING
+    page.say(now_s)
+    assert (pages.readiness, pages.driver) == (Readiness.READY, "page1")
+    page.say(now_s + 0.02, run=True, r2=0.5)
+    hands = pages.hands(now_s + 0.02)
+    assert hands is not None
+    assert (hands.run, hands.r2) == (True, 0.5)
+    page.say(now_s + 0.04, r2=0.5)
+    assert pages.hands(now_s + 0.04) is None
+    page.say(now_s + 0.06, run=True, r2=0.5)
+    assert pages.hands(now_s + 0.06) is None
+    assert pages.rest_s(now_s + 0.06) == REST_S
+
+
+def running(pages: DrivingPage, page: TalkingPage, start_s: float = 0.0) -> float:
+    now_s = page.go_on(start_s, 1.1)
+    page.say(now_s, run=True)
+    assert pages.readiness is Readiness.RUNNING
+    return now_s
+
+
+def test_nobody_takes_over_from_a_page_that_drives_nor_drives_without_meaning_it(pages: DrivingPage) -> None:
+    one, two = TalkingPage(pages, 1), TalkingPage(pages, 2)
+    now_s = running(pages, one)
+    two.say(now_s)
+    assert pages.driver == "page1"
+    assert pages.hands(now_s) is not None
+    pages.close(1, now_s)
+    assert pages.hands(now_s) is None
+    two.say(now_s + 0.02)
+    assert pages.driver is None  # it asked while somebody else drove: it has to ask anew
+    two.say(now_s + 0.04, driving=False)
+    two.say(now_s + 0.06)
+    assert pages.driver == "page2"
+
+
+def test_any_page_stops_and_then_all_keys_are_up_first(pages: DrivingPage) -> None:
+    one, two = TalkingPage(pages, 1), TalkingPage(pages, 2)
+    now_s = running(pages, one)
+    two.say(now_s, driving=False, stop=True)
+    assert pages.stopping(now_s + 0.1)
+    assert not pages.stopping(now_s + SILENCE_S + 0.001)
+    assert pages.hands(now_s) is None
+    one.say(now_s + 0.02, run=True)
+    assert pages.hands(now_s + 0.02) is None
+
+
+def test_what_was_overtaken_counts_no_more_but_for_a_stop_in_it(pages: DrivingPage) -> None:
+    page = TalkingPage(pages)
+    late, late_stop = page.content(run=True, r2=1.0), page.content(stop=True)
+    now_s = running(pages, page)
+    pages.receive(1, late, now_s)
+    hands = pages.hands(now_s)
+    assert hands is not None
+    assert (pages.stale, hands.r2) == (1, 0.0)
+    pages.receive(1, late_stop, now_s)
+    assert pages.stopping(now_s)
+
+
+def test_where_a_controller_drives_no_page_does_but_any_stops() -> None:
+    pages = DrivingPage(may_drive=False)
+    page = TalkingPage(pages)
+    now_s = page.go_on(0.0, 1.5)
+    page.say(now_s, run=True)
+    assert pages.driver is None
+    assert pages.hands(now_s) is None
+    page.say(now_s, stop=True)
+    assert pages.stopping(now_s)
+
+
+def test_the_person_goes_on_only_by_the_page_that_drives_or_any_when_none_does(pages: DrivingPage) -> None:
+    one, two = TalkingPage(pages, 1), TalkingPage(pages, 2)
+    one.say(0.0)
+    two.say(0.0, driving=False, give_back=True)
+    assert not pages.take_give_back()
+    one.say(0.02, give_back=True)
+    assert pages.take_give_back()
+    assert pages.driver is None
+    one.say(0.04, driving=False, give_back=True)
+    assert not pages.take_give_back()  # held, and not pressed again
+    two.say(0.06, driving=False)
+    two.say(0.08, driving=False, give_back=True)
+    assert pages.take_give_back()
+
+
+def test_wishes_that_come_at_once_are_kept_together_the_newest_of_each_kind(pages: DrivingPage) -> None:
+    for tune in ({"probability": 0.8}, {"link": "delay 5ms"}, {"probability": 0.9}):
+        pages.receive(1, {"tune": tune}, 0.0)
+    assert pages.take_wish() == TuneWish(0.9, "delay 5ms")
+    assert pages.take_wish() is None
+
+
+@dataclass(frozen=True)
+class Heard:
+    """What a page said, and when."""
+
+    now_s: float
+    page: int
+    hands: PageHands
+
+
+KINDS: dict[str, dict[str, Any]] = {
+    "rest": {},
+    "run": {"run": True},
+    "pull": {"run": True, "r2": 1.0},
+    "pull only": {"l2": 0.5},
+    "stick": {"run": True, "lateral": [0.0, -1.0]},
+    "grip": {"gripper": 1},
+    "stop": {"stop": True},
+    "look on": {"driving": False},
+    "give back": {"give_back": True},
+}
+segments = st.lists(
+    st.tuples(
+        st.sampled_from([*KINDS, "rest", "rest", "run", "pull", "silence", "garbage", "close", "replay"]),
+        st.sampled_from([1, 1, 1, 2]),
+        st.integers(1, 60),
+        st.sampled_from([PERIOD_S, 0.004, 0.1, SILENCE_S, 0.16]),
+    ),
+    max_size=12,
+)
+
+
+@settings(max_examples=300, deadline=None)
+@example([("rest", 1, 55, PERIOD_S), ("pull", 1, 5, PERIOD_S), ("stop", 2, 1, PERIOD_S), ("pull", 1, 60, PERIOD_S)])
+@example([("rest", 1, 55, PERIOD_S), ("pull", 1, 1, PERIOD_S), ("silence", 1, 1, 0.16), ("pull", 1, 60, PERIOD_S)])
+@example([("rest", 1, 55, PERIOD_S), ("rest", 2, 55, PERIOD_S), ("pull", 1, 9, PERIOD_S), ("pull", 2, 9, PERIOD_S)])
+@given(segments)
+def test_hands_count_only_while_fresh_and_after_a_second_of_rest(script: list[tuple[str, int, int, float]]) -> None:
+    pages = DrivingPage()
+    talkers = {number: TalkingPage(pages, number) for number in (1, 2)}
+    heard: list[Heard] = []
+    said: dict[int, list[dict[str, Any]]] = {1: [], 2: []}
+    now_s = 0.0
+    for kind, number, count, period_s in script:
+        for _ in range(count):
+            judge(pages, heard, now_s + 0.9 * period_s)
+            now_s += period_s
+            if kind == "garbage":
+                pages.receive(number, {"hands": {"run": True}}, now_s)
+            elif kind == "close":
+                pages.close(number, now_s)
+            elif kind == "replay" and said[number]:
+                pages.receive(number, said[number][0], now_s)
+            elif kind in KINDS:
+                content = talkers[number].content(**KINDS[kind])
+                said[number].append(content)
+                pages.receive(number, content, now_s)
+                hands = read_page_message(content).hands
+                assert hands is not None
+                heard.append(Heard(now_s, number, hands))
+            judge(pages, heard, now_s)
+
+
+def judge(pages: DrivingPage, heard: list[Heard], now_s: float) -> None:
+    """What counts is fresh, and has behind it a second of rest of the same page, without a gap and without a stop."""
+    hands = pages.hands(now_s)
+    if hands is None:
+        return
+    [number] = {one.page for one in heard if one.hands is hands or one.hands == hands}
+    ours = [one for one in heard if one.page == number]
+    assert ours[-1].hands == hands
+    assert now_s - ours[-1].now_s <= SILENCE_S
+    began = len(ours)
+    while began > 0 and ours[began - 1].hands.run and not ours[began - 1].hands.stop:
+        began -= 1
+    rested = began
+    while rested > 0 and ours[rested - 1].hands.all_up and ours[rested - 1].hands.driving:
+        if rested < len(ours) and ours[rested].now_s - ours[rested - 1].now_s > SILENCE_S:
+            break
+        rested -= 1
+    assert all(after.now_s - before.now_s <= SILENCE_S for before, after in pairwise(ours[rested:]))
+    assert ours[began].now_s - ours[rested].now_s >= REST_S
+    assert not any(one.hands.stop for one in heard if one.now_s > ours[began].now_s - REST_S)

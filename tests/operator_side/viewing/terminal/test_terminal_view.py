@@ -1,0 +1,143 @@
+"""The terminal view: what is on the screen, and that the terminal is given back however the run ends."""
+
+import io
+import os
+import signal
+import sys
+import termios
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+import pytest
+from rich.cells import cell_len
+from rich.console import Console
+from rich.screen import Screen as Whole
+
+from common.errors import ConfigurationError
+from operator_side.viewing.facts import OperatorFacts
+from operator_side.viewing.terminal.screen import SILENT_AFTER_S, Screen
+from operator_side.viewing.terminal.status import TerminalStatus
+from tests.operator_side.console_feed import facts
+from tests.operator_side.viewing.terminal.on_terminal import LEFT, OnTerminal
+
+PLAYER = """
+import sys, time
+from common.command.stop_signal import StopSignal
+from operator_side.viewing.terminal.status import TerminalStatus
+from tests.operator_side.console_feed import facts
+with StopSignal() as stop, TerminalStatus("player") as status:
+    print(status._companion.process_id, file=sys.stderr, flush=True)
+    status.note("noted while it runs")
+    for sent in range(10**9):
+        if stop.is_set:
+            break
+        status.show_facts(facts(sent / 20))
+        time.sleep(0.001 if "--fast" in sys.argv else 0.05)
+        if sent == 3000:
+            print("sent", file=sys.stderr, flush=True)
+status.note("the result")
+"""
+
+
+def drawn(shown: OperatorFacts | None, width: int = 80, height: int = 24, age_s: float = 0.0) -> list[str]:
+    screen, console = Screen(), Console(file=io.StringIO(), width=width, height=height)
+    for number in range(100):
+        screen.notes.append(f"note {number} \x1b[2J")
+        if shown is not None:
+            screen.add(shown)
+    lines = console.render_lines(Whole(screen.lines(age_s, width)), console.options.update(height=height))
+    return ["".join(text for text, *_ in line) for line in lines]
+
+
+def with_status(**status: Any) -> OperatorFacts:
+    shown = facts(2.0)
+    return msgspec.structs.replace(shown, status=shown.status | status)
+
+
+@pytest.mark.parametrize("size", [(60, 20), (80, 24), (120, 40), (200, 60), (10, 3), (1, 1)])
+def test_every_size_is_filled_and_nothing_of_a_peer_controls_the_terminal(size: tuple[int, int]) -> None:
+    hostile = with_status(target="目標 🤖\x1b[2J", link="lost: \x07", nearest_mm=float("nan"), overlap_mm3=1e299)
+    for shown in (None, facts(2.0), hostile):
+        lines = drawn(shown, *size)
+        assert [cell_len(line) for line in lines] == [size[0]] * size[1]
+        assert all(line.isprintable() for line in lines)
+
+
+def test_everything_is_on_a_screen_of_the_usual_size() -> None:
+    text = "\n".join(drawn(with_status(nearest="bottle", nearest_mm=34.0, target_mm=120.0, tick_p99_us=140.0)))
+    for said in (
+        *(">>> ARMED  advancing >>>", "link up", "lease armed", "hands person", "mean  52.0  p99  61.0  now"),
+        *("asked: delay 50ms 10ms", "round trip 101 ms", "field age 1.0 ms", "R2 advances   71 %, free 40 %"),
+        *("L2 retreats    0 %, free 100 %", ".  .  .  1  2  3  4  5  6", "meets   1 of 8  stiffness 0.71"),
+        *("57 mm ahead", "20 30 40 50 60 70 80 90", "nearest bottle at 34 mm", "target mug at 120 mm"),
+        *("holding nothing", "delay ", "stiffness ", "overlap ", "tick p99 ", "140 of 140 µs", "note 99 ?[2J"),
+    ):
+        assert said in text
+
+
+@pytest.mark.parametrize(
+    ("status", "banner"),
+    [
+        ({"state": "disarmed", "owner": "ready", "person": None}, "--- DISARMED  ready to arm ---  "),
+        ({"state": "stopped", "stopped_because": "emergency stop"}, "!!! STOPPED: emergency stop !!!!!"),
+        ({"link": "lost: nothing heard"}, "!!! LINK LOST: nothing heard !!!!!"),
+        ({"release_first": True}, "!!! RELEASE BOTH TRIGGERS !!!!!"),
+        ({"link": "waiting for the robot side", "state": None}, "... waiting for the robot side ...  "),
+    ],
+)
+def test_the_banner_says_what_keeps_the_arm_from_moving(status: dict[str, Any], banner: str) -> None:
+    assert drawn(with_status(**status))[0].startswith(banner)
+    assert drawn(with_status(**status), age_s=SILENT_AFTER_S + 0.01)[0].startswith("!!! NO NEWS for 0.5 s !!!!!")
+
+
+@pytest.fixture(params=[()])
+def player(request: pytest.FixtureRequest) -> Iterator[OnTerminal]:
+    made = OnTerminal([sys.executable, "-P", "-c", PLAYER, *request.param])
+    yield made
+    made.close()
+
+
+@pytest.mark.processes
+def test_the_screen_follows_the_terminals_size_and_is_put_back_on_ctrl_c(player: OnTerminal) -> None:
+    player.read_until(lambda seen: b"ARMED" in seen and b"noted while it runs" in seen)
+    typed = termios.tcgetattr(player.ours)
+    assert not typed[3] & termios.ECHO
+    assert typed[3] & termios.ISIG
+    player.resize(60, 20)
+    # A whole screen is sent at once, from its first place on; its lines do not scroll it.
+    player.read_until(lambda seen: b"\x1b[H" in seen and seen.split(b"\x1b[H")[-2].count(b"\n") == 19)
+    assert player.end(b"the result") == 0
+    assert player.is_put_back()
+    assert b"player: the result" in player.seen.partition(LEFT)[2]
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("whose", ["the run's", "its own"])
+def test_a_kill_puts_the_terminal_back(player: OnTerminal, whose: str) -> None:
+    assert player.process.stderr is not None
+    companion = int(player.process.stderr.readline())
+    player.read_until(lambda seen: b"ARMED" in seen)
+    os.kill(player.process.pid if whose == "the run's" else companion, signal.SIGKILL)
+    player.read_until(lambda _: player.is_put_back())
+    if whose == "its own":
+        assert player.process.poll() is None
+        assert player.end(b"the result") == 0
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("player", [("--fast",)], indirect=True)
+def test_a_terminal_that_stalls_holds_nobody_up(player: OnTerminal) -> None:
+    assert player.process.stderr is not None
+    player.read_until(lambda seen: b"ARMED" in seen)
+    termios.tcflow(player.theirs, termios.TCOOFF)
+    assert [player.process.stderr.readline() for _ in range(2)][1] == "sent\n"
+    termios.tcflow(player.theirs, termios.TCOON)
+    assert player.end(b"the result") == 0
+    assert player.is_put_back()
+
+
+def test_what_is_no_terminal_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdout", io.StringIO())
+    with pytest.raises(ConfigurationError, match="no terminal"):
+        TerminalStatus("player")

@@ -1,0 +1,191 @@
+"""The compiled step of the simulated arm against plain NumPy and MuJoCo's own products, over long random runs."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from robot_side.drivers.mujoco.arm import MujocoArm
+from robot_side.drivers.mujoco.encoders import Encoder
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
+from robot_side.drivers.mujoco.joint_reference import MotionLimits
+from robot_side.drivers.mujoco.scene import Scene, load_scene
+from tests.helpers.arm_models import MIRRORED_GRIPPER, MOTORS, POSITION_SERVOS, VELOCITY_SERVOS, planar_arm
+
+LIMITS = MotionLimits(velocity_rad_s=1.0, windup_rad=0.01)
+STEPS = 3000
+SPRING = '<joint name="elbow" stiffness="3" springref="-40"'
+
+
+class PlainReference:
+    """The reference in array operations."""
+
+    def __init__(self, position: FloatArray, ends: tuple[FloatArray, FloatArray], windup: FloatArray) -> None:
+        self.position, (self.lower, self.upper), self.windup = position, ends, windup
+        self.velocity, self.acceleration, self.command = (np.zeros_like(position) for _ in range(3))
+        self.followed = False
+
+    def told(self, velocity: FloatArray) -> None:
+        self.command = velocity / max(np.abs(velocity).max() / LIMITS.velocity_rad_s, 1.0)
+
+    def advance(self, following: bool, step_s: float, measured: FloatArray, measured_speed: FloatArray) -> None:
+        if self.followed and not following:
+            self.position = measured
+            self.velocity = np.clip(measured_speed, -LIMITS.velocity_rad_s, LIMITS.velocity_rad_s)
+        self.followed = following
+        stopping = 2.0 * LIMITS.deceleration_rad_s2
+        slowest = -np.sqrt(stopping * np.maximum(self.position - self.lower, 0.0))
+        fastest = np.sqrt(stopping * np.maximum(self.upper - self.position, 0.0))
+        change = (np.clip(self.command, slowest, fastest) if following else 0.0) - self.velocity
+        most = (LIMITS.acceleration_rad_s2 if following else LIMITS.deceleration_rad_s2) * step_s
+        change = change * min(most / max(np.abs(change).max(), 1e-300), 1.0)
+        velocity = np.clip(self.velocity + change, slowest, fastest)
+        self.acceleration, self.velocity = (velocity - self.velocity) / step_s, velocity
+        lead = self.windup + np.abs(velocity * step_s)
+        self.position = np.clip(
+            np.clip(self.position + velocity * step_s, self.lower, self.upper),
+            np.minimum(self.position, measured - lead),
+            np.maximum(self.position, measured + lead),
+        )
+
+
+class PlainGripper:
+    """The gripper's reference, its opening and its grip, by interpolation in the travel."""
+
+    def __init__(self, travel: GripperTravel) -> None:
+        self.travel = travel
+        self.stroke = travel.lengths[-1] - travel.lengths[0]
+        self.reference = self.speed = self.standing_s = self.opening_m = 0.0
+        self.closed_last = False
+
+    def advance(self, moving: float, step_s: float, length: float, length_speed: float) -> None:
+        travel = self.travel
+        closures = (travel.lengths - travel.lengths[0]) / self.stroke
+        closure = (length - travel.lengths[0]) / self.stroke
+        self.speed += (length_speed / self.stroke - self.speed) * min(step_s / 0.05, 1.0)
+        self.opening_m = np.interp(closure, closures, travel.openings_m)
+        free = np.interp(closure, closures, travel.references)
+        if moving:
+            self.closed_last = moving > 0.0
+            lead = sorted([0.0, math.copysign(travel.force_lead, moving)])
+            nearest, farthest = (free + travel.lag_s * self.speed + end for end in lead)
+            self.reference = np.clip(np.clip(self.reference + moving * step_s / 0.6, nearest, farthest), 0.0, 1.0)
+        blocked = self.reference - free > min(0.02, 0.5 * travel.force_lead)
+        self.standing_s = self.standing_s + step_s if blocked and abs(self.speed) < 0.05 and self.closed_last else 0.0
+
+    @property
+    def control(self) -> FloatArray:
+        opened, closed = self.travel.open_control, self.travel.closed_control
+        return opened + self.reference * (closed - opened)
+
+
+def plain_inputs(scene: Scene, reference: PlainReference) -> tuple[FloatArray, FloatArray]:
+    """The inputs (n,) that the arm's actuators are to have, and the torques (n,) that they are to give."""
+    data, robot, drives = scene.data, scene.robot, scene.robot.drives
+    dofs, motor = robot.arm_velocities, (drives.stiffness == 0.0) & (drives.damping == 0.0)
+    error = reference.position - data.qpos[robot.arm_positions]
+    speed_error = reference.velocity - data.qvel[dofs]
+    acceleration: FloatArray = np.zeros(scene.model.nv)
+    acceleration[dofs] = reference.acceleration + np.where(motor, 2500.0 * error + 100.0 * speed_error, 0.0)
+    inertial: FloatArray = np.zeros(scene.model.nv)
+    mujoco.mj_mulM(scene.model, data, inertial, acceleration)
+    load = (inertial + data.qfrc_bias - data.qfrc_gravcomp - data.qfrc_spring)[dofs]
+    load = load + scene.model.dof_damping[dofs] * reference.velocity
+    ahead = np.where((drives.stiffness == 0.0) & ~motor, 20.0 * error, 0.0)
+    stiffness, damping = drives.gear**2 * drives.stiffness, drives.gear**2 * drives.damping
+    # On its reference a joint feels the load's torque and nothing else.
+    torque = load + stiffness * error + damping * (speed_error + ahead)
+    length = drives.gear * data.qpos[robot.arm_positions]
+    length_speed = drives.gear * data.qvel[dofs]
+    held_back = drives.offset - drives.stiffness * length - drives.damping * length_speed
+    return (torque / drives.gear - held_back) / drives.gain, torque
+
+
+def built_in(_: Path) -> Scene:
+    return load_scene()
+
+
+def position_servos(path: Path) -> Scene:
+    return load_scene(planar_arm(path, arm_actuators=POSITION_SERVOS), "tcp")
+
+
+def velocity_servos(path: Path) -> Scene:
+    return load_scene(planar_arm(path, arm_actuators=VELOCITY_SERVOS, gripper_actuators=""), "tcp")
+
+
+def sprung_motors_and_two_fingers(path: Path) -> Scene:
+    model = planar_arm(path, arm_actuators=MOTORS, gripper_actuators=MIRRORED_GRIPPER, extra_bottom="", mirrored=True)
+    model.write_text(model.read_text().replace('<joint name="elbow"', SPRING))
+    return load_scene(model, "tcp")
+
+
+@pytest.mark.parametrize("load", [built_in, position_servos, velocity_servos, sprung_motors_and_two_fingers])
+def test_every_step_is_what_plain_formulas_say(tmp_path: Path, load: Callable[[Path], Scene]) -> None:
+    scene = load(tmp_path)
+    data, robot = scene.data, scene.robot
+    travel = measure_gripper(scene)
+    arm = MujocoArm(scene, Encoder(0.0, 0.0), LIMITS)
+    step_s, joints = scene.model.opt.timestep, arm.joint_count
+    gripper = None if travel is None else PlainGripper(travel)
+    start = data.qpos[robot.arm_positions]
+    windup_rad = robot.drives.windup_rad(LIMITS.windup_rad)
+    reference = PlainReference(start, arm.ends_rad, windup_rad)
+    random = np.random.default_rng(1)
+    arm.state(0.0)
+    ends_s, closing_ends_s, closing, followed, ran_out = -1.0, -1.0, 0.0, 0, 0
+    for step in range(STEPS):
+        now_s = step * step_s
+        if random.uniform() < 0.02:
+            ends_s = now_s + random.uniform(0.0, 0.2)
+            velocity = random.uniform(-1.5, 1.5, joints)
+            arm.command(velocity, ends_s)
+            reference.told(velocity)
+        if random.uniform() < 0.02:
+            closing, closing_ends_s = (
+                float(random.choice([-1.0, -0.3, 0.0, 0.5, 1.0])),
+                now_s + random.uniform(0.0, 0.3),
+            )
+            arm.command_gripper(closing, closing_ends_s)
+        followed, ran_out = followed + (now_s < ends_s), ran_out + (now_s >= ends_s)
+        before, was_there = reference.velocity, data.qpos[robot.arm_positions].copy()
+        reference.advance(now_s < ends_s, step_s, was_there, data.qvel[robot.arm_velocities])
+        # No limit is broken, and nothing jumps but to what is measured when a command ends.
+        assert (np.abs(reference.velocity) <= LIMITS.velocity_rad_s + 1e-12).all()
+        assert (np.abs(reference.position - was_there) <= windup_rad + np.abs(reference.velocity * step_s) + 1e-9).all()
+        assert ((arm.ends_rad[0] <= reference.position) & (reference.position <= arm.ends_rad[1])).all()
+        if now_s < ends_s:
+            assert np.abs(reference.velocity - before).max() <= LIMITS.deceleration_rad_s2 * step_s + 1e-12
+        control, torque = plain_inputs(scene, reference)
+        if gripper is not None:
+            actuator = robot.gripper_actuators[0]
+            length, length_speed = data.actuator_length[actuator], data.actuator_velocity[actuator]
+            gripper.advance(closing if now_s < closing_ends_s else 0.0, step_s, length, length_speed)
+        state = arm.state(now_s + step_s)
+        np.testing.assert_allclose(data.ctrl[robot.arm_controls], control, rtol=1e-12, atol=1e-12)
+        np.testing.assert_array_equal(state.joint_positions_rad, data.qpos[robot.arm_positions])
+        np.testing.assert_array_equal(state.joint_velocities_rad_s, data.qvel[robot.arm_velocities])
+        strong = np.abs(torque) < robot.drives.strongest
+        given = data.qfrc_actuator[robot.arm_velocities]
+        np.testing.assert_allclose(given[strong], torque[strong], rtol=1e-9, atol=1e-9)
+        if gripper is not None:
+            np.testing.assert_allclose(data.ctrl[robot.gripper_controls], gripper.control, rtol=1e-12, atol=1e-12)
+            assert state.gripper_opening_m == pytest.approx(gripper.opening_m, abs=1e-12)
+            assert state.gripper_holding == (gripper.standing_s >= 0.05 and gripper.opening_m > 1e-3)
+    assert min(followed, ran_out) > STEPS // 5
+
+
+def test_a_measurement_is_not_changed_by_the_next() -> None:
+    arm = MujocoArm(load_scene(), Encoder(seed=1))
+    arm.state(0.0)
+    arm.command(np.full(6, 0.3), 1.0)
+    first = arm.state(0.1)
+    kept = [first.joint_positions_rad.copy(), first.joint_velocities_rad_s.copy(), first.finger_positions.copy()]
+    arm.state(0.2)
+    for now, before in zip(
+        (first.joint_positions_rad, first.joint_velocities_rad_s, first.finger_positions), kept, strict=True
+    ):
+        np.testing.assert_array_equal(now, before)

@@ -1,0 +1,62 @@
+"""What is drawn from the seed stays within what is said of it."""
+
+from typing import Any, get_args
+
+import pytest
+
+from robot_side.drivers.mujoco.built_in_scenes import SceneName
+from robot_side.drivers.mujoco.ground_truth import GroundTruth
+from robot_side.drivers.mujoco.scene import Scene, load_scene
+from robot_side.surroundings.perceived import Role
+
+SEEDS = range(12)
+NAMES: tuple[SceneName, ...] = get_args(SceneName)
+
+
+def box(scene: Scene, name: str) -> tuple[Any, Any]:
+    """Centre (3,) and half sizes (3,) of the object's only geom."""
+    geom = next(thing for thing in scene.objects if thing.name == name).geoms[0]
+    return scene.data.geom_xpos[geom], scene.model.geom_size[geom]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_scene_has_one_target_that_stands_and_nothing_touches_the_gripper(name: SceneName) -> None:
+    for seed in SEEDS if name != "table" else (0,):
+        scene = load_scene(name=name, seed=seed)
+        assert list(scene.roles.values()).count(Role.TARGET) == 1
+        truth = GroundTruth(scene).observe()
+        assert truth.contacts == frozenset()
+        assert truth.target is not None
+        assert truth.target.support_gap_m == pytest.approx(0.0, abs=1e-6)
+        assert truth.min_obstacle_distance_m is not None
+        assert truth.min_obstacle_distance_m > 0.03
+
+
+@pytest.mark.parametrize("name", ["wall", "slot", "shelf"])
+def test_the_seed_says_where_things_stand(name: SceneName) -> None:
+    places = [load_scene(name=name, seed=seed).data.geom_xpos.tolist() for seed in (0, 0, 1)]
+    assert places[0] == places[1] != places[2]
+
+
+def test_what_is_drawn_stays_within_what_is_said_of_it() -> None:
+    behind_m = []
+    for seed in SEEDS:
+        scene = load_scene(name="wall", seed=seed)
+        (wall, wall_half), (target, _) = box(scene, "wall"), box(scene, "target")
+        # The target's centre lies 20 mm behind the tool's point, which the tips pass by 15 mm.
+        behind_m.append(wall[0] - wall_half[0] - (target[0] + 0.020 + 0.015))
+
+        scene = load_scene(name="slot", seed=seed)
+        parts, (target, _) = scene.robot.gripper_geoms, box(scene, "target")
+        half_m = max(abs(scene.data.geom_xpos[part][1]) + scene.model.geom_size[part][1] for part in parts)
+        for name, side in (("left_post", 1.0), ("right_post", -1.0)):
+            post, post_half = box(scene, name)
+            assert 0.014 <= side * (post[1] - target[1]) - post_half[1] - half_m <= 0.041
+
+        scene = load_scene(name="shelf", seed=seed)
+        (edge, edge_half), (target, _) = box(scene, "edge"), box(scene, "target")
+        board, board_half = box(scene, "support_shelf")
+        assert 0.008 <= target[2] - 0.032 - (edge[2] + edge_half[2]) <= 0.025
+        assert 0.030 <= board[2] + board_half[2] <= 0.090
+        assert edge[2] + edge_half[2] > board[2] + board_half[2]
+    assert 0.010 <= min(behind_m) < max(behind_m) - 0.02 <= 0.040

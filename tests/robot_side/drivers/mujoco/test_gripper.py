@@ -1,0 +1,84 @@
+"""The measured travel of a gripper, and the gap that the spheres leave of it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from common.arrays import FloatArray
+from common.errors import ConfigurationError
+from robot_side.drivers.mujoco.gripper_cover import cover_gripper
+from robot_side.drivers.mujoco.gripper_measurement import (
+    GripperSweep,
+    candidate_ends,
+    jaw_pairs,
+    measure_gripper,
+    open_gap,
+    travel_from_sweep,
+)
+from robot_side.drivers.mujoco.scene import load_scene
+from tests.helpers.arm_models import TENDON_GRIPPER, planar_arm
+
+
+def sweep(openings_m: FloatArray, lengths: FloatArray) -> GripperSweep:
+    """Two jaws with a constant other pair; one finger joint."""
+    controls = np.arange(len(lengths), dtype=np.float64)[:, None]
+    gaps_m = np.column_stack([openings_m, openings_m + 0.02, np.full(len(lengths), 0.01)])
+    return GripperSweep(controls, lengths[:, None], lengths, gaps_m)
+
+
+@pytest.mark.parametrize("low_is_open", [True, False])
+def test_the_wider_end_is_the_open_one(low_is_open: bool) -> None:
+    openings = np.array([0.08, 0.05, 0.03, 0.0])
+    found = travel_from_sweep(sweep(openings if low_is_open else openings[::-1], np.array([0.0, 0.3, 0.5, 0.8])), 0, 0)
+    assert found is not None
+    assert (found.open_control.item(), found.closed_control.item()) == ((0.0, 3.0) if low_is_open else (3.0, 0.0))
+    np.testing.assert_allclose(found.openings_m, openings)
+
+
+def test_fingers_that_meet_before_the_inputs_end_keep_a_monotone_travel() -> None:
+    found = travel_from_sweep(sweep(np.array([0.08, 0.04, 0.0, 0.0]), np.array([0.0, 0.4, 0.8, 0.8])), 0.0, 0.0)
+    assert found is not None
+    np.testing.assert_allclose(found.references, [0.0, 1.0 / 3.0, 2.0 / 3.0])
+    np.testing.assert_allclose(found.openings_m, [0.08, 0.04, 0.0])
+    assert travel_from_sweep(sweep(np.full(4, 0.05), np.linspace(0.0, 1.0, 4)), 0.0, 0.0) is None
+
+
+def test_a_servo_leads_by_its_force_and_lags_by_its_damping(tmp_path: Path) -> None:
+    travel = measure_gripper(load_scene(planar_arm(tmp_path), "tcp"))
+    assert travel is not None
+    # Of 100 N at 0.0156863 N for each of 255 steps, the default share of the stroke is less.
+    assert travel.force_lead == 0.3
+    assert travel.lag_s == pytest.approx(10.0 / 100.0)
+    assert (travel.open_control.item(), travel.closed_control.item()) == (255.0, 0.0)
+    np.testing.assert_allclose(travel.openings_m[[0, -1]], [0.08, 0.0], atol=1e-3)
+
+
+def test_a_gripper_of_unknown_range_is_named(tmp_path: Path) -> None:
+    unlimited = TENDON_GRIPPER.replace('ctrlrange="0 255"', "")
+    with pytest.raises(ConfigurationError, match="'hand' has no ctrlrange; valid: its open and its closed input"):
+        measure_gripper(load_scene(planar_arm(tmp_path, gripper_actuators=unlimited), "tcp"))
+
+
+def test_two_actuators_may_run_against_each_other() -> None:
+    lower, upper = np.array([0.0, -1.0]), np.array([1.0, 0.0])
+    ends = [(first.tolist(), last.tolist()) for first, last in candidate_ends(lower, upper)]
+    assert ends == [([0.0, -1.0], [1.0, 0.0]), ([0.0, 0.0], [1.0, -1.0])]
+    assert len(candidate_ends(np.zeros(1), np.ones(1))) == 1
+    assert len(candidate_ends(np.zeros(4), np.ones(4))) == 1
+
+
+def test_pairs_have_a_finger_and_two_bodies() -> None:
+    pairs = jaw_pairs(np.array([7, 8, 9, 10]), np.array([1, 2, 2, 3]), np.array([False, True, True, False]))
+    assert pairs == [(8, 7), (9, 7), (10, 8), (10, 9)]
+
+
+@pytest.mark.parametrize("stand_out_m", [0.001, 0.003, 0.006])
+def test_the_spheres_leave_the_gap_between_the_fingers_free_but_for_what_they_stand_out(stand_out_m: float) -> None:
+    scene = load_scene()
+    cover = cover_gripper(scene.model, scene.robot.gripper_geoms, stand_out_m)
+    gaps = open_gap(scene, cover)
+    assert gaps is not None
+    gap_m, kept_m = gaps
+    assert gap_m == pytest.approx(0.085, abs=1e-4)
+    assert gap_m - 2.0 * stand_out_m - 1e-6 <= kept_m < gap_m

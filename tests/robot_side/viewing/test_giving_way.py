@@ -1,0 +1,61 @@
+"""Pictures give way: rate, then quality, then size, and come back slowly in reverse."""
+
+from itertools import pairwise
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robot_side.viewing.giving_way import GivingWay, Step, steps
+
+
+def test_rate_gives_way_first_then_quality_then_size() -> None:
+    down = steps(30.0, 75)
+
+    assert down[0] == (30.0, 75, False)
+    assert down[-1] == (5.0, 30, True)
+    changed = [[name for name in Step._fields if getattr(a, name) != getattr(b, name)] for a, b in pairwise(down)]
+    order = [name for (name,) in changed]
+    assert order == sorted(order, key=["rate_hz", "quality", "halved"].index)
+
+
+@given(st.floats(0.1, 120.0), st.integers(1, 100), st.lists(st.floats(1e3, 1e8), max_size=50), st.integers(0, 2))
+def test_never_more_than_was_asked_for_and_back_by_one_step_a_second(
+    rate_hz: float, quality: int, left_bit_s: list[float], views: int
+) -> None:
+    giving_way, every = GivingWay(rate_hz, quality), steps(rate_hz, quality)
+    at = 0
+    for number, left in enumerate(left_bit_s):
+        now = every.index(giving_way.update(left, views, 0.5 * number))
+        assert now >= at - 1
+        at = now
+    for number in range(2 * len(every) + 2):
+        giving_way.update(1e12, views, 100.0 + number)
+    assert giving_way.step == (rate_hz, quality, False)
+
+
+def test_what_pictures_take_is_measured_whatever_step_they_were_made_in() -> None:
+    giving_way = GivingWay(30.0, 75)
+    for _ in range(200):
+        giving_way.made(2_000, giving_way.step)
+    assert giving_way.update(1e6, 2, 0.0) == (30.0, 75, False)
+    low = Step(5.0, 30, halved=True)
+    for _ in range(200):
+        giving_way.made(int(40_000 * low.bytes_share()), low)
+    step = giving_way.update(4e6, 2, 1.0)
+    assert step.quality == 75
+    assert 8.0 * 2 * 40_000 * step.rate_hz <= 4e6
+
+
+def test_a_narrow_link_shows_two_views_in_h264_where_jpeg_gives_way_to_the_least() -> None:
+    giving_way = GivingWay(30.0, 75)
+    assert giving_way.update(200e3, 2, 0.0) == (5.0, 30, True)
+    # At once, as the codec is another one, and before the first picture.
+    assert giving_way.update(200e3, 2, 0.01, h264=True).rate_hz > 7.0
+    for _ in range(200):
+        giving_way.made(1_000, giving_way.step, h264=True)
+    for number in range(20):
+        giving_way.update(200e3, 2, 1.0 + number, h264=True)
+    step = giving_way.step
+    assert step.rate_hz >= 9.0
+    assert (step.quality, step.halved) == (75, False)
+    assert giving_way.update(200e3, 2, 30.0) == (5.0, 30, True)

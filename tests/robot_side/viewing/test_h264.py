@@ -1,0 +1,112 @@
+"""Pictures in H.264 from the robot side's encoder to the JPEG that an operator side makes of them."""
+
+import numpy as np
+import pytest
+import simplejpeg
+
+from common.protocol.messages import Header
+from common.protocol.view_messages import VideoStep
+from robot_side.drivers.mujoco.scene import load_scene
+from tests.robot_side.viewing.picture_taking import HEIGHT, WIDTH, Image, picture_taker
+
+pytest.importorskip("av", reason="needs the extra `video`")
+from common.video.steps import Steps
+from robot_side.viewing.h264 import H264
+
+HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
+
+
+def moving(number: int, width: int = 160, height: int = 96) -> Image:
+    """A bright disc that crosses a slope of colours."""
+    rows, columns = np.mgrid[0:height, 0:width]
+    picture = np.stack([columns % 256, 2 * rows % 256, 128 + 0 * rows], axis=2)
+    picture[np.hypot(rows - height // 2, columns - 20 - 3 * number) < 12] = (250, 250, 90)
+    return picture.astype(np.uint8)
+
+
+def step(encoder: H264, picture: Image, quality: int = 90, *, whole: bool = False) -> VideoStep:
+    content, is_whole = encoder.encode(picture, quality, whole=whole)
+    height, width, _ = picture.shape
+    return VideoStep(HEADER, "first_person", 1.5, width, height, encoder.number, is_whole, content)
+
+
+def error(steps: Steps, sent: VideoStep, picture: Image) -> float | None:
+    """Root of the mean square between what is shown and what was seen, of 255; None where nothing is shown."""
+    frame = steps.follow(sent)
+    if frame is None:
+        return None
+    assert (frame.view, frame.captured_s) == ("first_person", 1.5)
+    shown = simplejpeg.decode_jpeg(frame.jpeg)
+    assert shown.shape == picture.shape == (frame.height, frame.width, 3)
+    return float(np.sqrt(np.mean((shown.astype(float) - picture) ** 2)))
+
+
+def test_each_picture_is_shown_as_it_comes_and_takes_few_bytes() -> None:
+    encoder, steps, sizes = H264(), Steps(), []
+    for number in range(30):
+        sent = step(encoder, moving(number))
+        assert (sent.number, sent.whole) == (number + 1, number == 0)
+        found = error(steps, sent, moving(number))
+        assert found is not None
+        assert found < 8.0
+        sizes.append(len(sent.h264))
+    assert steps.lacks == (0, 0)
+    assert np.mean(sizes[1:]) < 0.3 * sizes[0]
+    assert np.mean(sizes[1:]) < 0.2 * len(simplejpeg.encode_jpeg(moving(0), 90))
+
+
+def test_after_a_picture_that_is_lost_nothing_is_shown_until_a_whole_one() -> None:
+    encoder, steps = H264(), Steps()
+    sent = [step(encoder, moving(number), whole=number in (0, 20)) for number in range(30)]
+    assert [one.number for one in sent if one.whole] == [1, 21]
+    del sent[9]
+    shown = [steps.follow(one) is not None for one in sent]
+    assert shown == 9 * [True] + 10 * [False] + 10 * [True]
+    late = Steps()
+    assert late.follow(sent[4]) is None
+    assert late.lacks == (0, 5)
+    # Those who see them all are shown the whole one like any other.
+    assert late.follow(sent[19]) is not None
+    assert late.lacks == (0, 0)
+
+
+def test_another_size_or_quality_begins_with_a_whole_picture() -> None:
+    encoder, steps = H264(), Steps()
+    for sent, picture, whole in (
+        (step(encoder, moving(0)), moving(0), True),
+        (step(encoder, moving(1), 91), moving(1), False),  # as near as x264's factor goes
+        (step(encoder, moving(2), 30), moving(2), True),
+        (step(encoder, moving(3, 80, 48), 30), moving(3, 80, 48), True),
+        (step(encoder, moving(4, 80, 48), 30), moving(4, 80, 48), False),
+    ):
+        assert sent.whole == whole
+        found = error(steps, sent, picture)
+        assert found is not None
+        assert found < 16.0
+
+
+@pytest.mark.parametrize("content", [b"", b"\x00", bytes(1000), b"\x00\x00\x00\x01\x67" + bytes(range(200))])
+def test_bytes_that_are_no_picture_are_lacking_and_no_error(content: bytes) -> None:
+    encoder, steps = H264(), Steps()
+    assert steps.follow(step(encoder, moving(0))) is not None
+    for whole in (False, True):
+        assert steps.follow(VideoStep(HEADER, "first_person", 1.5, 160, 96, 2, whole, content)) is None
+        assert steps.lacks == (0, 2)
+    wrong_size = VideoStep(HEADER, "first_person", 1.5, 320, 96, 3, True, step(encoder, moving(1), whole=True).h264)
+    assert steps.follow(wrong_size) is None
+    assert steps.follow(step(encoder, moving(2), whole=True)) is not None
+    assert steps.lacks == (0, 0)
+
+
+@pytest.mark.processes
+def test_the_companion_makes_jpeg_or_steps_as_each_order_says() -> None:
+    with picture_taker(load_scene()) as taker:
+        jpeg, steps = taker.take("overview").astype(float), Steps()
+        for number in (1, 2):
+            picture = taker.picture("overview", h264=True)
+            assert (picture.number, picture.whole) == (number, number == 1)
+            place = HEADER, picture.view, picture.captured_s, WIDTH, HEIGHT
+            frame = steps.follow(VideoStep(*place, picture.number, picture.whole, picture.content))
+            assert frame is not None
+            assert np.abs(simplejpeg.decode_jpeg(frame.jpeg) - jpeg).mean() < 3.0
+        assert taker.picture("overview").number == 0

@@ -1,0 +1,203 @@
+"""What is made for whoever looks, in virtual time: how much, when, and what it says."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from common.arrays import FloatArray
+from common.emulation.spec import LinkSpec
+from robot_side.laws.paper import PaperLaw
+from robot_side.laws.swept import SweptLaw
+from robot_side.parts import build_parts
+from robot_side.settings import CameraSettings, RobotSettings
+from tests.robot_side.viewing.looking_table import TABLES, Table
+
+ALL = {"overview": True, "first_person": True, "scene": True}
+
+
+@pytest.fixture(autouse=True)
+def _cleared_away() -> Iterator[None]:
+    yield
+    while TABLES:
+        TABLES.pop().desk.close()
+
+
+def rows(values: bytes, width: int) -> FloatArray:
+    return np.frombuffer(values, "<f4").reshape(-1, width).astype(np.float64)
+
+
+def test_nobody_looks_nothing_is_made() -> None:
+    table = Table()
+    table.run(2.0)
+    assert table.seen == []
+    assert table.desk.companions == []
+    for counts in ("overview", "first_person", "scene"):
+        made = table.looking.summary()[counts]
+        assert made["sent"] == 0
+        assert 55 <= made["nobody_looks"] <= 61
+
+
+def test_what_is_looked_at_comes_thirty_times_a_second_and_ends_a_second_after_the_last_watch() -> None:
+    table = Table()
+    table.watch(**ALL)
+    table.run(3.0)
+    views = Counter(frame.view for frame in table.frames())
+    assert all(80 <= views[view] <= 90 for view in ("overview", "first_person"))
+    assert 80 <= len(table.states()) <= 90
+    assert len(table.shapes()) == 1
+    # Ordered in the turn of its stamp, answered 4 ms later.
+    assert table.ages_s["video"] == [0.0] * len(table.frames())
+    assert all(0.004 <= frame.header.sent_s - frame.captured_s < 0.008 for frame in table.frames())
+    table.watching = {}
+    table.run(2.0)
+    before = len(table.seen)
+    table.run(1.0)
+    assert len(table.seen) == before
+    newest_s = max(state.taken_s for state in table.states())
+    assert 3.6 < newest_s < 3.8  # the last Watch came at 2.75 s
+
+
+def test_shapes_come_again_every_three_seconds_and_when_another_begins_to_look() -> None:
+    table = Table()
+    table.watch(scene=True)
+    table.run(7.0)
+    assert len(table.shapes()) == 3
+    table.watching = {}
+    table.run(2.0)
+    table.watch(scene=True)
+    table.run(0.5)
+    assert len(table.shapes()) == 4
+    first = table.shapes()[0]
+    for later in table.shapes():
+        assert later.version == first.version == 1
+        assert later.shapes == first.shapes
+    assert {state.version for state in table.states()} == {1}
+    headers = [message.header.sequence for message in table.seen]
+    assert headers == sorted(set(headers))
+
+
+def test_a_recording_gets_the_scene_although_nobody_looks() -> None:
+    table = Table(always=("scene",))
+    table.run(2.0)
+    assert 55 <= len(table.states()) <= 61
+    assert len(table.shapes()) == 1
+    assert table.frames() == []
+
+
+def test_a_slow_video_link_delays_frames_and_never_a_stiffness() -> None:
+    free, slow = Table(), Table(link=LinkSpec.parse("video: rate 2mbit"))
+    for table in (free, slow):
+        table.watch(**ALL)
+        table.run(4.0)
+    assert slow.ages_s["haptics"] == free.ages_s["haptics"]
+    assert slow.ages_s["telemetry"] == free.ages_s["telemetry"]
+    # 18 kB at 2 Mbit/s are 73 ms; what waits behind one other is the most, as nothing more is made meanwhile.
+    assert min(slow.ages_s["video"]) >= 0.072
+    assert max(slow.ages_s["video"]) < 0.25
+    assert 10 * 4 <= len(slow.frames()) <= 14 * 4
+    assert {frame.view for frame in slow.frames()[-4:]} == {"overview", "first_person"}
+    assert slow.looking.summary()["overview"]["behind"] > 50
+
+
+def test_pictures_give_way_to_a_narrow_link_and_come_back() -> None:
+    table = Table(left_bit_s=150e3)
+    table.watch(overview=True, first_person=True)
+    table.run(4.0)
+    assert table.looking.pictures == {"rate_hz": 5.0, "quality": 30, "size": 0.5}
+    assert 2 * 4 * 4 <= len(table.frames()) <= 2 * 5 * 4 + 4
+    assert {(frame.width, frame.height) for frame in table.frames()[4:]} == {(320, 240)}
+    table.left_bit_s, table.begins = 1e9, True
+    table.run(4.0)
+    assert table.looking.pictures == {"rate_hz": 30.0, "quality": 75, "size": 1.0}
+    last = table.frames()[-50:]
+    assert {(frame.width, frame.height) for frame in last} == {(640, 480)}
+
+
+def test_the_same_link_shows_whole_size_in_h264_and_another_codec_begins_where_its_bytes_say() -> None:
+    table = Table(left_bit_s=150e3, link=LinkSpec.parse("video: rate 150kbit"))
+    table.watch(overview=True, first_person=True, lacks=(0, 0))
+    table.run(8.0)
+    seen = table.looking.pictures
+    assert seen is not None
+    assert (seen["quality"], seen["size"]) == (75, 1.0)
+    for view in ("overview", "first_person"):
+        steps = [step for step in table.steps() if step.view == view]
+        assert [step.number for step in steps] == list(range(1, len(steps) + 1))
+        assert [step.number for step in steps if step.whole] == [1]
+        assert len(steps) >= 5 * 6
+    assert table.frames() == []
+    # Whole ones of both views are under way for 1.2 s; then no step waits long.
+    assert max(table.ages_s["video"][10:]) < 0.25
+    # One who shows JPEG alone begins to look.
+    table.watch(overview=True, first_person=True)
+    table.run(1.0)
+    assert table.looking.pictures == {"rate_hz": 5.0, "quality": 30, "size": 0.5}
+
+
+@pytest.mark.parametrize("law", ["swept", "paper"])
+def test_a_state_says_where_the_robot_side_believes_everything_is(law: str) -> None:
+    camera = CameraSettings(mean_m=(0.01, -0.02, 0.005), sd_m=0.004)
+    table = Table(RobotSettings(camera=camera, law=law))  # type: ignore[arg-type]
+    table.watch(scene=True)
+    table.run(0.5)
+    state, [shapes] = table.states()[-1], table.shapes()
+    scene, kinematics = table.parts.scene, table.parts.kinematics
+    assert table.robot.newest is not None
+    _, situation = table.robot.newest
+    objects = situation.objects
+    assert objects.positions_m is not None
+    # Links where the encoders say, objects where the camera does: each is wrong by its own error.
+    bodies = np.array([scene.model.body(name).id for name in shapes.links])
+    links = rows(state.link_poses, 7)
+    np.testing.assert_allclose(links[:, :3], kinematics.body_poses(bodies)[:, :3], atol=2e-4)
+    np.testing.assert_allclose(links[:, :3], scene.data.xpos[bodies], atol=2e-3)
+    assert list(np.frombuffer(state.object_index, "<u4")) == list(range(len(shapes.objects)))
+    poses = rows(state.object_poses, 7)
+    np.testing.assert_allclose(poses[:, :3], objects.positions_m, atol=1e-6)
+    for index, thing in enumerate(scene.objects):
+        true_m = scene.data.geom_xpos[thing.geoms[0]]
+        assert thing.name == shapes.objects[index]
+        assert np.linalg.norm(poses[index, :3] - true_m) > 0.01
+        turned = Rotation.from_quat(poses[index, 3:], scalar_first=True).as_matrix()
+        np.testing.assert_allclose(turned, scene.data.geom_xmat[thing.geoms[0]].reshape(3, 3), atol=1e-5)
+    target = shapes.objects.index("target")
+    assert [index for index, role in enumerate(state.roles) if role == 1] == [target]
+    assert rows(state.spheres, 4).shape == (len(situation.pose.sphere_radii_m), 4)
+    assert state.tool_pose[:3] == pytest.approx(situation.pose.tool_position_m, abs=2e-4)
+    for terms in (state.l2, state.r2):
+        assert terms.camera_sd_m == pytest.approx(0.004)
+        assert terms.quantile == pytest.approx(2.3263, abs=1e-3)
+        variance = terms.kinematic_sd_m**2 + terms.camera_sd_m**2 + terms.prediction_sd_m**2
+        assert terms.sigma_m == pytest.approx(terms.mean_m + terms.quantile * np.sqrt(variance), rel=1e-9)
+    if law == "swept":
+        # û·(μ_ee - μ_c) along ±x, and the same μ_δ.
+        assert state.l2.mean_m - state.r2.mean_m == pytest.approx(0.02, abs=1e-4)
+
+
+@pytest.mark.parametrize("law", ["swept", "paper"])
+def test_overlaps_add_up_to_the_total_that_the_law_has(law: str) -> None:
+    table = Table(RobotSettings(camera=CameraSettings(mean_m=-0.01), law=law))  # type: ignore[arg-type]
+    table.run(0.1)
+    core = table.robot
+    assert core.newest is not None
+    sensed, situation = core.newest
+    # Among things, with a delay that is known, moving: a tenth of a second's way ahead something is met.
+    pose = situation.pose
+    there = replace(pose, sphere_centers_m=pose.sphere_centers_m + np.array([0.2, 0.02, -0.17]))
+    velocities = np.linalg.pinv(pose.tool_jacobian) @ [0.1, 0.0, 0.0, 0.0, 0.0, 0.0]
+    moving = replace(situation, pose=there, loop_age_known=True, loop_age_s=0.3, joint_velocities_rad_s=velocities)
+    law_anew = build_parts(table.settings, 1, "clock").explains
+    assert isinstance(law_anew, SweptLaw | PaperLaw)
+    sensed = law_anew.sense(moving, 10.0)
+    assert sensed.overlap_m3 > 1e-6
+    l2, r2 = law_anew.explain("l2", moving, sensed), law_anew.explain("r2", moving, sensed)
+    assert len(r2.overlaps_m3) > 1
+    assert sum(r2.overlaps_m3.values()) == pytest.approx(sensed.overlap_m3, rel=1e-6)
+    assert r2.terms.displacement_m == pytest.approx(0.03, rel=1e-3)
+    if law == "swept":
+        assert sum(l2.overlaps_m3.values()) != pytest.approx(sensed.overlap_m3, rel=1e-3)
+        assert max(r2.terms.sigma_m, l2.terms.sigma_m) > 0.0

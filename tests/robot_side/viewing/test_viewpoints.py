@@ -1,0 +1,54 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robot_side.drivers.mujoco.scene import load_scene
+from robot_side.viewing.viewpoints import viewpoints
+from tests.helpers.arm_models import planar_arm
+from tests.robot_side.viewing.picture_taking import HEIGHT, WIDTH, project
+
+CAMERA = '<camera name="{}" pos="0.5 0 3" fovy="50"/>'
+
+
+def test_the_models_own_cameras_come_first(tmp_path: Path) -> None:
+    scene = load_scene(planar_arm(tmp_path, world=CAMERA.format("other") + CAMERA.format("overview")), "tcp")
+    chosen = viewpoints(scene)["overview"].camera
+    assert chosen is not None
+    assert scene.model.camera(chosen).name == "overview"
+    assert viewpoints(load_scene())["first_person"].camera == load_scene().model.camera("tool").id
+
+
+@pytest.mark.parametrize("built_in", [True, False])
+def test_the_overview_shows_tool_base_and_what_is_ahead(built_in: bool, tmp_path: Path) -> None:
+    scene = load_scene() if built_in else load_scene(planar_arm(tmp_path, yaw_deg=70.0), "tcp")
+    overview = viewpoints(scene)["overview"]
+    tool = scene.data.site(scene.robot.site)
+    ahead_m = tool.xpos + 0.2 * tool.xmat.reshape(3, 3)[:, 2] * [1.0, 1.0, 0.0]
+    for point_m in (tool.xpos, ahead_m):
+        row, column, depth_m = project(scene, overview, point_m)
+        assert depth_m > 0.3
+        assert 0.1 * HEIGHT < row < 0.9 * HEIGHT
+        assert 0.1 * WIDTH < column < 0.9 * WIDTH
+    # From above, and ahead is up.
+    assert project(scene, overview, ahead_m)[0] < project(scene, overview, tool.xpos)[0]
+    assert overview.forward[2] < -0.7
+
+
+def test_the_first_person_is_behind_the_palm_and_beside_it(tmp_path: Path) -> None:
+    scene = load_scene(planar_arm(tmp_path), "tcp")
+    view = viewpoints(scene)["first_person"]
+    assert view.camera is None
+    tool = scene.data.site(scene.robot.site)
+    for along_m in (-0.02, 0.0, 0.3):
+        row, column, depth_m = project(scene, view, tool.xpos + along_m * tool.xmat.reshape(3, 3)[:, 2])
+        assert depth_m > 0.0
+        assert 0 < row < HEIGHT
+        assert column == pytest.approx(0.5 * WIDTH, abs=1.0)
+    forward = scene.data.xmat[view.body].reshape(3, 3) @ view.forward
+    assert forward @ tool.xmat.reshape(3, 3)[:, 2] > np.cos(np.radians(45.0))
+    fingers = scene.data.geom_xpos[scene.robot.gripper_geoms[scene.robot.geom_on_finger]]
+    for finger_m in fingers:
+        row, column, _ = project(scene, view, finger_m)
+        assert 0 < row < HEIGHT
+        assert 0 < column < WIDTH
