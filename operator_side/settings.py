@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import tyro
 from msgspec import Meta
 
-from common.command.run_options import RunOptions
+from common.command.run_options import SideOptions
 from common.limits import check_limits
 from common.protocol.messages import Compensation
 from common.sockets.turns import CONNECTIONS, MOST_CONNECTIONS_EACH
@@ -17,7 +17,7 @@ from operator_side.people.settings import PersonSettings
 
 
 @dataclass(frozen=True)
-class OperatorSettings(RunOptions):
+class OperatorSettings(SideOptions):
     """The operator side: a DualSense whose triggers stiffen in the direction of danger.
 
     It connects to a robot side, sends what the hands do, and lets the fingers feel what is ahead. L1 held: the
@@ -38,8 +38,6 @@ class OperatorSettings(RunOptions):
     connections: Annotated[int, Meta(ge=1, le=MOST_CONNECTIONS_EACH)] = CONNECTIONS
     """Messages go to the robot side and back over several connections in turn. A packet that the network loses then
     holds up a part of the messages, and newer ones overtake. 8 help where packets are lost in bursts."""
-    realtime: bool = False
-    """Real-time scheduling and locked memory; where that is not permitted, a note says what permits it."""
     device: Literal["hid", "simulated", "browser"] = "hid"
     """A real controller, which is waited for while it is not there; a simulated one with a scripted person, out of
     whose hands a page of the console may take it; or a simulated one that nobody but a page drives."""

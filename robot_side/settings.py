@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import tyro
 from msgspec import Meta
 
-from common.command.run_options import RunOptions
+from common.command.run_options import SideOptions
 from common.limits import check_limits, check_value
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
@@ -62,7 +62,7 @@ class CameraSettings:
 
 
 @dataclass(frozen=True)
-class RobotSettings(RunOptions):
+class RobotSettings(SideOptions):
     """The robot side: a simulated arm that knows how wrong it may be, and warns of what is ahead.
 
     It listens for an operator side, moves as that one asks while commands keep coming, and answers with the
@@ -79,8 +79,6 @@ class RobotSettings(RunOptions):
     feelahead keys make robot; then, for each operator: feelahead keys allow NAME KEY."""
     insecure: bool = False
     """Listen beyond this machine without keys: anyone who reaches the port can move the arm."""
-    realtime: bool = False
-    """Real-time scheduling and locked memory; where that is not permitted, a note says what permits it."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
     """Any MJCF arm with actuators instead of the built-in one. It starts at its keyframe named home, else at its first
     keyframe, else in the middle of its joints' ranges."""

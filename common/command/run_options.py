@@ -68,3 +68,11 @@ class RunOptions:
         """`asymmetry` in seconds, with its sign; ConfigurationError for what is no time."""
         text = self.asymmetry.strip()
         return -parse_duration(text[1:], "--asymmetry") if text.startswith("-") else parse_duration(text, "--asymmetry")
+
+
+@dataclass(frozen=True)
+class SideOptions(RunOptions):
+    """The flags of a side that is a process of its own."""
+
+    realtime: bool = False
+    """Real-time scheduling and locked memory; where that is not permitted, a note says what permits it."""

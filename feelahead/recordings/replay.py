@@ -18,7 +18,7 @@ from operator_side.core import OperatorSide
 from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
-from robot_side.arm.port import ArmState
+from robot_side.arm.port import Arm, ArmState
 from robot_side.compiled.warm_up import kernel_digests, warm_up
 from robot_side.core import RobotSide
 from robot_side.parts import build_parts
@@ -27,8 +27,10 @@ from robot_side.settings import RobotSettings
 from robot_side.surroundings.perceived import PerceivedObjects, Role
 
 
-class _Given:
+class _Given(Arm):
     """An Arm and an ObjectSource that give what was recorded; what they are told goes nowhere."""
+
+    joint_count = 0
 
     def __init__(self, joint_count: int) -> None:
         self.joint_count = joint_count

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
+from common.clock import Clock
 
 
 @dataclass
@@ -31,7 +32,10 @@ class ArmState:
 
 
 class Arm(Protocol):
-    """A velocity-controlled arm that stops by itself when it is no longer told to go on."""
+    """A velocity-controlled arm that stops by itself when it is no longer told to go on.
+
+    The last three say how a simulation keeps up; an arm that derives from this class runs in real time.
+    """
 
     @property
     def joint_count(self) -> int:
@@ -52,6 +56,19 @@ class Arm(Protocol):
     def state(self, now_s: float) -> ArmState:
         """The measured state at `now_s`; a simulated arm advances its physics up to then first."""
         ...
+
+    def give_way(self, clock: Clock) -> None:
+        """From now on fall behind real time, by `clock`, rather than hold up the caller of `state`."""
+        del clock
+
+    @property
+    def share_of_real_time(self) -> float:
+        """Simulated time over real time since the first `state`, 0 to 1."""
+        return 1.0
+
+    def take_share_of_real_time(self) -> float:
+        """Return the same since the last call."""
+        return 1.0
 
 
 @dataclass

@@ -29,6 +29,7 @@ ARROWS = """
     common/video: common/protocol
     common/sockets: common common/files
     common/command: common common/emulation common/files common/recording
+    common/loop: common common/command common/files common/realtime common/recording
 
     robot_side/compiled: common common/companion common/files
     robot_side/overlap/checks: common
@@ -77,7 +78,7 @@ ARROWS = """
     robot_side/parts.py: common common/protocol common/timing robot_side/compiled robot_side/core.py
         robot_side/drivers/mujoco robot_side/enlargement robot_side/gripper robot_side/laws robot_side/operators
         robot_side/outcome robot_side/settings.py robot_side/surroundings
-    robot_side: common common/command common/emulation common/protocol common/realtime common/recording common/sockets
+    robot_side: common common/command common/emulation common/loop common/protocol common/realtime common/sockets
         robot_side/compiled robot_side/core.py robot_side/events.py robot_side/parts.py robot_side/recording
         robot_side/reporting robot_side/settings.py robot_side/viewing
 
@@ -111,11 +112,11 @@ ARROWS = """
         operator_side/dualsense/effects operator_side/dualsense/reports operator_side/dualsense/simulated
         operator_side/people operator_side/settings.py operator_side/viewing/console operator_side/viewing/facts.py
         operator_side/viewing/pages
-    operator_side: common common/command common/emulation common/protocol common/realtime common/recording
-        common/sockets operator_side/calibration operator_side/core.py operator_side/dualsense/hid
-        operator_side/dualsense/reports operator_side/dualsense/simulated operator_side/events.py operator_side/hands
-        operator_side/robot_link operator_side/settings.py operator_side/viewing operator_side/viewing/console
-        operator_side/viewing/pages operator_side/viewing/terminal
+    operator_side: common common/command common/emulation common/loop common/protocol common/recording common/sockets
+        operator_side/calibration operator_side/core.py operator_side/dualsense/hid operator_side/dualsense/reports
+        operator_side/dualsense/simulated operator_side/events.py operator_side/hands operator_side/robot_link
+        operator_side/settings.py operator_side/viewing operator_side/viewing/console operator_side/viewing/pages
+        operator_side/viewing/terminal
 
     feelahead/both_sides: common/* robot_side/* operator_side/*
     feelahead/recordings: common/* robot_side/* operator_side/*
@@ -159,10 +160,9 @@ LIBRARIES = {
     "common.clock.MonotonicClock": (
         "common/sockets/shell.py",
         "common/recording",
-        "robot_side/main.py",
+        "common/loop",
         "robot_side/viewing",
         "robot_side/compiled/warm_up.py",
-        "operator_side/main.py",
         "operator_side/viewing/terminal",
         "feelahead/lab",
         "feelahead/both_sides",

@@ -5,7 +5,7 @@ import pytest
 
 from common.arrays import FloatArray
 from common.protocol.messages import Header, MotionCommand
-from robot_side.arm.port import ArmState
+from robot_side.arm.port import Arm, ArmState
 from robot_side.gripper.grip import Grip
 from robot_side.motion import Motion
 from robot_side.operators.safety import Permission
@@ -15,7 +15,7 @@ from robot_side.settings import RobotSettings
 PARTS = build_parts(RobotSettings(), 1, "clock")
 
 
-class ToldArm:
+class ToldArm(Arm):
     """Keeps what it is told."""
 
     joint_count = PARTS.arm.joint_count

@@ -12,20 +12,20 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
 
 import operator_side.main
 import robot_side.main
+from common.loop.loop import Loop
 from common.protocol.session import OWNING
 from common.sockets.authentication import make_key_pair
 from common.sockets.keys import KeyFolder
 from feelahead.both_sides.processes import SideFailedError, SideProcess
 from feelahead.lab.hostile.raw_zmtp import RawConnection, port_of
-from robot_side.main import KEYS_PERIOD_S
 from robot_side.operators.safety import SafetySettings
+from robot_side.turns import KEYS_PERIOD_S
 from tests.helpers.python_process import LIMIT_S, ended, start
 
 pytestmark = pytest.mark.processes
@@ -209,16 +209,17 @@ def test_a_summary_on_a_full_disk_is_one_line_and_the_old_one_stays(tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("side", "arguments"), [(operator_side.main, NOWHERE), (robot_side.main, ROBOT)], ids=["operator", "robot"]
+    ("command", "arguments"),
+    [(operator_side.main.command, NOWHERE), (robot_side.main.command, ROBOT)],
+    ids=["operator", "robot"],
 )
 def test_a_run_that_fails_in_whatever_way_has_its_summary(
-    side: ModuleType, arguments: Sequence[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: Callable[[Sequence[str]], int], arguments: Sequence[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
         raise RuntimeError("of no kind that was thought of")
 
-    command: Callable[[Sequence[str]], int] = side.command
-    monkeypatch.setattr(side._Loop, "run", fail)
+    monkeypatch.setattr(Loop, "run", fail)
     path = tmp_path / "out.json"
     with pytest.raises(RuntimeError, match="of no kind"):
         command([*arguments, f"--summary={path}", "--status=none"])

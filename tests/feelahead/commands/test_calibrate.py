@@ -10,6 +10,7 @@ import pytest
 import feelahead.commands.calibrate
 import operator_side.main
 from common.errors import ConfigurationError, DeviceError
+from common.loop import process
 from feelahead.main import command
 from operator_side.calibration.procedure import CalibrationError
 from operator_side.calibration.store import calibration_path, load_calibration, read_calibration, write_calibration
@@ -131,7 +132,7 @@ def test_the_operator_side_uses_what_is_given_else_what_is_stored_for_its_contro
 ) -> None:
     backend = FakeBackend({0x0CE6: {b"/dev/hidraw3": FakeHandle()}})
     # It would be this process's, and stay so.
-    monkeypatch.setattr(operator_side.main, "raise_priority", lambda: False)
+    monkeypatch.setattr(process, "raise_priority", lambda: False)
     taken: list[TravelCalibration] = []
     monkeypatch.setattr(OperatorSide, "calibrate", lambda _, calibration: taken.append(calibration))
 

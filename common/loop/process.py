@@ -1,0 +1,89 @@
+"""The process of a side, from its settings to its exit code.
+
+Order of a start: settings, files and keys are checked; everything is built and compiled; then the sockets open, and the
+loop runs. Until then a stop signal ends the process at once, with code 0. Each run writes its summary, one that failed
+or never began, too.
+"""
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from typing import Any, Literal, Protocol, Self, TypeVar
+
+from common.command.run_options import SideOptions
+from common.command.status import Status
+from common.command.stop_signal import LeavingAtOnce, StopSignal, ignore_broken_output
+from common.files.output_file import write_json
+from common.loop.loop import Loop, Side
+from common.realtime.priority import make_realtime, raise_priority
+from common.recording.side import Encoder, SideRecording, recording_to
+
+Received = TypeVar("Received")
+
+
+class Summarized(Side[Received], Protocol[Received]):
+    """A side that has figures of its run."""
+
+    def close(self) -> None:
+        """End what runs beside, and let devices go; safe to call again."""
+
+    def summary(self) -> Mapping[str, Any]:
+        """Return the figures of the run, once it is closed."""
+
+
+class Process:
+    """What a side's process has around its loop: status, recording, and what is to be closed at the end."""
+
+    def __init__(
+        self, settings: SideOptions, side: Literal["robot", "operator"], status: Status, encoder: Encoder, loop: Loop
+    ) -> None:
+        self._leaving = LeavingAtOnce(settings.summary)
+        self._settings, self._side, self._encoder = settings, side, encoder
+        self.status, self.loop, self.stack = status, loop, ExitStack()
+        """stack: closed at the end, last in first out"""
+        self.recording: SideRecording | None = None
+        """The recording of the run; None without one"""
+
+    def __enter__(self) -> Self:
+        with ExitStack() as opened:
+            opened.enter_context(self.status)
+            self.recording = opened.enter_context(recording_to(self._settings.record, self._side, self._encoder))
+            self.status.also = None if self.recording is None else self.recording.note
+            self.stack = opened.pop_all()
+        return self
+
+    def __exit__(self, *ended: Any) -> bool | None:
+        return self.stack.__exit__(*ended)
+
+    def note(self, text: str) -> None:
+        """Tell a person one line, which stays."""
+        self.status.note(text)
+
+    def run(self, open_side: Callable[[], Summarized[Received]]) -> int:
+        """Open the side's sockets, run it, and write the summary; return the exit code. Raises what ended the run."""
+        stop = self.stack.enter_context(StopSignal())
+        self._leaving.summary = None
+        raise_priority()
+        for text in make_realtime() if self._settings.realtime else ():
+            self.note(text)
+        # Last: no crowd at a port takes what is still to be opened.
+        side = open_side()
+        failure: Exception | None = None
+        try:
+            self.loop.run(side, stop, self._settings.duration, self.note)
+        except BrokenPipeError:
+            ignore_broken_output()  # no failure: the reader of our output has left
+        except Exception as error:
+            failure = error
+        finally:
+            side.close()
+        summary = {**self.loop.summary(self._side), **side.summary()}
+        if self.recording is not None:
+            summary["recording"] = self.recording.close()
+        summary["errors"] = [] if failure is None else [str(failure)]
+        try:
+            if self._settings.summary is not None:
+                write_json("--summary", self._settings.summary, summary)
+        finally:
+            if failure is not None:
+                raise failure
+        return 0

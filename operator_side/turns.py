@@ -1,0 +1,181 @@
+"""The work of the operator side in the turns of its loop: sockets, controller and people around the core."""
+
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
+
+from common.command.live_view import Value
+from common.loop.process import Process
+from common.sockets.operator import OperatorSockets
+from operator_side.core import OperatorSide
+from operator_side.dualsense.hid.connection import Connection
+from operator_side.dualsense.hid.release_guard import ReleaseGuard
+from operator_side.recorded import recorded_status
+from operator_side.robot_link.commanding import ToRobot
+from operator_side.robot_link.sending import Sending
+from operator_side.settings import OperatorSettings
+from operator_side.stored_travel import StoredTravel
+from operator_side.viewing.console.console import Console
+from operator_side.viewing.facts_of_core import Surroundings
+from operator_side.viewing.following_pages import follow_pages, hands_facts
+from operator_side.viewing.pages.driving_page import DrivingPage
+from operator_side.viewing.pages.shared_hands import SharedHands
+from operator_side.viewing.viewing import Viewing
+
+HELPS: Final = {
+    "sockets": "a slower link",
+    "messages": "a slower link",
+    "feeling": "--no-haptics",
+    "hands": "another controller",
+    "": "a page of the console fewer, or a faster machine,",
+}
+"""The stages of a turn, and what makes each of them shorter: sending and receiving; taking in what arrived; what the
+controller is told; what is read from it, and commands. "": all else, such as what is shown."""
+_GUARD_PERIOD_S: Final = 0.5
+"""From one look at the watchdog to the next."""
+
+
+class Desk(NamedTuple):
+    """What stands before the operator: a controller, and who may hold it."""
+
+    connection: Connection
+    guard: ReleaseGuard | None
+    """The watchdog of a real controller"""
+    person: SharedHands | None
+    """The hands on a simulated controller; None on a real one"""
+    pages: DrivingPage
+    console: Console | None
+
+
+class OperatorTurns:
+    """Motion, messages and effects, and what is shown."""
+
+    def __init__(
+        self,
+        settings: OperatorSettings,
+        core: OperatorSide,
+        desk: Desk,
+        sockets: OperatorSockets,
+        process: Process,
+        *,
+        stored_travel: bool,
+    ) -> None:
+        """stored_travel: take on the calibration that is stored for a controller."""
+        self._process, self._core, self._sockets = process, core, sockets
+        self._connection, self._guard, self._person, self._pages, console = desk
+        self._sending = Sending(settings.link_spec(), sockets)
+        self._viewing = Viewing(
+            core,
+            lambda now_s: Surroundings(
+                "controller" if self._person is None else self._person.hands,
+                self._sending.asked,
+                settings.swap_sides,
+                hands_facts(self._pages, self._person, core, now_s),
+            ),
+            *(process.status, self._pages, console, process.recording),
+        )
+        self._travel = StoredTravel(self._connection, core, self._viewing.note) if stored_travel else None
+        timed = process.loop.stages.timed
+        self._take, self._feel = timed("messages", self._take_in), timed("feeling", self._tell_controller)
+        self.turn = timed("hands", self._move)
+        self.wait, self.next_due = sockets.wait, self._sending.next_due
+        self._guard_s = 0.0
+
+    @property
+    def resting(self) -> bool:
+        """The arm is not armed, as far as is known."""
+        stiffness = self._core.stiffness
+        return stiffness is None or stiffness.state != "armed"
+
+    def receive(self) -> tuple[Sequence[bytes], Sequence[tuple[bytes, bytes]]]:
+        """Return what has arrived, of control and of view."""
+        return self._sockets.receive(), self._sockets.receive_view()
+
+    def take(self, received: tuple[Sequence[bytes], Sequence[tuple[bytes, bytes]]], now_s: float) -> None:
+        """Take in what has arrived, and tell the controller what follows from it."""
+        self._take(*received, now_s)
+        self._feel(now_s)
+
+    def send(self) -> None:
+        """Let go of what is due."""
+        if not self._sending.send(self._process.loop.clock.now()):
+            self._core.held_command.forget()
+
+    def rest(self, now_s: float, turned_s: float) -> None:
+        """Record, look after the watchdog, and show."""
+        del turned_s
+        recording, status = self._process.recording, self._process.status
+        if recording is not None:
+            for text in recording.idle(now_s, lambda: recorded_status(self._core, now_s)):
+                self._viewing.note(text)
+        self._say_what_is_new()
+        if self._guard is not None and now_s >= self._guard_s:
+            self._guard_s = now_s + _GUARD_PERIOD_S
+            for text in self._guard.take_notes():
+                self._viewing.note(text)
+        shows, tells = self._viewing.facts_due(now_s), status.due(now_s)
+        values = self._values(now_s) if shows or tells else {}
+        if shows:
+            self._viewing.show(values, now_s)
+        if tells:
+            self._viewing.tell(values, now_s)
+
+    def close(self) -> None:
+        """Release the triggers, and let the controller go."""
+        self._connection.close()
+
+    def summary(self) -> dict[str, Any]:
+        """Return the core's figures and the process's."""
+        pages = self._pages
+        figures = {
+            "controller": {"found": self._connection.found, "state": str(self._connection.state)},
+            "triggers_released": self._connection.released,
+            "pages": {"rejected": pages.rejected, "stale": pages.stale, "silences": pages.silences},
+        }
+        return self._core.summary() | self._sending.summary() | figures
+
+    def _take_in(self, received: Sequence[bytes], seen: Sequence[tuple[bytes, bytes]], now_s: float) -> None:
+        for payload in received:
+            self._core.receive(payload, now_s)
+        for topic, payload in seen:
+            if not self._viewing.take(topic, payload):
+                self._core.receive_view(payload, now_s)
+
+    def _tell_controller(self, now_s: float) -> None:
+        self._connection.beat(now_s)
+        if (output := self._core.output_report(now_s)) is not None:
+            self._connection.write(output, now_s)
+
+    def _move(self, now_s: float) -> None:
+        core, connection = self._core, self._connection
+        follow_pages(self._pages, core, now_s)
+        # Before anything else is sent: the wish arrives after all that took the old way.
+        if (words := core.tuner.take_link()) is not None:
+            self._sending.tune(words)
+        if self._person is not None:
+            self._person.tick(now_s, core.screen, core.link.round_trip.mean or 0.0)
+        connection.update(now_s)
+        self._say_what_is_new()
+        if self._travel is not None:
+            self._travel.follow()
+        if (report := connection.read(now_s)) is not None:
+            core.read_report(report, now_s)
+        self._sending.push([*core.motion(now_s), *map(ToRobot, self._viewing.requests(now_s))], now_s)
+        self._sending.measure(core.link.outgoing, now_s)
+
+    def _say_what_is_new(self) -> None:
+        for text in self._connection.take_notes():
+            self._viewing.note(text)
+
+    def _values(self, now_s: float) -> dict[str, Value]:
+        """The values that a person sees."""
+        values: dict[str, Value] = dict(self._core.status(now_s))
+        if self._sockets.trouble is not None and values.get("link") != "up":
+            values["link"] = self._sockets.trouble
+        values["controller"] = self._connection.state
+        controller = self._connection.controller
+        values["triggers_released"] = None if controller is None else controller.device.released
+        if self._person is not None:
+            values["person"] = self._person.doing
+        values["motion_overruns"] = self._process.loop.pacer.overruns
+        values["queue_to_robot_ms"] = self._sending.queue_ms
+        return values
