@@ -98,13 +98,13 @@ class RobotSide:
         finally:
             command = self.session.safety.command
             sent_s = math.nan if command is None else command.header.sent_s
-            self._heard.begin("listeners")
+            self._heard.on_step("listeners")
             self._heard.on_tick(Tick(now_s, self._measured, self.sight.frame, sent_s, outgoing, self._found))
-            self._heard.begin("end")
+            self._heard.on_step("end")
         return outgoing
 
     def _run(self, now_s: float) -> list[Outgoing]:
-        begin, parts, sight, grip = self._heard.begin, self.parts, self.sight, self.grip
+        begin, parts, sight, grip = self._heard.on_step, self.parts, self.sight, self.grip
         delay_s = self._follow_operator(now_s)
         begin("arm")
         self._measured = parts.arm.state(now_s)
@@ -156,9 +156,9 @@ class RobotSide:
 
     def observe(self, now_s: float) -> None:
         """After the messages of the tick at `now_s` have left: take in a frame, and let listeners work."""
-        self._heard.begin("frame")
+        self._heard.on_step("frame")
         self.sight.see(now_s)
-        self._heard.begin("end")
+        self._heard.on_step("end")
         self._heard.on_sent(now_s)
 
     def status(self, now_s: float) -> dict[str, float | str | bool | None]:

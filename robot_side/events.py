@@ -3,8 +3,8 @@
 A listener changes nothing: what it hears are the core's own values, not copies.
 """
 
-from collections.abc import Callable, Sequence
-from typing import Final, Literal, NamedTuple
+from collections.abc import Callable, Collection, Sequence
+from typing import Final, Literal, NamedTuple, get_args
 
 from common.arrays import FloatArray
 from robot_side.arm.port import ArmState
@@ -50,11 +50,14 @@ class Tick(NamedTuple):
 class Listener:
     """Hears what happens to a core; a method that is left as it is costs nothing."""
 
+    steps: Collection[Step] = ()
+    """The steps that `on_step` hears of"""
+
     def on_received(self, peer: bytes, payload: bytes, now_s: float) -> None:
         """Hear of a control payload, before it is judged."""
 
     def on_step(self, step: Step) -> None:
-        """Hear which step of the turn begins."""
+        """Hear which step of the turn begins: one of `steps`."""
 
     def on_tick(self, tick: Tick) -> None:
         """Hear of a tick, before its messages leave."""
@@ -69,11 +72,13 @@ class Listeners(Listener):
     def __init__(self, listeners: Sequence[Listener]) -> None:
         own: Final = {
             name: [getattr(one, name) for one in listeners if getattr(type(one), name) is not getattr(Listener, name)]
-            for name in ("on_received", "on_step", "on_tick", "on_sent")
+            for name in ("on_received", "on_tick", "on_sent")
         }
-        self._received, self._steps, self._ticks, self._sent = (tuple(found) for found in own.values())
-        self.begin: Callable[[Step], None] = self._steps[0] if len(self._steps) == 1 else self.on_step
-        """As `on_step`: several times in a tick, mostly for one listener"""
+        self._received, self._ticks, self._sent = (tuple(found) for found in own.values())
+        self._steps: dict[str, list[Callable[[Step], None]]] = {name: [] for name in get_args(Step)}
+        for one in listeners:
+            for name in one.steps:
+                self._steps[name].append(one.on_step)
 
     def on_received(self, peer: bytes, payload: bytes, now_s: float) -> None:
         """Pass it on."""
@@ -82,7 +87,7 @@ class Listeners(Listener):
 
     def on_step(self, step: Step) -> None:
         """Pass it on."""
-        for hear in self._steps:
+        for hear in self._steps[step]:
             hear(step)
 
     def on_tick(self, tick: Tick) -> None:

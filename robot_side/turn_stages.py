@@ -25,6 +25,8 @@ class StageTiming(Listener):
     def __init__(self, stages: Stages) -> None:
         self._stages = stages
 
+    steps = ("arm", "pose", "law", "messages")
+
     def on_step(self, step: Step) -> None:
         """Begin the step's stage, or end the one before."""
         if self._stages.looks:

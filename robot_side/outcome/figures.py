@@ -70,21 +70,17 @@ class RunFigures(Listener):
         self._placing = Placing()
         self._held = False
         self._newest: FloatArray = np.zeros(NUMBERS)
+        self._unread: list[Tick] = []
 
     def on_tick(self, tick: Tick) -> None:
-        """Take in one tick; one that failed found nothing."""
+        """Keep the tick for when its messages have left."""
         if self._start_s is None:
             self._start_s = tick.now_s
-        if (found := tick.found) is None:
-            return
-        armed = found.permission.state == "armed"
-        if found.situation.loop_age_known:
-            self._loop_age.add(found.situation.loop_age_s)
-        self.tick(found.sensed, armed=armed)
-        self.task(armed, found.holds_target, found.target_m, tick.now_s)
+        self._unread.append(tick)
 
     def on_sent(self, now_s: float) -> None:
         """Reckon with a block of ticks at once, which costs each of them less, and see what is true."""
+        self._read()
         if len(self._rows) >= BLOCK:
             self._take_in()
         if self._observer is not None:
@@ -96,6 +92,18 @@ class RunFigures(Listener):
     def since_start_s(self, time_s: float) -> float:
         """Return the time since the first tick."""
         return time_s - (self._start_s or 0.0)
+
+    def _read(self) -> None:
+        """Take in the ticks; one that failed found nothing."""
+        for tick in self._unread:
+            if (found := tick.found) is None:
+                continue
+            armed = found.permission.state == "armed"
+            if found.situation.loop_age_known:
+                self._loop_age.add(found.situation.loop_age_s)
+            self.tick(found.sensed, armed=armed)
+            self.task(armed, found.holds_target, found.target_m, tick.now_s)
+        self._unread.clear()
 
     def tick(self, sensed: Sensed, *, armed: bool = True) -> None:
         """One tick's enlargement, overlap and stiffness; nobody feels any while the arm is not armed."""
@@ -155,7 +163,8 @@ class RunFigures(Listener):
             self._lifted_m = max(self._lifted_m, height_m - self._rest_height_m)
 
     def summary(self) -> dict[str, Any]:
-        """The summary's keys that come from here, in the units of their names."""
+        """Return the summary's keys that come from here, in the units of their names."""
+        self._read()
         self._take_in()
         grasp_s = None
         if self._grasped_s is not None and self._armed_s is not None:

@@ -14,7 +14,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, get_args
 
 import numpy as np
 import tyro
@@ -67,6 +67,7 @@ class StepTimes(Listener):
 
     def __init__(self, *, all_stages: bool) -> None:
         """all_stages: or else those alone that are no part of look to message."""
+        self.steps = get_args(Step) if all_stages else ("arm", "pose", "frame", "end")
         self.took_s = np.zeros(len(STAGES))
         self._places = {
             step: STAGES.index(stage) for step, stage in _OF_STEPS.items() if all_stages or stage in OUTSIDE
