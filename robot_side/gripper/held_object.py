@@ -1,6 +1,6 @@
 """An object between the fingers moves with them: it leaves the surroundings and joins the gripper as spheres."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,17 +24,9 @@ class HeldObject:
     centers_in_tool_m: FloatArray
     """(k, 3) contiguous"""
     radii_m: FloatArray
-    """(k,)"""
-    _joined: list[tuple[FloatArray, FloatArray, BoolArray]] = field(default_factory=list, compare=False, repr=False)
-
-    def joined(self, pose: GripperPose) -> tuple[FloatArray, BoolArray]:
-        """Radii (m + k,) of the gripper's spheres and of these, and which are a finger's; made once for poses
-        that share their radii."""
-        own = pose.sphere_radii_m
-        if not self._joined or self._joined[0][0] is not own:
-            on_finger = np.concatenate([pose.sphere_on_finger, np.zeros(len(self.radii_m), dtype=np.bool_)])
-            self._joined[:] = [(own, np.concatenate([own, self.radii_m]), on_finger)]
-        return self._joined[0][1:]
+    """(m + k,) of the gripper's own spheres and of these"""
+    on_finger: BoolArray
+    """(m + k,) whether the sphere belongs to a finger"""
 
 
 def gripped_object(scene: SceneTable, tool_position_m: FloatArray, reach_m: float) -> int | None:
@@ -66,16 +58,17 @@ def grip(objects: PerceivedObjects, index: int, pose: GripperPose, covers: HeldC
         index=index,
         name=objects.names[index],
         centers_in_tool_m=(in_world - pose.tool_position_m) @ pose.tool_rotation,
-        radii_m=radii,
+        radii_m=np.concatenate([pose.sphere_radii_m, radii]),
+        on_finger=np.concatenate([pose.sphere_on_finger, np.zeros(len(radii), dtype=np.bool_)]),
     )
 
 
 def with_held(pose: GripperPose, held: HeldObject) -> GripperPose:
-    """The gripper's spheres and after them the held object's, all moving with the tool."""
-    radii_m, on_finger = held.joined(pose)
-    centers_m = np.empty((len(radii_m), 3))
+    """Join the gripper's spheres and the held object's, which move with the tool."""
+    centers_m = np.empty((len(held.radii_m), 3))
     _join(pose.sphere_centers_m, held.centers_in_tool_m, pose.tool_position_m, pose.tool_rotation, centers_m)
-    return GripperPose(*(pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, centers_m, radii_m, on_finger))
+    spheres = centers_m, held.radii_m, held.on_finger
+    return GripperPose(pose.tool_position_m, pose.tool_rotation, pose.tool_jacobian, *spheres)
 
 
 @compiled(input_array(2), input_array(2), input_array(1), input_array(2), output_array(2))
