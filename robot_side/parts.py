@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 
 from common.errors import ConfigurationError
-from common.protocol.around import MOST_JOINTS
 from common.protocol.link_end import LinkEnd
 from common.timing.ages import LoopAge
 from robot_side.compiled.kernel import Compiled, imported_kernels
@@ -25,8 +24,7 @@ from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.laws.explanation import Explains
-from robot_side.laws.paper import PaperLaw
-from robot_side.laws.swept import SweptLaw
+from robot_side.laws.named import LAWS
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.operators.tuning import Tuning
@@ -123,15 +121,13 @@ def build_parts(
     joint_limits = limits.of_joints(arm.joint_count, *arm.ends_rad)
     surroundings = Surroundings()
     prediction, prediction_note = _prediction_errors(settings, scene)
-    law = (SweptLaw if settings.law == "swept" else PaperLaw)(
+    law = LAWS[settings.law](
         settings.uncertainty(prediction),
         np.full(arm.joint_count, encoder.standard_deviation_rad()),
         joint_limits,
         settings.motion,
         surroundings,
     )
-    if isinstance(law, SweptLaw):
-        law.ask_around(asked=len(law.encoder_sigma_rad) <= MOST_JOINTS)
     return SimulatedParts(
         arm=arm,
         kinematics=kinematics,

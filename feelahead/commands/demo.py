@@ -30,6 +30,7 @@ from feelahead.both_sides.summary import both_statuses, merge_summaries, read_su
 from feelahead.commands.open_browser import show_address
 from operator_side.viewing.facts import OperatorFacts
 from operator_side.viewing.terminal.status import TerminalStatus
+from robot_side.laws.named import LawName
 
 _START_TIMEOUT_S = 600.0
 """The first start compiles the overlap kernels, which a busy machine takes minutes for."""
@@ -65,7 +66,7 @@ class DemoSettings(RunOptions):
     """The share of contacts that a warning must precede, between 0 and 1 (eq. 10)."""
     assist: Literal["none", "speed"] = "none"
     """speed: the robot side caps the speed along the triggers, so that the arm stops where full strength is due."""
-    law: Literal["swept", "paper"] = "swept"
+    law: LawName = "swept"
     """The law of what is felt ahead. swept: in time to let go, along each trigger; paper: the paper's plain law."""
     compensation: Compensation = "operator"
     """The side that reckons with the delay: operator, by the commands under way; robot, by v t_d (eq. 8)."""

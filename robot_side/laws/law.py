@@ -1,7 +1,7 @@
 """What a law makes of the surroundings in one tick: two trigger fields and a rumble, whatever the law."""
 
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Protocol
 
 from common.arrays import FloatArray
 from common.protocol.around import Around
@@ -9,9 +9,6 @@ from common.protocol.messages import Compensation, Vector2
 from robot_side.arm.port import GripperPose
 from robot_side.laws.sensed import Sensed
 from robot_side.surroundings.perceived import PerceivedObjects
-
-LawName = Literal["swept", "paper"]
-"""swept: ways along each trigger, for its own zones. paper: the plain law of §4.2, one number for both triggers."""
 
 
 @dataclass

@@ -17,7 +17,7 @@ from typing import Final, NamedTuple, NoReturn
 import numpy as np
 
 from common.arrays import FloatArray, IntArray, require_finite
-from common.protocol.around import LISTS, LONGEST_S, PROBES, Around
+from common.protocol.around import LISTS, LONGEST_S, MOST_JOINTS, PROBES, Around
 from common.touch_speed import touch_speed_m_s
 from robot_side.arm.ability import JointLimits, change_times_s, find_ability
 from robot_side.arm.port import GripperPose
@@ -130,6 +130,11 @@ class SweptLaw:
         if not ways_around(self.memory.bundle, pose.tool_position_m, pose.tool_rotation, *seen, ways_m):
             return None
         return Around.of(until_s, ways_m, change_times_s(pose, self._limits, self._twists))
+
+    @property
+    def fits_a_message(self) -> bool:
+        """Whether a map has room for all joints."""
+        return len(self.encoder_sigma_rad) <= MOST_JOINTS
 
     def ask_around(self, *, asked: bool) -> None:
         """Look from around the gripper, too, from now on, or no longer; nobody asks for it at first."""

@@ -50,6 +50,7 @@ ARROWS = """
     robot_side/surroundings: common robot_side/compiled robot_side/overlap/meshes robot_side/surroundings/kinds
     robot_side/field: common robot_side/arm robot_side/compiled robot_side/enlargement robot_side/surroundings
         robot_side/surroundings/kinds
+    robot_side/laws/named.py: robot_side/laws
     robot_side/laws: common common/protocol robot_side/arm robot_side/compiled robot_side/enlargement robot_side/field
         robot_side/surroundings
     robot_side/gripper: common common/files robot_side/arm robot_side/compiled robot_side/overlap/meshes
@@ -72,12 +73,12 @@ ARROWS = """
     robot_side/viewing: common common/companion common/protocol robot_side/core.py robot_side/drivers/mujoco
         robot_side/laws robot_side/reporting robot_side/surroundings
     robot_side/settings.py: common common/command robot_side/arm robot_side/drivers/mujoco robot_side/enlargement
-        robot_side/laws robot_side/operators robot_side/surroundings robot_side/viewing
+        robot_side/laws/named.py robot_side/operators robot_side/surroundings robot_side/viewing
     robot_side/recording: common/recording robot_side/arm robot_side/compiled robot_side/core.py robot_side/events.py
         robot_side/settings.py robot_side/surroundings
     robot_side/parts.py: common common/protocol common/timing robot_side/compiled robot_side/core.py
-        robot_side/drivers/mujoco robot_side/enlargement robot_side/gripper robot_side/laws robot_side/operators
-        robot_side/outcome robot_side/settings.py robot_side/surroundings
+        robot_side/drivers/mujoco robot_side/enlargement robot_side/gripper robot_side/laws robot_side/laws/named.py
+        robot_side/operators robot_side/outcome robot_side/settings.py robot_side/surroundings
     robot_side: common common/command common/emulation common/loop common/protocol common/realtime common/sockets
         robot_side/compiled robot_side/core.py robot_side/events.py robot_side/parts.py robot_side/recording
         robot_side/reporting robot_side/settings.py robot_side/viewing
@@ -122,8 +123,8 @@ ARROWS = """
     feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/containers: common/* feelahead/both_sides
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers
-    feelahead/commands: common/* robot_side/compiled operator_side/* feelahead/lab feelahead/both_sides
-        feelahead/recordings
+    feelahead/commands: common/* robot_side/compiled robot_side/laws/named.py operator_side/* feelahead/lab
+        feelahead/both_sides feelahead/recordings
     feelahead: common/* feelahead/commands/*
 """
 """Each room with the rooms that it may import: `X` is the files directly in folder X, or file X where that has a row of

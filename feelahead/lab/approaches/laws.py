@@ -3,7 +3,7 @@
 from typing import Final, Literal, get_args
 
 from common.protocol.messages import Compensation
-from robot_side.laws.law import LawName
+from robot_side.laws.named import LawName
 
 Law = Literal["swept", "swept_robot", "paper", "none", "full"]
 """swept: ways along each trigger, rendered over its travel (docs/feel.md), with the operator side's commands under way.

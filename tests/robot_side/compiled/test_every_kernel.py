@@ -8,7 +8,7 @@ import pytest
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.warm_up import import_kernels, warm_up
 from robot_side.core import RobotSide
-from robot_side.laws.law import LawName
+from robot_side.laws.named import LawName
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 

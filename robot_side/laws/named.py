@@ -1,0 +1,38 @@
+"""The laws by their names. Another law is a file of its own and an entry here; it is imported when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Final, Literal, Protocol
+
+if TYPE_CHECKING:
+    from robot_side.laws.explanation import Explains
+    from robot_side.laws.law import Law
+
+    class NamedLaw(Law, Explains, Protocol):
+        """A law that a robot side can be told to follow."""
+
+        def expect(self, probability: float) -> None:
+            """Take another P of eq. 10 from now on; ConfigurationError outside (0, 1)."""
+
+
+LawName = Literal["swept", "paper"]
+"""swept: ways along each trigger, for its own zones. paper: the plain law of §4.2, one number for both triggers."""
+
+
+def _swept(*arguments: Any) -> NamedLaw:
+    from robot_side.laws.swept import SweptLaw  # noqa: PLC0415
+
+    law = SweptLaw(*arguments)
+    law.ask_around(asked=law.fits_a_message)
+    return law
+
+
+def _paper(*arguments: Any) -> NamedLaw:
+    from robot_side.laws.paper import PaperLaw  # noqa: PLC0415
+
+    return PaperLaw(*arguments)
+
+
+LAWS: Final[Mapping[LawName, Callable[..., NamedLaw]]] = {"swept": _swept, "paper": _paper}
+"""Makers: of an uncertainty, the encoders' standard deviations (n,) in rad, joint limits, tool motion, surroundings."""
