@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Any, NamedTuple
 
+from msgspec.structs import replace
+
 from common.clock import MonotonicClock, ThreadClock
 from common.command.command_line import given_fields, parse_settings
 from common.command.ending import end_with, failure_of
-from common.command.live_view import Value
 from common.command.status import Status
 from common.command.stop_signal import LeavingAtOnce, StopSignal
 from common.emulation.spec import unused_clauses
@@ -23,6 +24,8 @@ from common.recording.side import SideRecording, recording_to
 from common.silence import MOTION_PERIOD_S
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
+from common.status.codes import Hands, LinkState
+from common.status.statuses import OperatorStatus
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.background_writes import BackgroundWrites
 from operator_side.dualsense.hid.connection import Connection
@@ -31,7 +34,7 @@ from operator_side.dualsense.hid.finding import Finder
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.search import BackgroundSearch, OpenController, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.recorded import OperatorEncoder, build_recorded, recorded_status
+from operator_side.recorded import OperatorEncoder, build_recorded
 from operator_side.robot_link.commanding import ToRobot
 from operator_side.robot_link.sending import Sending
 from operator_side.settings import OperatorSettings
@@ -104,7 +107,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
             viewing = Viewing(
                 core,
                 lambda now_s: Surroundings(
-                    "controller" if person is None else person.hands,
+                    Hands.CONTROLLER if person is None else person.hands,
                     sending.asked,
                     settings.swap_sides,
                     hands_facts(pages, person, core, now_s),
@@ -261,7 +264,7 @@ class _Loop:
     def _use_idle_time(self, now_s: float) -> None:
         """Do all that no message should wait for."""
         if self.recording is not None:
-            for text in self.recording.idle(now_s, lambda: recorded_status(self._core, now_s)):
+            for text in self.recording.idle(now_s, lambda: self._core.status(now_s)):
                 self._viewing.note(text)
         self._say_what_is_new()
         if self._guard is not None and now_s >= self._guard_s:
@@ -269,24 +272,26 @@ class _Loop:
             for text in self._guard.take_notes():
                 self._viewing.note(text)
         shows, tells = self._viewing.facts_due(now_s), self._status.due(now_s)
-        values = self._values(now_s) if shows or tells else {}
-        if shows:
-            self._viewing.show(values, now_s)
-        if tells:
-            self._viewing.tell(values, now_s)
+        if shows or tells:
+            status = self._values(now_s)
+            if shows:
+                self._viewing.show(status, now_s)
+            if tells:
+                self._viewing.tell(status, now_s)
         stiffness = self._core.stiffness
         self._collection.idle(now_s, resting=stiffness is None or stiffness.state != "armed")
 
-    def _values(self, now_s: float) -> dict[str, Value]:
-        """The values that a person sees."""
-        values: dict[str, Value] = dict(self._core.status(now_s))
-        if self._sockets.trouble is not None and values.get("link") != "up":
-            values["link"] = self._sockets.trouble
-        values["controller"] = self._connection.state
-        controller = self._connection.controller
-        values["triggers_released"] = None if controller is None else controller.device.released
-        if self._person is not None:
-            values["person"] = self._person.doing
-        values["motion_overruns"] = self._pacer.overruns
-        values["queue_to_robot_ms"] = self._sending.queue_ms
-        return values
+    def _values(self, now_s: float) -> OperatorStatus:
+        """The status with what the process knows."""
+        controller, status = self._connection.controller, self._core.status(now_s)
+        if (trouble := self._sockets.trouble) is not None and status.link is not LinkState.UP:
+            link = LinkState.REFUSED if self._sockets.key_refused else status.link
+            status = replace(status, link=link, link_reason=trouble)
+        return replace(
+            status,
+            controller=self._connection.state,
+            triggers_released=None if controller is None else controller.device.released,
+            person=None if self._person is None else self._person.doing,
+            motion_overruns=self._pacer.overruns,
+            queue_to_robot_ms=self._sending.queue_ms,
+        )

@@ -7,6 +7,8 @@ from contextlib import ExitStack
 from functools import partial
 from typing import Any
 
+from msgspec.structs import replace
+
 from common.clock import MonotonicClock, ThreadClock, clock_domain
 from common.command.command_line import parse_settings, run_command
 from common.command.ending import end_with, failure_of
@@ -26,11 +28,12 @@ from common.sockets.admission import Admission
 from common.sockets.authentication import RobotKeys
 from common.sockets.robot import RobotSockets
 from common.statistics import RunningStatistics
+from common.status.statuses import RobotStatus
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotParts, RobotSide
 from robot_side.events import Listener
 from robot_side.parts import SimulatedParts, build_parts
-from robot_side.recording.recorder import Recorder, RobotEncoder, recorded_status, robot_header
+from robot_side.recording.recorder import Recorder, RobotEncoder, robot_header
 from robot_side.reporting.link_reporter import LinkReporter
 from robot_side.reporting.sending import SENT_STREAMS, Sending
 from robot_side.settings import RobotSettings
@@ -235,6 +238,9 @@ class _Loop:
         session = self._core.session
         self._sending.send(None if session.owner_peer is None else session.link.outgoing, self._clock.now())
 
+    def _values(self, now_s: float) -> RobotStatus:
+        return replace(self._core.status(now_s), **self._reporter.status())
+
     def _paced(self) -> dict[str, float | int]:
         """The ticks since this was last asked for."""
         share = self._arm.take_share_of_real_time()
@@ -265,13 +271,11 @@ class _Loop:
         if self._recording is not None:
             for message in seen:
                 self._recording.view(now_s, message.payload)
-            for text in self._recording.idle(
-                now_s, lambda: recorded_status(self._core, now_s) | self._reporter.status()
-            ):
+            for text in self._recording.idle(now_s, lambda: self._values(now_s)):
                 self._status.note(text)
         self._sending.push(self._reporter.due(now_s), now_s)
         if self._status.due(now_s):
-            self._status.show(now_s, self._core.status(now_s) | self._paced() | self._reporter.status())
+            self._status.show(now_s, robot=replace(self._values(now_s), **self._paced()))
         if now_s >= self._next_keys_s:
             self._next_keys_s = now_s + KEYS_PERIOD_S
             self._sockets.refresh_keys()
