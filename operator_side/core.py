@@ -10,14 +10,17 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from common.command.live_view import LINK_UP
+from msgspec import UNSET
+
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import decode, encode
 from common.protocol.link_end import Arrival, LinkEnd
 from common.protocol.messages import Compensation, Hello, LeaseNotice, LinkReport, StiffnessUpdate, Telemetry
+from common.status.codes import LinkState
+from common.status.statuses import OperatorStatus
 from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.events import Input, Listener
-from operator_side.feel.blindness import Blindness, Sight
+from operator_side.feel.blindness import Blindness
 from operator_side.feel.haptics import Haptics
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.intent import OperatorIntent
@@ -250,38 +253,35 @@ class OperatorSide:
             one.on_output(report, now_s)
         return report
 
-    def status(self, now_s: float) -> dict[str, float | str | bool | None]:
-        """What a person is shown; L2 and R2 are the controller's own, whatever the sides mean."""
-        mean_s, lease, screen = self.link.delay.mean, self.lease, self.screen
-        felt = (None, None) if self.stiffness is None else (self.stiffness.l2.stiffness, self.stiffness.r2.stiffness)
-        intent, sight = self.hands.present(now_s), self._blindness.sight
-        pulled = (None, None) if intent is None else (intent.l2, intent.r2)
+    def status(self, now_s: float) -> OperatorStatus:
+        """What a person is shown; what the process knows beside it is not in it."""
+        mean_s, lease, screen, felt = self.link.delay.mean, self.lease, self.screen, self.stiffness
+        intent, rendering = self.hands.present(now_s), self.haptics.rendering
         order, linked = -1 if self._swap_sides else 1, self.felt.within(STIFFNESS_EXPIRES_S, now_s)
-        (left, right), (left_pulled, right_pulled) = felt[::order], pulled[::order]
-        state, stands = (None, None) if self.stiffness is None else (self.stiffness.state, self.stiffness.stands)
-        values: dict[str, float | str | bool | None] = {
-            "link": self._standing.link_status(self.other_version, linked=linked, heard=self.felt.count > 0),
-            "state": state,
-            "stopped_because": lease.why if lease is not None and self.felt.stopped else None,
-            "owner": None if lease is None else str(lease.session),
-            "L2": left,
-            "R2": right,
-            "L2_pulled": left_pulled,
-            "R2_pulled": right_pulled,
-            "haptics": self._haptics_enabled,
-            "feel": self.haptics.status() if sight is Sight.SEEING else sight,
-            "release_first": sight is Sight.WAITING,
-            "delay_ms": None if mean_s is None else 1e3 * mean_s,
-        }
-        values |= self._standing.link_values(now_s) | {"stands": stands}
-        if screen is not None and values["link"] == LINK_UP:
-            centre_m = screen.target_in_tool_m
-            values |= {
-                "target": screen.target,
-                "target_centre_mm": None if centre_m is None else 1e3 * math.hypot(*centre_m),
-                "holding": "something" if screen.holding else "nothing",
-            }
-        return values
+        left, right = ((None, None) if felt is None else (felt.l2.stiffness, felt.r2.stiffness))[::order]
+        left_pulled, right_pulled = ((None, None) if intent is None else (intent.l2, intent.r2))[::order]
+        link = self._standing.status_fields(self.other_version, now_s, linked=linked, heard=self.felt.count > 0)
+        seen = screen if link["link"] is LinkState.UP else None
+        centre_m = None if seen is None else seen.target_in_tool_m
+        return OperatorStatus(
+            **link,
+            state=None if felt is None else felt.state,
+            stopped_because=lease.why if lease is not None and self.felt.stopped else None,
+            l2=left,
+            r2=right,
+            l2_pulled=left_pulled,
+            r2_pulled=right_pulled,
+            l2_free=rendering.l2.free_travel,
+            r2_free=rendering.r2.free_travel,
+            haptics=self._haptics_enabled,
+            feel=self._blindness.sight,
+            delay_ms=None if mean_s is None else 1e3 * mean_s,
+            stands=None if felt is None else felt.stands,
+            target=UNSET if seen is None else seen.target,
+            target_centre_mm=None if centre_m is None else 1e3 * math.hypot(*centre_m),
+            holding=None if seen is None else seen.holding,
+            offset_s=self.link.clock_offset.offset_at(now_s),
+        )
 
     def summary(self) -> dict[str, Any]:
         """This side's part of the run's summary."""

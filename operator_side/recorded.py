@@ -87,8 +87,3 @@ def build_recorded(settings: OperatorSettings, epoch: int, recording: SideRecord
     core = build_operator_side(settings, epoch, clock_domain(), [Recorder(recording.noted.append)])
     recording.begin(provenance(settings, epoch, clock_domain()))
     return core
-
-
-def recorded_status(core: OperatorSide, now_s: float) -> dict[str, Any]:
-    """What a person is shown, and the offset of the robot side's clock."""
-    return core.status(now_s) | {"offset_s": core.link.clock_offset.offset_at(now_s)}

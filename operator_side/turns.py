@@ -3,13 +3,15 @@
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
-from common.command.live_view import Value
+from msgspec.structs import replace
+
 from common.loop.process import Process
 from common.sockets.operator import OperatorSockets
+from common.status.codes import Hands, LinkState
+from common.status.statuses import OperatorStatus
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.connection import Connection
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
-from operator_side.recorded import recorded_status
 from operator_side.robot_link.commanding import ToRobot
 from operator_side.robot_link.sending import Sending
 from operator_side.settings import OperatorSettings
@@ -66,7 +68,7 @@ class OperatorTurns:
         self._viewing = Viewing(
             core,
             lambda now_s: Surroundings(
-                "controller" if self._person is None else self._person.hands,
+                Hands.CONTROLLER if self._person is None else self._person.hands,
                 self._sending.asked,
                 settings.swap_sides,
                 hands_facts(self._pages, self._person, core, now_s),
@@ -105,7 +107,7 @@ class OperatorTurns:
         del turned_s
         recording, status = self._process.recording, self._process.status
         if recording is not None:
-            for text in recording.idle(now_s, lambda: recorded_status(self._core, now_s)):
+            for text in recording.idle(now_s, lambda: self._core.status(now_s)):
                 self._viewing.note(text)
         self._say_what_is_new()
         if self._guard is not None and now_s >= self._guard_s:
@@ -113,11 +115,12 @@ class OperatorTurns:
             for text in self._guard.take_notes():
                 self._viewing.note(text)
         shows, tells = self._viewing.facts_due(now_s), status.due(now_s)
-        values = self._values(now_s) if shows or tells else {}
-        if shows:
-            self._viewing.show(values, now_s)
-        if tells:
-            self._viewing.tell(values, now_s)
+        if shows or tells:
+            said = self._status(now_s)
+            if shows:
+                self._viewing.show(said, now_s)
+            if tells:
+                self._viewing.tell(said, now_s)
 
     def close(self) -> None:
         """Release the triggers, and let the controller go."""
@@ -166,16 +169,17 @@ class OperatorTurns:
         for text in self._connection.take_notes():
             self._viewing.note(text)
 
-    def _values(self, now_s: float) -> dict[str, Value]:
-        """The values that a person sees."""
-        values: dict[str, Value] = dict(self._core.status(now_s))
-        if self._sockets.trouble is not None and values.get("link") != "up":
-            values["link"] = self._sockets.trouble
-        values["controller"] = self._connection.state
-        controller = self._connection.controller
-        values["triggers_released"] = None if controller is None else controller.device.released
-        if self._person is not None:
-            values["person"] = self._person.doing
-        values["motion_overruns"] = self._process.loop.pacer.overruns
-        values["queue_to_robot_ms"] = self._sending.queue_ms
-        return values
+    def _status(self, now_s: float) -> OperatorStatus:
+        """The core's status with what the process knows."""
+        controller, status = self._connection.controller, self._core.status(now_s)
+        if (trouble := self._sockets.trouble) is not None and status.link is not LinkState.UP:
+            link = LinkState.REFUSED if self._sockets.key_refused else status.link
+            status = replace(status, link=link, link_reason=trouble)
+        return replace(
+            status,
+            controller=self._connection.state,
+            triggers_released=None if controller is None else controller.device.released,
+            person=None if self._person is None else self._person.doing,
+            motion_overruns=self._process.loop.pacer.overruns,
+            queue_to_robot_ms=self._sending.queue_ms,
+        )

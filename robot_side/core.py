@@ -9,7 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from common.command.live_view import LINK_LOST, LINK_UP
+import msgspec
+
+from common.status.codes import LinkState
+from common.status.statuses import RobotStatus
 from common.timing.ages import LoopAge
 from robot_side.arm.ability import JointLimits
 from robot_side.arm.joint_estimate import JointEstimate
@@ -161,39 +164,40 @@ class RobotSide:
         self._heard.on_step("end")
         self._heard.on_sent(now_s)
 
-    def status(self, now_s: float) -> dict[str, float | str | bool | None]:
-        """What a person is shown, and a few figures for whoever reads JSON lines."""
+    def status(self, now_s: float) -> RobotStatus:
+        """What a person is shown; what the process knows beside it is not in it."""
         lease, safety, command = self.session.lease, self.session.safety, self.session.safety.command
         delay_s = self.session.link.delay.mean
-        lost = f"{LINK_LOST}nothing heard from the operator" if lease.token > 0 else "waiting for an operator"
-        values: dict[str, float | str | bool | None] = {
-            "link": lost if lease.owner is None else LINK_UP,
-            "state": safety.state,
-            "stopped_because": safety.stops[-1][1] if safety.stops and safety.state != "armed" else None,
-            "owner": "none" if lease.owner is None else str(lease.owner.state),
-            "observers": len(lease.observers()),
-            "refused": self.session.refused,
-            "loop_age_ms": 1e3 * self.loop_age_s(now_s),
-            "delay_ms": None if delay_s is None else 1e3 * delay_s,
-            "L2_pulled": None if command is None else command.l2,
-            "R2_pulled": None if command is None else command.r2,
-        }
-        if self.newest is not None and (objects := self.sight.frame) is not None:
-            sensed, pose = self.newest[0], self.newest[1].pose
-            target = self.sight.target
-            apart = perceived_distances(pose, self.parts.surroundings.see(objects), target, self.grip.index)
-            values |= {
-                "L2": sensed.l2.stiffness,
-                "R2": sensed.r2.stiffness,
-                "enlargement_mm": 1e3 * sensed.enlargement_m,
-                "holding": (self.held or "nothing")[:SHOWN_NAME],
-                "stands": self.grip.touching_down.stands,
-                "nearest": None if apart.nearest is None else apart.nearest[:SHOWN_NAME],
-                "nearest_mm": scaled(apart.nearest_m, 1e3),
-                "target": None if target is None else objects.names[target][:SHOWN_NAME],
-                "target_mm": scaled(apart.target_m, 1e3),
-            }
-        return values
+        status = RobotStatus(
+            link=LinkState.UP if lease.owner is not None else LinkState.LOST if lease.token > 0 else LinkState.WAITING,
+            state=safety.state,
+            stopped_because=safety.stops[-1][1] if safety.stops and safety.state != "armed" else None,
+            owner=None if lease.owner is None else lease.owner.state,
+            observers=len(lease.observers()),
+            refused=self.session.refused,
+            loop_age_ms=1e3 * self.loop_age_s(now_s),
+            delay_ms=None if delay_s is None else 1e3 * delay_s,
+            l2_pulled=None if command is None else command.l2,
+            r2_pulled=None if command is None else command.r2,
+            offset_s=self.session.link.clock_offset.offset_at(now_s),
+        )
+        if self.newest is None or (objects := self.sight.frame) is None:
+            return status
+        sensed, pose = self.newest[0], self.newest[1].pose
+        target = self.sight.target
+        apart = perceived_distances(pose, self.parts.surroundings.see(objects), target, self.grip.index)
+        return msgspec.structs.replace(
+            status,
+            l2=sensed.l2.stiffness,
+            r2=sensed.r2.stiffness,
+            enlargement_mm=1e3 * sensed.enlargement_m,
+            holding=None if self.held is None else self.held[:SHOWN_NAME],
+            stands=self.grip.touching_down.stands,
+            nearest=None if apart.nearest is None else apart.nearest[:SHOWN_NAME],
+            nearest_mm=scaled(apart.nearest_m, 1e3),
+            target=None if target is None else objects.names[target][:SHOWN_NAME],
+            target_mm=scaled(apart.target_m, 1e3),
+        )
 
     def summary(self) -> dict[str, Any]:
         """This side's part of the run's summary."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from common.errors import ConfigurationError
 from common.protocol.link_end import LinkEnd
+from common.roles import Role
 from common.timing.ages import LoopAge
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core import RobotParts
@@ -30,7 +31,7 @@ from robot_side.operators.safety import Safety
 from robot_side.operators.tuning import Tuning
 from robot_side.outcome.figures import RunFigures
 from robot_side.settings import RobotSettings
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 
 _SEARCHING = "searching for spheres that cover gripper and objects, seconds for each shape; the next start is quick"

@@ -10,13 +10,13 @@ from msgspec import Meta
 
 from common.command.run_options import SideOptions
 from common.limits import check_limits, check_value
+from common.roles import Role
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.enlargement.distance import Uncertainty, Vector3
 from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.laws.named import LawName
 from robot_side.operators.safety import SafetySettings
-from robot_side.surroundings.perceived import Role
 from robot_side.viewing.settings import CamerasSettings
 
 Assist = Literal["none", "speed"]

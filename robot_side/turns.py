@@ -5,6 +5,8 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any, Final
 
+from msgspec.structs import replace
+
 from common.command.live_view import SLOW
 from common.emulation.spec import LinkSpec
 from common.emulation.tuned import tuned_link
@@ -14,8 +16,8 @@ from common.realtime.stages import microseconds
 from common.sockets.admission import Admission
 from common.sockets.robot import RobotSockets
 from common.statistics import RunningStatistics
+from common.status.statuses import RobotStatus
 from robot_side.core import RobotSide
-from robot_side.recording.recorder import recorded_status
 from robot_side.reporting.link_reporter import LinkReporter
 from robot_side.reporting.sending import Sending
 from robot_side.settings import RobotSettings
@@ -95,13 +97,11 @@ class RobotTurns:
         if process.recording is not None:
             for message in seen:
                 process.recording.view(now_s, message.payload)
-            for text in process.recording.idle(
-                now_s, lambda: recorded_status(self._core, now_s) | self._reporter.status()
-            ):
+            for text in process.recording.idle(now_s, lambda: self._status(now_s)):
                 process.note(text)
         self._sending.push(self._reporter.due(now_s), now_s)
         if process.status.due(now_s):
-            process.status.show(now_s, self._core.status(now_s) | self._paced() | self._reporter.status())
+            process.status.show(now_s, robot=replace(self._status(now_s), **self._paced()))
         if now_s >= self._next_keys_s:
             self._next_keys_s = now_s + KEYS_PERIOD_S
             self._sockets.refresh_keys()
@@ -114,6 +114,9 @@ class RobotTurns:
             self._link = tuned_link(self._link, words)
             self._sending.change(self._link)
         self._core.observe(turned_s)
+
+    def _status(self, now_s: float) -> RobotStatus:
+        return replace(self._core.status(now_s), **self._reporter.status())
 
     def _paced(self) -> dict[str, float | int]:
         """The ticks since this was last asked for."""

@@ -1,23 +1,21 @@
 """A run as people see it: figures that each may be unknown, and the state in words.
 
-A side's status values are the keys of its JSON lines. They become one frozen record here, which `live_line` writes
-for a terminal and `live_story` for a file. All distances are perceived ones, never the simulation's truth.
+The statuses of one side or both become one frozen record here, which `live_line` writes for a terminal and
+`live_story` for a file. All distances are perceived ones, never the simulation's truth.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-Value = float | int | str | bool | None
+from msgspec import UNSET
 
-LINK_UP = "up"
-LINK_LOST = "lost: "
-"""Begins the link's word when there was one; the reason follows."""
-LINK_REFUSED = "refused: "
+from common.command.words import phase_words, printable
+from common.status.codes import LinkState
+from common.status.phase import phase_of
+from common.status.statuses import OperatorStatus, RobotStatus
+
 _LARGEST = 1e300
 SLOW = 0.9
 """A simulation below this share of real time is said to be slow."""
-_BEFORE_ARMED = ("resting", "arming")
-"""The simulated person's phases before they have seen that it is armed."""
 
 
 @dataclass(frozen=True)
@@ -70,78 +68,38 @@ class LiveView:
     """Whether that stands on something."""
 
 
-def live_view(values: Mapping[str, Value]) -> LiveView:
-    """The record of a side's status values, or of both sides' together; keys that are not there are not known."""
-    phase, reason, alarm = _phase(values)
-    armed, link = values.get("state") == "armed", _text(values, "link")
-    free = 0.0 if values.get("state") is not None and not armed else None
-    l2, r2 = (
-        TriggerView(number(values.get(f"{name}_pulled")), number(values.get(name)) if free is None else free)
-        for name in ("L2", "R2")
-    )
-    holding = _text(values, "holding")
+def live_view(robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> LiveView:
+    """The record of what is known of either side: of controller and link what the operator side says first."""
+    facts, side, scene = phase_of(robot, operator), operator or robot, robot or operator
+    if side is None or scene is None:
+        return LiveView()
+    phase, reason = phase_words(facts, side)
+    free = 0.0 if side.state not in (None, "armed") else None
+    holding = scene.holding if isinstance(scene, RobotStatus) else "something" if scene.holding else None
     return LiveView(
         phase=phase,
         reason=reason,
-        alarm=alarm,
-        state=_text(values, "state"),
-        armed=armed,
-        linked=None if link is None else link == LINK_UP,
-        real_time=number(values.get("real_time")),
-        delay_ms=number(values.get("delay_ms")),
-        queue_ms=number(values.get("queue_ms")),
-        lost_percent=number(values.get("lost_percent")),
-        l2=l2,
-        r2=r2,
-        haptics=values.get("haptics") is not False,
-        nearest=_text(values, "nearest"),
-        nearest_mm=number(values.get("nearest_mm")),
-        has_target=values["target"] is not None if "target" in values else None,
-        target_mm=number(values.get("target_mm")),
-        target_centre_mm=number(values.get("target_centre_mm")),
-        holding=None if holding == "nothing" else holding,
-        stands=values.get("stands") is True,
+        alarm=facts.alarm,
+        state=side.state,
+        armed=side.state == "armed",
+        linked=side.link is LinkState.UP,
+        real_time=None if robot is None else number(robot.real_time),
+        delay_ms=number(side.delay_ms),
+        queue_ms=number(scene.queue_ms),
+        lost_percent=number(scene.lost_percent),
+        l2=TriggerView(number(side.l2_pulled), number(side.l2) if free is None else free),
+        r2=TriggerView(number(side.r2_pulled), number(side.r2) if free is None else free),
+        haptics=operator is None or operator.haptics,
+        nearest=None if robot is None or robot.nearest is None else printable(robot.nearest),
+        nearest_mm=None if robot is None else number(robot.nearest_mm),
+        has_target=None if scene.target is UNSET else scene.target is not None,
+        target_mm=None if robot is None else number(robot.target_mm),
+        target_centre_mm=None if operator is None else number(operator.target_centre_mm),
+        holding=None if holding is None else printable(holding),
+        stands=scene.stands is True,
     )
 
 
-def _phase(values: Mapping[str, Value]) -> tuple[str, str | None, bool]:
-    """The state, its reason, and whether it is an alarm: first comes a state that keeps the arm from moving."""
-    link, state, person = _text(values, "link"), values.get("state"), _text(values, "person")
-    because, controller = _text(values, "stopped_because"), values.get("controller")
-    for beginning, word in ((LINK_LOST, "LINK LOST"), (LINK_REFUSED, "REFUSED")):
-        if link is not None and link.startswith(beginning):
-            return word, link.removeprefix(beginning), True
-    if state == "stopped":
-        return "STOPPED", because, True
-    for word, so in (
-        ("CONTROLLER LOST", controller == "lost"),
-        ("RELEASE BOTH TRIGGERS", state == "armed" and values.get("release_first") is True),
-    ):
-        if so:
-            return word, None, True
-    if state == "disarmed" and because is not None:
-        return "DISARMED", because, True
-    if link not in (None, LINK_UP):
-        return str(link), None, False
-    if controller == "absent":
-        return "no controller", None, False
-    if state == "armed" and person in (None, *_BEFORE_ARMED):
-        return "armed", None, False
-    ready = state == "disarmed" and values.get("owner") == "ready"
-    return person or ("ready to arm" if ready else str(state or "starting")), None, False
-
-
-def number(value: Value) -> float | None:
+def number(value: float | None) -> float | None:
     """Return a finite number; None for everything else."""
-    known = isinstance(value, float | int) and not isinstance(value, bool) and -_LARGEST < value < _LARGEST
-    return float(value) if known and value is not None else None
-
-
-def printable(text: str) -> str:
-    """Put a question mark for each sign that cannot be printed, such as a terminal's control characters."""
-    return text if text.isprintable() else "".join(sign if sign.isprintable() else "?" for sign in text)
-
-
-def _text(values: Mapping[str, Value], name: str) -> str | None:
-    value = values.get(name)
-    return printable(value) if isinstance(value, str) else None
+    return value if value is not None and -_LARGEST < value < _LARGEST else None

@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import IO, Any, Literal, cast
 
 import msgspec
@@ -12,8 +12,9 @@ from rich.text import Text
 
 from common.command.live_line import live_line
 from common.command.live_story import Story
-from common.command.live_view import Value, live_view
+from common.command.live_view import live_view
 from common.command.patient_output import PatientOutput
+from common.status.statuses import OperatorStatus, RobotStatus, joined
 
 StatusMode = Literal["line", "json", "facts", "none"]
 
@@ -29,7 +30,7 @@ class _Console(Console):
 
 
 class Status:
-    """Shows `show`'s values a few times a second; errors go elsewhere, always to standard error.
+    """Shows a status a few times a second; errors go elsewhere, always to standard error.
 
     Nothing waits for the reader: what one that stalls has no room for is dropped. A note after the context is
     a result, which waits for its reader.
@@ -75,15 +76,15 @@ class Status:
         """Whether `show` would show anything; building the values costs time in a tick."""
         return self._mode != "none" and now_s >= self._next_s
 
-    def show(self, now_s: float, values: Mapping[str, Value]) -> None:
-        """Show the values, at most five times a second, ten with facts; BrokenPipeError, once, when the reader left."""
+    def show(self, now_s: float, *, robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> None:
+        """Show it at most five times a second, ten with facts; BrokenPipeError, once, when the reader left."""
         if not self.due(now_s):
             return
         self._next_s = now_s + (_FACTS_PERIOD_S if self.wants_facts else _PERIOD_S)
         if self._mode in _LINES_OF_JSON:
-            self.event("status", **values)
+            self._write({"event": "status", **joined(robot, operator)})
             return
-        view = live_view(values)
+        view = live_view(robot, operator)
         if self._live is not None:
             # The last column stays free: some terminals break the line as soon as it is written to.
             text = live_line(view, self._console.width - 1)
@@ -95,9 +96,13 @@ class Status:
     def show_facts(self, facts: Any) -> None:
         """All that is known of one moment, a struct, at once."""
         if self._mode == "facts":
-            self._output.write(msgspec.json.encode({"event": "facts", "facts": facts}).decode() + "\n")
+            self._write({"event": "facts", "facts": facts})
 
-    def event(self, kind: str, **values: Value) -> bool:
+    def _write(self, event: dict[str, Any]) -> None:
+        # Numbers that are not finite become null.
+        self._output.write(msgspec.json.encode(event).decode() + "\n")
+
+    def event(self, kind: str, **values: str | int) -> bool:
         """One line of JSON, at once; False outside the modes for programs, where it says nothing."""
         if self._mode in _LINES_OF_JSON:
             self._output.write(json.dumps({"event": kind, **values}) + "\n")

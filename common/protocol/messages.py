@@ -209,7 +209,7 @@ class LinkReport(Message, frozen=True, tag="report"):
     """The streams that gave way since the last report, and why; empty for none."""
 
     def values(self) -> dict[str, float | str | None]:
-        """The same as status values."""
+        """The same as fields of a status (common/status)."""
         return {
             "rate_kbit_s": self.rate_kbit_s,
             "queue_ms": self.queue_ms,
@@ -273,8 +273,11 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
         _in_range("rumble", 0.0, 1.0, self.rumble)
 
 
-class Telemetry(Message, frozen=True, tag="telemetry"):
-    """What the operator's screen shows of the robot; never used for control by the robot side."""
+class Telemetry(Message, frozen=True, tag="telemetry", array_like=False):
+    """What the operator's screen shows of the robot; never used for control by the robot side.
+
+    It travels packed (compact.py): named fields are for the page and for recordings.
+    """
 
     state: MotionState
     tool_position_m: _Place

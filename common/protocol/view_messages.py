@@ -124,7 +124,7 @@ class SceneState(Message, frozen=True, tag="scene"):
     object_poses: bytes
     """(k, 7) float32"""
     roles: bytes
-    """(objects,) uint8: 0 obstacle, 1 target, 2 support, 3 ignored"""
+    """(objects,) uint8: places in common/roles.py"""
     tool_pose: tuple[float, float, float, float, float, float, float]
     """Of the tool, whose z axis is the approach"""
     spheres: bytes

@@ -86,7 +86,7 @@ class SideRecording:
         """Tell first what the core was made from, so that it can be made again."""
         self._channel.send(HEADER, as_json({"side": self._side, **header}))
 
-    def idle(self, now_s: float, status: Callable[[], Mapping[str, Any]] | None = None) -> list[str]:
+    def idle(self, now_s: float, status: Callable[[], msgspec.Struct] | None = None) -> list[str]:
         """Hand over what was noted; `status` is asked for a few times a second. What a person has to know now."""
         noted, self.noted[:] = self.noted[:], []
         for one in noted:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from common.clock import MonotonicClock
-from common.command.live_view import LINK_UP
 from common.errors import FeelaheadError
+from common.status.codes import LinkState
 from feelahead.both_sides.processes import SideProcess, StartedSide
 from feelahead.both_sides.summary import read_summary
 
@@ -53,7 +53,7 @@ def run_for(robot: StartedSide, operator: StartedSide, duration_s: float) -> Non
     """Let them run for `duration_s` once their link is up, and end both; SideFailedError where one fails."""
     clock, pause = MonotonicClock(), threading.Event()
     limit_s = clock.now() + LINK_S
-    while operator.wait_for("status", LINK_S).get("link") != LINK_UP:
+    while operator.wait_for("status", LINK_S).get("link") != LinkState.UP:
         robot.check()
         if clock.now() > limit_s or not robot.running:
             raise FeelaheadError(f"no link within {LINK_S:g} s")

@@ -5,16 +5,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from common.command.live_view import Value
-
-_OPERATORS_OWN = ("link", "state", "owner", "delay_ms", "L2", "R2", "L2_pulled", "R2_pulled")
-"""What both sides tell, and the operator side knows better."""
-
-
-def both_statuses(robot: Mapping[str, Value], operator: Mapping[str, Value]) -> dict[str, Value]:
-    """What both sides know: of the controller and the link what the operator side says, of the rest the robot side."""
-    return {**operator, **robot, **{name: operator[name] for name in _OPERATORS_OWN if name in operator}}
-
 
 def merge_summaries(robot: Mapping[str, Any], operator: Mapping[str, Any], errors: Sequence[str]) -> dict[str, Any]:
     """The robot side's summary with the operator side's part of the figures that both sides know.

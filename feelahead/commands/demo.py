@@ -14,7 +14,6 @@ import tyro
 from msgspec import Meta
 
 from common.command.command_line import given_fields, parse_settings
-from common.command.live_view import LINK_UP, Value
 from common.command.run_options import RunOptions
 from common.command.status import Status
 from common.command.stop_signal import StopSignal
@@ -25,8 +24,10 @@ from common.files.output_file import write_json
 from common.limits import check_limits
 from common.protocol.messages import Compensation
 from common.recording.side import Recorder
+from common.status.codes import LinkState
+from common.status.statuses import OperatorStatus, RobotStatus
 from feelahead.both_sides.processes import SideFailedError, SideProcess
-from feelahead.both_sides.summary import both_statuses, merge_summaries, read_summary
+from feelahead.both_sides.summary import merge_summaries, read_summary
 from feelahead.commands.open_browser import show_address
 from operator_side.viewing.facts import OperatorFacts
 from operator_side.viewing.terminal.status import TerminalStatus
@@ -212,7 +213,7 @@ def _watch(
 ) -> list[str]:
     """Show both sides' status until the time is over, Ctrl-C, or a side ends; what went wrong."""
     waiting_since_s, linked_s = 0.0, None
-    said: dict[str, dict[str, Value]] = {"robot": {}, "operator": {}}
+    said = _Said()
     while not stop.is_set:
         now_s = time.monotonic()
         for side in (robot, operator):
@@ -224,30 +225,40 @@ def _watch(
                     return [str(error)]
                 return [f"the {side.name} side ended early"]
         if linked_s is None:
-            if said["operator"].get("link") == LINK_UP:
-                linked_s = now_s
-            elif not said["operator"]:
+            if said.operator is None:
                 # A busy machine may take long to start a process, which says nothing about the link.
                 waiting_since_s = now_s
+            elif said.operator.link is LinkState.UP:
+                linked_s = now_s
             elif now_s - waiting_since_s > _LINK_TIMEOUT_S:
                 asked = f"; the link that was asked for may be why: --link {settings.link!r}" if settings.link else ""
                 return [f"the sides did not find each other within {_LINK_TIMEOUT_S:g} s{asked}"]
         elif settings.duration is not None and now_s - linked_s >= settings.duration:
             break
-        if said["operator"]:
-            status.show(now_s, both_statuses(said["robot"], said["operator"]))
+        if said.operator is not None:
+            status.show(now_s, robot=said.robot, operator=said.operator)
         time.sleep(0.02)
     return []
 
 
-def _take_events(side: SideProcess, said: dict[str, dict[str, Value]], status: Status) -> None:
+@dataclass
+class _Said:
+    """The newest status of each side."""
+
+    robot: RobotStatus | None = None
+    operator: OperatorStatus | None = None
+
+
+def _take_events(side: SideProcess, said: _Said, status: Status) -> None:
     """Keep the newest status of `side`, and show the notes that it has sent."""
     for event in side.events():
-        if event["event"] == "status":
-            said[side.name] = {name: value for name, value in event.items() if name != "event"}
+        if event["event"] == "status" and side.name == "robot":
+            said.robot = msgspec.convert(event, RobotStatus)
+        elif event["event"] == "status":
+            said.operator = msgspec.convert(event, OperatorStatus)
         elif event["event"] == "facts":
             facts = msgspec.convert(event["facts"], OperatorFacts)
-            status.show_facts(msgspec.structs.replace(facts, status=both_statuses(said["robot"], facts.status)))
+            status.show_facts(msgspec.structs.replace(facts, robot=said.robot))
         elif event["event"] == "console":
             show_address(str(event["address"]), status)
         else:

@@ -8,11 +8,10 @@ from typing import Any, Final
 import msgspec
 
 from common.clock import MonotonicClock
-from common.command.live_view import Value
 from common.command.status import Status
 from common.command.stop_signal import StopSignal
 from common.recording.reading import Recording
-from feelahead.both_sides.summary import both_statuses
+from common.status.statuses import RobotStatus
 from feelahead.commands.open_browser import show_address
 from feelahead.recordings.playback import FACTS, ROBOT, VIEW, Playback, Seen
 from operator_side.viewing.console.console import Console
@@ -75,18 +74,18 @@ def play_in_terminal(recording: Recording, speed: float) -> int:
     """To the end, or until Ctrl-C. ConfigurationError unless standard output is a terminal."""
     decoder, pause = msgspec.json.Decoder(OperatorFacts), threading.Event()
     with TerminalStatus(_PROGRAM) as status, StopSignal() as stop:
-        robot: dict[str, Value] = {}
+        robot: RobotStatus | None = None
         figures = SceneFigures()
 
         def send(one: Seen) -> None:
+            nonlocal robot
             if one.kind == ROBOT:
-                robot.update(msgspec.json.decode(one.content))
+                robot = msgspec.json.decode(one.content, type=RobotStatus)
             elif one.kind == VIEW:
                 figures.take(one.content)
             else:
                 facts = decoder.decode(one.content)
-                known = both_statuses(robot, facts.status) | figures.figures()
-                status.show_facts(msgspec.structs.replace(facts, status=known))
+                status.show_facts(msgspec.structs.replace(facts, robot=robot, scene=figures.figures()))
 
         playback = Playback(recording, speed)
         playback.paused = False

@@ -7,6 +7,7 @@ from typing import Final, Literal
 from common.emulation.clauses import LinkModel
 from common.protocol.around import Around
 from common.protocol.uniform_field import uniform_field
+from common.roles import Role
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
 from feelahead.lab.table import Row
 from operator_side.dualsense.effects.official import MAX_STRENGTH
@@ -25,7 +26,6 @@ from robot_side.laws.sensed import Sensed
 from robot_side.main import TICK_PERIOD_S
 from robot_side.outcome.placing import Placing
 from robot_side.settings import CameraSettings, RobotSettings
-from robot_side.surroundings.perceived import Role
 
 Arm = Literal["off", "mechanical", "reacting"]
 """off: nothing is felt. mechanical: triggers stiffen, and the person takes no notice. reacting: they do."""

@@ -12,12 +12,16 @@ from common.protocol.view_messages import SceneState, VideoFrame
 from common.recording.entries import Kind, split_text, unpack_block
 from common.recording.images import read_image
 from common.recording.reading import Message, Recording
+from common.status.statuses import RobotStatus
+from operator_side.viewing.facts import OperatorFacts
 
 FACTS: Final = b"f"
 VIEW: Final = b"v"
 ROBOT: Final = b"s"
 _NANOSECONDS: Final = 1e-9
-_TOPICS: Final = ("/robot/status", "/operator/facts", "/view", "/camera/overview", "/camera/first_person")
+_FACTS: Final = "/operator/facts"
+_ROBOT: Final = "/robot/status"
+_TOPICS: Final = (_ROBOT, _FACTS, "/view", "/camera/overview", "/camera/first_person")
 
 
 class Seen(NamedTuple):
@@ -33,7 +37,15 @@ class Seen(NamedTuple):
 
 
 def require_protocol(recording: Recording) -> None:
-    """Raise a ConfigurationError where the first message that a side sent is of another protocol than ours."""
+    """Raise a ConfigurationError where a side's first message or status is of another release than ours."""
+    for topic, struct in ((_FACTS, OperatorFacts), (_ROBOT, RobotStatus)):
+        for message in recording.messages((topic,)):
+            try:
+                msgspec.json.decode(message.content, type=struct)
+            except msgspec.ValidationError as error:
+                why = f"{recording.path}: {topic} of another release ({error}); valid: feelahead export"
+                raise ConfigurationError(why) from error
+            break
     for message in recording.messages([f"/{side}/inputs" for side in recording.headers]):
         for entry in unpack_block(message.content).unpacked():
             if entry.kind == Kind.SENT:
@@ -50,9 +62,9 @@ def seen(recording: Recording) -> Iterator[Seen]:
     pictures: dict[tuple[str, int], bytes] = {}
     for message in recording.messages(_TOPICS):
         time_s = _NANOSECONDS * (message.log_ns - began_ns)
-        if message.topic == "/operator/facts":
+        if message.topic == _FACTS:
             yield Seen(time_s, FACTS, message.topic, message.content)
-        elif message.topic == "/robot/status":
+        elif message.topic == _ROBOT:
             yield Seen(time_s, ROBOT, message.topic, message.content)
         elif message.topic == "/view":
             yield Seen(time_s, VIEW, *_view(message, pictures))

@@ -12,6 +12,7 @@ from common.errors import ConfigurationError
 from common.recording.entries import Kind, split_text
 from common.recording.provenance import processor_name, settings_from
 from common.recording.reading import Recording
+from common.roles import Role
 from feelahead.recordings.comparison import Comparison, differing_origin, recorded_entries, require_side
 from operator_side.assembly import build_operator_side
 from operator_side.core import OperatorSide
@@ -24,7 +25,7 @@ from robot_side.core import RobotSide
 from robot_side.parts import build_parts
 from robot_side.recording.inputs import FrameUnpacker, unpack_state
 from robot_side.settings import RobotSettings
-from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.perceived import PerceivedObjects
 
 
 class _Given(Arm):

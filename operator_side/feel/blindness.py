@@ -6,9 +6,9 @@ seeing ─▶ blind ─▶ waiting ─▶ seeing
        └ the field has expired
 """
 
-from enum import StrEnum
 from typing import Final
 
+from common.status.codes import Sight
 from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, Color, Rumble
 
 SIGNAL_S: Final = 3.0
@@ -17,14 +17,6 @@ _PERIOD_S: Final = 1.0
 _PULSES_S: Final = ((0.0, 0.12), (0.24, 0.36))
 """Two short pulses in each period, of both motors: nothing else moves both alike."""
 _PULSE: Final = Rumble(left=0.7, right=0.7)
-
-
-class Sight(StrEnum):
-    """Whether what is ahead is known; the values are shown to people."""
-
-    SEEING = "seeing"
-    BLIND = "blind"
-    WAITING = "waiting for released triggers"
 
 
 class Blindness:

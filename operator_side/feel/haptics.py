@@ -153,10 +153,6 @@ class Haptics:
         """What the controller was told last; nothing while it has not been told anything yet."""
         return self._written or RELEASED
 
-    def status(self) -> str:
-        """A few words for people on each of the controller's own triggers."""
-        return f"L2 {self.rendering.l2.status()}, R2 {self.rendering.r2.status()}"
-
     def summary(self) -> dict[str, Any]:
         """What is to be known of the run."""
         return self.rendering.summary() | {"writes": self.writes, "without_history": self.without_history}

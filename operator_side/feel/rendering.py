@@ -108,14 +108,6 @@ class RenderedTrigger:
         """How far it is pulled, in calibrated travel, 0 to 1, by what the controller reports, before it stiffens."""
         return self._travel.travel(min(self._strengths.count(0) / ZONE_COUNT / SENSED_TRAVEL, 1.0))
 
-    def status(self) -> str:
-        """Its free way for people."""
-        free, way = self._strengths.count(0), self.free_travel
-        if free == ZONE_COUNT or way == 1.0:
-            return "free"
-        least, most = self._strengths[free], self._strengths[-1]
-        return f"free to {100.0 * way:.0f} %, then {least}" + (f" to {most}" if most > least else "")
-
     def zones(self) -> dict[str, int | None]:
         """The run's figures of its zones."""
         return {"first_stiff": self.first_stiff, "max": self.max_strength}

@@ -19,6 +19,7 @@ from typing import Final, Literal
 import numpy as np
 
 from common.protocol.messages import Telemetry, Vector2, Vector3
+from common.status.codes import Doing
 from operator_side.dualsense.reports.controller_state import Button
 from operator_side.dualsense.reports.output_report import WARNING_LIGHT
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
@@ -50,18 +51,18 @@ _BACK_M: Final = 0.1
 """So far they draw back from what they have set down."""
 
 Phase = Literal["wait", "arm", "advance", "close", "retreat", "lift", "carry", "lower", "release", "withdraw", "done"]
-_DOING: Final[dict[Phase, str]] = {
-    "wait": "resting",
-    "arm": "arming",
-    "advance": "advancing",
-    "close": "grasping",
-    "retreat": "retreating",
-    "lift": "lifting",
-    "carry": "carrying",
-    "lower": "lowering",
-    "release": "letting go",
-    "withdraw": "drawing back",
-    "done": "done",
+_DOING: Final[dict[Phase, Doing]] = {
+    "wait": Doing.RESTING,
+    "arm": Doing.ARMING,
+    "advance": Doing.ADVANCING,
+    "close": Doing.GRASPING,
+    "retreat": Doing.RETREATING,
+    "lift": Doing.LIFTING,
+    "carry": Doing.CARRYING,
+    "lower": Doing.LOWERING,
+    "release": Doing.LETTING_GO,
+    "withdraw": Doing.DRAWING_BACK,
+    "done": Doing.DONE,
 }
 _REST: Final[Vector2] = (0.0, 0.0)
 
@@ -102,10 +103,10 @@ class SimulatedOperator:
         self._warned_s = -math.inf
 
     @property
-    def doing(self) -> str:
-        """Their phase in a word for people; without a target they do not seem to advance."""
+    def doing(self) -> Doing:
+        """Their phase; without a target they do not seem to advance."""
         aimless = self.phase == "advance" and self._view is not None and self._view.target_in_tool_m is None
-        return "no target" if aimless else _DOING[self.phase]
+        return Doing.NO_TARGET if aimless else _DOING[self.phase]
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """Look at the screen and move the hands; `delay_s` is the round trip that the person has got used to."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from common.protocol.messages import Telemetry, Vector2
+from common.status.codes import Doing
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.button_map import BUTTON_OF, Action
 from operator_side.hands.travel_calibration import StickRest
@@ -22,7 +23,12 @@ _ASIDE_S: Final = 1.5
 _STICK: Final = StickRest()
 
 Phase = Literal["rest", "arm", "grip", "pull"]
-_DOING: Final[dict[Phase, str]] = {"rest": "resting", "arm": "arming", "grip": "grasping", "pull": "pulling"}
+_DOING: Final[dict[Phase, Doing]] = {
+    "rest": Doing.RESTING,
+    "arm": Doing.ARMING,
+    "grip": Doing.GRASPING,
+    "pull": Doing.PULLING,
+}
 
 
 @dataclass(frozen=True)
@@ -72,8 +78,8 @@ class PullingHands:
         self._holding_s: float | None = None
 
     @property
-    def doing(self) -> str:
-        """Their phase in a word for people."""
+    def doing(self) -> Doing:
+        """Their phase."""
         return _DOING[self.phase]
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:

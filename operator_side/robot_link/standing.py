@@ -1,11 +1,11 @@
 """Where we stand with the robot side: the notice that came last, and whether it still counts."""
 
 import math
-from typing import Final
+from typing import Any, Final
 
-from common.command.live_view import LINK_LOST, LINK_REFUSED, LINK_UP
 from common.protocol.messages import LeaseNotice, LinkReport
 from common.protocol.session import OWNING, SessionState
+from common.status.codes import LinkState
 
 NOTICE_EXPIRES_S: Final = 0.5
 """Without a notice for this long nobody knows whose lease it is."""
@@ -54,24 +54,28 @@ class Standing:
         if known is None or report.header.epoch != known.header.epoch or report.header.sequence > known.header.sequence:
             self._report, self._reported_s = report, now_s
 
-    def link_values(self, now_s: float) -> dict[str, float | str | None]:
-        """The newest report as status values; none where it is old."""
-        if self._report is None or now_s - self._reported_s > REPORT_EXPIRES_S:
-            return {}
-        return self._report.values()
+    def status_fields(self, other_version: str | None, now_s: float, *, linked: bool, heard: bool) -> dict[str, Any]:
+        """The fields of a status that tell of the link. linked: stiffness comes; heard: some came once."""
+        link, reason = self._link(other_version, linked=linked, heard=heard)
+        fields: dict[str, Any] = {"link": link, "link_reason": reason}
+        if self.lease is not None:
+            lease = self.lease
+            fields |= {"owner": lease.session, "place": lease.place, "waiting": lease.waiting}
+        if self._report is not None and now_s - self._reported_s <= REPORT_EXPIRES_S:
+            fields |= self._report.values()
+        return fields
 
-    def link_status(self, other_version: str | None, *, linked: bool, heard: bool) -> str:
-        """The link in words. linked: stiffness comes; heard: some came once."""
+    def _link(self, other_version: str | None, *, linked: bool, heard: bool) -> tuple[LinkState, str | None]:
         lease = self.lease
         if other_version is not None:
-            return f"{LINK_REFUSED}{other_version}"
+            return LinkState.REFUSED, other_version
         if lease is not None and lease.session is SessionState.OBSERVING:
-            return f"observing ({lease.place} of {lease.waiting} waiting)"
+            return LinkState.OBSERVING, None
         if lease is not None and lease.session not in OWNING:
-            return f"{LINK_REFUSED}{lease.why}"
+            return LinkState.REFUSED, lease.why
         if linked and lease is not None:
-            return LINK_UP
-        return f"{LINK_LOST}nothing heard from the robot" if heard else "waiting for the robot side"
+            return LinkState.UP, None
+        return LinkState.LOST if heard else LinkState.WAITING, None
 
     def expire(self, now_s: float) -> None:
         """Nothing is known any more once the last notice is too old."""

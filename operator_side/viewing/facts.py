@@ -3,9 +3,14 @@
 The console, the terminal view and the recording are all made of it.
 """
 
+from enum import StrEnum
+from typing import Literal
+
 import msgspec
 
-from common.command.live_view import Value
+from common.protocol.messages import Telemetry
+from common.status.codes import Doing, Hands, Readiness
+from common.status.statuses import OperatorStatus, RobotStatus
 
 Ten = tuple[int, int, int, int, int, int, int, int, int, int]
 
@@ -49,18 +54,27 @@ class HandsFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Whether a page can drive at all: not where a real controller does"""
     driver: str | None
     """The word by which the page that drives calls itself; None while none does"""
-    readiness: str
-    """operator_side/viewing/pages/driving_page.py: nobody drives, all keys up first, ready, running"""
+    readiness: Readiness
     rest_s: float
     """For how long all keys still have to be up before hold-to-run counts"""
     person: bool
     """Whether there is a scripted person who could go on"""
-    doing: str
-    """What whoever has the controller does, in a word; empty for a real controller"""
+    doing: Doing | None
+    """None for a real controller"""
     tuning_refused: str
     """Why the last wish to tune was refused; empty where it was not"""
     link_asked: str | None
     """The link that was asked for last from here, in netem's words; None while nothing was"""
+
+
+class SceneFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Figures of the robot side's scene."""
+
+    overlap_mm3: float
+    """Of the trigger that has more ahead"""
+    tick_us: float
+    tick_p99_us: float
+    overruns: int
 
 
 class OperatorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -70,28 +84,45 @@ class OperatorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """On this machine's monotonic clock, which is the console's, too"""
     offset_s: float | None
     """What the robot side's clock is ahead of ours: a stamp of its less this is on our clock; None while unknown"""
-    status: dict[str, Value]
-    """As the status line is made of (common/command/live_view.py)"""
+    status: OperatorStatus
+    screen: Telemetry | None
+    """The robot side's newest telemetry"""
     l2: TriggerFacts
     r2: TriggerFacts
     rumble: float
     """As written to the motors, 0 to 1"""
-    advancing: str
-    """Which of the two advances: L2 or R2"""
+    advancing: Literal["L2", "R2"]
+    """Which of the two advances"""
     to_operator: DelayFacts
     to_robot: DelayFacts
     """As far as this side knows: half of what the round trip leaves, where it cannot be told"""
     round_trip_ms: float | None
     field_age_ms: float | None
     """Since the newest stiffness arrived; None before the first"""
-    hands: str
-    """Whose hands move the arm: controller, person (scripted) or browser"""
+    hands: Hands
     may_tune: bool
     """Whether the robot side lets this operator change P and the emulated link"""
     probability: float | None
     """P as the robot side has it; None while it has not said"""
     page: HandsFacts | None = None
     """None where there is nothing for pages to drive or to stop"""
+    scene: SceneFacts | None = None
+    robot: RobotStatus | None = None
+    """Where both sides' statuses are at hand: in the demo, and in a recording of both"""
+
+
+class ShownKind(StrEnum):
+    """What a message to a page is."""
+
+    RUN = "run"
+    """What does not change in a run"""
+    FACTS = "facts"
+    SCENE = "scene"
+    NOTE = "note"
+    PLAYER = "player"
+    """Where in a recording we are"""
+    END = "end"
+    """No message follows before the page has said that it took all up to here"""
 
 
 FACTS_PERIOD_S = 1.0 / 30.0

@@ -1,16 +1,17 @@
 """What a person may want to see, put together from the core: made only while somebody looks."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Final, cast
 
 import msgspec
 
-from common.command.live_view import Value, number
+from common.status.codes import Hands
+from common.status.statuses import OperatorStatus
 from operator_side.core import OperatorSide
 from operator_side.dualsense.effects.official import ZONE_COUNT, Off
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
-from operator_side.viewing.facts import DelayFacts, HandsFacts, OperatorFacts, Ten, TriggerFacts
+from operator_side.viewing.facts import DelayFacts, HandsFacts, OperatorFacts, SceneFacts, Ten, TriggerFacts
 
 _RECENT_S: Final = 1.0
 _TAIL: Final = 0.99
@@ -19,8 +20,7 @@ _TAIL: Final = 0.99
 class Surroundings(msgspec.Struct, frozen=True):
     """What the core itself does not know."""
 
-    hands: str
-    """As OperatorFacts.hands"""
+    hands: Hands
     asked_to_robot: str = ""
     """The profile that this side emulates, in the grammar's words"""
     swap_sides: bool = False
@@ -28,12 +28,12 @@ class Surroundings(msgspec.Struct, frozen=True):
 
 
 def operator_facts(
-    core: OperatorSide, status: Mapping[str, Value], surroundings: Surroundings, now_s: float
+    core: OperatorSide, status: OperatorStatus, around: Surroundings, now_s: float, scene: SceneFacts | None = None
 ) -> OperatorFacts:
-    """The facts of `now_s`; `status`: `core.status(now_s)`, and what else the status line is made of."""
+    """The facts of `now_s`; `status`: `core.status(now_s)`, with what the process knows."""
     felt, written, lease = core.stiffness, core.haptics.written, core.lease
-    pulled = [number(status.get(f"{name}_pulled")) for name in ("L2", "R2")]
-    order = -1 if surroundings.swap_sides else 1
+    pulled = [status.l2_pulled, status.r2_pulled]
+    order = -1 if around.swap_sides else 1
     needed: list[float | None] = [None, None]
     fields = [None, None] if felt is None else [felt.l2, felt.r2][::order]
     if felt is not None:
@@ -63,19 +63,21 @@ def operator_facts(
     return OperatorFacts(
         now_s=now_s,
         offset_s=offset.offset_s,
-        status=dict(status),
+        status=status,
+        screen=core.screen,
         l2=triggers[0],
         r2=triggers[1],
         rumble=0.0 if written.rumble is None else max(written.rumble.left, written.rumble.right),
-        advancing="L2" if surroundings.swap_sides else "R2",
+        advancing="L2" if around.swap_sides else "R2",
         to_operator=_delay("", (there for _, there, _ in recent)),
-        to_robot=_delay(surroundings.asked_to_robot, (_back(there, both) for _, there, both in recent)),
+        to_robot=_delay(around.asked_to_robot, (_back(there, both) for _, there, both in recent)),
         round_trip_ms=None if offset.round_trip_s is None else 1e3 * offset.round_trip_s,
         field_age_ms=1e3 * (now_s - core.felt.received_s) if core.felt.count else None,
-        hands=surroundings.hands,
+        hands=around.hands,
         may_tune=lease is not None and lease.may_tune,
         probability=None if lease is None else lease.probability,
-        page=surroundings.page,
+        page=around.page,
+        scene=scene,
     )
 
 

@@ -45,10 +45,10 @@ def hands_facts(pages: DrivingPage, shared: SharedHands | None, core: OperatorSi
     return HandsFacts(
         may_drive=pages.may_drive,
         driver=pages.driver,
-        readiness=str(pages.readiness),
+        readiness=pages.readiness,
         rest_s=rest_s,
         person=shared is not None and shared.has_person,
-        doing="" if shared is None else shared.doing,
+        doing=None if shared is None else shared.doing,
         tuning_refused=core.tuner.why,
         link_asked=core.tuner.link,
     )

@@ -1,10 +1,9 @@
 """Whoever looks at a run from this side: the console, and what the robot side is asked to render for it."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Final
 
-from common.command.live_view import Value
 from common.command.status import Status
 from common.errors import RemoteProtocolError
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, claims_to_be, decode_view, encode
@@ -13,10 +12,11 @@ from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC, SceneState
 from common.rate.pieces import PIECE, Joining
 from common.recording.entries import Kind
 from common.recording.side import SideRecording
+from common.status.statuses import OperatorStatus
 from operator_side.core import OperatorSide
 from operator_side.settings import OperatorSettings
 from operator_side.viewing.console.console import Console
-from operator_side.viewing.facts import FACTS_PERIOD_S
+from operator_side.viewing.facts import FACTS_PERIOD_S, SceneFacts
 from operator_side.viewing.facts_of_core import Surroundings, operator_facts
 from operator_side.viewing.following_pages import hear_pages
 from operator_side.viewing.pages.driving_page import DrivingPage
@@ -32,19 +32,19 @@ def view_topics(settings: OperatorSettings) -> tuple[bytes, ...]:
 
 
 class SceneFigures:
-    """Overlaps and ticks of the robot side's scene, as words: unpacked from the newest bytes when somebody asks."""
+    """Overlaps and ticks of the robot side's scene, unpacked from the newest bytes when somebody asks."""
 
     def __init__(self) -> None:
         self._newest: bytes | None = None
-        self._figures: dict[str, Value] = {}
+        self._figures: SceneFacts | None = None
 
     def take(self, payload: bytes) -> None:
         """One payload of the topic `scene`; shapes, which are large, are passed over."""
         if claims_to_be("scene", payload):
             self._newest = payload
 
-    def figures(self) -> dict[str, Value]:
-        """As status values; empty before the first."""
+    def figures(self) -> SceneFacts | None:
+        """Those of the newest; None before the first."""
         payload, self._newest = self._newest, None
         if payload is not None:
             try:
@@ -53,12 +53,12 @@ class SceneFigures:
                 return self._figures
             if isinstance(state, SceneState):
                 by_trigger = zip(*((l2, r2) for _, l2, r2 in state.overlaps), strict=True)
-                self._figures = {
-                    "overlap_mm3": 1e9 * max(map(sum, by_trigger), default=0.0),
-                    "tick_us": state.tick_p50_us,
-                    "tick_p99_us": state.tick_p99_us,
-                    "overruns": state.overruns,
-                }
+                self._figures = SceneFacts(
+                    overlap_mm3=1e9 * max(map(sum, by_trigger), default=0.0),
+                    tick_us=state.tick_p50_us,
+                    tick_p99_us=state.tick_p99_us,
+                    overruns=state.overruns,
+                )
         return self._figures
 
 
@@ -137,8 +137,8 @@ class Viewing:
                 self._status.note(f"console: {self._told}")
         return console.pages > 0
 
-    def show(self, status: Mapping[str, Value], now_s: float) -> None:
-        """Show and record the facts of `now_s`; `status`: what the status line is made of."""
+    def show(self, status: OperatorStatus, now_s: float) -> None:
+        """Show and record the facts of `now_s`; `status`: with what the process knows."""
         self._facts_s = now_s if now_s - self._facts_s > 2 * FACTS_PERIOD_S else self._facts_s + FACTS_PERIOD_S
         facts = operator_facts(self._core, status, self._surroundings(now_s), now_s)
         if self.console is not None:
@@ -146,9 +146,9 @@ class Viewing:
         if self._recording is not None:
             self._recording.facts(now_s, facts)
 
-    def tell(self, status: Mapping[str, Value], now_s: float) -> None:
+    def tell(self, status: OperatorStatus, now_s: float) -> None:
         """Tell the status of `now_s`, and the facts where somebody wants them."""
-        self._status.show(now_s, status)
+        self._status.show(now_s, operator=status)
         if self._status.wants_facts:
-            known = {**status, **self._figures.figures()}
-            self._status.show_facts(operator_facts(self._core, known, self._surroundings(now_s), now_s))
+            scene = self._figures.figures()
+            self._status.show_facts(operator_facts(self._core, status, self._surroundings(now_s), now_s, scene))

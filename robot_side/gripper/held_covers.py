@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
+from common.roles import Role
 from robot_side.gripper.kept_covers import kept_cover
 from robot_side.gripper.solids import Solid, convex_solid
 from robot_side.gripper.spheres import cover_boxes
 from robot_side.gripper.surface_cover import cover_surface
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 
 if TYPE_CHECKING:
     from robot_side.overlap.meshes.mesh_library import MeshLibrary

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
+from common.roles import Role
 from robot_side.arm.port import GripperPose
 from robot_side.compiled.kernel import compiled, input_array, output_array
 from robot_side.compiled.vectors import dot, load
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.surroundings.distances import object_distances
-from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import SceneTable
 
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from common.roles import Role
 from robot_side.arm.port import GripperPose
 from robot_side.surroundings.distances import object_distances
-from robot_side.surroundings.perceived import Role
 from robot_side.surroundings.scene_table import SceneTable
 
 _FIRST_REACH_M = 0.1

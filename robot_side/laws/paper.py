@@ -13,6 +13,7 @@ from common.arrays import FloatArray, IntArray
 from common.protocol.around import Around
 from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
 from common.protocol.view_messages import EnlargementTerms
+from common.roles import Role
 from robot_side.arm.ability import JointLimits, along_approach
 from robot_side.arm.port import GripperPose
 from robot_side.arm.tool_motion import ToolMotionSettings
@@ -23,7 +24,6 @@ from robot_side.field.total_overlap import total_overlap_m3
 from robot_side.laws.explanation import Trigger, TriggerExplained, moved_and_inflated, overlaps_by_object
 from robot_side.laws.law import Situation
 from robot_side.laws.sensed import Sensed
-from robot_side.surroundings.perceived import Role
 from robot_side.surroundings.surroundings import Surroundings
 
 REFERENCE_SHARE: Final = 0.05

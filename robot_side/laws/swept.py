@@ -18,6 +18,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray, require_finite
 from common.protocol.around import LISTS, LONGEST_S, MOST_JOINTS, PROBES, Around
+from common.roles import Role
 from common.touch_speed import touch_speed_m_s
 from robot_side.arm.ability import JointLimits, change_times_s, find_ability
 from robot_side.arm.port import GripperPose
@@ -44,7 +45,7 @@ from robot_side.laws.path import go_to_place
 from robot_side.laws.prospect import find_prospect, stopping_s
 from robot_side.laws.sense import sense
 from robot_side.laws.sensed import L2, NUMBERS, R2, Sensed
-from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import SceneTable
 from robot_side.surroundings.surroundings import Surroundings
 

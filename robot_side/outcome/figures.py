@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from common.arrays import FloatArray
+from common.roles import Role
 from common.statistics import BLOCK, RunningStatistics
 from robot_side.events import Listener, Tick
 from robot_side.laws.sensed import (
@@ -22,7 +23,6 @@ from robot_side.laws.sensed import (
     Sensed,
 )
 from robot_side.outcome.placing import Placing, scaled
-from robot_side.surroundings.perceived import Role
 
 if TYPE_CHECKING:
     from robot_side.outcome.truth import Truth

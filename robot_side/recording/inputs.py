@@ -19,8 +19,9 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
+from common.roles import Role
 from robot_side.arm.port import ArmState
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 
 ARRAYS: Final[Mapping[str, tuple[type, tuple[int, ...]]]] = {
     name: described

@@ -11,7 +11,6 @@ from common.recording.entries import Kind, entry, text
 from common.recording.provenance import provenance
 from robot_side.arm.port import ArmState
 from robot_side.compiled.warm_up import kernel_digests
-from robot_side.core import RobotSide
 from robot_side.events import Listener, Tick
 from robot_side.recording.inputs import FramePacker, pack_state
 from robot_side.settings import RobotSettings
@@ -73,8 +72,3 @@ class RobotEncoder:
 def robot_header(settings: RobotSettings, epoch: int, clock_domain: str) -> dict[str, Any]:
     """What the core was made from; to be told once its kernels are there."""
     return provenance(settings, epoch, clock_domain) | {"kernels": kernel_digests()}
-
-
-def recorded_status(core: RobotSide, now_s: float) -> dict[str, Any]:
-    """What a person is shown, and the offset of the operator side's clock."""
-    return core.status(now_s) | {"offset_s": core.session.link.clock_offset.offset_at(now_s)}

@@ -13,8 +13,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from common.roles import Role
 from robot_side.surroundings.kinds.layout import NUMBERS, rows
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.placing import numbers_of, primitives_of
 
 OF_OBJECTS: Final = {"positions_m": (3,), "rotations": (3, 3), "velocities_m_s": (3,)}

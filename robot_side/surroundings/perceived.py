@@ -2,26 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from common.roles import Role
 from robot_side.surroundings.kinds import box, ellipsoid, half_space, mesh, sphere, tetrahedron
 
 if TYPE_CHECKING:
     # A scene without meshes does not load the kernels for them.
     from robot_side.overlap.meshes.mesh_library import MeshLibrary
-
-
-class Role(Enum):
-    """What an object is to the task."""
-
-    OBSTACLE = "obstacle"
-    TARGET = "target"
-    SUPPORT = "support"
-    IGNORED = "ignored"
 
 
 KINDS: Final = (sphere.KIND, box.KIND, tetrahedron.KIND, half_space.KIND, mesh.KIND, ellipsoid.KIND)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 
 from common.errors import ConfigurationError
-from robot_side.surroundings.perceived import Role
+from common.roles import Role
 
 _ROLE_OF_PREFIX = {
     "target": Role.TARGET,

@@ -1,7 +1,8 @@
 """Follow the camera's newest frame, and the target in it."""
 
 from common.arrays import FloatArray
-from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects, Role
+from common.roles import Role
+from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 from robot_side.surroundings.target import next_target, object_centers
 

@@ -3,7 +3,8 @@
 from typing import Final
 
 from common.arrays import FloatArray
-from robot_side.surroundings.perceived import PerceivedObjects, Role
+from common.roles import Role
+from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import SceneTable, go_to, make, moved_table
 from robot_side.surroundings.target import center_m
 from robot_side.surroundings.validity import require_valid

@@ -5,10 +5,11 @@ import math
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from common.roles import Role
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import COUNT, compiled, output_array
 from robot_side.surroundings.kinds.layout import HALF_SPACE, TETRAHEDRON
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.scene_columns import SCENE
 from robot_side.surroundings.scene_table import SceneTable
 

@@ -11,14 +11,14 @@ from common.arrays import FloatArray, IntArray
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, Prepared
 from common.protocol.messages import Header
 from common.protocol.view_messages import SceneShapes, SceneState, Shape
+from common.roles import ROLES
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
 from robot_side.laws.explanation import Explains, Trigger, TriggerExplained
 from robot_side.laws.law import Situation
 from robot_side.laws.sensed import Sensed
-from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.viewing.shapes import SceneModel, bytes_of
 
-_ROLES: Final = {Role.OBSTACLE: 0, Role.TARGET: 1, Role.SUPPORT: 2, Role.IGNORED: 3}
 _TRIGGERS: Final[tuple[Trigger, Trigger]] = ("l2", "r2")
 _FEW: Final = 64
 """So many objects have their poses in every SceneState, whether they move or not."""
@@ -119,7 +119,7 @@ class SceneView:
             link_poses=begun.link_poses,
             object_index=begun.object_index.astype("<u4").tobytes(),
             object_poses=begun.object_poses,
-            roles=bytes([_ROLES[role] for role in objects.roles]),
+            roles=bytes(map(ROLES.index, objects.roles)),
             tool_pose=_pose(pose.tool_position_m, pose.tool_rotation),
             spheres=_row_bytes(np.column_stack([pose.sphere_centers_m, pose.sphere_radii_m])),
             overlaps=tuple(

@@ -6,9 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from common.arrays import FloatArray
+from common.roles import Role
 from robot_side.overlap import Mesh, MeshLibrary
 from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
-from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.perceived import PerceivedObjects
 
 # A cube's corners, numbered by their bits (x, y, z), and five tetrahedra that fill it.
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)

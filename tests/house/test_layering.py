@@ -28,20 +28,21 @@ ARROWS = """
     common/recording: common common/companion common/protocol
     common/video: common/protocol
     common/sockets: common common/files
-    common/command: common common/emulation common/files common/recording
+    common/status: common/protocol
+    common/command: common common/emulation common/files common/recording common/status
     common/loop: common common/command common/files common/realtime common/recording
 
     robot_side/compiled: common common/companion common/files
     robot_side/overlap/checks: common
     robot_side/overlap/digits: common robot_side/compiled
     robot_side/overlap/closed_forms: common robot_side/compiled robot_side/overlap/digits
-    robot_side/overlap/lanes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/digits
-        robot_side/overlap/closed_forms
-    robot_side/overlap/precise: common robot_side/compiled robot_side/overlap/digits robot_side/overlap/closed_forms
-    robot_side/overlap/meshes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/digits
-        robot_side/overlap/closed_forms
+    robot_side/overlap/lanes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/closed_forms
+        robot_side/overlap/digits
+    robot_side/overlap/precise: common robot_side/compiled robot_side/overlap/closed_forms robot_side/overlap/digits
+    robot_side/overlap/meshes: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/closed_forms
+        robot_side/overlap/digits
     robot_side/overlap: common robot_side/compiled robot_side/overlap/checks robot_side/overlap/closed_forms
-        robot_side/overlap/lanes robot_side/overlap/precise robot_side/overlap/meshes
+        robot_side/overlap/lanes robot_side/overlap/meshes robot_side/overlap/precise
     robot_side/operators: common common/emulation common/protocol
     robot_side/arm: common common/protocol robot_side/compiled
     robot_side/enlargement: common common/protocol robot_side/compiled
@@ -66,58 +67,57 @@ ARROWS = """
     robot_side/events.py: common robot_side/arm robot_side/laws robot_side/operators robot_side/reporting
         robot_side/surroundings
     robot_side/outcome: common robot_side/events.py robot_side/laws robot_side/outcome/truth.py
-        robot_side/surroundings
-    robot_side/core.py: common/command common/timing robot_side/arm robot_side/events.py robot_side/gripper
+    robot_side/core.py: common/status common/timing robot_side/arm robot_side/events.py robot_side/gripper
         robot_side/laws robot_side/motion.py robot_side/operators robot_side/outcome robot_side/reporting
         robot_side/surroundings
     robot_side/viewing: common common/companion common/protocol robot_side/core.py robot_side/drivers/mujoco
         robot_side/laws robot_side/reporting robot_side/surroundings
     robot_side/settings.py: common common/command robot_side/arm robot_side/drivers/mujoco robot_side/enlargement
-        robot_side/laws/named.py robot_side/operators robot_side/surroundings robot_side/viewing
-    robot_side/recording: common/recording robot_side/arm robot_side/compiled robot_side/core.py robot_side/events.py
+        robot_side/laws/named.py robot_side/operators robot_side/viewing
+    robot_side/recording: common common/recording robot_side/arm robot_side/compiled robot_side/events.py
         robot_side/settings.py robot_side/surroundings
     robot_side/parts.py: common common/protocol common/timing robot_side/compiled robot_side/core.py
         robot_side/drivers/mujoco robot_side/enlargement robot_side/gripper robot_side/laws robot_side/laws/named.py
         robot_side/operators robot_side/outcome robot_side/settings.py robot_side/surroundings
     robot_side: common common/command common/emulation common/loop common/protocol common/realtime common/sockets
-        robot_side/compiled robot_side/core.py robot_side/events.py robot_side/parts.py robot_side/recording
-        robot_side/reporting robot_side/settings.py robot_side/viewing
+        common/status robot_side/compiled robot_side/core.py robot_side/events.py robot_side/parts.py
+        robot_side/recording robot_side/reporting robot_side/settings.py robot_side/viewing
 
     operator_side/dualsense/effects:
     operator_side/dualsense/reports: common operator_side/dualsense/effects
-    operator_side/dualsense/hid: common operator_side/dualsense/reports
+    operator_side/dualsense/hid: common common/status operator_side/dualsense/reports
     operator_side/dualsense/simulated: common operator_side/dualsense/effects operator_side/dualsense/reports
     operator_side/dualsense/uhid: common common/realtime operator_side/dualsense/reports
         operator_side/dualsense/simulated
     operator_side/hands: common operator_side/dualsense/effects operator_side/dualsense/reports
-    operator_side/robot_link: common common/command common/emulation common/protocol common/rate common/sockets
+    operator_side/robot_link: common common/emulation common/protocol common/rate common/sockets common/status
         operator_side/hands
     operator_side/events.py: operator_side/dualsense/reports operator_side/robot_link
-    operator_side/feel: common common/protocol operator_side/dualsense/effects operator_side/dualsense/reports
-        operator_side/hands
+    operator_side/feel: common common/protocol common/status operator_side/dualsense/effects
+        operator_side/dualsense/reports operator_side/hands
     operator_side/calibration: common common/files operator_side/dualsense/reports operator_side/hands
-    operator_side/people: common common/protocol operator_side/calibration operator_side/dualsense/reports
-        operator_side/dualsense/simulated operator_side/hands
-    operator_side/core.py: common common/command common/protocol operator_side/dualsense/reports
-        operator_side/events.py operator_side/feel operator_side/hands operator_side/robot_link
+    operator_side/people: common common/protocol common/status operator_side/calibration
+        operator_side/dualsense/reports operator_side/dualsense/simulated operator_side/hands
+    operator_side/core.py: common common/protocol common/status operator_side/dualsense/reports operator_side/events.py
+        operator_side/feel operator_side/hands operator_side/robot_link
     operator_side/settings.py: common common/command common/protocol common/sockets operator_side/feel
         operator_side/hands operator_side/people
-    operator_side/viewing/facts.py: common/command
-    operator_side/viewing/terminal: common common/command common/companion operator_side/dualsense/reports
-        operator_side/viewing/facts.py
-    operator_side/viewing/pages: common common/protocol operator_side/dualsense/simulated operator_side/hands
-        operator_side/people
-    operator_side/viewing/console: common common/command common/companion common/protocol common/video
+    operator_side/viewing/facts.py: common/protocol common/status
+    operator_side/viewing/terminal: common common/command common/companion common/status
         operator_side/dualsense/reports operator_side/viewing/facts.py
-    operator_side/viewing: common common/command common/protocol common/rate common/recording operator_side/core.py
-        operator_side/dualsense/effects operator_side/dualsense/reports operator_side/dualsense/simulated
-        operator_side/people operator_side/settings.py operator_side/viewing/console operator_side/viewing/facts.py
-        operator_side/viewing/pages
+    operator_side/viewing/pages: common common/protocol common/status operator_side/dualsense/simulated
+        operator_side/hands operator_side/people
+    operator_side/viewing/console: common common/companion common/protocol common/status common/video
+        operator_side/dualsense/reports operator_side/viewing/facts.py operator_side/viewing/pages
+    operator_side/viewing: common common/command common/protocol common/rate common/recording common/status
+        operator_side/core.py operator_side/dualsense/effects operator_side/dualsense/reports
+        operator_side/dualsense/simulated operator_side/people operator_side/settings.py operator_side/viewing/console
+        operator_side/viewing/facts.py operator_side/viewing/pages
     operator_side: common common/command common/emulation common/loop common/protocol common/recording common/sockets
-        operator_side/calibration operator_side/core.py operator_side/dualsense/hid operator_side/dualsense/reports
-        operator_side/dualsense/simulated operator_side/events.py operator_side/hands operator_side/robot_link
-        operator_side/settings.py operator_side/viewing operator_side/viewing/console operator_side/viewing/pages
-        operator_side/viewing/terminal
+        common/status operator_side/calibration operator_side/core.py operator_side/dualsense/hid
+        operator_side/dualsense/reports operator_side/dualsense/simulated operator_side/events.py operator_side/hands
+        operator_side/robot_link operator_side/settings.py operator_side/viewing operator_side/viewing/console
+        operator_side/viewing/pages operator_side/viewing/terminal
 
     feelahead/both_sides: common/* robot_side/* operator_side/*
     feelahead/recordings: common/* robot_side/* operator_side/*

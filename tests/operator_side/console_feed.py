@@ -1,13 +1,15 @@
 """Something to see in a console: an arm that sways before a table, as both sides would tell of it."""
 
 import math
+from typing import Literal
 
 import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
 
 from common.protocol.codec import encode
-from common.protocol.messages import Header
+from common.protocol.messages import Header, MotionState
+from common.protocol.session import SessionState
 from common.protocol.view_messages import (
     VIEW_NAMES,
     EnlargementTerms,
@@ -18,6 +20,8 @@ from common.protocol.view_messages import (
     VideoFrame,
     ViewName,
 )
+from common.status.codes import Doing, Hands, LinkState
+from common.status.statuses import OperatorStatus
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts import FACTS_PERIOD_S, DelayFacts, OperatorFacts, TriggerFacts
 
@@ -34,7 +38,7 @@ def header(now_s: float, sequence: int = 1) -> Header:
     return Header(epoch=1, sequence=sequence, sent_s=now_s + OFFSET_S)
 
 
-def facts(now_s: float, state: str = "armed", link: str = "up", advancing: str = "R2") -> OperatorFacts:
+def facts(now_s: float, state: MotionState = "armed", advancing: Literal["L2", "R2"] = "R2") -> OperatorFacts:
     pull = 0.5 - 0.5 * math.cos(now_s)
     strongest = round(8 * pull)
     zones = tuple(max(0, strongest - (9 - zone)) for zone in range(10))
@@ -43,15 +47,16 @@ def facts(now_s: float, state: str = "armed", link: str = "up", advancing: str =
     return OperatorFacts(
         now_s=now_s,
         offset_s=OFFSET_S,
-        status={
-            "link": link,
-            "state": state,
-            "owner": state,
-            "target": "mug",
-            "holding": "nothing",
-            "person": "advancing" if state == "armed" else "resting",
-            "stopped_because": "a button" if state == "stopped" else None,
-        },
+        status=OperatorStatus(
+            link=LinkState.UP,
+            state=state,
+            owner=SessionState(state),
+            target="mug",
+            holding=False,
+            person=Doing.ADVANCING if state == "armed" else Doing.RESTING,
+            stopped_because="a button" if state == "stopped" else None,
+        ),
+        screen=None,
         l2=l2,
         r2=r2,
         rumble=0.0,
@@ -60,7 +65,7 @@ def facts(now_s: float, state: str = "armed", link: str = "up", advancing: str =
         to_robot=DelayFacts("delay 50ms 10ms distribution normal", 49.0, 58.0, 49.0 + 5.0 * math.cos(5.0 * now_s)),
         round_trip_ms=101.0,
         field_age_ms=1.0,
-        hands="person",
+        hands=Hands.PERSON,
         may_tune=False,
         probability=None,
     )

@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 import pytest
 
+from common.status.codes import ConnectionState
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
-from operator_side.dualsense.hid.connection import LOOK_PERIOD_S, Connection, ConnectionState
+from operator_side.dualsense.hid.connection import LOOK_PERIOD_S, Connection
 from operator_side.dualsense.hid.finding import Finder
 from operator_side.dualsense.reports.controller_state import Button
 from operator_side.settings import OperatorSettings

@@ -10,6 +10,7 @@ from common.protocol.codec import PROTOCOL_VERSION, decode, encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import AnyMessage, Hello, LeaseNotice, MotionCommand, Tune
 from common.protocol.session import SessionState
+from common.status.codes import LinkState, Sight
 from operator_side.core import OperatorSide
 from operator_side.dualsense.effects.official import Off
 from operator_side.dualsense.reports.controller_state import Button
@@ -54,19 +55,17 @@ def test_another_calibration_changes_what_is_read_and_what_is_felt(bench: Bench)
 @pytest.mark.parametrize("swapped", [False, True])
 def test_status_and_summary_speak_of_the_controllers_own_triggers(swapped: bool) -> None:
     bench, order = Bench(swap_sides=swapped), -1 if swapped else 1
-    assert [bench.side.status(bench.now_s)[name] for name in ("L2_pulled", "R2_pulled")] == [None, None]
+    assert (status := bench.side.status(bench.now_s)).l2_pulled is status.r2_pulled is None
     bench.hands(**{"l2" if swapped else "r2": 1.0})
     [command] = bench.commands()
     assert (command.l2, command.r2) == (0.0, 1.0)
     bench.feel(6)
     status = bench.side.status(bench.now_s)
-    assert [status[name] for name in ("L2", "R2")][::order] == [0.0, 0.75]
-    assert [status[name] for name in ("L2_pulled", "R2_pulled")][::order] == [0.0, 1.0]
-    free, stiff = "{} free", "{} free to 0 %, then 6"
-    assert status["feel"] == ", ".join(
-        text.format(name) for name, text in zip(("L2", "R2"), (free, stiff)[::order], strict=True)
-    )
-    assert bench.side.status(bench.now_s + 0.11)["L2_pulled"] is None
+    assert [status.l2, status.r2][::order] == [0.0, 0.75]
+    assert [status.l2_pulled, status.r2_pulled][::order] == [0.0, 1.0]
+    assert [status.l2_free, status.r2_free][::order] == [1.0, 0.0]
+    assert status.feel is Sight.SEEING
+    assert bench.side.status(bench.now_s + 0.11).l2_pulled is None
     summary = bench.side.summary()
     zones = [{"first_stiff": None, "max": 0}, {"first_stiff": 0, "max": 6}][::order]
     assert [summary["zones"][name] for name in ("l2", "r2")] == zones
@@ -76,12 +75,12 @@ def test_status_and_summary_speak_of_the_controllers_own_triggers(swapped: bool)
 
 
 def test_that_something_stands_is_felt_once_and_shown_as_long_as_it_does(bench: Bench) -> None:
-    assert bench.side.status(bench.now_s)["stands"] is None
+    assert bench.side.status(bench.now_s).stands is None
     shaken = []
     for stands in (False, *(True,) * 50):
         bench.now_s += 0.01
         bench.feel_field(felt(bench.robot.stamp(bench.now_s), stands=stands))
-        assert bench.side.status(bench.now_s)["stands"] is stands
+        assert bench.side.status(bench.now_s).stands is stands
         shaken.append(bench.device.rumble)
     assert shaken == [Rumble(), *[Rumble(right=0.7)] * 8, *[Rumble()] * 42]
 
@@ -108,11 +107,11 @@ def test_a_controller_that_comes_while_blind_is_released_then_told(bench: Bench)
         bench.side.controller_found(bench.now_s) if light is None else None
         bench.write()
     assert bench.device.output.lightbar == WARNING_LIGHT
-    assert bench.side.status(bench.now_s)["feel"] == "blind"
+    assert bench.side.status(bench.now_s).feel is Sight.BLIND
     bench.feel(5)
     assert bench.device.output.lightbar == USUAL_LIGHT
     assert bench.device.effects[1].zone_strengths == (5,) * 10
-    assert bench.side.status(bench.now_s)["feel"] == "waiting for released triggers"
+    assert bench.side.status(bench.now_s).feel is Sight.WAITING
     assert bench.side.summary()["rendering"]["blind"] == 1
 
 
@@ -173,40 +172,42 @@ def test_garbage_and_messages_of_the_wrong_kind_are_counted_and_change_nothing(
 def test_a_robot_side_of_another_version_is_told_apart(bench: Bench) -> None:
     payload = bytes([0x92, PROTOCOL_VERSION + 1]) + bench.stiffness(4)[2:]
     bench.side.receive(payload, bench.now_s)
-    shown = bench.side.status(bench.now_s)["link"]
-    assert shown == f"refused: protocol version {PROTOCOL_VERSION + 1}; valid: {PROTOCOL_VERSION}"
+    shown = bench.side.status(bench.now_s)
+    why = f"protocol version {PROTOCOL_VERSION + 1}; valid: {PROTOCOL_VERSION}"
+    assert (shown.link, shown.link_reason) == (LinkState.REFUSED, why)
     assert bench.side.rejected == 1
     bench.feel(2)
-    assert bench.side.status(bench.now_s)["link"] == "up"
+    assert bench.side.status(bench.now_s).link is LinkState.UP
 
 
 def test_the_status_shows_where_we_stand_and_the_summary_each_standing(bench: Bench) -> None:
-    assert bench.side.status(bench.now_s)["link"] == "waiting for the robot side"
+    assert bench.side.status(bench.now_s).link is LinkState.WAITING
     bench.feel(0)
     for session, shown in (
-        (SessionState.ARMED, "up"),
-        (SessionState.READY, "up"),
-        (SessionState.OBSERVING, "observing (1 of 2 waiting)"),
-        (SessionState.UNKNOWN, "refused: 8 others observe already"),
-        (SessionState.DISARMED, "up"),
+        (SessionState.ARMED, (LinkState.UP, None)),
+        (SessionState.READY, (LinkState.UP, None)),
+        (SessionState.OBSERVING, (LinkState.OBSERVING, None)),
+        (SessionState.UNKNOWN, (LinkState.REFUSED, "8 others observe already")),
+        (SessionState.DISARMED, (LinkState.UP, None)),
     ):
         bench.notice(session, "8 others observe already")
         status = bench.side.status(bench.now_s)
-        assert (status["link"], status["state"], status["owner"]) == (shown, "armed", str(session))
+        assert (status.link, status.link_reason) == shown
+        assert (status.state, status.owner, status.place, status.waiting) == ("armed", session, 1, 2)
     assert bench.side.summary()["lease_states"] == ["owner", "observing", str(SessionState.UNKNOWN), "owner"]
     bench.now_s += 0.201
-    assert bench.side.status(bench.now_s)["link"] == "lost: nothing heard from the robot"
+    assert bench.side.status(bench.now_s).link is LinkState.LOST
 
 
 def test_why_it_stopped_is_shown_once_it_has_been_armed(bench: Bench) -> None:
     bench.notice(SessionState.DISARMED, "first come, and always disarmed")
     bench.feel(0, "disarmed")
-    assert bench.side.status(bench.now_s)["stopped_because"] is None
+    assert bench.side.status(bench.now_s).stopped_because is None
     bench.feel(0)
-    assert bench.side.status(bench.now_s)["stopped_because"] is None
+    assert bench.side.status(bench.now_s).stopped_because is None
     bench.notice(SessionState.STOPPED, "emergency stop")
     bench.feel(0, "stopped")
-    assert bench.side.status(bench.now_s)["stopped_because"] == "emergency stop"
+    assert bench.side.status(bench.now_s).stopped_because == "emergency stop"
 
 
 def permit(bench: Bench, **fields: Any) -> None:

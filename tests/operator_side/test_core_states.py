@@ -198,7 +198,7 @@ class Core(RuleBasedStateMachine):
             assert device.rumble != Rumble()
             assert device.output.lightbar == WARNING_LIGHT
         self.waited = False
-        assert self.bench.side.status(self.bench.now_s)["release_first"] == (self.sight == "waiting")
+        assert self.bench.side.status(self.bench.now_s).feel == self.sight
         assert (self.bench.side.lease is None) == (self.lease is None)
         assert self.bench.side.stop_button.presses == self.presses
 

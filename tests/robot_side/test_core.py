@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import UNSET
 
 from common.protocol.messages import Header
+from common.roles import Role
 from common.silence import KEEP_ALIVE_S
+from common.status.codes import LinkState
 from feelahead.lab.faults.session_bench import QUICK, TICK_S, Bench, Operator
 from robot_side.core import RobotSide
 from robot_side.drivers.mujoco.scene import load_scene
@@ -15,7 +18,6 @@ from robot_side.gripper.held_object import grip
 from robot_side.laws.law import Situation
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
-from robot_side.surroundings.perceived import Role
 
 
 def test_an_armed_robot_moves_as_asked_and_stops_when_commands_stop(bench: Bench) -> None:
@@ -98,27 +100,28 @@ def test_the_target_is_switched_once_for_each_press(bench: Bench) -> None:
 
 def test_the_status_says_who_pulls_how_far_everything_is_and_why_it_stopped(bench: Bench) -> None:
     status = bench.robot.status(bench.now_s)
-    assert (status["link"], status["L2_pulled"], "nearest_mm" in status) == ("waiting for an operator", None, False)
+    assert (status.link, status.l2_pulled, status.nearest_mm, status.target) == (LinkState.WAITING, None, None, UNSET)
     operator = bench.join(2)
     bench.arm_it(operator)
     bench.drive(0.2, operator, r2=0.4)
     status = bench.robot.status(bench.now_s)
-    assert (status["link"], status["R2_pulled"], status["stopped_because"]) == ("up", 0.4, None)
-    assert status["target"] == "target"
-    before_mm = status["target_mm"]
+    assert (status.link, status.r2_pulled, status.stopped_because) == ("up", 0.4, None)
+    assert status.target == "target"
+    before_mm = status.target_mm
     assert isinstance(before_mm, float)
     bench.drive(0.5, operator, r2=0.4)
-    nearer_mm, nearest_mm = (bench.robot.status(bench.now_s)[name] for name in ("target_mm", "nearest_mm"))
+    status = bench.robot.status(bench.now_s)
+    nearer_mm, nearest_mm = status.target_mm, status.nearest_mm
     assert isinstance(nearer_mm, float)
     assert isinstance(nearest_mm, float)
     assert nearer_mm == pytest.approx(before_mm - 50.0, abs=15.0)
     assert nearest_mm <= nearer_mm
     bench.tick(400)
     status = bench.robot.status(bench.now_s)
-    assert "no command for" in str(status["stopped_because"])
-    assert status["R2_pulled"] is None
+    assert "no command for" in str(status.stopped_because)
+    assert status.r2_pulled is None
     bench.silence(1.0)
-    assert bench.robot.status(bench.now_s)["link"] == "lost: nothing heard from the operator"
+    assert bench.robot.status(bench.now_s).link is LinkState.LOST
     assert bench.robot.summary()["loop_age_ms"]["mean"] > 0.0
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigurationError
+from common.roles import Role
 from robot_side.compiled.kernel import Compiled
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotSide
@@ -16,7 +17,6 @@ from robot_side.laws.paper import PaperLaw
 from robot_side.laws.swept import SweptLaw
 from robot_side.parts import build_parts
 from robot_side.settings import CameraSettings, EncoderSettings, RobotSettings
-from robot_side.surroundings.perceived import Role
 from tests.helpers.arm_models import planar_arm
 from tests.helpers.repository import ROOT
 

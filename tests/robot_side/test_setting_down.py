@@ -72,7 +72,7 @@ class Placing(Bench):
 def test_what_stands_is_pressed_no_farther_and_nothing_springs_when_it_is_let_go(measures: bool, most_n: float) -> None:
     bench = Placing(measures=measures)
     bench.set_down()
-    assert bench.robot.status(bench.now_s)["stands"] is True
+    assert bench.robot.status(bench.now_s).stands is True
     where = bench.tool_m
     assert bench.pressed_n < most_n
     bench.go(0.5, r2=1.0)

@@ -7,12 +7,12 @@ import pytest
 
 from common.command.command_line import load_toml, parse_settings
 from common.errors import ConfigurationError
+from common.roles import Role
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.operators.safety import SafetySettings
 from robot_side.parts import build_parts
 from robot_side.settings import CameraSettings, EncoderSettings, RobotSettings
-from robot_side.surroundings.perceived import Role
 from robot_side.viewing.settings import CamerasSettings
 
 NAN, INFINITY = math.nan, math.inf

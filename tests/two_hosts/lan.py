@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from common.status.codes import Doing
 from feelahead.both_sides.processes import SideProcess
 from robot_side.compiled.machine_code import machine_code_folder
 from tests.helpers.machines.two_machines import Machine
@@ -273,7 +274,7 @@ def is_armed(status: Status) -> bool:
 
 
 def _is_armed_and_shown(status: Status) -> bool:
-    return is_armed(status) and "target_centre_mm" in status
+    return is_armed(status) and status["target_centre_mm"] is not None
 
 
 def gap_ms(stop: Status) -> float:
@@ -294,8 +295,8 @@ def is_moving(status: Status) -> bool:
 
 def is_done(status: Status) -> bool:
     """Whether the scripted person will not do anything any more."""
-    return status.get("person") in ("done", "no target")
+    return status.get("person") in (Doing.DONE, Doing.NO_TARGET)
 
 
 def _short(status: Status) -> Status:
-    return {name: status.get(name) for name in ("link", "state", "stopped_because", "feel", "person")}
+    return {name: status.get(name) for name in ("link", "link_reason", "state", "stopped_because", "feel", "person")}

@@ -19,10 +19,10 @@ from msgspec import Meta
 from rich.table import Table as Shown
 
 from common.command.command_line import parse_settings
-from common.command.live_view import LINK_UP
 from common.emulation.clauses import LinkModel
 from common.emulation.named_links import NAMED_LINKS
 from common.errors import FeelaheadError
+from common.status.codes import LinkState
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.both_sides.real_time import LINK_S, run_for, started
 from feelahead.both_sides.summary import merge_summaries
@@ -113,7 +113,7 @@ def in_virtual_time(trial: Trial) -> Row:
     robot = parse_settings(RobotSettings, "feelahead-robot", [*trial.robot_arguments(), *link])
     operator = parse_settings(OperatorSettings, "feelahead-operator", [*trial.operator_arguments(), *link])
     both = Loopback(LoopbackSettings(robot, operator))
-    while both.operator.status(both.clock.now())["link"] != LINK_UP:
+    while both.operator.status(both.clock.now()).link is not LinkState.UP:
         if both.clock.now() > LINK_S:
             raise FeelaheadError(f"no link within {LINK_S:g} s over --link {trial.link!r}")
         both.run_until(both.clock.now() + _LOOK_S)

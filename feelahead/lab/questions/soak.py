@@ -24,9 +24,9 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from common.clock import MonotonicClock, clock_domain
-from common.command.live_view import LINK_UP
 from common.emulation.spec import LinkSpec
 from common.sockets.operator import OperatorSockets
+from common.status.codes import LinkState
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.both_sides.memory import descriptors, resident_mb
 from feelahead.both_sides.processes import SideFailedError, SideProcess
@@ -108,7 +108,7 @@ def _virtual(cell: Soak, seed: int) -> Iterator[Row]:
 def _real(cell: Soak, seed: int) -> Iterator[Row]:
     own = [f"--seed={seed}", f"--link={cell.link}"]
     with started(own, own) as both, ExitStack() as stack:
-        while both.operator.wait_for("status", START_S).get("link") != LINK_UP:
+        while both.operator.wait_for("status", START_S).get("link") != LinkState.UP:
             both.robot.check()
         sides = _Running(both.robot, both.operator)
         sides.bring(

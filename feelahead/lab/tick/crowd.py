@@ -5,8 +5,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from common.roles import Role
 from robot_side.surroundings.movers import OF_OBJECTS, Movers
-from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects, Role, SomeObjects
+from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects, SomeObjects
 
 MIDDLE_M: Final = (0.55, 0.0, 0.25)
 """The middle of the built-in table's things."""

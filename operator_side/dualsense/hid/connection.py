@@ -3,10 +3,10 @@
 Without I/O: the search that opens a controller is an argument, and so is `now_s`.
 """
 
-from enum import StrEnum
 from typing import Final, Protocol
 
 from common.errors import DeviceError, NoDeviceError, NoDriverError
+from common.status.codes import ConnectionState
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.search import OpenController, Search
 from operator_side.dualsense.reports.output_report import OutputReport
@@ -18,16 +18,6 @@ RETELL_AFTER_S: Final = 0.1
 however long we were kept between looking at the clock and beating."""
 LOOK_PERIOD_S: Final = 1.0
 """From one look to the next, and from a loss to the first look: by then the robot side has long stopped."""
-
-
-class ConnectionState(StrEnum):
-    """Whether there is a controller; the values are shown to people."""
-
-    ABSENT = "absent"
-    """No controller has been found yet."""
-    CONNECTED = "connected"
-    LOST = "lost"
-    """There was one."""
 
 
 class Listener(Protocol):

@@ -19,7 +19,6 @@ from typing import Any, Final
 
 import msgspec
 
-from common.command.live_view import live_view
 from common.companion.channel import Channel
 from common.companion.process import companion_channel
 from common.errors import RemoteProtocolError
@@ -33,8 +32,10 @@ from common.protocol.view_messages import (
     VideoFrame,
     VideoStep,
 )
+from common.roles import ROLES, Role
+from common.status.phase import phase_of
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
-from operator_side.viewing.facts import OperatorFacts
+from operator_side.viewing.facts import OperatorFacts, ShownKind
 
 _NICENESS: Final = 5
 """Behind both sides."""
@@ -43,8 +44,7 @@ _FRAME: Final = struct.Struct("<Bd")
 _MOST_LISTED: Final = 6
 _SLOW_PERIOD_S: Final = 0.25
 """Between two drawings for a browser without a graphics processor."""
-_LASTING: Final = {b"r": "run", b"p": "player"}
-_ROLES: Final = ("obstacle", "target", "support", "ignored")
+_LASTING: Final = {b"r": ShownKind.RUN, b"p": ShownKind.PLAYER}
 
 
 class _Process:
@@ -135,10 +135,10 @@ class _Process:
         if kind == b"f":
             self._facts = facts = msgspec.msgpack.decode(content, type=OperatorFacts)
             at = [None if trigger.raw is None else SENSED_TRAVEL * trigger.raw for trigger in (facts.l2, facts.r2)]
-            shown = {"kind": "facts", "facts": facts, "view": live_view(facts.status), "fingers": at}
-            self._pages.show("facts", msgspec.json.encode(shown).decode())
+            shown = {"kind": ShownKind.FACTS, "facts": facts, "phase": phase_of(None, facts.status), "fingers": at}
+            self._pages.show(ShownKind.FACTS, msgspec.json.encode(shown).decode())
         elif kind == b"n":
-            note = {"kind": "note", "text": content.decode("utf-8", "replace")}
+            note = {"kind": ShownKind.NOTE, "text": content.decode("utf-8", "replace")}
             self._pages.note(msgspec.json.encode(note).decode())
         elif kind in _LASTING:
             lasting = {"kind": _LASTING[kind], **msgspec.msgpack.decode(content)}
@@ -177,15 +177,16 @@ class _Process:
         total_l2, total_r2 = (sum(row[column] for row in state.overlaps) for column in (1, 2))
         listed = sorted(state.overlaps, key=lambda row: -max(row[1], row[2]))[:_MOST_LISTED]
         known = {index for index, _, _ in listed}
-        listed += [(index, 0.0, 0.0) for index, role in enumerate(state.roles) if role == 1 and index not in known]
+        targets = (index for index, role in enumerate(state.roles) if role == ROLES.index(Role.TARGET))
+        listed += [(index, 0.0, 0.0) for index in targets if index not in known]
         scene = {
-            "kind": "scene",
+            "kind": ShownKind.SCENE,
             "taken_s": state.taken_s,
             "overlap_mm3": (1e9 * total_l2, 1e9 * total_r2),
             "objects": [
                 {
                     "name": names[index] if index < len(names) else f"object {index}",
-                    "role": _ROLES[state.roles[index]] if index < len(state.roles) else _ROLES[0],
+                    "role": (ROLES[state.roles[index]] if index < len(state.roles) else Role.OBSTACLE).value,
                     "overlap_mm3": (1e9 * by_l2, 1e9 * by_r2),
                 }
                 for index, by_l2, by_r2 in listed
@@ -196,7 +197,7 @@ class _Process:
             "tick_us": (state.tick_p50_us, state.tick_p99_us),
             "overruns": state.overruns,
         }
-        self._pages.show("scene", msgspec.json.encode(scene).decode())
+        self._pages.show(ShownKind.SCENE, msgspec.json.encode(scene).decode())
 
 
 def _terms_mm(terms: EnlargementTerms) -> dict[str, float]:

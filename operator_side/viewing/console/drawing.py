@@ -11,13 +11,19 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from common.protocol.view_messages import SceneShapes, SceneState, Shape
+from common.roles import ROLES, Role
 from operator_side.viewing.console.solids import Solid, solid_of, sphere
 
 Floats = NDArray[np.float64]
 """Poses are rows of x, y, z and the quaternion w, x, y, z."""
 
-ROLES: Final = ("obstacle", "target", "support", "ignored")
-_ROLE_COLORS: Final = np.array([(150, 150, 156), (245, 240, 225), (104, 108, 118), (200, 200, 204)], np.float64)
+_COLOR_OF: Final = {
+    Role.OBSTACLE: (150, 150, 156),
+    Role.TARGET: (245, 240, 225),
+    Role.SUPPORT: (104, 108, 118),
+    Role.IGNORED: (200, 200, 204),
+}
+_ROLE_COLORS: Final = np.array([_COLOR_OF[role] for role in ROLES], np.float64)
 L2_COLOR: Final = (0, 114, 189)
 R2_COLOR: Final = (230, 130, 0)
 """Blue and orange, which every eye tells apart; the page's style has the same."""
@@ -194,7 +200,7 @@ class Drawing:
             self._server.initial_camera.fov = _FIELD_OF_VIEW
 
     def _place_label(self, shapes: SceneShapes, roles: NDArray[np.uint8]) -> None:
-        targets = np.flatnonzero(roles == ROLES.index("target"))
+        targets = np.flatnonzero(roles == ROLES.index(Role.TARGET))
         if len(targets) == 0:
             if self._label is not None:
                 self._label.visible = False

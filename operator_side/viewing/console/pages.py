@@ -9,6 +9,8 @@ import msgspec
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
+from operator_side.viewing.facts import ShownKind
+
 MOST_PAGES: Final = 8
 """At once; as many may draw the scene."""
 _MOST_NOTES: Final = 50
@@ -17,7 +19,7 @@ _A_SECOND: Final = 500
 _TOO_MANY, _NOT_OURS = 1013, 1008
 """WebSocket's own codes: try again later; policy violation."""
 
-ROUND_ENDS: Final = '{"kind":"end"}'
+ROUND_ENDS: Final = f'{{"kind":"{ShownKind.END}"}}'
 """A page answers it with `taken`."""
 
 Heard = Callable[[str, bytes], None]

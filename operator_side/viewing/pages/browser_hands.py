@@ -3,10 +3,11 @@
 from typing import Final
 
 from common.protocol.messages import Telemetry, Vector2
+from common.status.codes import Doing, Readiness
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.button_map import Action, button_of
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
-from operator_side.viewing.pages.driving_page import DrivingPage, Readiness
+from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.pages.page_messages import PageHands
 
 _PRESS_S: Final = 0.2
@@ -35,11 +36,11 @@ class BrowserHands:
         self._moves = False
 
     @property
-    def doing(self) -> str:
-        """What they do, in a word for people."""
+    def doing(self) -> Doing:
+        """What they do."""
         if self._pages.readiness is not Readiness.RUNNING or self._moves:
-            return str(self._pages.readiness)
-        return "at rest first" if self._was_armed else "arming"
+            return Doing(self._pages.readiness)
+        return Doing.AT_REST_FIRST if self._was_armed else Doing.ARMING
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """Do with the controller what the page's hands do; the screen says whether the arm is armed."""

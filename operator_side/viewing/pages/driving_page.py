@@ -7,10 +7,10 @@ silence for 150 ms, a page that lets go or closes: nobody, and whoever drives ne
 """
 
 from collections import OrderedDict
-from enum import StrEnum
 from typing import Final
 
 from common.errors import RemoteProtocolError
+from common.status.codes import Readiness
 from operator_side.viewing.pages.page_messages import PageHands, TuneWish, read_page_message
 
 SILENCE_S: Final = 0.15
@@ -18,15 +18,6 @@ SILENCE_S: Final = 0.15
 REST_S: Final = 1.0
 """All keys are up for so long before hold-to-run counts."""
 _MOST_PAGES: Final = 64
-
-
-class Readiness(StrEnum):
-    """Where the hands of the page that drives stand; the values are shown to people."""
-
-    NOBODY = "nobody drives"
-    RESTING = "all keys up first"
-    READY = "ready"
-    RUNNING = "running"
 
 
 class DrivingPage:

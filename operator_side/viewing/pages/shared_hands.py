@@ -1,17 +1,14 @@
 """A simulated controller that a person in a browser may take out of the scripted person's hands, and give back."""
 
 from collections.abc import Callable
-from typing import Final
 
 from common.protocol.messages import Telemetry
+from common.status.codes import Doing, Hands
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.whoever import Whoever
 from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
-
-BROWSER: Final = "browser"
-PERSON: Final = "person"
 
 
 class SharedHands:
@@ -40,13 +37,13 @@ class SharedHands:
         return self._new_person is not None
 
     @property
-    def hands(self) -> str:
+    def hands(self) -> Hands:
         """Whose hands they are: the person's or a browser's."""
-        return BROWSER if self._person is None else PERSON
+        return Hands.BROWSER if self._person is None else Hands.PERSON
 
     @property
-    def doing(self) -> str:
-        """What they do, in a word for people."""
+    def doing(self) -> Doing:
+        """What they do."""
         return self._browser.doing if self._person is None else self._person.doing
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:

@@ -10,7 +10,9 @@ from rich.table import Table
 from rich.text import Text
 
 from common.command.live_line import UNKNOWN, millimetres, percent
-from common.command.live_view import LiveView, live_view, number, printable
+from common.command.live_view import LiveView, live_view, number
+from common.command.words import link_words, printable, words
+from common.status.codes import Sight
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts
 
@@ -34,12 +36,13 @@ class Screen:
     def add(self, facts: OperatorFacts) -> None:
         """Show these facts, and their figures in the curves; 0 for unknown."""
         self.facts, stiffest = facts, max(facts.l2.stiffness or 0.0, facts.r2.stiffness or 0.0)
-        figures = (facts.to_operator.newest_ms, stiffest, *map(facts.status.get, ("overlap_mm3", "tick_p99_us")))
-        self._history.append(tuple(number(value) or 0.0 for value in figures))
+        ahead = (None, None) if facts.scene is None else (facts.scene.overlap_mm3, facts.scene.tick_p99_us)
+        self._history.append(tuple(number(value) or 0.0 for value in (facts.to_operator.newest_ms, stiffest, *ahead)))
 
     def lines(self, age_s: float, width: int) -> Group:
         """Draw at most `width` columns, the most important lines first. `age_s`: time since the facts came."""
-        facts, view = self.facts, live_view({} if self.facts is None else self.facts.status)
+        facts = self.facts
+        view = LiveView() if facts is None else live_view(facts.robot, facts.status)
         drawn: list[RenderableType] = [_banner(view, 0.0 if facts is None else age_s, width)]
         if facts is not None:
             triggers = Table.grid("", "", padding=(0, 2, 0, 0), expand=True)
@@ -76,25 +79,27 @@ def _banner(view: LiveView, age_s: float, width: int) -> Text:
 
 def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
     """Show what both sides say of the link, over the last second, and of what is ahead and in the hand."""
-    link, lease, feel, controller = map(facts.status.get, ("link", "owner", "feel", "controller"))
-    lines = [_named(link=link, lease=lease, hands=facts.hands, feel=feel, controller=controller)]
+    status, robot, known = facts.status, facts.robot, facts.robot or facts.status
+    felt = {} if status.feel in (None, Sight.SEEING) else {"feel": words(status.feel)}
+    who = {"lease": words(status.owner), "hands": words(facts.hands), "controller": words(status.controller)}
+    lines = [_named(link=link_words(status), **who, **felt)]
     for name, delay in (("to operator", facts.to_operator), ("to robot   ", facts.to_robot)):
         mean, p99, newest = (_figure(value, 5) for value in (delay.mean_ms, delay.p99_ms, delay.newest_ms))
         asked = delay.asked and f"  asked: {delay.asked}"
         lines.append(_line(f"{name}  mean {mean}  p99 {p99}  now {newest} ms{asked}"))
-    said = facts.status
-    rate, queue, lost = (_figure(number(said.get(name))) for name in ("rate_kbit_s", "queue_ms", "lost_percent"))
+    rate, queue, lost = map(_figure, (known.rate_kbit_s, known.queue_ms, known.lost_percent))
     rates = {"rate": f"{rate} kbit/s", "queue": f"{queue} ms", "lost": f"{lost} %"}
-    lines.append(_named(**rates, pictures=said.get("pictures"), held_back=said.get("held_back")))
-    ages = (facts.round_trip_ms, facts.field_age_ms, number(facts.status.get("loop_age_ms")))
+    lines.append(_named(**rates, pictures=known.pictures, held_back=known.held_back))
+    ages = (facts.round_trip_ms, facts.field_age_ms, None if robot is None else robot.loop_age_ms)
     round_trip, field_age, loop_age = (f"{_figure(age)} ms" for age in ages)
     target = UNKNOWN if view.has_target is None else "none"
     if view.has_target:
         centre, way_mm = ("", view.target_mm) if view.target_mm is not None else ("centre ", view.target_centre_mm)
-        target = f"{facts.status.get('target')} {centre}at {millimetres(way_mm)}"
+        target = f"{known.target} {centre}at {millimetres(way_mm)}"
     nearest = f"{view.nearest or 'nearest thing'} at {millimetres(view.nearest_mm)}"
     asked = "" if facts.probability is None else f"   P {facts.probability:g}"
-    grown = f"enlargement {_figure(number(facts.status.get('enlargement_mm')))} mm   rumble {_figure(facts.rumble)}"
+    enlarged_mm = None if facts.screen is None else 1e3 * facts.screen.enlargement_m
+    grown = f"enlargement {_figure(enlarged_mm)} mm   rumble {_figure(facts.rumble)}"
     return [
         *(*lines, _named(round_trip=round_trip, field_age=field_age, loop_age=loop_age)),
         _named(

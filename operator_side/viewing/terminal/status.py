@@ -9,7 +9,6 @@ import os
 import select
 import sys
 import termios
-from collections.abc import Mapping
 from typing import Any, Final, Self
 
 import msgspec
@@ -17,11 +16,11 @@ from rich.console import Console
 from rich.live import Live
 
 from common.clock import MonotonicClock
-from common.command.live_view import Value
 from common.command.status import Status
 from common.companion.channel import Channel
 from common.companion.process import Companion, companion_channel
 from common.errors import ConfigurationError
+from common.status.statuses import OperatorStatus, RobotStatus
 from operator_side.viewing.facts import OperatorFacts
 from operator_side.viewing.terminal.screen import Screen
 
@@ -55,9 +54,9 @@ class TerminalStatus(Status):
             companion.close(_END_LIMIT_S)
             _put_back(self._before)
 
-    def show(self, now_s: float, values: Mapping[str, Value]) -> None:
-        """Show nothing: the same values are in the facts."""
-        del values
+    def show(self, now_s: float, *, robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> None:
+        """Show nothing: the same is in the facts."""
+        del robot, operator
         self._next_s = now_s + _PERIOD_S
 
     def show_facts(self, facts: OperatorFacts | str) -> None:

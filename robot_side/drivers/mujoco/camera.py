@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from common.arrays import FloatArray
+from common.roles import Role
 from robot_side.drivers.mujoco.object_primitives import MovingPrimitives
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.surroundings.kinds.layout import VELOCITY
 from robot_side.surroundings.movers import Movers
-from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.velocities import ObjectVelocities
 
 _FRAME_PERIOD_S = 1.0 / 30.0

@@ -8,10 +8,10 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from common.roles import Role
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.outcome.truth import TargetTruth, Truth
-from robot_side.surroundings.perceived import Role
 
 _FARTHEST_SUPPORT_M: Final = 1.0
 _FEW: Final = 64

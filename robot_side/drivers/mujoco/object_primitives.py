@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
+from common.roles import Role
 from robot_side.compiled.kernel import compiled, input_array, input_indices, output_array
 from robot_side.compiled.vectors import add, load
 from robot_side.drivers.mujoco.mesh_arrays import mesh_vertices
@@ -15,7 +16,7 @@ from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.surroundings.kinds.kind import by_kind
 from robot_side.surroundings.kinds.layout import MESH, NUMBERS, rows, write_pose
 from robot_side.surroundings.kinds.mesh import of_library
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 
 if TYPE_CHECKING:
     from robot_side.drivers.mujoco.geom_meshes import GeomMesh

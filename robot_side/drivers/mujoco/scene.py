@@ -14,11 +14,11 @@ import numpy as np
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from common.files.input_file import require_input_file
+from common.roles import Role
 from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.object_primitives import ObjectPrimitives, SceneObject
 from robot_side.drivers.mujoco.robot_model import RobotModel, can_touch, find_robot
-from robot_side.surroundings.perceived import Role
 from robot_side.surroundings.roles import assign_roles
 
 _LOG = logging.getLogger(__name__)

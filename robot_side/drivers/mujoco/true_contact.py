@@ -9,10 +9,10 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
+from common.roles import Role
 from robot_side.drivers.mujoco.ground_truth import geom_distance, least_distance
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.scene import Scene
-from robot_side.surroundings.perceived import Role
 
 _TOUCHING_M = 1e-5
 _MOST_STEPS = 200

@@ -7,17 +7,37 @@ from typing import Any
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from msgspec.structs import replace as replaced
 from rich.cells import cell_len
 
 from common.command.live_line import _facts, live_line
 from common.command.live_story import SHORTEST_GAP_S, Resistance, Story, next_resistance
 from common.command.live_view import LiveView, TriggerView, live_view
+from common.protocol.session import SessionState
+from common.status.codes import ConnectionState, Doing, LinkState, Sight
+from common.status.statuses import OperatorStatus, RobotStatus, SideStatus
 
-APPROACH: dict[str, Any] = {
-    **{"link": "up", "state": "armed", "person": "advancing", "delay_ms": 12.4, "haptics": True},
-    **{"L2": 0.0, "R2": 0.34, "L2_pulled": 0.0, "R2_pulled": 0.62},
-    **{"nearest": "tin", "nearest_mm": 84.2, "target": "carton", "target_mm": 120.4, "holding": "nothing"},
-}
+ROBOT = RobotStatus(nearest="tin", nearest_mm=84.2, target="carton", target_mm=120.4)
+OPERATOR = OperatorStatus(
+    link=LinkState.UP,
+    state="armed",
+    person=Doing.ADVANCING,
+    delay_ms=12.4,
+    l2=0.0,
+    r2=0.34,
+    l2_pulled=0.0,
+    r2_pulled=0.62,
+)
+
+
+def approach(**changes: Any) -> LiveView:
+    """Both sides' statuses of an approach, but for these figures of either."""
+    return live_view(replaced(ROBOT, **of(ROBOT, changes)), replaced(OPERATOR, **of(OPERATOR, changes)))
+
+
+def of(one: SideStatus, changes: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in changes.items() if name in one.__struct_fields__}
+
 
 names = st.one_of(st.none(), st.text(max_size=40))
 shares = st.one_of(st.none(), st.floats(0.0, 1.0))
@@ -45,18 +65,14 @@ views = st.builds(
 
 
 def test_eighty_columns_tell_everything() -> None:
-    assert live_line(live_view(APPROACH), 79) == (
-        "advancing  L2/R2 pull 0/62% resist 0/34%  near 84mm  target 120mm  link 12ms"
-    )
-    far = {"R2_pulled": 1.0, "R2": 1.0, "nearest_mm": 144.0, "target_mm": 193.0, "delay_ms": 205.0}
-    assert live_line(live_view(APPROACH | far), 79) == (
-        "advancing  L2/R2 pull 0/100% resist 0/100% near 144mm target 193mm link 205ms"
-    )
+    assert live_line(approach(), 79) == ("advancing  L2/R2 pull 0/62% resist 0/34%  near 84mm  target 120mm  link 12ms")
+    far = approach(r2_pulled=1.0, r2=1.0, nearest_mm=144.0, target_mm=193.0, delay_ms=205.0)
+    assert live_line(far, 79) == ("advancing  L2/R2 pull 0/100% resist 0/100% near 144mm target 193mm link 205ms")
 
 
 def test_a_simulation_that_falls_behind_is_told() -> None:
-    assert live_line(live_view(APPROACH | {"real_time": 0.97}), 79) == live_line(live_view(APPROACH), 79)
-    assert live_line(live_view(APPROACH | {"real_time": 0.2}), 99) == (
+    assert live_line(approach(real_time=0.97), 79) == live_line(approach(), 79)
+    assert live_line(approach(real_time=0.2), 99) == (
         "advancing  20 % of real time  L2/R2 pull 0/62% resist 0/34%  near 84mm  target 120mm  link 12ms"
     )
 
@@ -67,36 +83,39 @@ def test_a_simulation_that_falls_behind_is_told() -> None:
         ({"state": "stopped", "stopped_because": "emergency stop"}, "STOPPED  emergency stop  "),
         ({"state": "stopped"}, "STOPPED  "),
         ({"state": "disarmed", "stopped_because": "no command for 312 ms"}, "DISARMED  no command for 312 ms  "),
-        ({"link": "lost: nothing heard from the robot", "state": None}, "LINK LOST  nothing heard from the robot  "),
-        ({"link": "refused: 8 others observe already"}, "REFUSED  8 others observe already  "),
-        ({"controller": "lost", "state": "disarmed"}, "CONTROLLER LOST  "),
-        ({"release_first": True}, "RELEASE BOTH TRIGGERS  "),
+        ({"link": LinkState.LOST, "state": None}, "LINK LOST  nothing heard from the robot  "),
+        ({"link": LinkState.REFUSED, "link_reason": "8 observe"}, "REFUSED  8 observe  "),
+        ({"controller": ConnectionState.LOST, "state": "disarmed"}, "CONTROLLER LOST  "),
+        ({"feel": Sight.WAITING}, "RELEASE BOTH TRIGGERS  "),
         ({"state": "disarmed", "person": None}, "disarmed  L2/R2 pull 0/62% resist 0/0%  "),
-        ({"state": "disarmed", "person": None, "owner": "ready"}, "ready to arm  "),
-        ({"state": "disarmed", "controller": "absent"}, "no controller  "),
-        ({"link": "waiting for the robot side", "state": None}, "waiting for the robot side  "),
-        ({"person": "no target", "target": None, "target_mm": None}, "no target  "),
+        ({"state": "disarmed", "person": None, "owner": SessionState.READY}, "ready to arm  "),
+        ({"state": "disarmed", "controller": ConnectionState.ABSENT}, "no controller  "),
+        ({"link": LinkState.WAITING, "state": None}, "waiting for the robot side  "),
+        ({"link": LinkState.WAITING, "link_reason": "no key"}, "waiting for the robot side  no key  "),
+        ({"link": LinkState.OBSERVING, "place": 1, "waiting": 2}, "observing (1 of 2 waiting)  "),
+        ({"person": Doing.NO_TARGET, "target": None, "target_mm": None}, "no target  "),
         ({"person": None}, "armed  "),
-        ({"person": "arming"}, "armed  "),
-        ({"person": "arming", "state": "disarmed"}, "arming  "),
+        ({"person": Doing.ARMING}, "armed  "),
+        ({"person": Doing.ARMING, "state": "disarmed"}, "arming  "),
     ],
 )
 def test_what_keeps_the_arm_from_moving_comes_first_and_in_words(changed: dict[str, Any], expected: str) -> None:
-    view = live_view(APPROACH | changed)
+    view = approach(**changed)
     assert live_line(view, 79).startswith(expected)
     assert view.alarm is expected.partition("  ")[0].isupper()
 
 
 def test_what_is_not_known_is_no_zero() -> None:
-    line = live_line(live_view({"link": "up"}), 79)
+    line = live_line(live_view(None, OperatorStatus(link=LinkState.UP)), 79)
     assert line == "starting  L2/R2 pull –/–% resist –/–%  near –mm  target –mm  link –ms"
-    assert live_line(live_view({"nearest_mm": math.nan, "R2": math.inf, "L2": True}), 79) == (
-        "starting  L2/R2 pull –/–% resist –/–%  near –mm  target –mm"
+    assert live_line(live_view(RobotStatus(nearest_mm=math.nan, r2=math.inf)), 79) == (
+        "waiting for an operator  L2/R2 pull –/–% resist –/–%  near –mm  target –mm"
     )
+    assert live_view() == LiveView()
 
 
 def test_without_haptics_nothing_resists() -> None:
-    line = live_line(live_view(APPROACH | {"haptics": False}), 79)
+    line = live_line(approach(haptics=False), 79)
     assert "resist" not in line
     assert "danger" in line
 
@@ -113,16 +132,17 @@ def test_without_haptics_nothing_resists() -> None:
     ],
 )
 def test_the_target_in_other_words(changed: dict[str, Any], expected: str) -> None:
-    assert expected in live_line(live_view(APPROACH | changed), 79)
+    assert expected in live_line(approach(**changed), 79)
 
 
 def test_control_characters_of_a_peer_do_not_reach_the_terminal() -> None:
-    view = live_view({"link": "refused: \x1b[2J\nhello", "nearest": "a\rb", "holding": "\x07"})
+    refused = OperatorStatus(link=LinkState.REFUSED, link_reason="\x1b[2J\nhello")
+    view = live_view(RobotStatus(nearest="a\rb", holding="\x07"), refused)
     assert (view.reason, view.nearest, view.holding) == ("?[2J?hello", "a?b", "?")
 
 
 @given(view=views, width=st.integers(0, 200))
-@example(view=live_view(APPROACH), width=79)
+@example(view=approach(), width=79)
 @example(view=replace(LiveView(), phase="界" * 5), width=9)
 def test_it_fits_and_holds_whole_facts_only(view: LiveView, width: int) -> None:
     line = live_line(view, width)

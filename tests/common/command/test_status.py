@@ -1,12 +1,14 @@
 import contextlib
 import json
+import math
 from typing import Any
 
 import msgspec
 import pytest
 
-from common.command.live_view import Value
 from common.command.status import Status, StatusMode
+from common.status.codes import LinkState
+from common.status.statuses import OperatorStatus, RobotStatus
 
 
 def shown(capsys: pytest.CaptureFixture[str]) -> list[str]:
@@ -21,34 +23,38 @@ def run(mode: StatusMode, seconds: float, start_s: float = 100.0) -> None:
     """`show` once a millisecond."""
     with Status(mode, "robot") as status:
         for tick in range(round(seconds * 1000)):
-            status.show(start_s + tick / 1000, {"tick": tick})
+            status.show(start_s + tick / 1000, robot=RobotStatus(observers=tick))
 
 
 def test_json_is_one_event_a_line_five_times_a_second(capsys: pytest.CaptureFixture[str]) -> None:
     run("json", 2.0)
     found = events(capsys)
     assert [event["event"] for event in found] == ["status"] * 10
-    assert [event["tick"] for event in found] == pytest.approx(range(0, 2000, 200), abs=10)
+    assert [event["observers"] for event in found] == pytest.approx(range(0, 2000, 200), abs=10)
 
 
-def test_json_keeps_the_values_types(capsys: pytest.CaptureFixture[str]) -> None:
-    values: dict[str, Value] = {"a": 0.125, "b": 3, "c": "armed", "d": True, "e": None}
+def test_json_says_codes_and_figures_and_of_each_side_what_it_knows_better(capsys: pytest.CaptureFixture[str]) -> None:
+    robot = RobotStatus(link=LinkState.UP, state="armed", l2=0.1, target="carton", real_time=math.nan)
+    operator = OperatorStatus(link=LinkState.LOST, holding=True, place=3)
     with Status("json", "robot") as status:
-        status.show(0.0, values)
+        status.show(0.0, robot=robot, operator=operator)
         status.event("listening", control="tcp://127.0.0.1:5555")
         status.event("bare")
-    assert events(capsys) == [
-        {"event": "status"} | values,
-        {"event": "listening", "control": "tcp://127.0.0.1:5555"},
-        {"event": "bare"},
-    ]
+        status.show(1.0, robot=robot)
+    both, listening, bare, alone = events(capsys)
+    for name, value in {"event": "status", "link": "lost", "state": None, "L2": None, "target": "carton"}.items():
+        assert both[name] == value
+    assert (both["holding"], both["place"], both["real_time"]) == (None, 3, None)
+    assert [listening, bare] == [{"event": "listening", "control": "tcp://127.0.0.1:5555"}, {"event": "bare"}]
+    assert (alone["link"], alone["L2"], alone["nearest_mm"], "place" in alone) == ("up", 0.1, None, False)
 
 
 def test_without_a_terminal_only_what_changed_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     with Status("line", "robot") as status:
         for tick in range(5000):
             armed = tick >= 3000
-            status.show(100.0 + tick / 1000, {"tick": tick, "link": "up", "state": "armed" if armed else "disarmed"})
+            said = RobotStatus(link=LinkState.UP, state="armed" if armed else "disarmed", observers=tick)
+            status.show(100.0 + tick / 1000, robot=said)
     assert shown(capsys) == ["   0.0 s  link up; disarmed", "   3.0 s  armed"]
 
 
@@ -82,7 +88,7 @@ def test_facts_are_for_programs_that_want_them_ten_times_a_second(capsys: pytest
         assert status.wants_facts
         for tick in range(1000):
             if status.due(now_s := 50.0 + tick / 1000):
-                status.show(now_s, {"tick": tick})
+                status.show(now_s)
                 status.show_facts(Facts(now_s))
         status.note("noted")
         assert status.event("bare")
@@ -99,14 +105,14 @@ def test_on_a_terminal_one_line_is_kept_up_to_date(
     monkeypatch.setenv("COLUMNS", "40")
     with contextlib.suppress(RuntimeError), Status("line", "robot") as status:
         for tick in range(1000):
-            status.show(tick / 1000, {"state": f"tick {tick}", "nearest_mm": 5.0})
+            status.show(tick / 1000, robot=RobotStatus(link=LinkState.UP, l2_pulled=tick / 100, nearest_mm=5.0))
         status.note("a line that stays")
         raise RuntimeError("in the loop")
     written = capsys.readouterr().out
-    updates = [tick for tick in range(1000) if f"tick {tick} " in written]
+    updates = [tick for tick in range(1000) if f"pull {tick}/–%" in written]
     assert updates == pytest.approx([0, 200, 400, 600, 800], abs=5)
     assert "a line that stays" in written
     # Whole facts only: there is no room for the distances.
-    assert "tick 0  L2/R2 pull –/–% resist 0/0%\r" in written
+    assert "starting  L2/R2 pull 0/–% resist –/–%\r" in written
     # The cursor that was hidden comes back, after an error, too.
     assert written.rindex("\x1b[?25h") > written.rindex("\x1b[?25l")

@@ -133,9 +133,9 @@ def tuned(run: Loopback, at_s: float, probability: float | None, link: str | Non
 def test_p_and_both_directions_of_the_link_change_while_the_run_goes_on() -> None:
     run = run_of(advance_until(3.5, (99.0, {})), permit_tuning=True)
     tuned(run, 5.0, 0.6, "delay 60ms")
-    before = run.robot.status(5.0)["enlargement_mm"]
+    before = run.robot.status(5.0).enlargement_mm
     run.run_until(8.0)
-    after = run.robot.status(8.0)["enlargement_mm"]
+    after = run.robot.status(8.0).enlargement_mm
     assert isinstance(before, float)
     assert isinstance(after, float)
     notice = run.operator.lease

@@ -141,7 +141,7 @@ def test_an_unknown_key_moves_nothing_and_a_revoked_one_is_thrown_out(tmp_path: 
                 if allowed:
                     wait_for_link(operator_side)
                     folder.revoke("anna")
-                wait_until(operator_side, lambda status: f"feelahead keys allow NAME {anna_key}" in status["link"])
+                wait_until(operator_side, lambda status: f"keys allow NAME {anna_key}" in str(status["link_reason"]))
                 assert [operator_side.wait_for("status", LIMIT_S)["link"] == "up" for _ in range(5)] == [False] * 5
             assert robot_side.stop(LIMIT_S) == 0
         figures = json.loads(path.read_text())

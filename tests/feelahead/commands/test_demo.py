@@ -13,10 +13,9 @@ from typing import Any, get_args
 import pytest
 
 from common.command.command_line import given_fields, parse_settings
-from common.command.live_view import Value
 from common.command.status import Status
 from common.errors import ConfigurationError
-from feelahead.both_sides.summary import both_statuses, merge_summaries
+from feelahead.both_sides.summary import merge_summaries
 from feelahead.commands import demo as module
 from feelahead.commands import open_browser
 from feelahead.commands.demo import DemoSettings, demo
@@ -104,14 +103,6 @@ def test_a_link_over_which_the_sides_cannot_meet_is_the_reason() -> None:
         demo(["--link", "delay 1e9ms", "--status", "none"])
     assert module._too_slow(DemoSettings(link="delay 14s")) is None
     assert module._too_slow(DemoSettings(link="to_robot: delay 31s")) is not None
-
-
-def test_each_side_says_what_it_knows_better() -> None:
-    robot: dict[str, Value] = {"link": "up", "L2": 0.1, "target": "carton", "stopped_because": "no command for 101 ms"}
-    operator: dict[str, Value] = {"link": "lost: all", "L2": None, "target": "?", "person": "done"}
-    operator["stopped_because"] = "no command for the gap limit"
-    assert both_statuses(robot, operator) == {**robot, "link": "lost: all", "L2": None, "person": "done"}
-    assert both_statuses(robot, {}) == robot
 
 
 @pytest.mark.processes

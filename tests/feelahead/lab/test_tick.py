@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from common.roles import Role
 from feelahead.lab.questions.tick import Case, Concave, rows, run
 from feelahead.lab.tick.crowd import MIDDLE_M, NEAREST_M, CrowdedCamera, crowd
 from feelahead.lab.tick.timed_robot import COLUMNS
 from robot_side.drivers.mujoco.camera import MujocoCamera
 from robot_side.drivers.mujoco.scene import load_scene
-from robot_side.surroundings.perceived import Role
 from robot_side.surroundings.validity import require_valid
 
 

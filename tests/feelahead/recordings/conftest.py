@@ -17,6 +17,7 @@ from common.recording.mcap_file import RecordingFile
 from common.recording.provenance import provenance
 from common.recording.reading import Recording, open_recording
 from common.recording.wire import BLOCK, FACTS, HEADER, STATUS, VIEW, as_json, stamped
+from common.status.statuses import SideStatus
 from feelahead.both_sides.loopback import VIRTUAL_CLOCK, Loopback, LoopbackSettings
 from operator_side import recorded as operator_recorded
 from operator_side.settings import OperatorSettings
@@ -48,10 +49,7 @@ def record_loopback(path: Path, duration_s: float, **settings: Any) -> None:
         "robot": robot_recorded.RobotEncoder(),
         "operator": operator_recorded.OperatorEncoder(),
     }
-    status: dict[str, Callable[[float], dict[str, Any]]] = {
-        "robot": lambda now_s: robot_recorded.recorded_status(run.robot, now_s),
-        "operator": lambda now_s: operator_recorded.recorded_status(run.operator, now_s),
-    }
+    status: dict[str, Callable[[float], SideStatus]] = {"robot": run.robot.status, "operator": run.operator.status}
     for source, side in enumerate(notes):
         content.take(source, HEADER + as_json({"side": side, **headers[side]}))
     for number in range(round(duration_s / _BLOCK_S)):

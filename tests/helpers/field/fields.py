@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray, IntArray
+from common.roles import Role
 from feelahead.lab.reference.ways_by_definition import Judged, defined_ways
 from robot_side.arm.port import GripperPose
 from robot_side.field.field import Ahead, Along, Field
 from robot_side.field.object_class import OBSTACLE, PASSED_OVER, TARGET
-from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import scene_table
 from tests.helpers.gripper_poses import free_pose
 

@@ -5,13 +5,8 @@ from dataclasses import dataclass
 import pytest
 
 from common.errors import DeviceError, NoDeviceError, NoDriverError
-from operator_side.dualsense.hid.connection import (
-    BEAT_PERIOD_S,
-    LOOK_PERIOD_S,
-    RETELL_AFTER_S,
-    Connection,
-    ConnectionState,
-)
+from common.status.codes import ConnectionState
+from operator_side.dualsense.hid.connection import BEAT_PERIOD_S, LOOK_PERIOD_S, RETELL_AFTER_S, Connection
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.search import BackgroundSearch, OpenController
 from operator_side.dualsense.reports.output_report import OutputReport

@@ -8,9 +8,10 @@ from common.protocol.codec import decode, encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import LeaseNotice, MotionCommand
 from common.protocol.session import SessionState
+from common.status.codes import ConnectionState
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.background_writes import STALL_S
-from operator_side.dualsense.hid.connection import BEAT_PERIOD_S, LOOK_PERIOD_S, Connection, ConnectionState
+from operator_side.dualsense.hid.connection import BEAT_PERIOD_S, LOOK_PERIOD_S, Connection
 from operator_side.dualsense.hid.finding import Finder
 from operator_side.dualsense.hid.release_watchdog import SILENCE_S
 from operator_side.dualsense.reports.controller_state import Button

@@ -1,5 +1,6 @@
 """From fields and time to what both triggers and the motors do."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -139,15 +140,13 @@ def test_the_run_says_which_zones_were_stiff_and_how_many_for_want_of_knowing() 
 
 def test_people_are_told_the_free_way_as_they_are_told_how_far_they_pull() -> None:
     trigger = RenderedTrigger(USUAL, TriggerTravel(0.0, 1.0))
-    assert trigger.status() == "free"
+    assert trigger.free_travel == 1.0
     trigger.render(field(ways(0.06)), 1.0, 0.0, STILL, 0.0)
-    assert (
-        trigger.status() == "free to 67 %, then 8"
-    )  # zone 5 begins at 0.5 of the travel, 0.5 / 0.75 of the sensed one
+    assert trigger.free_travel == pytest.approx(0.5 / 0.75)  # zone 5 begins at 0.5 of the travel, 0.75 of it sensed
     trigger.render(field(ways(0.04, 0.045, 0.06)), 1.0, 0.0, STILL, 1.0)
-    assert trigger.status() == "free to 53 %, then 2 to 8"
+    assert trigger.free_travel == pytest.approx(0.4 / 0.75)
     trigger.release()
     assert trigger.render(field(ways(0.0855)), 1.0, 0.0, STILL, 2.0) == Off()
     short = RenderedTrigger(USUAL, TriggerTravel(0.0, 0.88))  # a full pull ends at 0.66
     assert short.render(field(ways(0.085)), 1.0, 0.0, STILL, 0.0).zone_strengths == (0,) * 7 + (8,) * 3
-    assert short.status() == "free"
+    assert short.free_travel == 1.0

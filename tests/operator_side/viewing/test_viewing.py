@@ -13,6 +13,7 @@ from common.protocol.compact import STEP_M
 from common.protocol.messages import StiffnessUpdate, TriggerField, Watch
 from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC, SceneState
 from common.reaction import HORIZON_S
+from common.status.codes import Hands
 from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
 from operator_side.hands.travel_calibration import TriggerTravel
 from operator_side.settings import OperatorSettings
@@ -34,7 +35,7 @@ def field(first_m: float, displacement_m: float, stiffness: float) -> TriggerFie
 
 def facts_of(bench: Bench, surroundings: Surroundings | None = None) -> OperatorFacts:
     facts = operator_facts(
-        bench.side, bench.side.status(bench.now_s), surroundings or Surroundings(hands="controller"), bench.now_s
+        bench.side, bench.side.status(bench.now_s), surroundings or Surroundings(Hands.CONTROLLER), bench.now_s
     )
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(facts), type=OperatorFacts) == facts
     return facts
@@ -87,13 +88,13 @@ def test_what_is_needed_is_d_at_the_present_travel_by_the_controllers_own_names(
     facts = facts_of(felt_bench(r2=1.0))
     assert facts.r2.needed_m == pytest.approx(DISPLACED_M + FULL_M_S * HORIZON_S + FULL_M_S**2 / (2 * A_M_S2))
     assert facts.l2.needed_m == pytest.approx(-DISPLACED_M)
-    swapped = facts_of(felt_bench(l2=1.0, swap_sides=True), Surroundings(hands="controller", swap_sides=True))
+    swapped = facts_of(felt_bench(l2=1.0, swap_sides=True), Surroundings(Hands.CONTROLLER, swap_sides=True))
     assert (swapped.advancing, swapped.l2, swapped.r2) == ("L2", facts.r2, facts.l2)
 
 
 def test_delays_are_those_of_the_last_second() -> None:
     bench = felt_bench()
-    facts = facts_of(bench, Surroundings(hands="person", asked_to_robot="delay 5ms"))
+    facts = facts_of(bench, Surroundings(Hands.PERSON, asked_to_robot="delay 5ms"))
     assert facts.offset_s == 0.0
     assert (facts.to_robot.asked, facts.hands) == ("delay 5ms", "person")
     bench.side.link.recent.clear()
@@ -145,7 +146,7 @@ class FakeConsole:
 
 def surroundings(now_s: float) -> Surroundings:
     del now_s
-    return Surroundings(hands="person")
+    return Surroundings(Hands.PERSON)
 
 
 class Looking:
@@ -239,15 +240,16 @@ def test_what_pages_say_reaches_whoever_follows_them() -> None:
 
 def test_overlaps_of_the_trigger_with_more_and_ticks_are_read_from_the_newest_scene() -> None:
     figures = SceneFigures()
-    assert figures.figures() == {}
+    assert figures.figures() is None
     scene = decode_view(state(0.0))
     assert isinstance(scene, SceneState)
     scene = msgspec.structs.replace(scene, overlaps=((0, 1e-6, 2e-6), (3, 0.5e-6, 0.0)), overruns=3, tick_p50_us=60.0)
     for told, overlap_mm3 in ((scene, 2000.0), (msgspec.structs.replace(scene, overlaps=()), 0.0)):
         figures.take(encode(told))
-        expected = {"overlap_mm3": overlap_mm3, "tick_us": 60.0, "tick_p99_us": 130.0, "overruns": 3}
+        expected = (overlap_mm3, 60.0, 130.0, 3)
         # Shapes, and what is broken, change nothing.
         for payload in (None, shapes(), encode(scene)[:-3], b"", b"scene"):
             if payload is not None:
                 figures.take(payload)
-            assert figures.figures() == pytest.approx(expected)
+            assert (found := figures.figures()) is not None
+            assert msgspec.structs.astuple(found) == pytest.approx(expected)

@@ -7,12 +7,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
+from common.roles import Role
 from robot_side.arm.port import GripperPose
 from robot_side.gripper import spheres
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.held_object import grip, gripped_object, with_held
 from robot_side.overlap import Mesh
-from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import scene_table
 from tests.helpers.gripper_poses import free_pose
 from tests.helpers.perceived_scenes import Scene, random_rotation

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from common.roles import Role
 from robot_side.gripper.near_order import near_order
 from robot_side.gripper.perceived_distances import PerceivedDistances, perceived_distances
-from robot_side.surroundings.perceived import Role
 from robot_side.surroundings.scene_table import scene_table
 from tests.helpers.field.nearest_point import distance_to_object
 from tests.helpers.gripper_poses import cover_gripper, free_pose

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from common.protocol.uniform_field import uniform_field
+from common.roles import Role
 from robot_side.enlargement.kinematic_error import position_covariance
 from robot_side.laws.paper import PERIOD_S, REFERENCE_SHARE
 from robot_side.overlap import sphere_box, sphere_sphere
-from robot_side.surroundings.perceived import Role
 from tests.helpers.field.fields import AHEAD, RADIUS_M, ball_pose
 from tests.helpers.field.situations import (
     ACCELERATION_M_S2,

@@ -27,7 +27,7 @@ def tune(
 
 def enlargement_mm(bench: Bench) -> float:
     bench.tick(200)
-    found = bench.robot.status(bench.now_s)["enlargement_mm"]
+    found = bench.robot.status(bench.now_s).enlargement_mm
     assert isinstance(found, float)
     return found
 

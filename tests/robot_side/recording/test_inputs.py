@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.roles import Role
 from robot_side.arm.port import ArmState
 from robot_side.recording.inputs import ARRAYS, FramePacker, FrameUnpacker, pack_state, unpack_state
-from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.perceived import PerceivedObjects
 
 ANY_FLOAT = st.floats(width=64)
 NAMES = ("table", "target", "post")

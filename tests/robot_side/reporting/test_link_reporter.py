@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+import msgspec
 import pytest
 
 from common.command.live_line import live_line
@@ -11,6 +12,8 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import LinkReport
 from common.rate.budget import Budget
 from common.sockets.tcp_figures import TcpFigures
+from common.status.codes import LinkState
+from common.status.statuses import RobotStatus
 from operator_side.core import OperatorSide
 from operator_side.robot_link.standing import REPORT_EXPIRES_S
 from robot_side.operators.operator_session import OperatorSession
@@ -53,7 +56,7 @@ def test_losses_and_what_was_held_back_are_those_since_the_last_report(session: 
     assert second.lost == 4 / 200
     assert second.pictures == "15 Hz, quality 60, size 0.5"
     assert second.held_back == "pictures 3 (rate)"
-    assert made.status()["lost_percent"] == 2.0
+    assert msgspec.structs.replace(RobotStatus(), **made.status()).lost_percent == 2.0
     third = report_of(made, 2 * PERIOD_S)
     assert (third.lost, third.held_back) == (None, "")
 
@@ -68,18 +71,13 @@ def test_the_owner_sees_it_until_it_is_old(session: OperatorSession) -> None:
         [outgoing] = made.due(now_s)
         operator.receive(outgoing.payload, now_s + 0.02)
     shown = operator.status(PERIOD_S + 0.02)
-    assert (shown["lost_percent"], shown["rate_kbit_s"], shown["held_back"]) == (1.5, 1000.0, "")
-    assert "lost_percent" not in operator.status(PERIOD_S + 0.03 + REPORT_EXPIRES_S)
+    assert (shown.lost_percent, shown.rate_kbit_s, shown.held_back) == (1.5, 1000.0, "")
+    assert operator.status(PERIOD_S + 0.03 + REPORT_EXPIRES_S).lost_percent is None
     assert operator.rejected == 0
 
 
 def test_the_line_has_a_queue_and_losses_where_there_are_some() -> None:
-    values: dict[str, float | int | str | bool | None] = {
-        "link": "up",
-        "delay_ms": 52.0,
-        "queue_ms": 14.2,
-        "lost_percent": 1.25,
-    }
-    assert live_line(live_view(values), 200).endswith("link 52ms  queue 14ms  lost 1.2%")
-    values |= {"queue_ms": 1.0, "lost_percent": 0.0}
-    assert live_line(live_view(values), 200).endswith("link 52ms")
+    status = RobotStatus(link=LinkState.UP, delay_ms=52.0, queue_ms=14.2, lost_percent=1.25)
+    assert live_line(live_view(status), 200).endswith("link 52ms  queue 14ms  lost 1.2%")
+    status = msgspec.structs.replace(status, queue_ms=1.0, lost_percent=0.0)
+    assert live_line(live_view(status), 200).endswith("link 52ms")

@@ -12,11 +12,11 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
+from common.roles import Role
 from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.overlap import Mesh
 from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
 from robot_side.surroundings.distances import object_distances
-from robot_side.surroundings.perceived import Role
 from robot_side.surroundings.scene_table import scene_table
 from tests.helpers.field.nearest_point import (
     Nearest,

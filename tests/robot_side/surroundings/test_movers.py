@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from common.roles import Role
 from robot_side.surroundings.movers import OF_OBJECTS, Movers
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects, Role
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 from tests.helpers.perceived_scenes import random_rotation, random_scene
 

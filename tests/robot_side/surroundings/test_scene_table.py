@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
+from common.roles import Role
 from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.overlap import Mesh
 from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
@@ -17,7 +18,7 @@ from robot_side.surroundings import surroundings as module
 from robot_side.surroundings.blocks import TOGETHER
 from robot_side.surroundings.kinds.layout import BOX, HALF_SPACE, MESH, SPHERE, TETRAHEDRON
 from robot_side.surroundings.movers import Movers
-from robot_side.surroundings.perceived import PerceivedObjects, Role
+from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import SceneTable, make, moved_table, scene_table
 from robot_side.surroundings.surroundings import Surroundings
 from robot_side.surroundings.target import object_centers

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from robot_side.surroundings.perceived import PerceivedObjects, Role
+from common.roles import Role
+from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 from robot_side.surroundings.target import next_target, object_centers
 from tests.helpers.perceived_scenes import Scene

@@ -1,13 +1,14 @@
 // The page: what the console sends, shown as it comes.
 import { Chart } from "./charts.js";
-import { Hands } from "./hands.js";
+import { Hands as PageHands } from "./hands.js";
+import { Hands, LinkState, Look, ShownKind, VIEWS } from "./names.js";
 import { Player } from "./player.js";
+import { holdingWords, linkWords, phaseWords, reasonWords, WORDS, words } from "./words.js";
 import { Clock, View } from "./views.js";
 import { Trigger } from "./triggers.js";
 
 const SILENCE_MS = 400; // facts come 30 times a second
 const RETRY_MS = 500;
-const VIEWS = ["overview", "first_person"]; // by their number on the wire
 const MOST_NOTES = 50;
 const byId = (id) => document.getElementById(id);
 
@@ -33,7 +34,7 @@ let run = { title: "", live: true, tunable: [] };
 const send = (object) => {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(object));
 };
-const hands = new Hands(document, send);
+const hands = new PageHands(document, send);
 const player = new Player(byId("player"), send);
 
 function connect() {
@@ -53,17 +54,17 @@ function connect() {
 }
 
 function receive(message) {
-  if (message.kind === "end") send({ taken: true });
-  else if (message.kind === "facts") showFacts(message);
-  else if (message.kind === "scene") showScene(message);
-  else if (message.kind === "note") showNote(message.text);
-  else if (message.kind === "run") {
+  if (message.kind === ShownKind.END) send({ taken: true });
+  else if (message.kind === ShownKind.FACTS) showFacts(message);
+  else if (message.kind === ShownKind.SCENE) showScene(message);
+  else if (message.kind === ShownKind.NOTE) showNote(message.text);
+  else if (message.kind === ShownKind.RUN) {
     run = message;
     clock.live = run.live;
     document.title = `feelahead: ${run.title}`;
     document.body.classList.toggle("replay", !run.live);
     byId("player").hidden = run.live;
-  } else if (message.kind === "player") {
+  } else if (message.kind === ShownKind.PLAYER) {
     player.show(message);
     if (!facts) goWithoutFacts(message.at_s);
   }
@@ -73,8 +74,8 @@ function receive(message) {
 function goWithoutFacts(atS) {
   everHeard = true;
   clock.set(atS, null);
-  text("state", "RECORDED");
-  text("why", "the robot side alone · replay");
+  text("state", WORDS.recorded);
+  text("why", WORDS.robotAlone);
 }
 
 function text(id, value, bad = false) {
@@ -92,20 +93,19 @@ function showFacts(message) {
   facts = message.facts;
   clock.set(facts.now_s, facts.offset_s);
   const { status } = facts;
-  const { view } = message;
-  const state = stateOf(view, status);
-  document.body.dataset.state = state;
-  const word = view.alarm || state === "starting" ? view.phase : state;
+  const { look, alarm } = message.phase;
+  document.body.dataset.state = look;
+  const said = phaseWords(message.phase, status), reason = reasonWords(message.phase);
+  const word = alarm || look === Look.STARTING ? said : words(look);
   text("state", word.toUpperCase());
-  const doing = view.alarm ? view.reason : view.phase;
-  text("why", [doing === word ? null : doing, run.live ? null : "replay"].filter(Boolean).join(" · "));
-  text("link", status.link, status.link !== "up");
-  text("lease", status.owner);
-  text("whose", facts.hands === "person" ? "scripted person" : facts.hands);
+  text("why", [alarm || said === word ? null : said, reason, run.live ? null : WORDS.replay].filter(Boolean).join(" · "));
+  text("link", linkWords(status), status.link !== LinkState.UP);
+  text("lease", words(status.owner));
+  text("whose", facts.hands === Hands.PERSON ? WORDS.person : words(facts.hands));
   text("delay", `${ms(facts.to_robot.mean_ms)} / ${ms(facts.to_operator.mean_ms)} ms`, facts.field_age_ms > 200);
   showLink(status);
-  text("target", status.target ?? "none");
-  text("holding", status.stands ? `${status.holding}, it stands` : status.holding);
+  text("target", status.target ?? WORDS.none);
+  text("holding", holdingWords(status));
   const fingers = { l2: message.fingers[0], r2: message.fingers[1] };
   for (const side of ["l2", "r2"]) triggers[side].show(facts[side], fingers[side], facts.advancing === side.toUpperCase());
   charts.delay.add(clock.nowMs, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
@@ -122,14 +122,6 @@ function showLink(status) {
   text("rate", `${rate} / ${figure(status.queue_ms)} ms / ${figure(status.lost_percent, 1)} %`, status.queue_ms > 50);
   const held = status.held_back ? `; held back: ${status.held_back}` : "";
   text("pictures", `${status.pictures ?? "?"}${held}`);
-}
-
-// What the border says: no words of the status line are read but those that it is made of.
-function stateOf(view, status) {
-  if (view.phase === "LINK LOST" || view.phase === "REFUSED" || view.phase === "CONTROLLER LOST") return "lost";
-  if (status.state === "stopped") return "stopped";
-  if (status.state === "armed") return "armed";
-  return status.state === "disarmed" ? "disarmed" : "starting";
 }
 
 byId("drawn").onclick = ({ currentTarget }) => {

@@ -6,6 +6,7 @@
 //
 // The operator side judges the same by itself (operator_side/viewing/pages/driving_page.py); this is to show it.
 import { atRest, both, Grips, Keys, readGamepads, REST } from "./inputs.js";
+import { Doing, MotionState, Readiness } from "./names.js";
 import { Panel } from "./panel.js";
 import { Tuning } from "./tuning.js";
 
@@ -79,12 +80,12 @@ export class Hands {
   }
 
   get #armed() {
-    return this.#facts?.status.state === "armed";
+    return this.#facts?.status.state === MotionState.ARMED;
   }
 
   // Armed by the operator side's own hands, which may know it later than the status line.
   get #moves() {
-    return this.#armed && this.#hands?.doing === "running";
+    return this.#armed && this.#hands?.doing === Doing.RUNNING;
   }
 
   #keyDown(event) {
@@ -178,7 +179,7 @@ export class Hands {
   get #stops() {
     if (this.#stopMs === null) return false;
     const sinceMs = performance.now() - this.#stopMs;
-    const goesOn = this.#facts?.status.state !== "stopped" && sinceMs < STOP_TRIES_MS;
+    const goesOn = this.#facts?.status.state !== MotionState.STOPPED && sinceMs < STOP_TRIES_MS;
     return this.#stopHeld.size > 0 || sinceMs < STOP_MS || goesOn;
   }
 
@@ -207,7 +208,7 @@ export class Hands {
   #follow(hands, allUp, nowMs) {
     if (this.#state === "resting") {
       this.#upSinceMs = allUp ? this.#upSinceMs ?? nowMs : null;
-      const agreed = this.#hands?.driver === this.#page && this.#hands.readiness === "ready";
+      const agreed = this.#hands?.driver === this.#page && this.#hands.readiness === Readiness.READY;
       if (allUp && agreed && nowMs - this.#upSinceMs >= REST_MS) this.#enter("ready", "");
     } else if (this.#state === "ready" && !allUp) {
       if (hands.run && !this.#stops) this.#enter("running", "");
@@ -225,7 +226,7 @@ export class Hands {
     if (!known.may_drive) this.#end("A real controller drives.");
     else if (known.driver !== null && known.driver !== this.#page && nowMs - this.#drivingSinceMs > AGREES_MS)
       this.#end("Another page drives.");
-    else if (known.readiness === "all keys up first" && this.#state !== "resting" && nowMs - this.#sinceMs > AGREES_MS) {
+    else if (known.readiness === Readiness.RESTING && this.#state !== "resting" && nowMs - this.#sinceMs > AGREES_MS) {
       this.#enter("resting", this.#armed ? "" : "The arm was disarmed or stopped.");
     }
   }

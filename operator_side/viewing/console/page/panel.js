@@ -1,5 +1,6 @@
 // What the hands' part of the page shows, and what of it can be held.
 import { KEYS, keyWords } from "./inputs.js";
+import { Doing, Hands, MotionState, SessionState } from "./names.js";
 
 const FULL = "How far a key goes: 1 to 9";
 
@@ -91,18 +92,18 @@ export class Panel {
     this.#section.dataset.state = state;
     const cannot = hands === null ? "Nothing to drive is known yet."
       : !hands.may_drive ? "A real controller drives here; this page can stop the robot."
-      : facts.status.owner === "observing" ? "Another operator owns the robot; this one observes."
+      : facts.status.owner === SessionState.OBSERVING ? "Another operator owns the robot; this one observes."
       : "";
     const taken = hands?.driver && !mine && state === "watching" ? "Another page drives." : "";
     const words = state === "watching" ? "Drive from here" : "Let go";
     if (drive.textContent !== words) drive.textContent = words;
     drive.disabled = state === "watching" && (hands === null || !hands.may_drive || taken !== "");
-    giveBack.hidden = !(hands?.person && facts.hands === "browser" && (mine || !hands.driver));
+    giveBack.hidden = !(hands?.person && facts.hands === Hands.BROWSER && (mine || !hands.driver));
     this.#text("state", {
       watching: [why, taken, cannot || (taken ? "" : "You are watching.")].filter(Boolean).join(" "),
       resting: [why, "All keys up for a second."].filter(Boolean).join(" "),
       ready: "Ready: hold Space to arm and run.",
-      running: moves ? "You drive." : hands?.doing === "at rest first" ? "Let go of all but hold-to-run." : "Arming: keep holding.",
+      running: moves ? "You drive." : hands?.doing === Doing.AT_REST_FIRST ? "Let go of all but hold-to-run." : "Arming: keep holding.",
     }[state]);
     this.#text("rest", state === "resting" ? `still ${(restMs / 1000).toFixed(1)} s` : "");
     this.#text("level", state === "watching" ? "" : `${FULL}; now ${level}`);
@@ -111,8 +112,8 @@ export class Panel {
 
   #aboutStop(stop, facts) {
     if (stop === null) return "";
-    if (facts?.status.state === "stopped") return "STOPPED. Hold-to-run arms again after a second of rest.";
-    if (facts?.status.owner === "observing") return "Only the owner can stop the robot: this operator observes.";
+    if (facts?.status.state === MotionState.STOPPED) return "STOPPED. Hold-to-run arms again after a second of rest.";
+    if (facts?.status.owner === SessionState.OBSERVING) return "Only the owner can stop the robot: this operator observes.";
     if (stop.goesOn) return "Stop sent; the robot side has not confirmed it yet.";
     return stop.sinceMs < 10_000 ? "THE STOP WAS NOT CONFIRMED by the robot side." : "";
   }

@@ -1,4 +1,5 @@
 // What may be tuned while the run goes on: P of eq. 10 and the emulated link, where the run permits it.
+import { SessionState } from "./names.js";
 
 const PROBABILITIES = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998, 0.999];
 const PAUSE_MS = 250; // what is dragged is sent once it rests
@@ -56,7 +57,7 @@ export class Tuning {
 
   show(facts) {
     const asked = [facts.to_robot.asked, facts.to_operator.asked || facts.page?.link_asked || ""];
-    const owns = facts.status.owner !== "observing";
+    const owns = facts.status.owner !== SessionState.OBSERVING;
     const reason = !owns ? "Only the owner may tune; this operator observes."
       : !facts.may_tune ? "This run does not permit tuning (robot side: --permit-tuning)."
       : facts.page?.tuning_refused ?? "";

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from common.protocol.messages import Telemetry
+from common.status.codes import Hands
 from operator_side.dualsense.reports.controller_state import Button, ControllerState
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.output_report import OutputReport
@@ -14,7 +15,7 @@ from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 from operator_side.people.pulling_hands import PullingHands, constant_force
 from operator_side.viewing.pages.driving_page import DrivingPage
-from operator_side.viewing.pages.shared_hands import BROWSER, PERSON, SharedHands
+from operator_side.viewing.pages.shared_hands import SharedHands
 from tests.helpers.felt import feedback
 from tests.helpers.simulated_desk import VIEW, armed
 from tests.operator_side.viewing.pages.talking_page import PERIOD_S, TalkingPage
@@ -126,16 +127,16 @@ def test_the_person_lets_go_when_a_page_drives_and_silence_gives_nothing_back() 
     desk.let_pass(1.4, says=False)
     desk.screen = armed()
     desk.let_pass(1.0, says=False)
-    assert (desk.hands.hands, desk.hands.doing) == (PERSON, "pulling")
+    assert (desk.hands.hands, desk.hands.doing) == (Hands.PERSON, "pulling")
     assert desk.let_pass(0.004, says=False)[-1].r2 > 0.5
     after = desk.let_pass(0.1)
     assert {(one.r2, one.run) for one in after[1:]} == {(0.0, False)}
     silent = desk.let_pass(5.0, says=False)
     assert {(one.r2, one.run) for one in silent} == {(0.0, False)}
-    assert (desk.hands.hands, desk.people) == (BROWSER, 1)
+    assert (desk.hands.hands, desk.people) == (Hands.BROWSER, 1)
     desk.page.say(desk.now_s, driving=False, give_back=True)
     first = desk.let_pass(0.1, says=False)
-    assert (desk.hands.hands, desk.hands.doing, desk.people) == (PERSON, "resting", 2)
+    assert (desk.hands.hands, desk.hands.doing, desk.people) == (Hands.PERSON, "resting", 2)
     assert (first[0].r2, first[0].run) == (0.0, False)
 
 
@@ -144,11 +145,11 @@ def test_a_stop_takes_the_controller_from_the_person_for_good_and_nobody_goes_on
     desk.let_pass(1.3, says=False)
     desk.page.say(desk.now_s, driving=False, stop=True)
     assert not any(one.arm for one in desk.let_pass(10.0, says=False)[1:])
-    assert desk.hands.hands == BROWSER
+    assert desk.hands.hands == Hands.BROWSER
     alone = Desk()
     alone.page.say(0.0, driving=False, give_back=True)
     assert not any(one.run for one in alone.let_pass(3.0, says=False))
-    assert (alone.hands.hands, alone.hands.has_person) == (BROWSER, False)
+    assert (alone.hands.hands, alone.hands.has_person) == (Hands.BROWSER, False)
 
 
 def test_the_hands_press_no_button_that_was_not_asked_for() -> None:

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from operator_side.viewing.pages.driving_page import REST_S, SILENCE_S, DrivingPage, Readiness
+from common.status.codes import Readiness
+from operator_side.viewing.pages.driving_page import REST_S, SILENCE_S, DrivingPage
 from operator_side.viewing.pages.page_messages import PageHands, TuneWish, read_page_message
 from tests.operator_side.viewing.pages.talking_page import PERIOD_S, TalkingPage
 

@@ -15,7 +15,10 @@ from rich.console import Console
 from rich.screen import Screen as Whole
 
 from common.errors import ConfigurationError
-from operator_side.viewing.facts import OperatorFacts
+from common.protocol.session import SessionState
+from common.status.codes import LinkState, Sight
+from common.status.statuses import RobotStatus
+from operator_side.viewing.facts import OperatorFacts, SceneFacts
 from operator_side.viewing.terminal.screen import SILENT_AFTER_S, Screen
 from operator_side.viewing.terminal.status import TerminalStatus
 from tests.operator_side.console_feed import facts
@@ -50,14 +53,17 @@ def drawn(shown: OperatorFacts | None, width: int = 80, height: int = 24, age_s:
     return ["".join(text for text, *_ in line) for line in lines]
 
 
-def with_status(**status: Any) -> OperatorFacts:
+def with_status(robot: RobotStatus | None = None, **status: Any) -> OperatorFacts:
     shown = facts(2.0)
-    return msgspec.structs.replace(shown, status=shown.status | status)
+    changed = msgspec.structs.replace(shown.status, **status)
+    scene = SceneFacts(overlap_mm3=1e299, tick_us=80.0, tick_p99_us=140.0, overruns=0)
+    return msgspec.structs.replace(shown, status=changed, robot=robot, scene=scene)
 
 
 @pytest.mark.parametrize("size", [(60, 20), (80, 24), (120, 40), (200, 60), (10, 3), (1, 1)])
 def test_every_size_is_filled_and_nothing_of_a_peer_controls_the_terminal(size: tuple[int, int]) -> None:
-    hostile = with_status(target="目標 🤖\x1b[2J", link="lost: \x07", nearest_mm=float("nan"), overlap_mm3=1e299)
+    robot = RobotStatus(target="目標 🤖\x1b[2J", nearest_mm=float("nan"))
+    hostile = with_status(robot, link=LinkState.REFUSED, link_reason="\x07")
     for shown in (None, facts(2.0), hostile):
         lines = drawn(shown, *size)
         assert [cell_len(line) for line in lines] == [size[0]] * size[1]
@@ -65,7 +71,8 @@ def test_every_size_is_filled_and_nothing_of_a_peer_controls_the_terminal(size: 
 
 
 def test_everything_is_on_a_screen_of_the_usual_size() -> None:
-    text = "\n".join(drawn(with_status(nearest="bottle", nearest_mm=34.0, target_mm=120.0, tick_p99_us=140.0)))
+    robot = RobotStatus(nearest="bottle", nearest_mm=34.0, target="mug", target_mm=120.0)
+    text = "\n".join(drawn(with_status(robot)))
     for said in (
         *(">>> ARMED  advancing >>>", "link up", "lease armed", "hands person", "mean  52.0  p99  61.0  now"),
         *("asked: delay 50ms 10ms", "round trip 101 ms", "field age 1.0 ms", "R2 advances   71 %, free 40 %"),
@@ -79,11 +86,11 @@ def test_everything_is_on_a_screen_of_the_usual_size() -> None:
 @pytest.mark.parametrize(
     ("status", "banner"),
     [
-        ({"state": "disarmed", "owner": "ready", "person": None}, "--- DISARMED  ready to arm ---  "),
+        ({"state": "disarmed", "owner": SessionState.READY, "person": None}, "--- DISARMED  ready to arm ---  "),
         ({"state": "stopped", "stopped_because": "emergency stop"}, "!!! STOPPED: emergency stop !!!!!"),
-        ({"link": "lost: nothing heard"}, "!!! LINK LOST: nothing heard !!!!!"),
-        ({"release_first": True}, "!!! RELEASE BOTH TRIGGERS !!!!!"),
-        ({"link": "waiting for the robot side", "state": None}, "... waiting for the robot side ...  "),
+        ({"link": LinkState.LOST}, "!!! LINK LOST: nothing heard from the robot !!!!!"),
+        ({"feel": Sight.WAITING}, "!!! RELEASE BOTH TRIGGERS !!!!!"),
+        ({"link": LinkState.WAITING, "state": None}, "... waiting for the robot side ...  "),
     ],
 )
 def test_the_banner_says_what_keeps_the_arm_from_moving(status: dict[str, Any], banner: str) -> None:

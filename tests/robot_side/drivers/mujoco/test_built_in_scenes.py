@@ -4,10 +4,10 @@ from typing import Any, get_args
 
 import pytest
 
+from common.roles import Role
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from robot_side.surroundings.perceived import Role
 
 SEEDS = range(12)
 NAMES: tuple[SceneName, ...] = get_args(SceneName)

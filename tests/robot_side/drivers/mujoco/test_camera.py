@@ -3,11 +3,12 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from common.roles import Role
 from robot_side.drivers.mujoco.arm import MujocoArm
 from robot_side.drivers.mujoco.camera import CameraError, MujocoCamera
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from robot_side.surroundings.perceived import KINDS, Role
+from robot_side.surroundings.perceived import KINDS
 from tests.helpers.repository import DATA
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
+from common.roles import Role
 from robot_side.drivers.mujoco.camera import MujocoCamera
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from robot_side.surroundings.perceived import Role
 from tests.helpers.repository import DATA
 from tests.robot_side.drivers.mujoco.test_scene_meshes import overlap_of
 

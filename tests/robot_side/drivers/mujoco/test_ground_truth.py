@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from common.roles import Role
 from robot_side.drivers.mujoco.ground_truth import GroundTruth, geom_distance, least_distance
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from robot_side.surroundings.perceived import Role
 from tests.helpers.arm_models import planar_arm
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from common.roles import Role
 from robot_side.drivers.mujoco.camera import MujocoCamera
 from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
-from robot_side.surroundings.perceived import Role
 from tests.helpers.tool_driver import PERIOD_S, VALID_S, ToolDriver
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from common.errors import ConfigurationError
+from common.roles import Role
 from robot_side.drivers.mujoco import model_enums
 from robot_side.drivers.mujoco.camera import MujocoCamera
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
@@ -13,7 +14,6 @@ from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
-from robot_side.surroundings.perceived import Role
 from tests.helpers.arm_models import MOTORS, POSITION_SERVOS, SHAPES, STONE, TENDON_GRIPPER, planar_arm
 from tests.helpers.repository import DATA
 

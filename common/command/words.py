@@ -1,0 +1,41 @@
+"""Codes in words, for a terminal and a log: the only place that makes sentences of a status."""
+
+from enum import StrEnum
+from typing import Final
+
+from common.status.codes import LinkState, Phase
+from common.status.phase import PhaseFacts
+from common.status.statuses import OperatorStatus, RobotStatus
+
+_LOST: Final = "nothing heard from the {}"
+
+
+def words(code: StrEnum | str | None) -> str:
+    """A code in words; empty for none."""
+    return "" if code is None else str(code).replace("_", " ")
+
+
+def phase_words(facts: PhaseFacts, side: RobotStatus | OperatorStatus | None) -> tuple[str, str | None]:
+    """The phase, in capitals for an alarm, and the reason; None for none. side: whose link it is about."""
+    said, reason = words(facts.doing or facts.phase), facts.reason
+    if facts.phase in (Phase.WAITING, Phase.OBSERVING):
+        said = link_words(side)
+    elif facts.phase is Phase.LINK_LOST and reason is None:
+        reason = _LOST.format("operator" if isinstance(side, RobotStatus) else "robot")
+    return printable(said.upper() if facts.alarm else said), None if reason is None else printable(reason)
+
+
+def link_words(side: RobotStatus | OperatorStatus | None) -> str:
+    """The link in words, without a reason."""
+    if side is None:
+        return ""
+    if side.link is LinkState.WAITING:
+        return "waiting for an operator" if isinstance(side, RobotStatus) else "waiting for the robot side"
+    if isinstance(side, OperatorStatus) and side.link is LinkState.OBSERVING:
+        return f"observing ({side.place} of {side.waiting} waiting)"
+    return words(side.link)
+
+
+def printable(text: str) -> str:
+    """Put a question mark for each sign that cannot be printed, such as a terminal's control characters."""
+    return text if text.isprintable() else "".join(sign if sign.isprintable() else "?" for sign in text)

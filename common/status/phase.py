@@ -1,0 +1,55 @@
+"""Where a run stands, of all that both sides say: the one place that knows what is more severe than what."""
+
+import msgspec
+
+from common.protocol.session import SessionState
+from common.status.codes import ConnectionState, Doing, LinkState, Look, Phase, Sight
+from common.status.statuses import OperatorStatus, RobotStatus
+
+_UP_TO_ARMED = (None, Doing.RESTING, Doing.ARMING)
+"""What the simulated person does before they have seen that it is armed."""
+_LOST = (Phase.LINK_LOST, Phase.REFUSED, Phase.CONTROLLER_LOST)
+_NOBODY = OperatorStatus()
+
+
+class PhaseFacts(msgspec.Struct, frozen=True):
+    """Where a run stands."""
+
+    phase: Phase = Phase.STARTING
+    doing: Doing | None = None
+    """Where the phase is BUSY"""
+    reason: str | None = None
+    """Why, for people, where a side says so"""
+    alarm: bool = False
+    """Whether that keeps the arm from moving against somebody's will"""
+    look: Look = Look.STARTING
+
+
+def phase_of(robot: RobotStatus | None, operator: OperatorStatus | None) -> PhaseFacts:
+    """The phase by what is known of either side."""
+    side, hands = operator or robot, operator or _NOBODY
+    if side is None:
+        return PhaseFacts()
+    link, state, because = side.link, side.state, (robot or side).stopped_because
+    alarms: tuple[tuple[bool, Phase, str | None], ...] = (
+        (link is LinkState.LOST, Phase.LINK_LOST, hands.link_reason),
+        (link is LinkState.REFUSED, Phase.REFUSED, hands.link_reason),
+        (state == "stopped", Phase.STOPPED, because),
+        (hands.controller is ConnectionState.LOST, Phase.CONTROLLER_LOST, None),
+        (state == "armed" and hands.feel is Sight.WAITING, Phase.RELEASE_BOTH_TRIGGERS, None),
+        (state == "disarmed" and because is not None, Phase.DISARMED, because),
+    )
+    others: tuple[tuple[bool, Phase, str | None], ...] = (
+        (link is LinkState.WAITING, Phase.WAITING, hands.link_reason),
+        (link is LinkState.OBSERVING, Phase.OBSERVING, None),
+        (hands.controller is ConnectionState.ABSENT, Phase.NO_CONTROLLER, None),
+        (state == "armed" and hands.person in _UP_TO_ARMED, Phase.ARMED, None),
+        (hands.person is not None, Phase.BUSY, None),
+        (state == "disarmed" and side.owner is SessionState.READY, Phase.READY_TO_ARM, None),
+        (state == "disarmed", Phase.DISARMED, None),
+        (True, Phase.STARTING, None),
+    )
+    place = next(place for place, (holds, _, _) in enumerate(alarms + others) if holds)
+    _, phase, reason = (alarms + others)[place]
+    look = Look.LOST if phase in _LOST else Look.STARTING if state is None else Look(state)
+    return PhaseFacts(phase, hands.person if phase is Phase.BUSY else None, reason, place < len(alarms), look)

@@ -1,0 +1,45 @@
+"""The page and the operator side agree on names, and the page compares codes, never words."""
+
+import re
+from typing import Final
+
+import msgspec
+
+from common.status.statuses import OperatorStatus
+from operator_side.viewing.console.names import PATH, names
+from operator_side.viewing.facts import DelayFacts, HandsFacts, OperatorFacts, TriggerFacts
+
+_SOURCES: Final = {path.name: path.read_text(encoding="utf-8") for path in PATH.parent.glob("*.js")}
+_TEXT: Final = r"""(?:"[^"\n]*"|'[^'\n]*'|`[^`\n]*`)"""
+_COMPARED: Final = re.compile(
+    rf"(?:[=!]==?|\bcase\b)\s*({_TEXT})|({_TEXT})\s*[=!]==?|\.(?:startsWith|endsWith|includes)\(\s*({_TEXT})"
+)
+_READ: Final = {
+    r"\bfacts\??\.(\w+)": (OperatorFacts, TriggerFacts),  # triggers.js calls its own part so, too
+    r"\bfacts\??\.page\??\.(\w+)": (HandsFacts,),
+    r"\bhands\?\.(\w+)": (HandsFacts,),
+    r"\bfacts\.to_(?:robot|operator)\.(\w+)": (DelayFacts,),
+    r"\bstatus\??\.(\w+)": (OperatorStatus,),
+}
+"""Where the page reads a struct, with the ones that it may be"""
+
+
+def test_the_names_of_the_page_are_up_to_date() -> None:
+    assert _SOURCES[PATH.name] == names(), "to be run: python -m operator_side.viewing.console.names"
+
+
+def test_the_page_compares_no_sentence() -> None:
+    compared = [text for source in _SOURCES.values() for found in _COMPARED.findall(source) for text in found if text]
+    assert '"running"' in compared  # the page's own codes: the search finds something
+    assert [text for text in compared if " " in text] == []
+
+
+def test_the_page_reads_only_what_there_is() -> None:
+    read = 0
+    for pattern, structs in _READ.items():
+        there = {one.encode_name for struct in structs for one in msgspec.structs.fields(struct)}
+        for name, source in _SOURCES.items():
+            found = set(re.findall(pattern, source))
+            read += len(found)
+            assert found <= there, (name, pattern)
+    assert read > 30
