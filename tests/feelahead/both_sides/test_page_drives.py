@@ -119,7 +119,7 @@ def test_the_person_goes_on_from_the_start_once_they_are_told_to() -> None:
     assert state(run) == "armed"
     run.run_until(7.0)
     facts = hands_facts(run.pages, None, run.operator, 7.0)
-    assert (facts.driver, facts.readiness) == (None, "nobody drives")
+    assert (facts.driver, facts.readiness) == (None, "nobody_drives")
     assert speed_m_s(run) < 0.002
     run.run_until(17.0)
     assert run.summary()["task"]["time_to_grasp_s"] is not None
