@@ -28,6 +28,7 @@ from common.sockets.robot import RobotSockets
 from common.statistics import RunningStatistics
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotParts, RobotSide
+from robot_side.drivers.remote.beside import Beside
 from robot_side.events import Listener
 from robot_side.parts import SimulatedParts, build_parts
 from robot_side.recording.recorder import Recorder, RobotEncoder, recorded_status, robot_header
@@ -72,16 +73,18 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
     with (
         Status(settings.status, "robot") as status,
         recording_to(settings.record, "robot", RobotEncoder()) as recording,
+        Beside(settings.arm, settings.objects, status.note, insecure=settings.insecure, keys=keys) as beside,
     ):
         epoch = secrets.randbits(53)
         stages = Stages(STAGES, MonotonicClock(), ThreadClock(), settings.seed)
-        parts = build_parts(settings, epoch, clock_domain(), announce=status.note)
+        parts = build_parts(settings, epoch, clock_domain(), announce=status.note, beside=beside)
         listeners: list[Listener] = [StageTiming(stages)]
         core = build(parts, listeners if recording is None else [*listeners, Recorder(recording.noted.append)])
         sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
         for text in (*parts.notes, *unused_clauses(link, [("to_operator", stream) for stream in sent])):
             status.note(text)
         warm_up(lambda: status.note(_COMPILING), parts.kernels)
+        beside.wait()
         if recording is not None:
             recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": parts.notes})
             status.also = recording.note
@@ -102,7 +105,7 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
             status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
             failure = failure_of(partial(loop.run, stop))
             # A run that failed has figures, too.
-            summary = loop.summary() | core.summary()
+            summary = loop.summary() | core.summary() | {"beside": beside.summary()}
             if recording is not None:
                 summary["recording"] = recording.close()
             try:
