@@ -37,6 +37,7 @@ from robot_side.reporting.sending import SENT_STREAMS, Sending
 from robot_side.settings import RobotSettings
 from robot_side.turn_stages import HELPS, STAGES, StageTiming
 from robot_side.viewing.looking import Looking
+from robot_side.viewing.perceived_shapes import PerceivedModel
 from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.shapes import SceneModel
@@ -88,7 +89,8 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
         if recording is not None:
             recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": parts.notes})
             status.also = recording.note
-        view = SceneView(SceneModel(parts.scene), parts.kinematics, parts.explains)
+        model = PerceivedModel(parts.scene) if parts.any_objects else SceneModel(parts.scene)
+        view = SceneView(model, parts.kinematics, parts.explains)
         with ExitStack() as stack:
             stop = stack.enter_context(StopSignal())
             leaving.summary = None
