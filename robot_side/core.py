@@ -15,7 +15,7 @@ from common.status.codes import LinkState
 from common.status.statuses import RobotStatus
 from common.timing.ages import LoopAge
 from robot_side.arm.ability import JointLimits
-from robot_side.arm.joint_estimate import JointEstimate
+from robot_side.arm.joint_estimate import JointEstimate, lateness_s
 from robot_side.arm.port import Arm, ArmState, GripperKinematics
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.events import Found, Listener, Listeners, Tick
@@ -108,11 +108,13 @@ class RobotSide:
 
     def _run(self, now_s: float) -> list[Outgoing]:
         begin, parts, sight, grip = self._heard.on_step, self.parts, self.sight, self.grip
-        delay_s = self._follow_operator(now_s)
         begin("arm")
         self._measured = parts.arm.state(now_s)
         begin("pose")
-        state = self._joints.update(self._measured)
+        late_s = lateness_s(self._measured, now_s)
+        delay_s = self._follow_operator(now_s, late_s)
+        self._joints.update(self._measured)
+        state = self._joints.carried(late_s)
         pose = parts.kinematics.pose(state)
         begin("grip")
         objects = sight.see(now_s) if sight.frame is None else sight.frame
@@ -145,17 +147,21 @@ class RobotSide:
         self._found = Found(*found, holds_target, sight.target_m)
         return outgoing
 
-    def _follow_operator(self, now_s: float) -> float:
-        """Follow who owns the arm and how old the loop is; return t_d of eq. 8."""
+    def _follow_operator(self, now_s: float, late_s: float) -> float:
+        """Follow who owns the arm and how old the loop is; return t_d of eq. 8.
+
+        late_s: how late the arm's states come. What it is told takes about as long to reach it.
+        """
         session, loop_age = self.session, self.parts.loop_age
         session.update(now_s)
+        session.safety.arm_measured(late_s, now_s)
         if session.take_owner_changed():
             loop_age.reset()
             self.reports.begin_anew()
         if (age_s := session.loop_age_s(now_s)) is None:
             return loop_age.value(now_s)
         # In every tick, so that a link that falls silent ages, too (eq. 8).
-        return loop_age.update(age_s, now_s)
+        return loop_age.update(age_s + late_s, now_s)
 
     def observe(self, now_s: float) -> None:
         """After the messages of the tick at `now_s` have left: take in a frame, and let listeners work."""

@@ -16,6 +16,7 @@ from common.sockets.authentication import RobotKeys
 from common.sockets.robot import RobotSockets
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotParts, RobotSide
+from robot_side.drivers.remote.beside import Beside
 from robot_side.events import Listener
 from robot_side.parts import build_parts
 from robot_side.recording.recorder import Recorder, RobotEncoder, robot_header
@@ -23,6 +24,7 @@ from robot_side.reporting.sending import SENT_STREAMS
 from robot_side.settings import RobotSettings
 from robot_side.turn_stages import HELPS, StageTiming
 from robot_side.turns import RobotTurns
+from robot_side.viewing.perceived_shapes import PerceivedModel
 from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.shapes import SceneModel
@@ -54,7 +56,9 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
         # A port that is taken is said at once.
         open_sockets().close()
         epoch, recording = secrets.randbits(53), process.recording
-        parts = build_parts(settings, epoch, clock_domain(), announce=process.note)
+        beside = Beside(settings.arm, settings.objects, process.note, insecure=settings.insecure, keys=keys)
+        process.stack.enter_context(beside)
+        parts = build_parts(settings, epoch, clock_domain(), announce=process.note, beside=beside)
         recorder = [] if recording is None else [Recorder(recording.noted.append)]
         core = build(parts, [StageTiming(loop.stages), *recorder])
         sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
@@ -62,9 +66,11 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
         for text in (*parts.notes, *unused):
             process.note(text)
         warm_up(lambda: process.note(_COMPILING), parts.kernels)
+        beside.wait()
         if recording is not None:
             recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": parts.notes})
-        view = SceneView(SceneModel(parts.scene), parts.kinematics, parts.explains)
+        model = PerceivedModel(parts.scene) if parts.any_objects else SceneModel(parts.scene)
+        view = SceneView(model, parts.kinematics, parts.explains)
         cameras = Cameras(parts.scene, settings.cameras, process.note) if settings.cameras.on else None
 
         def open_side() -> RobotTurns:
@@ -73,7 +79,7 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
             for text in keys.notes() if keys is not None else [_OPEN_TO_ALL] if settings.insecure else []:
                 process.note(text)
             status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
-            return RobotTurns(settings, core, view, cameras, sockets, process)
+            return RobotTurns(settings, core, view, cameras, sockets, process, beside)
 
         return process.run(open_side)
 

@@ -1,4 +1,4 @@
-"""Make the parts of a robot side from its settings: the simulated arm, its camera, and everything in between."""
+"""Make the parts of a robot side from its settings: arm and camera, simulated or beside, and all in between."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -7,13 +7,14 @@ from functools import cache
 
 import numpy as np
 
+from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from common.protocol.link_end import LinkEnd
 from common.roles import Role
 from common.timing.ages import LoopAge
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core import RobotParts
-from robot_side.drivers.mujoco.arm import MujocoArm
+from robot_side.drivers.mujoco.arm import MujocoArm, stand
 from robot_side.drivers.mujoco.camera import CameraError, MujocoCamera
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_cover import GripperCover
@@ -22,6 +23,10 @@ from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.drivers.mujoco.true_contact import TrueContact
+from robot_side.drivers.remote.arm import RemoteArm
+from robot_side.drivers.remote.beside import Beside
+from robot_side.drivers.remote.driver_session import ArmShape
+from robot_side.drivers.remote.frame_message import perceived
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.laws.explanation import Explains
@@ -64,11 +69,12 @@ class SimulationObserver:
 
 @dataclass(frozen=True, kw_only=True)
 class SimulatedParts(RobotParts):
-    """Parts in front of a simulation, and the simulation."""
+    """Parts in front of a scene, and the scene: simulated, or followed where arm or objects are beside."""
 
     kinematics: MujocoKinematics
     scene: Scene
-    simulation: MujocoArm
+    any_objects: bool
+    """Whether objects of any kind may come"""
     explains: Explains
     """The settings' own law, whatever stands in for it"""
 
@@ -79,7 +85,7 @@ class SimulatedParts(RobotParts):
         Its primitives are the same throughout, and counted here with those of the objects that are ignored now.
         """
         seen = _as_loaded(self.scene, dict.fromkeys(self.scene.roles, Role.OBSTACLE))
-        unneeded = {kind.kernel for kind in KINDS if not len(getattr(seen, kind.owner))}
+        unneeded = {kind.kernel for kind in KINDS if not (self.any_objects or len(getattr(seen, kind.owner)))}
         return [
             kernel for kernel in imported_kernels() if kernel not in unneeded and not kernel.name.startswith(_LIBRARY)
         ]
@@ -91,35 +97,30 @@ def build_parts(
     clock_domain: str,
     scene: Scene | None = None,
     announce: Callable[[str], None] | None = None,
+    beside: Beside | None = None,
 ) -> SimulatedParts:
     """Make the parts; ConfigurationError for a model that cannot be used.
 
     scene: instead of loading the one that the settings name, so that the caller can look at it. announce: told once,
-    in one line, what takes long.
+    in one line, what takes long. beside: the arm and the objects that it has take the place of simulated ones.
     """
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
         raise ConfigurationError(f"{given} is given without {missing}; valid: both, or neither for the built-in arm")
-    scene = scene or load_scene(settings.model, settings.site, settings.roles, settings.scene or "table", settings.seed)
+    # What is perceived elsewhere is not known yet.
+    roles = settings.roles if settings.objects is None else {}
+    scene = scene or load_scene(settings.model, settings.site, roles, settings.scene or "table", settings.seed)
     noise, camera_noise = np.random.SeedSequence(settings.seed).generate_state(2)
     encoder = Encoder(settings.encoder.sigma_rad, settings.encoder.resolution_rad, int(noise))
     limits = MotionLimits()
-    arm = MujocoArm(scene, encoder, limits)
+    arm, ends_rad = _arm(scene, encoder, limits, beside)
     searching = None if announce is None else cache(lambda: announce(_SEARCHING))
     kinematics = MujocoKinematics(scene, settings.cover_m, searching)
-    camera = MujocoCamera(
-        scene,
-        CameraError(
-            tuple(thing.name for thing in scene.objects),
-            settings.camera.mean_vector_m,
-            settings.camera.sd_m,
-            settings.camera.frame_sd_m,
-            int(camera_noise),
-        ),
-    )
+    seen_elsewhere = None if beside is None else beside.objects(settings.roles, settings.camera.sd_m)
     # Before the first tick, as a search for spheres takes far longer than one.
-    held_covers = HeldCovers(_as_loaded(scene, scene.roles), settings.cover_m, scene.fixed, searching)
-    joint_limits = limits.of_joints(arm.joint_count, *arm.ends_rad)
+    first = _as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
+    held_covers = HeldCovers(first, settings.cover_m, scene.fixed, searching)
+    joint_limits = limits.of_joints(arm.joint_count, *ends_rad)
     surroundings = Surroundings()
     prediction, prediction_note = _prediction_errors(settings, scene)
     law = LAWS[settings.law](
@@ -132,7 +133,7 @@ def build_parts(
     return SimulatedParts(
         arm=arm,
         kinematics=kinematics,
-        camera=camera,
+        camera=seen_elsewhere or _camera(settings, scene, int(camera_noise)),
         law=law,
         explains=law,
         surroundings=surroundings,
@@ -146,19 +147,58 @@ def build_parts(
         limits=joint_limits,
         motion=settings.motion,
         scene=scene,
-        simulation=arm,
-        truth=SimulationObserver(scene),
+        any_objects=settings.objects is not None,
+        truth=SimulationObserver(scene) if settings.arm is None and settings.objects is None else None,
         held_covers=held_covers,
         assists=settings.assist == "speed",
         full_rate=settings.full_rate,
         seed=settings.seed,
-        notes=(*_notes(scene), *prediction_note, *_cover_notes(kinematics.cover, settings.cover_m, held_covers)),
+        notes=(
+            *_notes(scene, settings),
+            *prediction_note,
+            *_cover_notes(kinematics.cover, settings.cover_m, held_covers),
+        ),
     )
 
 
-def _notes(scene: Scene) -> tuple[str, ...]:
+def _arm(
+    scene: Scene, encoder: Encoder, limits: MotionLimits, beside: Beside | None
+) -> tuple[MujocoArm | RemoteArm, tuple[FloatArray, FloatArray]]:
+    """The arm of the scene, simulated unless it is beside; and where its joints end."""
+    if beside is None or not beside.has_arm:
+        simulated = MujocoArm(scene, encoder, limits)
+        return simulated, simulated.ends_rad
+    robot, (travel, ends_rad) = scene.robot, stand(scene)
+    opening_m = 0.0 if travel is None else float(travel.openings_m[0])
+    open_fingers = scene.data.qpos[robot.finger_positions].copy()
+    shape = ArmShape(*_joint_names(scene), open_fingers, opening_m)
+    return beside.arm(shape, scene.show), ends_rad
+
+
+def _joint_names(scene: Scene) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The names of the arm's joints and of the fingers', in the model's order."""
+    model, robot = scene.model, scene.robot
+    names = {int(model.jnt_qposadr[joint]): model.joint(joint).name or f"joint{joint}" for joint in range(model.njnt)}
+    arm, fingers = (
+        tuple(names[place] for place in places.tolist()) for places in (robot.arm_positions, robot.finger_positions)
+    )
+    return arm, fingers
+
+
+def _camera(settings: RobotSettings, scene: Scene, seed: int) -> MujocoCamera:
+    error = settings.camera.mean_vector_m, settings.camera.sd_m, settings.camera.frame_sd_m
+    return MujocoCamera(scene, CameraError(tuple(thing.name for thing in scene.objects), *error, seed))
+
+
+def _notes(scene: Scene, settings: RobotSettings) -> tuple[str, ...]:
     """What a person should know before the run: objects and roles, start pose, and what is not quite as modelled."""
-    notes = [f"starts at {scene.start_pose}", f"objects: {_roles(scene.roles)}"]
+    notes = [f"starts at {scene.start_pose}"]
+    if settings.arm is not None:
+        joints, fingers = (", ".join(names) or "none" for names in _joint_names(scene))
+        notes = [f"the driver's joints, in this order: {joints}; of the gripper: {fingers}"]
+    if settings.objects is not None:
+        return tuple(notes)
+    notes.append(f"objects: {_roles(scene.roles)}")
     if Role.TARGET not in scene.roles.values():
         notes.append(
             "no object is a target, so there is nothing to advance to; to name one: let its name begin with target, or"

@@ -84,6 +84,11 @@ class RobotSettings(SideOptions):
     keyframe, else in the middle of its joints' ranges."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """The model's site between the fingertips."""
+    arm: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """Where a driver of an arm of yours connects: that arm moves instead of a simulated one (docs/drivers.md). --model
+    says how it is built. With --keys a driver needs a key that is allowed, as an operator does."""
+    objects: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """Where a process of yours connects that perceives objects, instead of a simulated camera (docs/drivers.md)."""
     scene: SceneName | None = None
     """What the built-in arm stands before. table: a cluttered table, unless given. wall: a wall 10 to 60 mm behind the
     target. slot: two posts on the way, 15 to 40 mm to spare on each side. shelf: a shelf with a raised front edge to

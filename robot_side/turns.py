@@ -18,6 +18,7 @@ from common.sockets.robot import RobotSockets
 from common.statistics import RunningStatistics
 from common.status.statuses import RobotStatus
 from robot_side.core import RobotSide
+from robot_side.drivers.remote.beside import Beside
 from robot_side.reporting.link_reporter import LinkReporter
 from robot_side.reporting.sending import Sending
 from robot_side.settings import RobotSettings
@@ -40,9 +41,10 @@ class RobotTurns:
         cameras: Cameras | None,
         sockets: RobotSockets,
         process: Process,
+        beside: Beside,
     ) -> None:
         """cameras: None where no pictures are made."""
-        self._process, self._core, self._sockets = process, core, sockets
+        self._process, self._core, self._sockets, self._beside = process, core, sockets, beside
         self._clock, self._computed, self._pacer = process.loop.clock, process.loop.computed, process.loop.pacer
         self._link: LinkSpec = settings.link_spec()
         self._arm = core.parts.arm
@@ -152,6 +154,7 @@ class RobotTurns:
             "link": self._sending.summary(),
             "rate": {"robot": self._sending.budget.summary() | {"pictures": self._looking.pictures}},
             "simulation": {"share_of_real_time": self._arm.share_of_real_time},
+            "beside": self._beside.summary(),
             "looked_at": self._looking.summary(),
             "strangers": {
                 "refused": sockets.refused,

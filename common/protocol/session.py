@@ -46,6 +46,7 @@ class SessionEvent(Enum):
     TRIGGER_PULLED = "trigger pulled"
     GAP = "no command for the gap limit"
     OLD_LOOP = "loop age over the limit"
+    ARM_LOST = "arm's newest state too old"
     EMERGENCY_STOP = "emergency stop"
     WRONG_TOKEN = "command with another token"  # noqa: S105  # no password
     HAND_OVER = "hand-over button, somebody waits"
@@ -83,6 +84,9 @@ def _rows(
     return tuple(Transition(state, event, after or state, why) for state in SessionState if state in set(before))
 
 
+_ARM_LOST: Final = "arm lost: nothing new is heard of it"
+
+
 def _build() -> tuple[Transition, ...]:
     state, event = SessionState, SessionEvent
     strangers = (state.UNKNOWN, state.AWAY)
@@ -102,6 +106,9 @@ def _build() -> tuple[Transition, ...]:
         *_rows([state.STOPPED_READY], event.GAP, state.STOPPED, "no command for the gap limit"),
         *_rows([state.READY, state.ARMED], event.OLD_LOOP, state.DISARMED, "loop age over the limit"),
         *_rows([state.STOPPED_READY], event.OLD_LOOP, state.STOPPED, "loop age over the limit"),
+        *_rows([state.DISARMED], event.ARM_LOST, None, _ARM_LOST),
+        *_rows([state.READY, state.ARMED], event.ARM_LOST, state.DISARMED, _ARM_LOST),
+        *_rows([state.STOPPED_READY], event.ARM_LOST, state.STOPPED, _ARM_LOST),
         *_rows(OWNING, event.EMERGENCY_STOP, state.STOPPED, "emergency stop"),
         *_rows(known, event.WRONG_TOKEN, None, "counted, never applied"),
         *_rows(OWNING, event.HAND_OVER, state.OBSERVING, "the owner handed the lease over"),

@@ -39,6 +39,8 @@ class SafetySettings:
     """A loop age above this disarms."""
     healthy_s: _Allowance = 1.0
     """How long commands must have come, with released triggers, before arming."""
+    arm_s: _Limit = 0.1
+    """An arm whose newest state is older is lost."""
     lease_s: _Limit = 0.9
     """An operator that was silent for this long loses the lease: within a second, a tick included."""
 
@@ -72,6 +74,7 @@ class Safety:
         self._stop_followed = (-1, -1)
         """Epoch and sequence number of the newest stop that was followed."""
         self._session: Session | None = None
+        self._arm_lost = False
         self._forget()
 
     def _forget(self) -> None:
@@ -146,6 +149,12 @@ class Safety:
             return Permission(state, None, now_s)
         return Permission(state, self._command, self._accepted_s + self.settings.gap_s)
 
+    def arm_measured(self, age_s: float, now_s: float) -> None:
+        """Stop while the arm's newest state is too old; to be called in every tick. Without an arm nothing is lost."""
+        self._arm_lost = age_s > self.settings.arm_s
+        if self._arm_lost:
+            self._handle(SessionEvent.ARM_LOST, now_s, f"arm lost: its newest state is {1e3 * age_s:.0f} ms old")
+
     def check(self, now_s: float) -> None:
         """Whether silence or the loop's age has to stop the arm by now."""
         self._check_gap(now_s)
@@ -177,7 +186,7 @@ class Safety:
             self._handle(SessionEvent.TRIGGER_PULLED, now_s)
         elif command.emergency_stop:
             self._healthy_since_s = None
-        elif self._loop_is_young(now_s):
+        elif self._loop_is_young(now_s) and not self._arm_lost:
             if self._healthy_since_s is None:
                 self._healthy_since_s = now_s
             if self._healthy_for_long(now_s):

@@ -47,6 +47,7 @@ class RunFigures(Listener):
         """truth: sees what really happens, where there is a simulation to see it in."""
         self.ticks = 0
         self._observer = truth
+        self._knows_truth = truth is not None
         self._start_s: float | None = None
         self._next_truth_s = -np.inf
         self._loop_age = RunningStatistics(seed)
@@ -127,6 +128,7 @@ class RunFigures(Listener):
 
     def truth(self, truth: Truth, roles: dict[str, Role], now_s: float) -> None:
         """What really happened, from the simulation: distances and contact onsets."""
+        self._knows_truth = True
         self._min_distance_m = _smaller(self._min_distance_m, truth.min_distance_m)
         self._min_obstacle_distance_m = _smaller(self._min_obstacle_distance_m, truth.min_obstacle_distance_m)
         for name in {name for _, name in truth.contacts}:
@@ -183,15 +185,15 @@ class RunFigures(Listener):
                 "r2": {"mean": self._r2.mean, "max": self._r2.maximum},
             },
             "min_distance_mm": scaled(self._min_distance_m, 1e3),
-            "contacts": sum(self._contacts.values()),
+            "contacts": sum(self._contacts.values()) if self._knows_truth else None,
             "first_contact": self._first_contact,
             "loop_age_ms": self._loop_age.summary_ms(),
             "task": {
                 "time_to_grasp_s": grasp_s,
                 "lifted_mm": 1e3 * self._lifted_m,
-                "placing": self._placing.summary(self._armed_s),
-                "obstacle_contacts": self._obstacle_contacts,
-                "contacts_by_object": dict(sorted(self._contacts.items())),
+                "placing": self._placing.summary(self._armed_s) if self._knows_truth else None,
+                "obstacle_contacts": self._obstacle_contacts if self._knows_truth else None,
+                "contacts_by_object": dict(sorted(self._contacts.items())) if self._knows_truth else None,
                 "min_obstacle_distance_mm": scaled(self._min_obstacle_distance_m, 1e3),
             },
         }

@@ -88,6 +88,8 @@ class FramePacker:
     def pack(self, frame: PerceivedObjects) -> bytes:
         """One frame."""
         last, self._last = self._last, frame
+        if last is not None and last.names is not frame.names and last.names != frame.names:
+            last = None
         parts = [_FRAME.pack(frame.time_s, last is None)]
         for name in ARRAYS:
             parts += _packed(getattr(frame, name), None if last is None else getattr(last, name))
@@ -120,7 +122,10 @@ class FrameUnpacker:
     """Frames from what is new in them."""
 
     def __init__(self, scene: PerceivedObjects) -> None:
-        """scene: any frame of the same scene: the shapes of its meshes do not change and are not recorded."""
+        """scene: any frame of the same scene: the shapes of its meshes do not change and are not recorded.
+
+        Frames without meshes may be of other objects.
+        """
         self._scene = scene
         self._last: PerceivedObjects | None = None
 
@@ -141,14 +146,14 @@ class FrameUnpacker:
             names = msgspec.msgpack.decode(content[position - length : position], type=tuple[str, ...])
         else:
             names = last.names
-        if names != self._scene.names:
+        others = names != self._scene.names
+        if others and len(arrays["mesh_index"]):
             raise ValueError("a frame of other objects than the scene's")
         roles = tuple(_ROLES[role] for role in content[position:])
         if len(roles) != len(names):
             raise ValueError(f"a frame with {len(roles)} roles of {len(names)} objects")
-        self._last = PerceivedObjects(
-            time_s=time_s, names=names, roles=roles, mesh_library=self._scene.mesh_library, **arrays
-        )
+        library = None if others else self._scene.mesh_library
+        self._last = PerceivedObjects(time_s=time_s, names=names, roles=roles, mesh_library=library, **arrays)
         return self._last
 
 

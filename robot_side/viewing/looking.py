@@ -166,10 +166,11 @@ class Looking:
         if newest is None:
             return []
         sensed, situation = newest
-        if self._begun != session.watchers.scene_begun:
+        others = view.outdated(situation.objects)
+        if self._begun != session.watchers.scene_begun or others:
             self._begun = session.watchers.scene_begun
             self._next_shapes_s = now_s
-            if not view.complete:
+            if others or not view.complete:
                 view.begin_shapes(session.shown_header(now_s), situation)
         if not view.work_on_shapes() or view.shapes is None:
             return []

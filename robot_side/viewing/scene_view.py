@@ -75,6 +75,10 @@ class SceneView:
         """Whether there are shapes, and of everything."""
         return self.shapes is not None and self.left_out == 0
 
+    def outdated(self, objects: PerceivedObjects) -> bool:
+        """Whether there are other objects in this frame than before, or of other shapes."""
+        return self._model.follow(objects)
+
     def begin_shapes(self, header: Header, situation: Situation) -> None:
         """Begin to put SceneShapes together anew, the objects nearest to the tool first."""
         self._making = self._make_shapes(header, situation.objects, situation.pose.tool_position_m)

@@ -11,6 +11,7 @@ from common.protocol.view_messages import Shape, ShapeKind
 from robot_side.drivers.mujoco.mesh_arrays import height_field_surface, mesh_triangles, mesh_vertices
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.scene import Scene
+from robot_side.surroundings.perceived import PerceivedObjects
 
 _KINDS: Final[dict[GeomKind, ShapeKind]] = {
     GeomKind.PLANE: "plane",
@@ -46,6 +47,11 @@ class SceneModel:
         self._model = model
         self._geoms = [thing.geoms for thing in scene.objects]
         self._start = scene.data.geom_xpos.copy(), scene.data.geom_xmat.reshape(-1, 3, 3).copy()
+
+    def follow(self, objects: PerceivedObjects) -> bool:
+        """Take note of a frame; whether there are other objects now: a scene's stay the same."""
+        del objects
+        return False
 
     def link_shapes(self) -> Iterator[Shape]:
         """Of the robot, in the frames of its bodies."""

@@ -14,6 +14,7 @@ WAYS_IN = (SessionEvent.ASKED_WHILE_FREE, SessionEvent.LEASE_PASSED)
 STOPPING = (
     SessionEvent.GAP,
     SessionEvent.OLD_LOOP,
+    SessionEvent.ARM_LOST,
     SessionEvent.EMERGENCY_STOP,
     SessionEvent.HAND_OVER,
     SessionEvent.SILENT,

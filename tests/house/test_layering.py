@@ -70,6 +70,7 @@ ARROWS = """
     robot_side/core.py: common/status common/timing robot_side/arm robot_side/events.py robot_side/gripper
         robot_side/laws robot_side/motion.py robot_side/operators robot_side/outcome robot_side/reporting
         robot_side/surroundings
+    robot_side/drivers/remote: common common/sockets common/timing robot_side/arm robot_side/surroundings
     robot_side/viewing: common common/companion common/protocol robot_side/core.py robot_side/drivers/mujoco
         robot_side/laws robot_side/reporting robot_side/surroundings
     robot_side/settings.py: common common/command robot_side/arm robot_side/drivers/mujoco robot_side/enlargement
@@ -77,11 +78,11 @@ ARROWS = """
     robot_side/recording: common common/recording robot_side/arm robot_side/compiled robot_side/events.py
         robot_side/settings.py robot_side/surroundings
     robot_side/parts.py: common common/protocol common/timing robot_side/compiled robot_side/core.py
-        robot_side/drivers/mujoco robot_side/enlargement robot_side/gripper robot_side/laws robot_side/laws/named.py
-        robot_side/operators robot_side/outcome robot_side/settings.py robot_side/surroundings
+        robot_side/drivers/mujoco robot_side/drivers/remote robot_side/enlargement robot_side/gripper robot_side/laws
+        robot_side/laws/named.py robot_side/operators robot_side/outcome robot_side/settings.py robot_side/surroundings
     robot_side: common common/command common/emulation common/loop common/protocol common/realtime common/sockets
-        common/status robot_side/compiled robot_side/core.py robot_side/events.py robot_side/parts.py
-        robot_side/recording robot_side/reporting robot_side/settings.py robot_side/viewing
+        common/status robot_side/compiled robot_side/core.py robot_side/drivers/remote robot_side/events.py
+        robot_side/parts.py robot_side/recording robot_side/reporting robot_side/settings.py robot_side/viewing
 
     operator_side/dualsense/effects:
     operator_side/dualsense/reports: common operator_side/dualsense/effects

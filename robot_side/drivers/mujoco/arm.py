@@ -1,7 +1,7 @@
 """The simulated arm: physics on a clock of its own, commands that run out, and sensors."""
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
@@ -12,7 +12,7 @@ from common.errors import FeelaheadError
 from robot_side.arm.port import ArmState
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GRIPPER_INPUT, GripperDrive
-from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
 from robot_side.drivers.mujoco.joint_reference import JointReference, MotionLimits
 from robot_side.drivers.mujoco.plant import LIMITS, PLANT, Plant, drive, inertia_table, sense
 from robot_side.drivers.mujoco.scene import Scene
@@ -23,6 +23,26 @@ LONGEST_TURN_S: Final = 0.02
 _LIMIT_MARGIN_RAD = 0.005
 # Bad positions, velocities and accelerations, which are neighbours among MuJoCo's warnings.
 _UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
+
+
+class Stand(NamedTuple):
+    """What is known of an arm that stands at its start with the gripper open."""
+
+    travel: GripperTravel | None
+    """None without a gripper"""
+    ends_rad: tuple[FloatArray, FloatArray]
+    """Where the joints (n,) end, lowest and highest"""
+
+
+def stand(scene: Scene) -> Stand:
+    """Open the gripper where the scene starts; ConfigurationError where its inputs' range is not known."""
+    robot, data, travel = scene.robot, scene.data, measure_gripper(scene)
+    if travel is not None:
+        data.qpos[robot.finger_positions] = travel.open_fingers
+    start = data.qpos[robot.arm_positions]
+    # A servo that stops at full deceleration runs over a little; at the model's own limit it would hit a stop.
+    lowest = np.minimum(robot.lower_rad + _LIMIT_MARGIN_RAD, start)
+    return Stand(travel, (lowest, np.maximum(robot.upper_rad - _LIMIT_MARGIN_RAD, start)))
 
 
 class MujocoArm:
@@ -53,17 +73,9 @@ class MujocoArm:
         self._clock: Clock | None = None
         self._state: ArmState | None = None
 
-        travel = measure_gripper(scene)
+        travel, self.ends_rad = stand(scene)
         self._gripper = None if travel is None else GripperDrive(travel, gripper_stroke_time_s)
-        if travel is not None:
-            data.qpos[robot.finger_positions] = travel.open_fingers
         start = data.qpos[robot.arm_positions].copy()
-        # A servo that stops at full deceleration runs over a little; at the model's own limit it would hit a stop.
-        self.ends_rad = (
-            np.minimum(robot.lower_rad + _LIMIT_MARGIN_RAD, start),
-            np.maximum(robot.upper_rad - _LIMIT_MARGIN_RAD, start),
-        )
-        """Where the joints (n,) end, lowest and highest"""
         limits = limits or MotionLimits()
         self._reference = JointReference(start, *self.ends_rad, limits, robot.drives.windup_rad(limits.windup_rad))
         mujoco.mj_forward(model, data)

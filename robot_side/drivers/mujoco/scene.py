@@ -15,6 +15,7 @@ from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from common.files.input_file import require_input_file
 from common.roles import Role
+from robot_side.arm.port import ArmState
 from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.object_primitives import ObjectPrimitives, SceneObject
@@ -61,6 +62,12 @@ class Scene:
     def step(self) -> None:
         """Advance the state by one step, whoever drives the arm."""
         mujoco.mj_step(self.model, self.data)
+
+    def show(self, measured: ArmState) -> None:
+        """Put the robot where an arm that is elsewhere says it is; nobody steps the state then."""
+        self.data.qpos[self.robot.arm_positions] = measured.joint_positions_rad
+        self.data.qpos[self.robot.finger_positions] = measured.finger_positions
+        mujoco.mj_kinematics(self.model, self.data)
 
 
 def load_scene(

@@ -1,0 +1,85 @@
+"""A port of the robot side for one program of its user's: an arm's driver, or what perceives objects."""
+
+from typing import Final, NamedTuple
+
+import zmq
+
+from common.sockets.authentication import Authenticator, RobotKeys
+from common.sockets.endpoints import parse_bind, refuse_open
+from common.sockets.frames import user_of
+from common.sockets.inbox import Inbox
+from common.sockets.shell import SocketShell, bind_socket
+from common.sockets.turns import Offered
+
+_HEARTBEAT_S: Final = 1.0
+_HANDSHAKE_S: Final = 5.0
+
+
+class Received(NamedTuple):
+    """A message, and when it was taken from the socket, by our monotonic clock."""
+
+    peer: bytes
+    payload: bytes
+    received_s: float
+
+
+class DriverPort(SocketShell):
+    """It binds, so that the program may come and go; keys and what is refused are those of the control port."""
+
+    def __init__(
+        self, bind: str, flag: str, limit_bytes: int, *, insecure: bool = False, keys: RobotKeys | None = None
+    ) -> None:
+        """Bind to `bind`, the address after `flag`, for messages of at most `limit_bytes`.
+
+        ConfigurationError when the address is malformed, in use, not this machine's, or open to the network with
+        neither `keys` nor `insecure`.
+        """
+        endpoint = parse_bind(bind, flag)
+        if keys is None and not insecure:
+            refuse_open(endpoint, bind, flag)
+        self.revoked = 0
+        """Messages under keys that were allowed at the handshake, and are no more"""
+        self._keys = keys
+        super().__init__(_HEARTBEAT_S, _HANDSHAKE_S)
+        try:
+            self._authenticator = None if keys is None else Authenticator(self._context, keys.allowed)
+            self._part = self._open_control(zmq.ROUTER)
+            self._part.setsockopt(zmq.MAXMSGSIZE, limit_bytes)
+            self._part.setsockopt(zmq.ROUTER_MANDATORY, 1)
+            # A program that was killed may come back under its old name before its end is noticed.
+            self._part.setsockopt(zmq.ROUTER_HANDOVER, 1)
+            if keys is not None:
+                keys.secure(self._part)
+            bind_socket(self._part, endpoint, flag)
+            self._inbox = Inbox(self._part, frames=2)
+            self.endpoint = self._part.getsockopt_string(zmq.LAST_ENDPOINT)
+            """The address that it is bound to, with the port that the system chose"""
+        except BaseException:
+            self.close()
+            raise
+
+    def receive(self) -> list[Received]:
+        """Take what has arrived, the oldest first; never waits."""
+        if self._authenticator is not None:
+            self._authenticator.serve()
+        received = []
+        for name, *frames in self._inbox.read():
+            if self._keys is not None and user_of(frames[-1] if frames else name) not in self._keys.allowed.names:
+                self.revoked += 1
+            elif len(frames) == 1:
+                received.append(Received(name.bytes, frames[0].bytes, self._clock.now()))
+            else:
+                self.rejected += 1
+        return received
+
+    def send(self, peer: bytes, payload: bytes) -> bool:
+        """Send at once or not at all; False, and counted in `dropped`, where it is gone or does not keep up."""
+        self._inbox.used()
+        taken = self.offer(self._part, peer, payload) is Offered.TAKEN
+        self.dropped += not taken
+        return taken
+
+    def wait(self, timeout_s: float) -> float:
+        """Wait for a message, at most `timeout_s`; the time by our monotonic clock then."""
+        self.wait_for(timeout_s, [self._inbox], self._authenticator)
+        return self._clock.now()

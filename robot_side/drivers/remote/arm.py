@@ -1,0 +1,82 @@
+"""An arm whose driver is a process beside the robot side, in any language."""
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from common.arrays import FloatArray
+from common.errors import FeelaheadError
+from robot_side.arm.port import Arm, ArmState
+from robot_side.drivers.remote.driver_session import ArmShape, DriverSession
+
+
+class Wire(Protocol):
+    """A port that one program speaks to."""
+
+    def receive(self) -> Sequence[tuple[bytes, bytes, float]]:
+        """(peer, payload, when it was taken from the socket) of what has arrived."""
+        ...
+
+    def send(self, peer: bytes, payload: bytes) -> bool:
+        """Send at once or not at all."""
+        ...
+
+
+class RemoteArm(Arm):
+    """An Arm that asks and tells a driver. Its states are as old as they are: `time_s` says so, at the earliest."""
+
+    joint_count = 0
+
+    def __init__(
+        self, wire: Wire, shape: ArmShape, show: Callable[[ArmState], None], note: Callable[[str], None]
+    ) -> None:
+        """show: told each new state. note: told in one line what is wrong with a driver."""
+        self.session = DriverSession(shape)
+        self.joint_count = len(shape.joint_names)
+        self._wire, self._show, self._note = wire, show, note
+        self._shown: ArmState | None = None
+        self._now_s = 0.0
+
+    def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
+        """Follow `joint_velocity_rad_s` (n,) until `valid_until_s`; it leaves with the gripper's command.
+
+        ValueError for a wrong shape or a value that is not finite: nothing of it is applied.
+        """
+        self.session.command(joint_velocity_rad_s, valid_until_s)
+
+    def command_gripper(self, closing: float, valid_until_s: float) -> None:
+        """Close (+1), hold (0) or open (-1) at that share of the gripper's speed until `valid_until_s`; send both.
+
+        ValueError for a value outside [-1, 1] or a time that is not finite.
+        """
+        self.session.command_gripper(closing, valid_until_s)
+        self._send()
+
+    def exchange(self, now_s: float) -> bool:
+        """Take what the driver said by `now_s`; whether it has ever said where the arm is."""
+        session, self._now_s = self.session, now_s
+        for message in self._wire.receive():
+            session.receive(*message)
+        session.expire(now_s)
+        for text in session.take_notes():
+            self._note(text)
+        if session.state is not None and session.state is not self._shown:
+            self._shown = session.state
+            self._show(session.state)
+        return session.state is not None
+
+    def begin(self, now_s: float) -> bool:
+        """Exchange before the first tick: the arm is told to stand still; whether it has said where it is."""
+        ready = self.exchange(now_s)
+        self._send()
+        return ready
+
+    def state(self, now_s: float) -> ArmState:
+        """The newest state that has arrived by `now_s`, however old; FeelaheadError before the first."""
+        self.exchange(now_s)
+        if self.session.state is None:
+            raise FeelaheadError("the driver has not said yet where the arm is")
+        return self.session.state
+
+    def _send(self) -> None:
+        for peer, payload in self.session.outgoing(self._now_s):
+            self._wire.send(peer, payload)

@@ -1,0 +1,210 @@
+"""Who drives the arm, and what it said last: states in, commands out, without I/O."""
+
+import math
+from collections import Counter
+from typing import Final, Literal, NamedTuple
+
+import msgspec
+
+from common.arrays import FloatArray
+from common.errors import OtherVersionError, RemoteProtocolError
+from robot_side.arm.port import ArmState
+from robot_side.drivers.remote.driver_clock import DriverClock
+from robot_side.drivers.remote.messages import (
+    DRIVER_VERSION,
+    DriverCommand,
+    DriverState,
+    Refusal,
+    decoded,
+    encode,
+    floats,
+)
+
+SILENT_S: Final = 0.1
+"""A driver that was silent for so long is gone."""
+COMMAND_PERIOD_S: Final = 0.004
+"""As often as commands come at most; what stops the arm leaves at once."""
+_REFUSAL_PERIOD_S: Final = 1.0
+_DECODER: Final = msgspec.msgpack.Decoder(DriverState)
+
+_UNANSWERED: Final = 250
+"""A driver that has echoed none of so many commands, a second's, echoes none at all."""
+
+Why = Literal["second", "version", "malformed", "joints", "order", "echo", "clock"]
+
+
+class ArmShape(NamedTuple):
+    """What every state must have, and what one that says nothing of the gripper stands for."""
+
+    joint_names: tuple[str, ...]
+    finger_names: tuple[str, ...]
+    open_fingers: FloatArray
+    """(f,) positions of an open gripper"""
+    opening_m: float
+    """Its free gap; 0 without a gripper"""
+
+
+class _Told(NamedTuple):
+    """What the arm was told last."""
+
+    velocities: tuple[float, ...]
+    until_s: float
+
+
+class DriverSession:
+    """One driver at a time: the first that speaks, until it falls silent."""
+
+    def __init__(self, shape: ArmShape) -> None:
+        self.state: ArmState | None = None
+        """The newest; None before the first whose age is known"""
+        self.rejected: Counter[Why] = Counter()
+        """States that were rejected whole, by the reason"""
+        self.accepted = 0
+        self._shape = shape
+        self._peer: bytes | None = None
+        self._last_peer: bytes | None = None
+        self._heard_s = self._measured_s = -math.inf
+        self._sequence = -1
+        self._clock = DriverClock()
+        self._closing = (0.0, -math.inf)
+        self._told = _Told((0.0,) * len(shape.joint_names), -math.inf)
+        self._sent = self._sent_before = 0
+        self._sent_s, self._first_sent_s = -math.inf, math.inf
+        self._moves = False
+        self._refused_s = -math.inf
+        self._outgoing: list[tuple[bytes, bytes]] = []
+        self._said: set[Why] = set()
+        self._notes: list[str] = []
+
+    @property
+    def present(self) -> bool:
+        """Whether there is a driver."""
+        return self._peer is not None
+
+    def receive(self, peer: bytes, payload: bytes, received_s: float) -> None:
+        """Take one message; what cannot be is rejected whole, counted and told."""
+        if self._peer not in (None, peer):
+            self._reject("second", "a second driver, while the first one goes on", peer, received_s)
+            return
+        try:
+            said = decoded(payload, _DECODER, DRIVER_VERSION)
+            self._require_fitting(said)
+        except OtherVersionError as error:
+            self._reject("version", str(error), peer, received_s)
+        except RemoteProtocolError as error:
+            self._reject("malformed", str(error), peer, received_s)
+        except ValueError as error:
+            self._reject("joints", str(error), peer, received_s)
+        else:
+            self._take(peer, said, received_s)
+
+    def expire(self, now_s: float) -> None:
+        """Forget a driver that has fallen silent, after all that came was received: another one may speak now."""
+        if self._peer is not None and now_s - self._heard_s > SILENT_S:
+            self._notes.append(f"arm lost: nothing heard from the driver for {now_s - self._heard_s:.2f} s")
+            self._peer = None
+
+    def command(self, velocities_rad_s: FloatArray, until_s: float) -> None:
+        """What the arm is to do until then, by our clock; see `outgoing`. ValueError as for `Arm.command`."""
+        velocities = tuple(velocities_rad_s.tolist())
+        if velocities_rad_s.shape != (len(self._shape.joint_names),) or not all(map(math.isfinite, velocities)):
+            raise ValueError(
+                f"joint_velocity_rad_s = {velocities_rad_s}; valid: {len(self._shape.joint_names)} finite numbers"
+            )
+        if not math.isfinite(until_s):
+            raise ValueError(f"valid_until_s = {until_s}; valid: finite")
+        self._told = _Told(velocities, until_s)
+
+    def command_gripper(self, closing: float, until_s: float) -> None:
+        """How fast to close until then. ValueError as for `Arm.command_gripper`."""
+        if not (-1.0 <= closing <= 1.0 and math.isfinite(until_s)):
+            raise ValueError(f"closing = {closing} until {until_s}; valid: -1 to 1, and a finite time")
+        self._closing = closing, until_s
+
+    def outgoing(self, now_s: float) -> list[tuple[bytes, bytes]]:
+        """Take what has to leave now: (peer, payload)."""
+        leaving, self._outgoing = self._outgoing, []
+        closing = self._closing[0] if self._closing[1] > now_s else 0.0
+        moves = (any(self._told.velocities) and self._told.until_s > now_s) or closing != 0.0
+        due = now_s - self._sent_s >= COMMAND_PERIOD_S or (self._moves and not moves)
+        if self._peer is not None and due:
+            self._sent += 1
+            self._sent_s, self._moves = now_s, moves
+            self._first_sent_s = min(self._first_sent_s, now_s)
+            velocities, until_s = self._told.velocities, self._clock.drivers_s(self._told.until_s)
+            command = DriverCommand(DRIVER_VERSION, self._sent, now_s, velocities, closing, until_s)
+            leaving.append((self._peer, encode(command)))
+        return leaving
+
+    def take_notes(self) -> list[str]:
+        """News since the last call, a line each."""
+        notes, self._notes = self._notes, []
+        return notes
+
+    def summary(self) -> dict[str, int]:
+        """How many states were taken, and how many rejected, by reason."""
+        return {"accepted": self.accepted} | {str(why): count for why, count in self.rejected.items()}
+
+    def _require_fitting(self, said: DriverState) -> None:
+        """ValueError for other joints than the model's, RemoteProtocolError for what was measured after it was sent."""
+        for name, values, names in (
+            ("joint_positions", said.joint_positions, self._shape.joint_names),
+            ("joint_velocities", said.joint_velocities, self._shape.joint_names),
+            ("joint_loads", said.joint_loads, self._shape.joint_names),
+            ("finger_positions", said.finger_positions, self._shape.finger_names),
+        ):
+            if values is not None and len(values) != len(names):
+                raise ValueError(f"{name} holds {len(values)}; valid: {len(names)} ({', '.join(names) or 'none'})")
+        if said.measured_s > said.sent_s:
+            raise RemoteProtocolError(f"measured_s = {said.measured_s} after sent_s = {said.sent_s}; valid: before")
+
+    def _take(self, peer: bytes, said: DriverState, received_s: float) -> None:
+        if self._peer is None:
+            # One that goes on after a silence keeps its clock, by which what it sent before is known to be old.
+            if self._last_peer != peer or said.sequence <= self._sequence:
+                self._begin(said.sequence)
+            self._peer = self._last_peer = peer
+            self._notes.append("driver: connected")
+        if said.sequence <= self._sequence:
+            why = f"sequence {said.sequence} after {self._sequence}; valid: rising"
+            self._reject("order", why, peer, received_s)
+            return
+        self._heard_s, self._sequence = received_s, said.sequence
+        ours = said.echo_s is not None and self._first_sent_s <= said.echo_s <= received_s
+        echoed = (said.echo_s, said.held_s) if ours and said.echo_s is not None else None
+        if not self._clock.take(said.sent_s, received_s, echoed):
+            self._clock = DriverClock()
+            self._reject("clock", "its clock jumped, or echo_s and held_s are no stamps of ours", peer, received_s)
+            return
+        if not self._clock.known:
+            if self._sent - self._sent_before > _UNANSWERED:
+                why = "echo_s is none of our stamps; valid: sent_s of the newest command that was read"
+                self._reject("echo", why, peer, received_s)
+            return
+        # One that comes late says so: the arm is lost by its age, until younger ones come.
+        measured_s = min(self._clock.ours_s(said.measured_s), received_s)
+        self.accepted += 1
+        self._measured_s = max(self._measured_s, measured_s)
+        shape, fingers = self._shape, said.finger_positions
+        self.state = ArmState(
+            time_s=self._measured_s,
+            joint_positions_rad=floats(said.joint_positions),
+            joint_velocities_rad_s=floats(said.joint_velocities),
+            finger_positions=shape.open_fingers if fingers is None else floats(fingers),
+            gripper_opening_m=shape.opening_m if said.opening_m is None else said.opening_m,
+            gripper_holding=said.holding,
+            joint_loads_nm=None if said.joint_loads is None else floats(said.joint_loads),
+        )
+
+    def _begin(self, sequence: int) -> None:
+        """Know nothing of a new driver, whose first message has this number."""
+        self._clock, self._sequence, self._sent_before = DriverClock(), sequence - 1, self._sent
+
+    def _reject(self, why: Why, text: str, peer: bytes, now_s: float) -> None:
+        self.rejected[why] += 1
+        if why not in self._said:
+            self._said.add(why)
+            self._notes.append(f"driver: refused whole, and counted from now on: {text}")
+        if now_s - self._refused_s >= _REFUSAL_PERIOD_S:
+            self._refused_s = now_s
+            self._outgoing.append((peer, encode(Refusal(DRIVER_VERSION, text))))

@@ -1,0 +1,133 @@
+"""What a process that perceives objects tells the robot side (docs/drivers.md), and the frame that it makes."""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Any, Final
+
+import msgspec
+import numpy as np
+from msgspec import Meta, Struct
+from scipy.spatial.transform import Rotation
+
+from common.arrays import FloatArray
+from common.limits import Finite
+from common.roles import Role
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects
+
+FRAME_VERSION: Final = 1
+FRAME_LIMIT_BYTES: Final = 1024 * 1024
+MOST_OBJECTS: Final = 512
+_MOST_TETRAHEDRA: Final = 1024
+_UNIT: Final = 0.01
+"""A quaternion's length may differ from 1 by so much."""
+
+_Coordinate = Annotated[float, Meta(ge=-1e3, le=1e3)]
+_Size = Annotated[float, Meta(gt=0.0, le=1e3)]
+_Three = tuple[_Coordinate, _Coordinate, _Coordinate]
+_Sizes = tuple[_Size, _Size, _Size]
+_Tetrahedron = tuple[_Three, _Three, _Three, _Three]
+
+
+SHAPES: Final = ("sphere", "box", "ellipsoid", "half_space", "tetrahedra")
+
+
+class SeenObject(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One object: a name, a pose, and exactly one shape."""
+
+    name: Annotated[str, Meta(min_length=1, max_length=100)]
+    role: Role | None = None
+    """None: what the name's beginning tells"""
+    position_m: _Three = (0.0, 0.0, 0.0)
+    quaternion: tuple[_Coordinate, _Coordinate, _Coordinate, _Coordinate] = (1.0, 0.0, 0.0, 0.0)
+    """Object to world, w first"""
+    velocity_m_s: _Three = (0.0, 0.0, 0.0)
+    mean_m: _Three = (0.0, 0.0, 0.0)
+    """Mean error of the position, true minus perceived"""
+    sd_m: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
+    """Standard deviation of the position, per axis"""
+    sphere: _Size | None = None
+    """Radius"""
+    box: _Sizes | None = None
+    """Half sizes"""
+    ellipsoid: _Sizes | None = None
+    """Half axes"""
+    half_space: bool = False
+    """Solid where z <= 0 in its own frame"""
+    tetrahedra: Annotated[tuple[_Tetrahedron, ...], Meta(min_length=1, max_length=_MOST_TETRAHEDRA)] | None = None
+    """Four corners each, in its own frame"""
+
+
+class ObjectFrame(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """All objects that are there; times are by the sender's clock."""
+
+    version: int
+    sequence: Annotated[int, Meta(ge=0, le=2**53)]
+    sent_s: Finite
+    taken_s: Finite
+    """When the camera took it: no later than `sent_s`"""
+    objects: Annotated[tuple[SeenObject, ...], Meta(max_length=MOST_OBJECTS)]
+
+
+FRAME_DECODER: Final = msgspec.msgpack.Decoder(ObjectFrame)
+
+
+def require_possible(frame: ObjectFrame) -> None:
+    """ValueError for two objects of one name, no shape or several, a quaternion that is none, or a time to come."""
+    if frame.taken_s > frame.sent_s:
+        raise ValueError(f"taken_s = {frame.taken_s} after sent_s = {frame.sent_s}; valid: before")
+    names = [thing.name for thing in frame.objects]
+    for thing in frame.objects:
+        if names.count(thing.name) > 1:
+            raise ValueError(f"{thing.name!r} is there {names.count(thing.name)} times; valid: once")
+        shapes = sum(bool(getattr(thing, shape)) for shape in SHAPES)
+        if shapes != 1:
+            raise ValueError(f"{thing.name!r} has {shapes} shapes; valid: 1 of {', '.join(SHAPES)}")
+        if abs(math.hypot(*thing.quaternion) - 1.0) > _UNIT:
+            raise ValueError(f"{thing.name!r}: quaternion = {thing.quaternion}; valid: of length 1, w first")
+
+
+def perceived(things: Sequence[SeenObject], roles: Sequence[Role], time_s: float) -> PerceivedObjects:
+    """A frame of these objects, which are possible, in these roles."""
+    quaternions = np.array([thing.quaternion for thing in things]).reshape(-1, 4)
+    turned = Rotation.from_quat(quaternions, scalar_first=True).as_matrix() if things else np.empty((0, 3, 3))
+    # An error that is known on average is none any more.
+    positions = _rows(np.add(thing.position_m, thing.mean_m) for thing in things)
+    arrays: dict[str, Any] = {name: [] for kind in KINDS for name in (*kind.parts, kind.owner)}
+    for index, thing in enumerate(things):
+        kind, primitives = _primitives(thing, positions[index], turned[index])
+        for values in () if roles[index] is Role.IGNORED else primitives:
+            arrays[f"{kind}_object"].append(index)
+            for name, value in values.items():
+                arrays[name].append(value)
+    for one in KINDS:
+        arrays[one.owner] = np.array(arrays[one.owner], dtype=np.int64)
+        for name, (_, shape) in one.parts.items():
+            arrays[name] = np.array(arrays[name], dtype=np.float64).reshape(-1, *shape)
+    return PerceivedObjects(
+        time_s=time_s,
+        names=tuple(thing.name for thing in things),
+        roles=tuple(roles),
+        positions_m=positions,
+        rotations=np.ascontiguousarray(turned),
+        velocities_m_s=_rows(thing.velocity_m_s for thing in things),
+        **arrays,
+    )
+
+
+def _primitives(thing: SeenObject, position: FloatArray, turned: FloatArray) -> tuple[str, list[dict[str, Any]]]:
+    """The kind of its shape, and the values of the arrays of each primitive."""
+    if thing.sphere is not None:
+        return "sphere", [{"sphere_centers_m": position, "sphere_radii_m": thing.sphere}]
+    if thing.tetrahedra is not None:
+        corners = np.array(thing.tetrahedra) @ turned.T + position
+        return "tetrahedron", [{"tetrahedron_vertices_m": each} for each in corners]
+    if thing.half_space:
+        normal = turned[:, 2] / np.linalg.norm(turned[:, 2])
+        return "half_space", [{"half_space_normals": normal, "half_space_offsets_m": normal @ position}]
+    kind, sizes, name = ("box", thing.box, "half_sizes") if thing.box else ("ellipsoid", thing.ellipsoid, "half_axes")
+    return kind, [{f"{kind}_centers_m": position, f"{kind}_rotations": turned, f"{kind}_{name}_m": sizes}]
+
+
+def _rows(values: Iterable[Any]) -> FloatArray:
+    found: FloatArray = np.array([*values], dtype=np.float64).reshape(-1, 3)
+    return found

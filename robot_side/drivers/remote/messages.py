@@ -1,0 +1,107 @@
+"""What an arm's driver and the robot side tell each other (docs/drivers.md): maps in MessagePack."""
+
+from typing import Annotated, Any, Final, TypeVar
+
+import msgspec
+import numpy as np
+from msgspec import Meta, Struct
+
+from common.arrays import FloatArray
+from common.errors import OtherVersionError, RemoteProtocolError
+from common.limits import Finite
+
+DRIVER_VERSION: Final = 1
+STATE_LIMIT_BYTES: Final = 4096
+MOST_JOINTS: Final = 64
+
+_Count = Annotated[int, Meta(ge=0, le=2**53)]
+_Duration = Annotated[float, Meta(ge=0.0, lt=1e6)]
+_Value = Annotated[float, Meta(ge=-1e6, le=1e6)]
+_Values = Annotated[tuple[_Value, ...], Meta(max_length=MOST_JOINTS)]
+Message = TypeVar("Message", bound=Struct)
+
+
+class DriverState(Struct, frozen=True, forbid_unknown_fields=True):
+    """What a driver says of its arm; times are by its own clock."""
+
+    version: int
+    sequence: _Count
+    """Rises with every message of one connection"""
+    sent_s: Finite
+    measured_s: Finite
+    """No later than `sent_s`"""
+    joint_positions: _Values
+    """(n,) in the model's order; rad, or m for a prismatic joint"""
+    joint_velocities: _Values
+    """(n,) in rad/s or m/s"""
+    echo_s: Finite | None = None
+    """`sent_s` of the newest command that it has read; None before the first"""
+    held_s: _Duration = 0.0
+    """How long ago it read that, at `sent_s`"""
+    finger_positions: _Values | None = None
+    """(f,) of the joints beyond the tool's, in the model's order"""
+    opening_m: _Duration | None = None
+    holding: bool = False
+    joint_loads: _Values | None = None
+    """(n,) N m, or N: what it carries"""
+
+
+class DriverCommand(Struct, frozen=True):
+    """What its arm is to do."""
+
+    version: int
+    sequence: int
+    sent_s: float
+    """By the robot side's clock, to be echoed"""
+    joint_velocities: tuple[float, ...]
+    closing: float
+    """1 closes and -1 opens the gripper at full speed, 0 holds it"""
+    valid_until_s: float
+    """By the driver's clock: it stops then, unless there is a newer one"""
+
+
+class Refusal(Struct, frozen=True):
+    """Why nothing is taken from who sent the last message."""
+
+    version: int
+    refused: str
+
+
+_ENCODER: Final = msgspec.msgpack.Encoder()
+_VERSION: Final = msgspec.msgpack.Decoder(dict[str, Any])
+_BAD_BYTES: Final = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+
+
+def encode(message: DriverCommand | Refusal) -> bytes:
+    """Pack a message."""
+    return _ENCODER.encode(message)
+
+
+def decoded(payload: bytes, decoder: "msgspec.msgpack.Decoder[Message]", version: int) -> Message:
+    """Unpack and validate a message; RemoteProtocolError says which field cannot be.
+
+    OtherVersionError, a kind of it, for a map of another version.
+    """
+    try:
+        message = decoder.decode(payload)
+    except _BAD_BYTES as error:
+        _require_version(payload, version)
+        raise RemoteProtocolError(str(error)) from error
+    if (said := getattr(message, "version", None)) != version:
+        raise OtherVersionError(f"version {said}; valid: {version}")
+    return message
+
+
+def _require_version(payload: bytes, version: int) -> None:
+    """OtherVersionError for a map that names another one, whatever else it holds."""
+    try:
+        said = _VERSION.decode(payload).get("version")
+    except _BAD_BYTES:
+        return
+    if isinstance(said, int) and said != version:
+        raise OtherVersionError(f"version {said}; valid: {version}")
+
+
+def floats(values: tuple[float, ...]) -> FloatArray:
+    """A tuple of numbers as an array."""
+    return np.array(values, dtype=np.float64)

@@ -1,0 +1,126 @@
+"""Perceived objects of a process beside the robot side, in any language."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import Final, Literal
+
+from common.errors import FeelaheadError, OtherVersionError, RemoteProtocolError
+from common.roles import Role
+from robot_side.drivers.remote.arm import Wire
+from robot_side.drivers.remote.frame_message import (
+    FRAME_DECODER,
+    FRAME_VERSION,
+    MOST_OBJECTS,
+    ObjectFrame,
+    SeenObject,
+    perceived,
+    require_possible,
+)
+from robot_side.drivers.remote.messages import Refusal, decoded, encode
+from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.roles import role_from_name
+from robot_side.surroundings.validity import require_valid
+
+OLD_S: Final = 0.5
+"""A newest frame that is older is told. What it says holds on: nobody feels less for it."""
+_REFUSAL_PERIOD_S: Final = 1.0
+
+Why = Literal["second", "version", "malformed", "order"]
+
+
+class RemoteObjects:
+    """An ObjectSource: the newest whole frame that came, from one sender at a time."""
+
+    def __init__(self, wire: Wire, roles: Mapping[str, Role], sd_m: float, note: Callable[[str], None]) -> None:
+        """roles: by name, before what frames say. sd_m: σ_c that the law reckons with. note: told what is wrong."""
+        self.rejected: Counter[Why] = Counter()
+        """Frames that were rejected whole, by the reason"""
+        self.accepted = 0
+        self._wire, self._roles, self._sd_m, self._note = wire, dict(roles), sd_m, note
+        self._peer: bytes | None = None
+        self._sequence = -1
+        self._heard_s = self._taken_s = self._refused_s = -math.inf
+        self._frame: PerceivedObjects | None = None
+        self._known: dict[str, SeenObject] = {}
+        self._said: set[str] = set()
+        self._is_old = False
+
+    def perceive(self, now_s: float) -> PerceivedObjects:
+        """The newest frame at `now_s`; FeelaheadError before the first."""
+        if not self.exchange(now_s) or self._frame is None:
+            raise FeelaheadError("no objects have been perceived yet")
+        return self._frame
+
+    def set_role(self, name: str, role: Role) -> None:
+        """Change what the object `name` is to the task, from the next frame on."""
+        self._roles[name] = role
+
+    def exchange(self, now_s: float) -> bool:
+        """Take the frames that have come; whether there has ever been one."""
+        for peer, payload, received_s in self._wire.receive():
+            self._receive(peer, payload, received_s)
+        old = self._frame is not None and now_s - self._taken_s > OLD_S
+        if old is not self._is_old:
+            self._is_old = old
+            age = f"the newest frame is {now_s - self._taken_s:.1f} s old; what it shows holds on"
+            self._note(f"objects: {age if old else 'frames come again'}")
+        return self._frame is not None
+
+    def summary(self) -> dict[str, int]:
+        """How many frames were taken, and how many rejected, by reason."""
+        return {"accepted": self.accepted} | {str(why): count for why, count in self.rejected.items()}
+
+    def _receive(self, peer: bytes, payload: bytes, received_s: float) -> None:
+        if peer != self._peer and received_s - self._heard_s <= OLD_S:
+            self._reject("second", "a second sender, while the first one goes on", peer, received_s)
+            return
+        try:
+            frame = decoded(payload, FRAME_DECODER, FRAME_VERSION)
+            if peer == self._peer and frame.sequence <= self._sequence and received_s - self._heard_s <= OLD_S:
+                why = f"sequence {frame.sequence} after {self._sequence}; valid: rising"
+                self._reject("order", why, peer, received_s)
+                return
+            self._take(frame, received_s)
+        except OtherVersionError as error:
+            self._reject("version", str(error), peer, received_s)
+        except (RemoteProtocolError, ValueError) as error:
+            self._reject("malformed", str(error), peer, received_s)
+        else:
+            self.accepted += 1
+            self._peer, self._sequence, self._heard_s = peer, frame.sequence, received_s
+
+    def _take(self, frame: ObjectFrame, received_s: float) -> None:
+        """ValueError for what no frame can be."""
+        require_possible(frame)
+        # An object keeps its place among the names, and one that is gone has no shape there: it may be held.
+        known = self._known | {thing.name: thing for thing in frame.objects}
+        if len(known) > MOST_OBJECTS:
+            raise ValueError(
+                f"{len(known)} names so far; valid: up to {MOST_OBJECTS}, the same name for the same object"
+            )
+        present = {thing.name for thing in frame.objects}
+        roles = [self._role(thing) if thing.name in present else Role.IGNORED for thing in known.values()]
+        taken_s = received_s - (frame.sent_s - frame.taken_s)
+        seen = perceived([*known.values()], roles, taken_s)
+        require_valid(seen)
+        self._known, self._frame, self._taken_s = known, seen, taken_s
+        widest = max(frame.objects, key=lambda thing: thing.sd_m, default=None)
+        if widest is not None and widest.sd_m > self._sd_m:
+            told = f"sd_m = {widest.sd_m} of {widest.name!r} is more than the {self._sd_m} that is reckoned with"
+            self._tell("sd", f"objects: {told}; to raise that: --camera.sd-m {widest.sd_m}")
+
+    def _role(self, thing: SeenObject) -> Role:
+        return self._roles.get(thing.name) or thing.role or role_from_name(thing.name)
+
+    def _tell(self, about: str, text: str) -> None:
+        if about not in self._said:
+            self._said.add(about)
+            self._note(text)
+
+    def _reject(self, why: Why, text: str, peer: bytes, now_s: float) -> None:
+        self.rejected[why] += 1
+        self._tell(why, f"objects: refused whole, and counted from now on: {text}")
+        if now_s - self._refused_s >= _REFUSAL_PERIOD_S:
+            self._refused_s = now_s
+            self._wire.send(peer, encode(Refusal(FRAME_VERSION, text)))

@@ -1,0 +1,58 @@
+"""The shapes of objects that are perceived elsewhere, for whoever draws them; they change from frame to frame."""
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from common.protocol.view_messages import Shape
+from robot_side.drivers.mujoco.scene import Scene
+from robot_side.surroundings.perceived import KINDS, PerceivedObjects
+from robot_side.viewing.shapes import SceneModel
+
+_SIZES: Final = {"sphere": "sphere_radii_m", "box": "box_half_sizes_m", "ellipsoid": "ellipsoid_half_axes_m"}
+_IN_PLACE: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+_CORNERS: Final = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]], dtype="<u4")
+
+
+class PerceivedModel(SceneModel):
+    """The links of a scene's robot, and whatever objects the newest frame has."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene)
+        self._frame: PerceivedObjects | None = None
+        self._known: tuple[object, ...] = ()
+
+    def follow(self, objects: PerceivedObjects) -> bool:
+        """Take over a frame's objects; whether there are others now, or of other shapes."""
+        if objects is self._frame:
+            return False
+        arrays = [*(kind.owner for kind in KINDS), *_SIZES.values()]
+        known = objects.names, *(getattr(objects, name).tobytes() for name in arrays)
+        self._frame = objects
+        if known == self._known:
+            return False
+        self._known, self.objects = known, objects.names
+        self.may_move = np.arange(len(objects.names))
+        return True
+
+    def object_shapes(self, index: int) -> Iterator[Shape]:
+        """Of one object, in its own frame."""
+        frame = self._frame
+        if frame is None or frame.positions_m is None or frame.rotations is None:
+            return
+        for kind, name in _SIZES.items():
+            for size in getattr(frame, name)[getattr(frame, f"{kind}_object") == index]:
+                x, y, z = [*np.atleast_1d(size).tolist(), 0.0, 0.0][:3]
+                yield Shape(index, False, kind, (x, y, z), _IN_PLACE)  # type: ignore[arg-type]
+        if index in frame.half_space_object:
+            yield Shape(index, False, "plane", (0.0, 0.0, 0.0), _IN_PLACE)
+        for corners in frame.tetrahedron_vertices_m[frame.tetrahedron_object == index]:
+            own = (corners - frame.positions_m[index]) @ frame.rotations[index]
+            # Seen from outside, whichever way round its corners are.
+            triangles = _CORNERS if np.linalg.det(own[1:] - own[0]) < 0.0 else _CORNERS[:, ::-1]
+            yield Shape(
+                *(index, False, "mesh", (1.0, 1.0, 1.0), _IN_PLACE),
+                vertices_m=own.astype("<f4").tobytes(),
+                triangles=triangles.tobytes(),
+            )

@@ -1,0 +1,10 @@
+"""The built-in scene."""
+
+import pytest
+
+from robot_side.drivers.mujoco.scene import Scene, load_scene
+
+
+@pytest.fixture(scope="session")
+def scene() -> Scene:
+    return load_scene()

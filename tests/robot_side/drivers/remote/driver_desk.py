@@ -1,0 +1,104 @@
+"""A driver and a robot side's end of it in virtual time, with a delay both ways and a clock of the driver's own."""
+
+from collections import deque
+from typing import Any
+
+import msgpack
+import numpy as np
+
+from robot_side.arm.port import ArmState
+from robot_side.drivers.remote.arm import RemoteArm
+from robot_side.drivers.remote.driver_session import ArmShape
+
+SHAPE = ArmShape(("shoulder", "elbow"), ("finger",), np.array([0.04]), 0.08)
+TICK_S = 0.001
+AHEAD_S = 1000.0
+"""What the driver's clock is ahead of ours."""
+
+
+class DriverDesk:
+    """The wire between both, and a driver that follows velocities perfectly."""
+
+    def __init__(self, delay_s: float = 0.0, measuring_s: float = 0.0, period_s: float = 0.01) -> None:
+        self.delay_s, self.measuring_s, self.period_s = delay_s, measuring_s, period_s
+        self.now_s = 5.0
+        self.notes: list[str] = []
+        self.shown: list[ArmState] = []
+        self.arm = RemoteArm(self, SHAPE, self.shown.append, self.notes.append)
+        self.joints = np.zeros(2)
+        self.velocities = np.zeros(2)
+        self.refused: list[str] = []
+        self.peer, self.sequence, self.speaks = b"driver", 0, True
+        self.also: dict[str, Any] = {}
+        self._sent_s = self._moved_s = 0.0
+        self.newest: dict[str, Any] | None = None
+        self._read_s = 0.0
+        self._to_robot: deque[tuple[float, bytes, bytes]] = deque()
+        self._to_driver: deque[tuple[float, dict[str, Any]]] = deque()
+
+    def receive(self) -> list[tuple[bytes, bytes, float]]:
+        """As the robot side's port."""
+        found = []
+        while self._to_robot and self._to_robot[0][0] <= self.now_s:
+            _, peer, payload = self._to_robot.popleft()
+            found.append((peer, payload, self.now_s))
+        return found
+
+    def send(self, peer: bytes, payload: bytes) -> bool:
+        """As the robot side's port."""
+        self._to_driver.append((self.now_s + self.delay_s, msgpack.unpackb(payload)))
+        return peer == self.peer
+
+    @property
+    def drivers_s(self) -> float:
+        """The time by the driver's clock."""
+        return self.now_s + AHEAD_S
+
+    def say(self, peer: bytes | None = None, **fields: Any) -> None:
+        """Send a state; fields: in place of what is true."""
+        self.sequence += 1
+        newest = self.newest
+        state: dict[str, Any] = {
+            "version": 1,
+            "sequence": self.sequence,
+            "sent_s": self.drivers_s,
+            "measured_s": self.drivers_s - self.measuring_s,
+            "echo_s": None if newest is None else newest["sent_s"],
+            "held_s": 0.0 if newest is None else self.drivers_s - self._read_s,
+            "joint_positions": self.joints.tolist(),
+            "joint_velocities": self.velocities.tolist(),
+        }
+        payload = msgpack.packb(state | self.also | fields)
+        self._to_robot.append((self.now_s + self.delay_s, peer or self.peer, payload))
+
+    def drive(self) -> None:
+        """What a driver does all the time, if it runs."""
+        while self._to_driver and self._to_driver[0][0] <= self.now_s:
+            message = self._to_driver.popleft()[1]
+            if "refused" in message:
+                self.refused.append(message["refused"])
+            else:
+                self.newest, self._read_s = message, self.drivers_s
+        valid = self.newest is not None and self.drivers_s < self.newest["valid_until_s"]
+        self.velocities = np.array(self.newest["joint_velocities"]) if self.newest and valid else np.zeros(2)
+        self.joints = self.joints + TICK_S * self.velocities
+        if self.now_s - self._sent_s >= self.period_s - 1e-9:
+            self._sent_s = self.now_s
+            self.say()
+
+    def run(self, seconds: float, velocity: float | None = None, gap_s: float = 0.1) -> None:
+        """Let time pass; velocity: commanded to both joints in every tick, for `gap_s` each."""
+        for _ in range(round(seconds / TICK_S)):
+            self.now_s += TICK_S
+            if self.speaks:
+                self.drive()
+            if not self.arm.begin(self.now_s):
+                continue
+            state = self.arm.state(self.now_s)
+            told, until_s = (0.0, state.time_s) if velocity is None else (velocity, self.now_s + gap_s)
+            self.arm.command(np.full(2, told), until_s)
+            self.arm.command_gripper(0.0, until_s)
+
+    def age_s(self) -> float:
+        """How old the newest state is taken to be."""
+        return self.now_s - self.arm.state(self.now_s).time_s

@@ -1,0 +1,167 @@
+"""An arm behind a driver, in virtual time: how old its states are, when it stops, and what is rejected whole."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.robot_side.drivers.remote.driver_desk import AHEAD_S, DriverDesk
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.02])
+@pytest.mark.parametrize("measuring_s", [0.0, 0.02])
+def test_a_state_is_as_old_as_it_can_be_and_little_older(delay_s: float, measuring_s: float) -> None:
+    desk = DriverDesk(delay_s, measuring_s, period_s=0.001)
+    desk.run(1.0)
+    true_s = delay_s + measuring_s
+    # At worst the whole round trip counts as the way here.
+    assert true_s - 1e-9 <= desk.age_s() <= true_s + delay_s + 0.006
+
+
+def test_the_arm_follows_and_stops_by_its_own_clock_when_nothing_more_comes() -> None:
+    desk = DriverDesk()
+    desk.run(0.5)
+    desk.run(0.5, velocity=0.4)
+    assert desk.velocities == pytest.approx(0.4)
+    desk.delay_s = math.inf
+    for _ in range(110):
+        desk.now_s += 0.001
+        desk.drive()
+    assert not desk.velocities.any()
+    stopped = desk.joints
+    assert stopped == pytest.approx(0.4 * 0.6, abs=0.4 * 0.03)
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.03])
+def test_a_command_never_holds_longer_than_it_may_however_long_it_was_on_its_way(delay_s: float) -> None:
+    desk = DriverDesk(delay_s)
+    desk.run(1.0)
+    desk.run(0.2, velocity=0.4)
+    assert desk.newest is not None
+    until_s = desk.newest["valid_until_s"] - AHEAD_S
+    sent_s = desk.newest["sent_s"]
+    assert sent_s + 0.1 - delay_s - 0.011 <= until_s <= sent_s + 0.1
+
+
+def test_a_stop_leaves_at_once() -> None:
+    desk = DriverDesk()
+    desk.run(0.5)
+    desk.run(0.2, velocity=0.4)
+    desk.run(0.002)
+    assert not desk.velocities.any()
+
+
+def test_a_silent_driver_is_told_nothing_more_and_ages() -> None:
+    desk = DriverDesk()
+    desk.run(0.5)
+    desk.speaks = False
+    desk.run(0.3, velocity=0.4)
+    assert desk.age_s() == pytest.approx(0.3, abs=0.02)
+    assert any(note.startswith("arm lost: nothing heard from the driver for 0.1") for note in desk.notes)
+    assert not desk.arm.session.present
+
+
+def test_a_driver_that_was_stopped_goes_on_and_what_it_said_before_is_known_to_be_old() -> None:
+    desk = DriverDesk()
+    desk.run(0.5)
+    before = desk.drivers_s
+    desk.speaks = False
+    desk.run(1.0)
+    # What lay in its queue comes first.
+    desk.say(sent_s=before, measured_s=before, echo_s=None, held_s=0.0)
+    desk.run(0.001)
+    assert desk.age_s() > 0.9
+    desk.speaks = True
+    desk.run(0.05)
+    assert desk.age_s() < 0.02
+
+
+def test_a_driver_that_restarts_begins_anew_with_another_clock() -> None:
+    desk = DriverDesk()
+    desk.run(0.5)
+    desk.speaks = False
+    desk.run(0.2)
+    desk.peer, desk.sequence, desk.newest, desk.speaks = b"another", 0, None, True
+    desk.also = {"sent_s": 3.0, "measured_s": 3.0}
+    desk.say()
+    desk.also = {}
+    desk.run(0.3)
+    assert desk.age_s() < 0.02
+    assert desk.notes.count("driver: connected") == 2
+
+
+def test_a_second_driver_is_refused_and_hears_why() -> None:
+    desk = DriverDesk()
+    desk.run(0.5)
+    desk.say(b"second", joint_positions=[9.0, 9.0])
+    desk.run(0.003)
+    assert desk.arm.session.rejected == {"second": 1}
+    assert "second" in desk.refused[0]
+    assert desk.arm.state(desk.now_s).joint_positions_rad == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "why", "says"),
+    [
+        ({"joint_positions": [math.nan, 0.0]}, "malformed", "joint_positions"),
+        ({"joint_velocities": [math.inf, 0.0]}, "malformed", "joint_velocities"),
+        ({"joint_positions": [0.0]}, "joints", "joint_positions holds 1; valid: 2 (shoulder, elbow)"),
+        ({"finger_positions": [0.0, 0.0]}, "joints", "valid: 1 (finger)"),
+        ({"version": 2}, "version", "version 2; valid: 1"),
+        ({"version": 2, "joint_positions": "elsewhere"}, "version", "version 2; valid: 1"),
+        ({"sequence": 1}, "order", "sequence 1 after"),
+        ({"measured_s": 1e9}, "malformed", "measured_s"),
+        ({"sent_s": 2000.0, "measured_s": 2000.0}, "clock", "clock jumped"),
+        ({"extra": 1}, "malformed", "extra"),
+    ],
+)
+def test_what_cannot_be_is_rejected_whole_counted_and_told_once(wrong: dict[str, Any], why: str, says: str) -> None:
+    desk = DriverDesk()
+    desk.run(0.5)
+    newest = desk.arm.session.state
+    # A clock that has jumped is another clock: what comes by it next counts.
+    times = 1 if why == "clock" else 3
+    for _ in range(times):
+        desk.say(**wrong)
+    desk.speaks = False
+    desk.run(0.001)
+    assert desk.arm.session.state is newest
+    assert desk.arm.session.rejected == {why: times}
+    assert len([note for note in desk.notes if says in note]) == 1
+    desk.speaks = True
+    desk.run(0.1)
+    assert desk.age_s() < 0.03
+    assert says in desk.refused[0]
+
+
+def test_a_driver_that_echoes_nothing_is_told_so_and_never_trusted() -> None:
+    desk = DriverDesk()
+    desk.also = {"echo_s": None}
+    desk.run(2.0)
+    assert desk.arm.session.state is None
+    assert any("echo_s" in note for note in desk.notes)
+    assert desk.refused
+
+
+def test_without_a_word_of_the_gripper_it_is_open() -> None:
+    desk = DriverDesk()
+    desk.run(0.5)
+    state = desk.arm.state(desk.now_s)
+    assert (state.finger_positions.tolist(), state.gripper_opening_m, state.joint_loads_nm) == ([0.04], 0.08, None)
+    desk.also = {"finger_positions": [0.01], "opening_m": 0.02, "holding": True, "joint_loads": [1.0, 2.0]}
+    desk.run(0.1)
+    state = desk.arm.state(desk.now_s)
+    assert (state.finger_positions.tolist(), state.gripper_opening_m) == ([0.01], 0.02)
+    assert state.gripper_holding
+    assert state.joint_loads_nm is not None
+    assert state.joint_loads_nm.tolist() == [1.0, 2.0]
+
+
+def test_a_command_that_is_none_is_refused_whole() -> None:
+    desk = DriverDesk()
+    for velocities in (np.zeros(3), np.array([np.nan, 0.0])):
+        with pytest.raises(ValueError, match="2 finite"):
+            desk.arm.command(velocities, 1.0)
+    with pytest.raises(ValueError, match="-1 to 1"):
+        desk.arm.command_gripper(1.5, 1.0)

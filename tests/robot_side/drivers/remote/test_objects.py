@@ -1,0 +1,153 @@
+"""Perceived objects of another process, in virtual time."""
+
+import math
+from typing import Any
+
+import msgpack
+import numpy as np
+import pytest
+
+from common.errors import FeelaheadError
+from common.roles import Role
+from robot_side.drivers.remote.objects import RemoteObjects
+from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.surroundings import Surroundings
+from robot_side.viewing.perceived_shapes import PerceivedModel
+
+CUP: dict[str, Any] = {"name": "cup", "sphere": 0.05, "position_m": [0.5, 0.0, 0.1]}
+CORNERS = [[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]]
+TURNED = [math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
+"""By a right angle about z"""
+
+
+class Sender:
+    """A process that perceives, and the wire from it."""
+
+    def __init__(self) -> None:
+        self.now_s, self.sequence = 10.0, 0
+        self.notes: list[str] = []
+        self.answers: list[dict[str, Any]] = []
+        self._sent: list[tuple[bytes, bytes, float]] = []
+        self.objects = RemoteObjects(self, {"door": Role.IGNORED}, 0.003, self.notes.append)
+
+    def receive(self) -> list[tuple[bytes, bytes, float]]:
+        sent, self._sent = self._sent, []
+        return sent
+
+    def send(self, peer: bytes, payload: bytes) -> bool:
+        self.answers.append(msgpack.unpackb(payload))
+        return bool(peer)
+
+    def says(self, *things: dict[str, Any], peer: bytes = b"eyes", **fields: Any) -> PerceivedObjects:
+        """What is perceived after this frame has come."""
+        self.sequence += 1
+        frame = {"version": 1, "sequence": self.sequence, "sent_s": 3.0, "taken_s": 2.98, "objects": things} | fields
+        self._sent.append((peer, msgpack.packb(frame), self.now_s))
+        return self.objects.perceive(self.now_s)
+
+
+def test_each_kind_is_where_it_is_said_to_be() -> None:
+    place = {"position_m": [1.0, 2.0, 3.0], "quaternion": TURNED}
+    frame = Sender().says(
+        {"name": "target", "box": [0.1, 0.2, 0.3], "velocity_m_s": [0.1, 0.0, 0.0], **place},
+        {"name": "table", "half_space": True, "position_m": [0.0, 0.0, -0.1]},
+        {"name": "egg", "ellipsoid": [0.1, 0.2, 0.3], "role": "obstacle", **place},
+        {"name": "wedge", "tetrahedra": CORNERS, **place},
+        {"name": "door", "box": [1.0, 1.0, 1.0]},
+        CUP,
+    )
+    assert frame.names == ("target", "table", "egg", "wedge", "door", "cup")
+    assert [role.value for role in frame.roles] == ["target", "support", "obstacle", "obstacle", "ignored", "obstacle"]
+    assert frame.time_s == pytest.approx(9.98)
+    assert frame.box_object.tolist() == [0]  # what is ignored has no shape
+    assert frame.box_rotations[0, :, 0] == pytest.approx([0.0, 1.0, 0.0])
+    assert (frame.half_space_normals[0], frame.half_space_offsets_m[0]) == (pytest.approx([0, 0, 1]), -0.1)
+    assert frame.tetrahedron_vertices_m[0, 1] == pytest.approx([1.0, 2.1, 3.0])
+    assert frame.sphere_centers_m[0] == pytest.approx([0.5, 0.0, 0.1])
+    assert frame.velocities_m_s is not None
+    assert frame.velocities_m_s[0] == pytest.approx([0.1, 0.0, 0.0])
+    assert Surroundings().target(frame) == 0
+
+
+def test_a_mean_error_is_taken_off_and_a_spread_beyond_the_laws_is_told() -> None:
+    sender = Sender()
+    frame = sender.says(CUP | {"mean_m": [0.01, 0.0, 0.0], "sd_m": 0.005})
+    assert frame.sphere_centers_m[0] == pytest.approx([0.51, 0.0, 0.1])
+    assert "sd_m = 0.005 of 'cup'" in sender.notes[0]
+    assert "--camera.sd-m 0.005" in sender.notes[0]
+
+
+def test_an_object_keeps_its_place_among_the_names_and_has_no_shape_while_it_is_gone() -> None:
+    sender = Sender()
+    sender.says(CUP, {"name": "ball", "sphere": 0.02})
+    frame = sender.says({"name": "ball", "sphere": 0.02})
+    assert (frame.names, frame.roles[0], frame.sphere_object.tolist()) == (("cup", "ball"), Role.IGNORED, [1])
+    frame = sender.says({"name": "box", "box": [0.1, 0.1, 0.1]}, CUP)
+    assert (frame.names, frame.sphere_object.tolist(), frame.box_object.tolist()) == (("cup", "ball", "box"), [0], [2])
+
+
+def test_a_role_is_changed_from_the_next_frame_on() -> None:
+    sender = Sender()
+    sender.says(CUP)
+    sender.objects.set_role("cup", Role.TARGET)
+    assert sender.says(CUP).roles == (Role.TARGET,)
+
+
+@pytest.mark.parametrize(
+    ("things", "fields", "says"),
+    [
+        ([CUP, CUP], {}, "'cup' is there 2 times; valid: once"),
+        ([{"name": "cup"}], {}, "'cup' has 0 shapes; valid: 1 of sphere, box"),
+        ([CUP | {"box": [1, 1, 1]}], {}, "'cup' has 2 shapes"),
+        ([CUP | {"quaternion": [1, 1, 0, 0]}], {}, "quaternion = (1.0, 1.0, 0.0, 0.0); valid: of length 1"),
+        ([CUP | {"position_m": [math.nan, 0, 0]}], {}, "position_m"),
+        ([CUP | {"sphere": -1.0}], {}, "sphere"),
+        ([CUP], {"taken_s": 4.0}, "taken_s = 4.0 after sent_s = 3.0"),
+        ([CUP], {"version": 2}, "version 2; valid: 1"),
+        ([CUP], {"sequence": 1}, "sequence 1 after 1; valid: rising"),
+        ([CUP], {"peer": b"other"}, "a second sender"),
+        ([{"name": f"n{k}", "sphere": 0.1} for k in range(512)], {}, "513 names so far; valid: up to 512"),
+    ],
+)
+def test_what_cannot_be_is_rejected_whole_counted_and_told_once(
+    things: list[dict[str, Any]], fields: dict[str, Any], says: str
+) -> None:
+    sender = Sender()
+    before = sender.says({"name": "first", "sphere": 0.1})
+    for _ in range(3):
+        assert sender.says(*things, **fields) is before
+    assert sum(sender.objects.rejected.values()) == 3
+    assert len([note for note in sender.notes if says in note]) == 1
+    assert says in sender.answers[0]["refused"]
+    assert len(sender.answers) == 1
+
+
+def test_a_silence_is_told_and_what_was_seen_last_holds_on() -> None:
+    sender = Sender()
+    frame = sender.says(CUP)
+    sender.now_s += 0.6
+    assert sender.objects.perceive(sender.now_s) is frame
+    assert "the newest frame is 0.6 s old" in sender.notes[-1]
+    sender.says(CUP, peer=b"restarted", sequence=0)
+    assert "come again" in sender.notes[-1]
+
+
+def test_nothing_is_perceived_before_the_first_frame() -> None:
+    with pytest.raises(FeelaheadError, match="no objects"):
+        Sender().objects.perceive(0.0)
+
+
+def test_what_is_drawn_follows_the_frames(scene: Any) -> None:
+    sender, model = Sender(), PerceivedModel(scene)
+    assert model.follow(sender.says(CUP, {"name": "wedge", "tetrahedra": CORNERS, "quaternion": TURNED}))
+    assert not model.follow(sender.says(CUP | {"position_m": [0, 0, 0]}, {"name": "wedge", "tetrahedra": CORNERS}))
+    assert model.objects == ("cup", "wedge")
+    (ball,), (wedge,) = model.object_shapes(0), model.object_shapes(1)
+    assert (ball.kind, ball.size_m) == ("sphere", (0.05, 0.0, 0.0))
+    corners = np.frombuffer(wedge.vertices_m, "<f4").reshape(-1, 3)
+    assert corners == pytest.approx(np.array(CORNERS[0]))
+    first, second, third = corners[np.frombuffer(wedge.triangles, "<u4").reshape(-1, 3)].swapaxes(0, 1)
+    outward = np.einsum("ti,ti->t", np.cross(second - first, third - first), first - corners.mean(axis=0))
+    assert (outward > 0.0).all()
+    assert model.follow(sender.says({"name": "wedge", "tetrahedra": CORNERS}))
+    assert list(model.object_shapes(0)) == []
