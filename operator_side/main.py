@@ -23,13 +23,14 @@ from common.recording.side import SideRecording, recording_to
 from common.silence import MOTION_PERIOD_S
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
+from operator_side.controller.background_writes import BackgroundWrites
+from operator_side.controller.connection import Connection
+from operator_side.controller.port import OpenController
+from operator_side.controller.search import BackgroundSearch, Ready
 from operator_side.core import OperatorSide
-from operator_side.dualsense.hid.background_writes import BackgroundWrites
-from operator_side.dualsense.hid.connection import Connection
 from operator_side.dualsense.hid.device import HidBackend, load_backend
 from operator_side.dualsense.hid.finding import Finder
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
-from operator_side.dualsense.hid.search import BackgroundSearch, OpenController, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.recorded import OperatorEncoder, build_recorded, recorded_status
 from operator_side.robot_link.commanding import ToRobot
@@ -219,8 +220,8 @@ class _Loop:
 
     def _feel(self, now_s: float) -> None:
         self._connection.beat(now_s)
-        if (output := self._core.output_report(now_s)) is not None:
-            self._connection.write(output, now_s)
+        if (feel := self._core.feel_now(now_s)) is not None:
+            self._connection.write(feel, now_s)
 
     def _send(self) -> None:
         if not self._sending.send(self._clock.now()):
@@ -249,8 +250,8 @@ class _Loop:
         self._say_what_is_new()
         if self._travel is not None:
             self._travel.follow()
-        if (report := self._connection.read(now_s)) is not None:
-            self._core.read_report(report, now_s)
+        if (state := self._connection.read(now_s)) is not None:
+            self._core.read_state(state, now_s)
         self._sending.push([*self._core.motion(now_s), *map(ToRobot, self._viewing.requests(now_s))], now_s)
         self._sending.measure(self._core.link.outgoing, now_s)
 

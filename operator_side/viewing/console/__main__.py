@@ -33,7 +33,7 @@ from common.protocol.view_messages import (
     VideoFrame,
     VideoStep,
 )
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts
 
 _NICENESS: Final = 5

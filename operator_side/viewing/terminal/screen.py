@@ -11,7 +11,7 @@ from rich.text import Text
 
 from common.command.live_line import UNKNOWN, millimetres, percent
 from common.command.live_view import LiveView, live_view, number, printable
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts
 
 SILENT_AFTER_S: Final = 0.5
