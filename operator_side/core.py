@@ -1,8 +1,8 @@
 """The operator side without I/O: bytes in, bytes out, and `now` with every call.
 
-control payloads ─▶ receive ─▶ newest stiffness ─▶ output_report ─▶ controller
-                                                     ▲ own commands under way
-controller reports ─▶ read_report ─▶ newest intent ─▶ motion ─▶ control payloads
+control payloads ─▶ receive ─▶ newest stiffness ─▶ feel_now ─▶ controller
+                                                  ▲ own commands under way
+controller's states ─▶ read_state ─▶ newest intent ─▶ motion ─▶ control payloads
 view payloads ─▶ receive_view ─▶ screen
 """
 
@@ -18,7 +18,8 @@ from common.protocol.link_end import Arrival, LinkEnd
 from common.protocol.messages import Compensation, Hello, LeaseNotice, LinkReport, StiffnessUpdate, Telemetry
 from common.status.codes import LinkState
 from common.status.statuses import OperatorStatus
-from operator_side.dualsense.reports.output_report import OutputReport
+from operator_side.controller.feel import Feel
+from operator_side.controller.state import ControllerState
 from operator_side.events import Input, Listener
 from operator_side.feel.blindness import Blindness
 from operator_side.feel.haptics import Haptics
@@ -89,7 +90,7 @@ class OperatorSide:
 
     @property
     def intent(self) -> OperatorIntent | None:
-        """What the hands meant by the newest report of the controller; None before the first."""
+        """What the hands meant by the newest state of the controller; None before the first."""
         return self.hands.intent
 
     @property
@@ -161,13 +162,10 @@ class OperatorSide:
         if message.header.epoch == self.link.peer_epoch:
             self.view.take(message)
 
-    def read_report(self, report: bytes, now_s: float) -> None:
-        """Take one input report of the controller; one that is malformed is counted and passed over."""
-        self._hear("report", report, now_s)
-        if self.hands.read(report, now_s) and (intent := self.hands.intent) is not None:
-            self._blindness.see_hands(released=intent.triggers_released)
-        else:
-            self.rejected += 1
+    def read_state(self, state: ControllerState, now_s: float) -> None:
+        """Take one state of the controller."""
+        self._hear("state", state, now_s)
+        self._blindness.see_hands(released=self.hands.read(state, now_s).triggers_released)
 
     def tune(self, probability: float | None, link: str | None, now_s: float) -> None:
         """The person wants another P, another emulated link, or both; None leaves it."""
@@ -241,17 +239,17 @@ class OperatorSide:
         if self.felt.expired(now_s) and self._standing.owns:
             self._blindness.lose(now_s)
 
-    def output_report(self, now_s: float) -> OutputReport | None:
+    def feel_now(self, now_s: float) -> Feel | None:
         """What the controller has to be told now; None while nothing changes, or while a change has to wait."""
         self._look(now_s)
         felt, intent = self.stiffness, self.hands.present(now_s)
         if felt is not None and felt.state != "armed":
             felt = None
         pulled = (0.0, 0.0) if intent is None else (intent.l2, intent.r2)
-        report = self.haptics.output_report(felt, pulled, self._blindness, now_s)
+        feel = self.haptics.due(felt, pulled, self._blindness, now_s)
         for one in self._listeners:
-            one.on_output(report, now_s)
-        return report
+            one.on_output(feel, now_s)
+        return feel
 
     def status(self, now_s: float) -> OperatorStatus:
         """What a person is shown; what the process knows beside it is not in it."""

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from typing import Literal
 
-from operator_side.dualsense.reports.output_report import OutputReport
+from operator_side.controller.feel import Feel
 from operator_side.robot_link.commanding import ToRobot
 
-Input = Literal["received", "seen", "report", "tuned", "calibrated", "found", "lost", "stopped"]
-"""What comes in: a control payload, a view payload, a controller's report, another P or link, a calibration; that the
+Input = Literal["received", "seen", "state", "tuned", "calibrated", "found", "lost", "stopped"]
+"""What comes in: a control payload, a view payload, a controller's state, another P or link, a calibration; that the
 controller came or went; a stop that was pressed away from it."""
 
 
@@ -20,5 +20,5 @@ class Listener:
     def on_motion(self, messages: Sequence[ToRobot], now_s: float) -> None:
         """Hear what is sent to the robot side."""
 
-    def on_output(self, report: OutputReport | None, now_s: float) -> None:
+    def on_output(self, feel: Feel | None, now_s: float) -> None:
         """Hear what the controller is told; None for nothing."""

@@ -13,13 +13,14 @@ from common.loop.process import Process
 from common.silence import MOTION_PERIOD_S
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
+from operator_side.controller.background_writes import BackgroundWrites
+from operator_side.controller.connection import Connection
+from operator_side.controller.port import OpenController
+from operator_side.controller.search import BackgroundSearch, Ready
 from operator_side.core import OperatorSide
-from operator_side.dualsense.hid.background_writes import BackgroundWrites
-from operator_side.dualsense.hid.connection import Connection
 from operator_side.dualsense.hid.device import HidBackend, load_backend
 from operator_side.dualsense.hid.finding import Finder
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
-from operator_side.dualsense.hid.search import BackgroundSearch, OpenController, Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.recorded import OperatorEncoder, build_recorded
 from operator_side.settings import OperatorSettings

@@ -11,8 +11,9 @@ from common.recording.entries import Kind, entry, text
 from common.recording.provenance import provenance
 from common.recording.side import SideRecording
 from operator_side.assembly import build_operator_side
+from operator_side.controller.feel import Feel
+from operator_side.controller.state import ControllerState
 from operator_side.core import OperatorSide
-from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
 from operator_side.events import Input, Listener
 from operator_side.robot_link.commanding import ToRobot
 from operator_side.settings import OperatorSettings
@@ -24,7 +25,7 @@ _NOBODY: Final = text(b"")
 _KINDS: Final[dict[Input, Kind]] = {
     "received": Kind.RECEIVED,
     "seen": Kind.SEEN,
-    "report": Kind.REPORT,
+    "state": Kind.HANDS,
     "tuned": Kind.TUNED,
     "calibrated": Kind.CALIBRATED,
     "found": Kind.FOUND,
@@ -42,17 +43,17 @@ class Recorder(Listener):
 
     def on_input(self, what: Input, content: object, now_s: float | None) -> None:
         """Note it; what has no time happened after the last call that had one."""
-        packed = content if isinstance(content, bytes) else msgspec.json.encode(content)
-        self._note((_KINDS[what], self._now_s if now_s is None else now_s, packed))
+        kept = content if isinstance(content, bytes | ControllerState) else msgspec.json.encode(content)
+        self._note((_KINDS[what], self._now_s if now_s is None else now_s, kept))
 
     def on_motion(self, messages: Sequence[ToRobot], now_s: float) -> None:
         """Note the messages."""
         self._note((Kind.MOTION, now_s, messages))
 
-    def on_output(self, report: OutputReport | None, now_s: float) -> None:
-        """Note the report."""
+    def on_output(self, feel: Feel | None, now_s: float) -> None:
+        """Note what was told."""
         self._now_s = now_s
-        self._note((Kind.OUTPUT, now_s, report))
+        self._note((Kind.OUTPUT, now_s, feel))
 
 
 class OperatorEncoder:
@@ -69,8 +70,10 @@ class OperatorEncoder:
             return now_s, b"".join((entry(kind, now_s), *sent))
         if kind == Kind.OUTPUT:
             asked = entry(kind, now_s)
-            written = b"" if content is None else entry(Kind.WRITTEN, now_s, build_output_report(content))
-            return now_s, asked + written
+            told = b"" if content is None else entry(Kind.TOLD, now_s, msgspec.msgpack.encode(content))
+            return now_s, asked + told
+        if kind == Kind.HANDS:
+            return now_s, entry(kind, now_s, msgspec.msgpack.encode(content))
         if kind == Kind.RECEIVED:
             return now_s, entry(kind, now_s, _NOBODY, content)
         if kind == Kind.SEEN:

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from common.errors import ConfigurationError
 from operator_side.calibration.store import calibration_path, load_calibration
+from operator_side.controller.connection import Connection
 from operator_side.core import OperatorSide
-from operator_side.dualsense.hid.connection import Connection
 from operator_side.hands.travel_calibration import TravelCalibration
 
 

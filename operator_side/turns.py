@@ -9,8 +9,8 @@ from common.loop.process import Process
 from common.sockets.operator import OperatorSockets
 from common.status.codes import Hands, LinkState
 from common.status.statuses import OperatorStatus
+from operator_side.controller.connection import Connection
 from operator_side.core import OperatorSide
-from operator_side.dualsense.hid.connection import Connection
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.robot_link.commanding import ToRobot
 from operator_side.robot_link.sending import Sending
@@ -145,8 +145,8 @@ class OperatorTurns:
 
     def _tell_controller(self, now_s: float) -> None:
         self._connection.beat(now_s)
-        if (output := self._core.output_report(now_s)) is not None:
-            self._connection.write(output, now_s)
+        if (feel := self._core.feel_now(now_s)) is not None:
+            self._connection.write(feel, now_s)
 
     def _move(self, now_s: float) -> None:
         core, connection = self._core, self._connection
@@ -160,8 +160,8 @@ class OperatorTurns:
         self._say_what_is_new()
         if self._travel is not None:
             self._travel.follow()
-        if (report := connection.read(now_s)) is not None:
-            core.read_report(report, now_s)
+        if (state := connection.read(now_s)) is not None:
+            core.read_state(state, now_s)
         self._sending.push([*core.motion(now_s), *map(ToRobot, self._viewing.requests(now_s))], now_s)
         self._sending.measure(core.link.outgoing, now_s)
 

@@ -36,7 +36,7 @@ class Kind(IntEnum):
     SEEN = 6
     """The operator side got a view payload; those longer than a control payload go elsewhere, as no core heeds them."""
     REPORT = 7
-    """An input report of the controller."""
+    """An input report of a DualSense, in recordings made before HANDS."""
     CALIBRATED = 8
     """The controller's travel, as JSON."""
     FOUND = 9
@@ -46,15 +46,19 @@ class Kind(IntEnum):
     MOTION = 11
     """The operator side was asked what to send; what it sent follows as SENT."""
     OUTPUT = 12
-    """It was asked what to write to the controller; what it wrote follows as WRITTEN."""
+    """It was asked what to tell the controller; what it told follows as TOLD, in earlier recordings as WRITTEN."""
     WRITTEN = 13
-    """An output report for the controller."""
+    """An output report for a DualSense on USB, in recordings made before TOLD."""
     STOPPED = 14
     """The emergency stop was pressed away from the controller."""
     TUNED = 15
     """A wish for other settings of the run, as JSON."""
     WATCHED = 16
     """The operator side told what it looks at, under the next of its core's sequence numbers."""
+    HANDS = 17
+    """The controller's state (operator_side/controller/state.py), in MessagePack."""
+    TOLD = 18
+    """What the controller was told to let feel (operator_side/controller/feel.py), in MessagePack."""
 
 
 class Entry(NamedTuple):

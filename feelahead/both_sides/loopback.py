@@ -19,8 +19,9 @@ from common.statistics import RunningStatistics
 from feelahead.both_sides.summary import merge_summaries
 from operator_side import events as operator_events
 from operator_side.assembly import build_operator_side
-from operator_side.dualsense.hid.connection import Connection
-from operator_side.dualsense.hid.search import OpenController, Ready
+from operator_side.controller.connection import Connection
+from operator_side.controller.port import OpenController
+from operator_side.controller.search import Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.people.whoever import whoever
 from operator_side.settings import OperatorSettings
@@ -127,8 +128,8 @@ class Loopback:
                 self._ticks += 1
                 self._robot_tick(due_s)
             self._deliver(due_s)
-            if (output := self.operator.output_report(due_s)) is not None:
-                self.connection.write(output, due_s)
+            if (feel := self.operator.feel_now(due_s)) is not None:
+                self.connection.write(feel, due_s)
         self.clock.advance_to(end_s)
 
     def summary(self) -> dict[str, Any]:
@@ -162,8 +163,8 @@ class Loopback:
             self._to_robot.change(self._there.profile("to_robot"))
         self.person.tick(now_s, self.operator.screen, self.operator.link.round_trip.mean or 0.0)
         self.connection.update(now_s)
-        if (report := self.connection.read(now_s)) is not None:
-            self.operator.read_report(report, now_s)
+        if (state := self.connection.read(now_s)) is not None:
+            self.operator.read_state(state, now_s)
         for message in self.operator.motion(now_s):
             self._to_robot.push(now_s, message.payload)
 

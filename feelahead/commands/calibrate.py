@@ -17,16 +17,15 @@ from rich.text import Text
 from common.clock import Clock, MonotonicClock, VirtualClock
 from common.command.command_line import parse_settings
 from common.command.stop_signal import StopSignal
-from common.errors import ConfigurationError, DeviceError, RemoteProtocolError
+from common.errors import ConfigurationError, DeviceError
 from common.files.output_file import require_output_file
 from operator_side.calibration.procedure import CalibrationProcedure, Step
 from operator_side.calibration.store import calibration_path, write_calibration
+from operator_side.controller.feel import RELEASED
+from operator_side.controller.port import Controller, OpenController
+from operator_side.controller.state import ControllerState
 from operator_side.dualsense.hid.device import load_backend
 from operator_side.dualsense.hid.finding import find_controller
-from operator_side.dualsense.hid.search import Device, OpenController
-from operator_side.dualsense.reports.controller_state import ControllerState
-from operator_side.dualsense.reports.input_report import parse_input_report
-from operator_side.dualsense.reports.output_report import RELEASED
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 from operator_side.people.calibrating_hands import CalibratingHands
@@ -101,7 +100,7 @@ Show = Callable[[CalibrationProcedure, ControllerState, float], None]
 
 
 def _measure(
-    device: Device,
+    device: Controller,
     procedure: CalibrationProcedure,
     clock: Clock,
     hands: CalibratingHands | None,
@@ -118,12 +117,8 @@ def _measure(
         now_s = clock.now()
         if hands is not None:
             hands.act(procedure.step, now_s)
-        if (report := device.read(now_s)) is not None:
+        if (state := device.read(now_s)) is not None:
             heard_s = now_s
-            try:
-                state = parse_input_report(report)
-            except RemoteProtocolError:
-                continue
             procedure.feed(state, now_s)
             show(procedure, state, now_s)
         elif now_s - heard_s > _SILENT_S:

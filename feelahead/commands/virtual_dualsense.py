@@ -12,8 +12,10 @@ from common.clock import Clock, MonotonicClock
 from common.command.command_line import parse_settings
 from common.command.stop_signal import StopSignal, ignore_broken_output
 from common.limits import Limited
-from operator_side.dualsense.effects.official import AnyEffect, Off, OtherEffect
+from operator_side.controller.feel import FREE_TRIGGER
+from operator_side.dualsense.effects.official import decode_effect, encode_effect
 from operator_side.dualsense.reports.models import Model
+from operator_side.dualsense.reports.output_report import encoded_effects
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import INPUT_REPORT_PERIOD_S, SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
@@ -94,11 +96,14 @@ class _Narrated(SimulatedDualSense):
     def __init__(self, transport: Transport, model: Model, say: Say) -> None:
         super().__init__(transport, model)
         self._say = say
+        self._effects = dict.fromkeys(("L2", "R2"), encode_effect(FREE_TRIGGER))
         self._last_words = self._state_in_words()
 
     def take_report(self, report: bytes, now_s: float) -> None:
         """Take it, and say the changes."""
         super().take_report(report, now_s)
+        l2, r2 = encoded_effects(report)
+        self._effects = {"L2": l2 or self._effects["L2"], "R2": r2 or self._effects["R2"]}
         told = self._state_in_words()
         for part, doing in told.items():
             if doing != self._last_words[part]:
@@ -106,11 +111,8 @@ class _Narrated(SimulatedDualSense):
         self._last_words = told
 
     def _state_in_words(self) -> dict[str, str]:
-        l2, r2 = self.effects
-        light = self.output.lightbar
-        return {
-            "L2": described(l2),
-            "R2": described(r2),
+        light = self.told.light
+        return {name: described(encoded) for name, encoded in self._effects.items()} | {
             "rumble": f"left {self.rumble.left:.0%}, right {self.rumble.right:.0%}",
             "lightbar": "as it was" if light is None else "red {}, green {}, blue {}".format(*light),
         }
@@ -124,8 +126,8 @@ def pulling(time_s: float) -> tuple[float, float, tuple[float, float]]:
     return (0.0, pull_n, stick) if turns % 1.0 < 0.5 else (pull_n, 0.0, stick)
 
 
-def described(effect: AnyEffect) -> str:
+def described(encoded: bytes) -> str:
     """An effect for people: "Off", "strengths 0 0 0 6 6 6 6 6 6 6", or the bytes of one that feelahead never sends."""
-    if isinstance(effect, OtherEffect):
-        return f"another effect, {effect.encoded.hex(' ')}"
-    return "Off" if effect == Off() else f"strengths {' '.join(map(str, effect.zone_strengths))}"
+    if (strengths := decode_effect(encoded)) is None:
+        return f"another effect, {encoded.hex(' ')}"
+    return f"strengths {' '.join(map(str, strengths))}" if any(strengths) else "Off"

@@ -10,7 +10,7 @@ from common.protocol.uniform_field import uniform_field
 from common.roles import Role
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
 from feelahead.lab.table import Row
-from operator_side.dualsense.effects.official import MAX_STRENGTH
+from operator_side.controller.feel import MAX_STRENGTH
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.people.person import SimulatedOperator
 from operator_side.people.settings import PersonSettings
@@ -149,7 +149,7 @@ class _Watch(Listener):
         """Take the strength of the zone under the finger; None for a trigger that is not pulled."""
         device = self.loopback.device
         travel = device.travel[trigger]
-        return device.effects[trigger].zone_strengths[zone_of(travel)] if travel > 0.0 else None
+        return device.strengths[trigger][zone_of(travel)] if travel > 0.0 else None
 
 
 def run_trial(trial: Trial, seed: int) -> Row:

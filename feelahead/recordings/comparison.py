@@ -11,7 +11,8 @@ from common.protocol.codec import decode
 from common.protocol.messages import StiffnessUpdate
 from common.recording.entries import Block, Entry, unpack_block
 from common.recording.reading import Recording
-from operator_side.dualsense.reports.output_report import OutputReport, parse_output_report
+from feelahead.recordings.controller import recorded_feel
+from operator_side.controller.feel import Feel
 
 WITHIN_EIGHTHS = 1.0
 WITHIN_M = 1e-12
@@ -42,9 +43,9 @@ class Comparison:
         """Whether it is what another processor may make of it, or better."""
         return self.worst_eighths <= WITHIN_EIGHTHS and self.worst_m <= WITHIN_M
 
-    def take(self, first: bytes | None, second: bytes | None, *, report: bool = False) -> None:
-        """One message as recorded and as made again; None for one that is missing. `report`: for the controller."""
-        counts = report or _is_stiffness(first if second is None else second) or self.side == "operator"
+    def take(self, first: bytes | None, second: bytes | None, told: int | None = None) -> None:
+        """One message as recorded and as made again; None for one that is missing. `told`: kind, for the controller."""
+        counts = told is not None or _is_stiffness(first if second is None else second) or self.side == "operator"
         same = first == second
         if counts:
             self.made += second is not None
@@ -56,7 +57,7 @@ class Comparison:
             return
         eighths, metres = math.inf, 0.0
         if first is not None and second is not None:
-            eighths, metres = _difference(first, second, report=report)
+            eighths, metres = _difference(first, second, told)
         self.worst_eighths = max(self.worst_eighths, eighths)
         self.worst_m = max(self.worst_m, metres)
 
@@ -127,11 +128,11 @@ def _is_stiffness(payload: bytes | None) -> bool:
         return False
 
 
-def _difference(first: bytes, second: bytes, *, report: bool) -> tuple[float, float]:
+def _difference(first: bytes, second: bytes, told: int | None) -> tuple[float, float]:
     """Eighths of strength and metres; infinite eighths where more differs than these."""
     with contextlib.suppress(RemoteProtocolError):
-        if report:
-            return _report_difference(parse_output_report(first), parse_output_report(second))
+        if told is not None:
+            return _feel_difference(recorded_feel(told, first), recorded_feel(told, second))
         one, other = decode(first), decode(second)
         if isinstance(one, StiffnessUpdate) and isinstance(other, StiffnessUpdate):
             return _message_difference(one, other)
@@ -149,11 +150,11 @@ def _message_difference(one: StiffnessUpdate, other: StiffnessUpdate) -> tuple[f
     return max(eighths), max(metres)
 
 
-def _report_difference(one: OutputReport, other: OutputReport) -> tuple[float, float]:
-    apart = [0.0 if (one.rumble, one.lightbar) == (other.rumble, other.lightbar) else math.inf]
+def _feel_difference(one: Feel, other: Feel) -> tuple[float, float]:
+    apart = [0.0 if (one.rumble, one.light) == (other.rumble, other.light) else math.inf]
     for a, b in ((one.l2, other.l2), (one.r2, other.r2)):
         if a is not None and b is not None:
-            apart += [abs(x - y) for x, y in zip(a.zone_strengths, b.zone_strengths, strict=True)]
+            apart += [abs(x - y) for x, y in zip(a, b, strict=True)]
         elif a is not b:
             apart.append(math.inf)
     return max(apart), 0.0

@@ -1,5 +1,6 @@
 """The cores once more, with the inputs that were recorded: the same stiffness bit for bit, or by how much not."""
 
+import contextlib
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -8,15 +9,16 @@ from typing import Final
 import msgspec
 
 from common.arrays import FloatArray
-from common.errors import ConfigurationError
+from common.errors import ConfigurationError, RemoteProtocolError
 from common.recording.entries import Kind, split_text
 from common.recording.provenance import processor_name, settings_from
 from common.recording.reading import Recording
 from common.roles import Role
 from feelahead.recordings.comparison import Comparison, differing_origin, recorded_entries, require_side
+from feelahead.recordings.controller import FEELS, STATES, as_recorded, recorded_state
 from operator_side.assembly import build_operator_side
+from operator_side.controller.feel import Feel
 from operator_side.core import OperatorSide
-from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
 from robot_side.arm.port import Arm, ArmState
@@ -103,7 +105,6 @@ def replay_robot(recording: Recording) -> Comparison:
 _INPUTS: Final[Mapping[int, Callable[[OperatorSide, bytes, float], object]]] = {
     Kind.RECEIVED: lambda core, content, now_s: core.receive(split_text(content)[1], now_s),
     Kind.SEEN: OperatorSide.receive_view,
-    Kind.REPORT: OperatorSide.read_report,
     Kind.CALIBRATED: lambda core, content, _: core.calibrate(msgspec.json.decode(content, type=TravelCalibration)),
     Kind.FOUND: lambda core, _, now_s: core.controller_found(now_s),
     Kind.LOST: lambda core, _, now_s: core.controller_lost(now_s),
@@ -115,37 +116,47 @@ _INPUTS: Final[Mapping[int, Callable[[OperatorSide, bytes, float], object]]] = {
 
 
 def replay_operator(recording: Recording) -> Comparison:
-    """Make every motion command and report to the controller again; ConfigurationError where it was not recorded."""
+    """Make every motion command, and all that the controller was told, again.
+
+    ConfigurationError where the side was not recorded.
+    """
     header = require_side(recording, "operator")
     settings = settings_from(header["settings"], OperatorSettings)
     core = build_operator_side(settings, header["epoch"], header["clock_domain"])
     compared = Comparison("operator", "commands and reports to the controller")
     sent: deque[bytes] = deque()
-    written: deque[bytes] = deque()
+    told: deque[Feel] = deque()
     for entry in recorded_entries(recording, "operator", compared.notes):
         now_s, content = entry.now_s, entry.content
         if (give := _INPUTS.get(entry.kind)) is not None:
             give(core, content, now_s)
-            continue
+        elif entry.kind in STATES:
+            with contextlib.suppress(RemoteProtocolError):  # as the core passed over what a controller garbled
+                core.read_state(recorded_state(entry.kind, content), now_s)
+        elif entry.kind in FEELS:
+            compared.take(content, as_recorded(entry.kind, told.popleft()) if told else None, entry.kind)
         match entry.kind:
             case Kind.MOTION:
                 _compare_rest(compared, sent)
                 sent.extend(message.payload for message in core.motion(now_s))
             case Kind.OUTPUT:
-                _compare_rest(compared, written, report=True)
-                if (report := core.output_report(now_s)) is not None:
-                    written.append(build_output_report(report))
+                _compare_untold(compared, told)
+                if (feel := core.feel_now(now_s)) is not None:
+                    told.append(feel)
             case Kind.SENT:
                 payload = split_text(split_text(content)[1])[1]
                 compared.take(payload, sent.popleft() if sent else None)
-            case Kind.WRITTEN:
-                compared.take(content, written.popleft() if written else None, report=True)
     _compare_rest(compared, sent)
-    _compare_rest(compared, written, report=True)
+    _compare_untold(compared, told)
     return compared
 
 
-def _compare_rest(compared: Comparison, made: deque[bytes], *, report: bool = False) -> None:
-    """Compare the outputs that had not been recorded."""
+def _compare_rest(compared: Comparison, made: deque[bytes]) -> None:
+    """Compare the messages that had not been recorded."""
     while made:
-        compared.take(None, made.popleft(), report=report)
+        compared.take(None, made.popleft())
+
+
+def _compare_untold(compared: Comparison, made: deque[Feel]) -> None:
+    while made:
+        compared.take(None, as_recorded(Kind.TOLD, made.popleft()), Kind.TOLD)

@@ -17,8 +17,7 @@ from common.arrays import FloatArray
 from common.errors import RemoteProtocolError
 from common.recording.entries import Entry, Kind, unpack_block
 from common.recording.reading import Recording
-from operator_side.dualsense.reports.input_report import parse_input_report
-from operator_side.dualsense.reports.output_report import parse_output_report
+from feelahead.recordings.controller import FEELS, STATES, recorded_feel, recorded_state
 from robot_side.recording.inputs import unpack_state
 
 JOINED_HZ: Final = 100.0
@@ -146,14 +145,12 @@ def _row(entry: Entry, zones: dict[str, tuple[float, ...]]) -> tuple[str, dict[s
                 row |= {f"position_rad.{index}": float(position), f"velocity_rad_s.{index}": float(velocity)}
             row |= {"gripper_opening_m": state.gripper_opening_m, "gripper_holding": state.gripper_holding}
             return "arm", row
-        if entry.kind == Kind.REPORT:
-            hands = parse_input_report(entry.content)
+        if entry.kind in STATES:
+            hands = recorded_state(entry.kind, entry.content)
             return "controller", {"l2_raw": hands.l2, "r2_raw": hands.r2}
-        if entry.kind == Kind.WRITTEN:
-            told = parse_output_report(entry.content)
-            for name, effect in (("l2", told.l2), ("r2", told.r2)):
-                if effect is not None:
-                    zones[name] = tuple(effect.zone_strengths)
+        if entry.kind in FEELS:
+            told = recorded_feel(entry.kind, entry.content)
+            zones.update((name, strengths) for name, strengths in (("l2", told.l2), ("r2", told.r2)) if strengths)
             return "felt", {f"{name}.{zone}": value for name in zones for zone, value in enumerate(zones[name])}
     except (RemoteProtocolError, ValueError):
         return None

@@ -13,7 +13,7 @@ from enum import Enum
 from typing import Final
 
 from common.errors import FeelaheadError
-from operator_side.dualsense.reports.controller_state import ControllerState, Stick
+from operator_side.controller.state import ControllerState, Stick
 from operator_side.hands.travel_calibration import LARGEST_REST, StickRest, TravelCalibration, TriggerTravel
 
 REST_S: Final = 1.0

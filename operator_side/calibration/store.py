@@ -16,7 +16,7 @@ from common.files.output_file import output_file
 from common.files.toml_complaint import explain
 from common.files.toml_file import read_toml
 from common.files.user_folders import configuration_folder
-from operator_side.dualsense.reports.feature_report import checked_address
+from operator_side.controller.port import checked_address
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 
 _LARGEST_BYTES: Final = 10_000

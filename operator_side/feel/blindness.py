@@ -9,7 +9,7 @@ seeing ─▶ blind ─▶ waiting ─▶ seeing
 from typing import Final
 
 from common.status.codes import Sight
-from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, Color, Rumble
+from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT, Color, Rumble
 
 SIGNAL_S: Final = 3.0
 """The motors say it for so long; the light until the field is back."""
@@ -47,7 +47,7 @@ class Blindness:
             self.sight, self.light = Sight.WAITING, USUAL_LIGHT
 
     def see_hands(self, *, released: bool) -> None:
-        """What a report of the controller says of both triggers."""
+        """What the controller's state says of both triggers."""
         if released and self.sight is Sight.WAITING:
             self.sight = Sight.SEEING
 

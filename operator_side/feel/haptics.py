@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from common.protocol.messages import Compensation, MotionCommand, StiffnessUpdate
 from common.reaction import WRITE_S
-from operator_side.dualsense.reports.output_report import RELEASED, OutputReport
+from operator_side.controller.feel import RELEASED, Feel
 from operator_side.feel.blindness import Blindness
 from operator_side.feel.commands_under_way import CommandsUnderWay, Displacement, Report
 from operator_side.feel.path_ahead import Aside
@@ -32,7 +32,7 @@ class Haptics:
         compensation: Compensation,
     ) -> None:
         self.writes = 0
-        """Output reports that were made."""
+        """What was told, one count for each write."""
         self.without_history = 0
         """Renderings that took the robot side's displacement, as our own was asked for and is not known."""
         self._settings = settings
@@ -40,7 +40,7 @@ class Haptics:
         self._swap_sides = swap_sides
         self._compensation = compensation
         self._bound = WriteBound()
-        self._written: OutputReport | None = RELEASED
+        self._written: Feel | None = RELEASED
         self._commands = CommandsUnderWay()
         self._commanding = False
         self._mapped: StiffnessUpdate | None = None
@@ -77,9 +77,9 @@ class Haptics:
             self._commands.sent(now_s, 0.0)
         self._commanding = False
 
-    def output_report(
+    def due(
         self, felt: StiffnessUpdate | None, pulled: tuple[float, float], blindness: Blindness, now_s: float
-    ) -> OutputReport | None:
+    ) -> Feel | None:
         """What the controller has to be told now; None while nothing changes, or while a change has to wait.
 
         felt: the newest field, None while there is none or the arm is not armed. pulled: as TriggerRendering's.
@@ -92,7 +92,7 @@ class Haptics:
         wanted = self.rendering.render(felt, pulled, known, now_s, aside)
         if blindness.light is not None:
             rumble = blindness.rumble(now_s) if felt is None else wanted.rumble
-            wanted = dataclasses.replace(wanted, rumble=rumble, lightbar=blindness.light)
+            wanted = dataclasses.replace(wanted, rumble=rumble, light=blindness.light)
         if wanted == self._written:
             return None
         before, shown = self._written, self._bound.next(self._written, wanted, now_s)
@@ -149,7 +149,7 @@ class Haptics:
         )
 
     @property
-    def written(self) -> OutputReport:
+    def written(self) -> Feel:
         """What the controller was told last; nothing while it has not been told anything yet."""
         return self._written or RELEASED
 

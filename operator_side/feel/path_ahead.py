@@ -16,7 +16,7 @@ from common.arrays import FloatArray, IntArray
 from common.protocol.around import ACROSS, DIRECTIONS, TURNED, Around
 from common.protocol.messages import TriggerField
 from common.touch_speed import touch_speed_m_s
-from operator_side.dualsense.effects.official import MAX_STRENGTH
+from operator_side.controller.feel import MAX_STRENGTH
 from operator_side.feel.commands_under_way import AT_REST, Course, Sticks
 from operator_side.feel.zones import FREE, Zones
 

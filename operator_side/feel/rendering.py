@@ -1,6 +1,6 @@
 """From the field ahead to what both triggers and the motors do.
 
-field ─▶ ten zones of each trigger ─▶ falls over 100 ms, rises at once ─▶ effects
+field ─▶ ten zones of each trigger ─▶ falls over 100 ms, rises at once ─▶ strengths
 """
 
 import math
@@ -12,9 +12,16 @@ from msgspec import Meta
 from common.limits import Limited
 from common.protocol.messages import StiffnessUpdate, TriggerField
 from common.reaction import HORIZON_S
-from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT, MultiPositionFeedback, Off, TriggerEffect
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
-from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble
+from operator_side.controller.feel import (
+    FREE_TRIGGER,
+    MAX_STRENGTH,
+    RELEASED,
+    SENSED_TRAVEL,
+    ZONE_COUNT,
+    Feel,
+    Rumble,
+    Strengths,
+)
 from operator_side.feel.commands_under_way import Displacement
 from operator_side.feel.path_ahead import Aside, traced_zones
 from operator_side.feel.stand_pulse import StandPulse
@@ -52,8 +59,7 @@ class RenderedTrigger:
         self._last_s = -math.inf
         self._traced: Aside | None = None
         self._zones = FREE
-        self._strengths: tuple[int, ...] = FREE.strengths
-        self._effect: TriggerEffect = Off()
+        self._strengths = FREE_TRIGGER
 
     def render(
         self,
@@ -65,8 +71,8 @@ class RenderedTrigger:
         aside: Aside | None = None,
         *,
         forth: bool = True,
-    ) -> TriggerEffect:
-        """The effect at `now_s`; the others: of `zone_strengths`, or of `traced_zones` while sticks lead aside."""
+    ) -> Strengths:
+        """The strengths at `now_s`; the others: of `zone_strengths`, or of `traced_zones` while sticks lead aside."""
         horizon_s = self._settings.horizon_s
         zones = zone_strengths(field, horizon_m, self._travels, other_travel, moving, horizon_s)
         if aside is not None:
@@ -79,25 +85,24 @@ class RenderedTrigger:
         self.beyond_horizon += zones.beyond_horizon
         if zones is FREE and not any(self._levels):
             self._last_s = now_s
-            return self._effect
+            return self._strengths
         fallen = MAX_STRENGTH * max(now_s - self._last_s, 0.0) / FALL_S
         self._last_s = now_s
         self._levels = [
             max(float(strength), level - fallen) for strength, level in zip(zones.strengths, self._levels, strict=True)
         ]
         self._show(tuple(math.ceil(level - _ROUNDING) for level in self._levels))
-        return self._effect
+        return self._strengths
 
     def release(self) -> None:
         """Let go at once."""
         self._levels = [0.0] * ZONE_COUNT
-        self._show(FREE.strengths)
+        self._show(FREE_TRIGGER)
 
-    def _show(self, strengths: tuple[int, ...]) -> None:
+    def _show(self, strengths: Strengths) -> None:
         if strengths == self._strengths:
             return
         self._strengths = strengths
-        self._effect = MultiPositionFeedback(strengths) if any(strengths) else Off()
         self.max_strength = max(self.max_strength, strengths[-1])
         free = strengths.count(0)
         if free < ZONE_COUNT and (self.first_stiff is None or free < self.first_stiff):
@@ -132,7 +137,7 @@ class TriggerRendering:
         known: Displacement | None,
         now_s: float,
         aside: Aside | None = None,
-    ) -> OutputReport:
+    ) -> Feel:
         """What both triggers and the motors have to do at `now_s`; all off, at once, for None.
 
         pulled: present calibrated travel of the trigger that retreats and of the one that advances. known: δ and w by
@@ -145,12 +150,12 @@ class TriggerRendering:
             return RELEASED
         retreating, advancing = (self.r2, self.l2) if self._swap_sides else (self.l2, self.r2)
         back, forth = moving_along(felt, known)
-        effects = (
+        strengths = (
             retreating.render(felt.l2, felt.horizon_m, pulled[1], back, now_s, aside, forth=False),
             advancing.render(felt.r2, felt.horizon_m, pulled[0], forth, now_s, aside),
         )
-        l2, r2 = reversed(effects) if self._swap_sides else effects
-        return OutputReport(l2=l2, r2=r2, rumble=Rumble(felt.rumble, self._stand.right(felt.stands, now_s)))
+        l2, r2 = reversed(strengths) if self._swap_sides else strengths
+        return Feel(l2=l2, r2=r2, rumble=Rumble(felt.rumble, self._stand.right(felt.stands, now_s)))
 
     def zones(self) -> dict[str, Any]:
         """The run's figures of the controller's own triggers."""

@@ -8,7 +8,7 @@ was written before keeps a change back for longer than four writes take to be ea
 import dataclasses
 from typing import Final
 
-from operator_side.dualsense.reports.output_report import RELEASED, OutputReport
+from operator_side.controller.feel import RELEASED, Feel
 
 MOST_WRITES_PER_S: Final = 100
 _PARTS: Final = ("l2", "r2", "rumble")
@@ -25,7 +25,7 @@ class WriteBound:
         self._left = _BURST
         self._last_s: float | None = None
 
-    def next(self, written: OutputReport | None, wanted: OutputReport, now_s: float) -> OutputReport | None:
+    def next(self, written: Feel | None, wanted: Feel, now_s: float) -> Feel | None:
         """What the triggers and motors are to do after a write now; None for no write, now or at all.
 
         `written`: what they do by the last write, None where nobody knows: they are released then, whatever is left.
@@ -44,7 +44,7 @@ class WriteBound:
         shown = dataclasses.replace(written, **released)
         return shown if self._allows(written, shown) else None
 
-    def _allows(self, written: OutputReport, shown: OutputReport) -> bool:
+    def _allows(self, written: Feel, shown: Feel) -> bool:
         cost = 1 + _parts_on(shown) - _parts_on(written)
         if shown == written or cost > self._left:
             return False
@@ -52,5 +52,5 @@ class WriteBound:
         return True
 
 
-def _parts_on(shown: OutputReport) -> int:
+def _parts_on(shown: Feel) -> int:
     return sum(getattr(shown, part) != getattr(RELEASED, part) for part in _PARTS)

@@ -16,8 +16,7 @@ from typing import Final, NamedTuple
 from common.protocol.messages import StiffnessUpdate, TriggerField
 from common.reaction import HORIZON_S
 from common.touch_speed import touch_speed_m_s
-from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.controller.feel import FREE_TRIGGER, MAX_STRENGTH, SENSED_TRAVEL, ZONE_COUNT, Strengths
 from operator_side.feel.commands_under_way import Displacement
 from operator_side.hands.travel_calibration import TriggerTravel
 
@@ -25,8 +24,8 @@ from operator_side.hands.travel_calibration import TriggerTravel
 class Zones(NamedTuple):
     """One trigger's ten zones."""
 
-    strengths: tuple[int, ...]
-    """0 to 8, never falling with travel."""
+    strengths: Strengths
+    """Never falling with travel."""
     beyond_horizon: int
     """How many are full because nobody knows what lies so far ahead."""
 
@@ -36,7 +35,7 @@ class Zones(NamedTuple):
         return Zones(tuple(strengths), max(self.beyond_horizon, others.beyond_horizon))
 
 
-FREE: Final = Zones((0,) * ZONE_COUNT, 0)
+FREE: Final = Zones(FREE_TRIGGER, 0)
 
 
 def zone_travels(travel: TriggerTravel) -> tuple[float, ...]:

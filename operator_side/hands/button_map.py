@@ -5,7 +5,7 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Final
 
-from operator_side.dualsense.reports.controller_state import Button
+from operator_side.controller.state import Button
 
 
 class Action(Enum):

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
-from operator_side.dualsense.reports.controller_state import ControllerState, Stick
+from operator_side.controller.state import ControllerState, Stick
 from operator_side.hands.button_map import Action, button_of
 from operator_side.hands.travel_calibration import TravelCalibration
 

@@ -1,37 +1,32 @@
-"""What the hands mean by the newest report of the controller."""
+"""What the hands mean by the newest state of the controller."""
 
 from typing import Final
 
-from common.errors import RemoteProtocolError
-from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.controller.state import ControllerState
 from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import TravelCalibration
 
 INTENT_EXPIRES_S: Final = 0.1
-"""Without a controller report for this long nothing is sent, so that the robot stops."""
+"""Without a state of the controller for this long nothing is sent, so that the robot stops."""
 
 
 class Hands:
-    """What the hands mean by the newest report of the controller."""
+    """What the hands mean by the newest state of the controller."""
 
     def __init__(self, calibration: TravelCalibration, *, swap_sides: bool) -> None:
         self.calibration = calibration
         self.intent: OperatorIntent | None = None
-        """None before the first report, and once the controller is lost"""
+        """None before the first state, and once the controller is lost"""
         self.lost_s: float | None = None
         """When the controller went; None once the arm has stopped since"""
         self._swap_sides = swap_sides
-        self._reported_s = 0.0
+        self._read_s = 0.0
 
-    def read(self, report: bytes, now_s: float) -> bool:
-        """Take one input report; False for one that is malformed."""
-        try:
-            state = parse_input_report(report)
-        except RemoteProtocolError:
-            return False
-        self.intent = operator_intent(state, self.calibration, swap_sides=self._swap_sides)
-        self._reported_s = now_s
-        return True
+    def read(self, state: ControllerState, now_s: float) -> OperatorIntent:
+        """Take one state; what the hands mean by it."""
+        self.intent = intent = operator_intent(state, self.calibration, swap_sides=self._swap_sides)
+        self._read_s = now_s
+        return intent
 
     def lose(self, now_s: float) -> None:
         """Forget what the hands did last: the controller went."""
@@ -44,4 +39,4 @@ class Hands:
 
     def present(self, now_s: float) -> OperatorIntent | None:
         """Return the intent unless it has expired."""
-        return None if now_s - self._reported_s > INTENT_EXPIRES_S else self.intent
+        return None if now_s - self._read_s > INTENT_EXPIRES_S else self.intent

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Final
 
-from operator_side.dualsense.effects.official import ZONE_COUNT
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Stick
+from operator_side.controller.feel import SENSED_TRAVEL, ZONE_COUNT
+from operator_side.controller.state import Stick
 
 LARGEST_REST: Final = 0.3
 """A stick that rests farther from its centre is broken, or held."""

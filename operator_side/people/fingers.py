@@ -8,7 +8,8 @@ from typing import Final
 import numpy as np
 
 from common.protocol.messages import Vector2
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
+from operator_side.controller.feel import SENSED_TRAVEL
+from operator_side.controller.state import Button
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import (
     NORMAL_FINGER_FORCE_N,

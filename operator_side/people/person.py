@@ -20,8 +20,8 @@ import numpy as np
 
 from common.protocol.messages import Telemetry, Vector2, Vector3
 from common.status.codes import Doing
-from operator_side.dualsense.reports.controller_state import Button
-from operator_side.dualsense.reports.output_report import WARNING_LIGHT
+from operator_side.controller.feel import WARNING_LIGHT
+from operator_side.controller.state import Button
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.fingers import Cue, Fingers, within_unit_circle
@@ -117,7 +117,7 @@ class SimulatedOperator:
         while self._seen and self._seen[0][0] <= now_s - self._settings.visual_reaction_s:
             self._view = self._seen.popleft()[1]
         self._feel(now_s)
-        if self._device.output.lightbar == WARNING_LIGHT:
+        if self._device.told.light == WARNING_LIGHT:
             self._warned_s = now_s
         if self._view is None or now_s - self._warned_s < _CALM_S:
             self._fingers.do(0.0, _REST)
@@ -138,7 +138,7 @@ class SimulatedOperator:
             self._moves.break_off(now_s)
         self._gently_along |= stiff
         self._gently_across |= rumbles
-        seeing = self._device.output.lightbar != WARNING_LIGHT
+        seeing = self._device.told.light != WARNING_LIGHT
         self._stands |= self._pulse.acted_on(now_s, seeing and self._device.rumble.right > 0.0)
 
     def _enter(self, phase: Phase, now_s: float) -> None:

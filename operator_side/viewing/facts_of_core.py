@@ -8,9 +8,8 @@ import msgspec
 
 from common.status.codes import Hands
 from common.status.statuses import OperatorStatus
+from operator_side.controller.feel import FREE_TRIGGER, met
 from operator_side.core import OperatorSide
-from operator_side.dualsense.effects.official import ZONE_COUNT, Off
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
 from operator_side.viewing.facts import DelayFacts, HandsFacts, OperatorFacts, SceneFacts, Ten, TriggerFacts
 
 _RECENT_S: Final = 1.0
@@ -41,16 +40,16 @@ def operator_facts(
         needed = list(core.haptics.needed_m(felt, (back, forth), now_s)[::order])
     raw = (0.0, 0.0) if core.intent is None else core.intent.raw
     triggers = []
-    for k, (effect, rendered) in enumerate(
+    for k, (strengths, rendered) in enumerate(
         ((written.l2, core.haptics.rendering.l2), (written.r2, core.haptics.rendering.r2))
     ):
-        zones, field, travel = cast(Ten, (effect or Off()).zone_strengths), fields[k], pulled[k]
+        zones, field, travel = cast(Ten, strengths or FREE_TRIGGER), fields[k], pulled[k]
         triggers.append(
             TriggerFacts(
                 travel=travel,
                 raw=None if travel is None else raw[k],
                 zones=zones,
-                meets=0 if travel is None else zones[min(int(ZONE_COUNT * SENSED_TRAVEL * raw[k]), ZONE_COUNT - 1)],
+                meets=0 if travel is None else met(zones, raw[k]),
                 free=rendered.free_travel,
                 stiffness=None if field is None else field.stiffness,
                 needed_m=needed[k],

@@ -11,7 +11,6 @@ from typing import Any, Final
 import msgspec
 
 from common.protocol.messages import Telemetry
-from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.viewing.pages.driving_page import DrivingPage
@@ -106,8 +105,8 @@ class HandsAlone:
             self.state = "stopped"
         screen: Telemetry = msgspec.structs.replace(VIEW, state=self.state)
         self.shared.tick(now_s, screen, 0.0)
-        if (report := self.device.read(now_s)) is not None:
-            self.intent = operator_intent(parse_input_report(report))
+        if (state := self.device.read(now_s)) is not None:
+            self.intent = operator_intent(state)
             if self.intent.arm:
                 self.state = "armed"
         if self.hears:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from operator_side.calibration.procedure import CalibrationProcedure, Step
-from operator_side.dualsense.reports.controller_state import ControllerState, Stick
+from operator_side.controller.state import ControllerState, Stick
 
 REPORT_S = 0.004
 _PULL_S = 0.8

@@ -4,8 +4,8 @@ import zlib
 from dataclasses import dataclass, field
 from typing import Any
 
+from operator_side.controller.state import ControllerState
 from operator_side.dualsense.hid.device import HidHandle
-from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.feature_report import ADDRESS_ID, FIRMWARE_ID, Firmware, build_address
 from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.reports.transport import Transport
@@ -40,7 +40,7 @@ class FakeHandle:
     full_mode: bool = False
 
     def report(self, sequence: int = 0) -> bytes:
-        return build_input_report(ControllerState(sequence=sequence), self.transport)
+        return build_input_report(ControllerState(), self.transport, sequence)
 
     def open_path(self, path: bytes) -> None:
         if not self.opens:

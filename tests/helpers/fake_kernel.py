@@ -65,7 +65,7 @@ class PlainController(SimulatedDualSense):
         self.written: list[bytes] = []
         self.reads = 0
 
-    def read(self, now_s: float) -> bytes | None:
+    def read_report(self, now_s: float) -> bytes | None:
         del now_s
         self.reads += 1
         return bytes([1, self.reads % 256])

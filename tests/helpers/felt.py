@@ -1,4 +1,4 @@
-"""Messages that a robot side may send, and effects that they become: what tests need often."""
+"""Messages that a robot side may send, and strengths that they become: what tests need often."""
 
 import struct
 from typing import Any
@@ -8,7 +8,7 @@ import msgspec
 from common.protocol.messages import Header, MotionState, StiffnessUpdate, Telemetry, TriggerField, Ways
 from common.protocol.uniform_field import FAR_M, uniform_field
 from common.protocol.view_messages import EnlargementTerms, SceneState
-from operator_side.dualsense.effects.official import MultiPositionFeedback
+from operator_side.controller.feel import Strengths
 
 
 def ways(*metres: float) -> Ways:
@@ -57,6 +57,6 @@ def scene_state(header: Header, version: int = 1) -> SceneState:
     )
 
 
-def feedback(position: int, strength: int) -> MultiPositionFeedback:
+def feedback(position: int, strength: int) -> Strengths:
     """One strength from a zone to the end of the travel."""
-    return MultiPositionFeedback((0,) * position + (strength,) * (10 - position))
+    return (0,) * position + (strength,) * (10 - position)

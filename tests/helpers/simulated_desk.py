@@ -8,9 +8,8 @@ from typing import Any
 import msgspec
 
 from common.protocol.messages import Header, Telemetry, Vector3
-from operator_side.dualsense.effects.official import Off, TriggerEffect
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button, Stick
-from operator_side.dualsense.reports.output_report import OutputReport
+from operator_side.controller.feel import FREE_TRIGGER, SENSED_TRAVEL, Feel, Strengths
+from operator_side.controller.state import Button, Stick
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.hands.travel_calibration import TravelCalibration
@@ -121,10 +120,10 @@ class Desk:
         self.until("arm", VIEW, 3.0)
         self.until("advance", screen or armed((0.0, 0.0, 0.3)), 1.0)
 
-    def resist(self, r2: TriggerEffect, l2: TriggerEffect | None = None) -> None:
-        self.tell(OutputReport(l2=l2 or Off(), r2=r2))
+    def resist(self, r2: Strengths, l2: Strengths | None = None) -> None:
+        self.tell(Feel(l2=l2 or FREE_TRIGGER, r2=r2))
 
-    def tell(self, output: OutputReport) -> None:
+    def tell(self, output: Feel) -> None:
         self.device.write(output, self.now_s)
 
     def _frames(self, screen: Telemetry | None) -> Iterator[Telemetry | None]:

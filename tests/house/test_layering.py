@@ -84,39 +84,39 @@ ARROWS = """
         common/status robot_side/compiled robot_side/core.py robot_side/drivers/remote robot_side/events.py
         robot_side/parts.py robot_side/recording robot_side/reporting robot_side/settings.py robot_side/viewing
 
-    operator_side/dualsense/effects:
-    operator_side/dualsense/reports: common operator_side/dualsense/effects
-    operator_side/dualsense/hid: common common/status operator_side/dualsense/reports
-    operator_side/dualsense/simulated: common operator_side/dualsense/effects operator_side/dualsense/reports
+    operator_side/controller: common common/status
+    operator_side/dualsense/effects: operator_side/controller
+    operator_side/dualsense/reports: common operator_side/controller operator_side/dualsense/effects
+    operator_side/dualsense/hid: common operator_side/controller operator_side/dualsense/reports
+    operator_side/dualsense/simulated: common operator_side/controller operator_side/dualsense/reports
     operator_side/dualsense/uhid: common common/realtime operator_side/dualsense/reports
         operator_side/dualsense/simulated
-    operator_side/hands: common operator_side/dualsense/effects operator_side/dualsense/reports
+    operator_side/hands: operator_side/controller
     operator_side/robot_link: common common/emulation common/protocol common/rate common/sockets common/status
         operator_side/hands
-    operator_side/events.py: operator_side/dualsense/reports operator_side/robot_link
-    operator_side/feel: common common/protocol common/status operator_side/dualsense/effects
-        operator_side/dualsense/reports operator_side/hands
-    operator_side/calibration: common common/files operator_side/dualsense/reports operator_side/hands
-    operator_side/people: common common/protocol common/status operator_side/calibration
-        operator_side/dualsense/reports operator_side/dualsense/simulated operator_side/hands
-    operator_side/core.py: common common/protocol common/status operator_side/dualsense/reports operator_side/events.py
+    operator_side/events.py: operator_side/controller operator_side/robot_link
+    operator_side/feel: common common/protocol common/status operator_side/controller operator_side/hands
+    operator_side/calibration: common common/files operator_side/controller operator_side/hands
+    operator_side/people: common common/protocol common/status operator_side/calibration operator_side/controller
+        operator_side/dualsense/simulated operator_side/hands
+    operator_side/core.py: common common/protocol common/status operator_side/controller operator_side/events.py
         operator_side/feel operator_side/hands operator_side/robot_link
     operator_side/settings.py: common common/command common/protocol common/sockets operator_side/feel
         operator_side/hands operator_side/people
     operator_side/viewing/facts.py: common/protocol common/status
-    operator_side/viewing/terminal: common common/command common/companion common/status
-        operator_side/dualsense/reports operator_side/viewing/facts.py
+    operator_side/viewing/terminal: common common/command common/companion common/status operator_side/controller
+        operator_side/viewing/facts.py
     operator_side/viewing/pages: common common/protocol common/status operator_side/dualsense/simulated
         operator_side/hands operator_side/people
     operator_side/viewing/console: common common/companion common/protocol common/status common/video
-        operator_side/dualsense/reports operator_side/viewing/facts.py operator_side/viewing/pages
+        operator_side/controller operator_side/viewing/facts.py operator_side/viewing/pages
     operator_side/viewing: common common/command common/protocol common/rate common/recording common/status
-        operator_side/core.py operator_side/dualsense/effects operator_side/dualsense/reports
-        operator_side/dualsense/simulated operator_side/people operator_side/settings.py operator_side/viewing/console
-        operator_side/viewing/facts.py operator_side/viewing/pages
+        operator_side/controller operator_side/core.py operator_side/dualsense/simulated operator_side/people
+        operator_side/settings.py operator_side/viewing/console operator_side/viewing/facts.py
+        operator_side/viewing/pages
     operator_side: common common/command common/emulation common/loop common/protocol common/recording common/sockets
-        common/status operator_side/calibration operator_side/core.py operator_side/dualsense/hid
-        operator_side/dualsense/reports operator_side/dualsense/simulated operator_side/events.py operator_side/hands
+        common/status operator_side/calibration operator_side/controller operator_side/core.py
+        operator_side/dualsense/hid operator_side/dualsense/simulated operator_side/events.py operator_side/hands
         operator_side/robot_link operator_side/settings.py operator_side/viewing operator_side/viewing/console
         operator_side/viewing/pages operator_side/viewing/terminal
 

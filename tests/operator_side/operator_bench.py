@@ -6,9 +6,8 @@ from common.protocol.codec import decode, encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import LeaseNotice, MotionCommand, MotionState, StiffnessUpdate
 from common.protocol.session import SessionState
+from operator_side.controller.state import Button, ControllerState
 from operator_side.core import OperatorSide
-from operator_side.dualsense.reports.controller_state import Button, ControllerState
-from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from tests.helpers.felt import felt
 
@@ -44,18 +43,17 @@ class Bench:
         self.write()
 
     def write(self) -> None:
-        if (report := self.side.output_report(self.now_s)) is not None:
-            self.device.write(report, self.now_s)
+        if (feel := self.side.feel_now(self.now_s)) is not None:
+            self.device.write(feel, self.now_s)
 
     def read(self) -> None:
-        report = self.device.read(self.now_s)
-        assert report is not None
-        self.side.read_report(report, self.now_s)
+        state = self.device.read(self.now_s)
+        assert state is not None
+        self.side.read_state(state, self.now_s)
 
     def hands(self, *buttons: Button, **state: Any) -> None:
-        """A report of a controller that is held so arrives."""
-        report = build_input_report(ControllerState(pressed=frozenset(buttons), **state))
-        self.side.read_report(report, self.now_s)
+        """A state of a controller that is held so arrives."""
+        self.side.read_state(ControllerState(pressed=frozenset(buttons), **state), self.now_s)
 
     def payloads(self) -> list[bytes]:
         return [message.payload for message in self.side.motion(self.now_s)]

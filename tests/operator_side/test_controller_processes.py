@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
-from operator_side.dualsense.effects.official import Off
-from operator_side.dualsense.reports.output_report import RELEASED, WARNING_LIGHT, OutputReport, parse_output_report
+from operator_side.controller.feel import FREE_TRIGGER, RELEASED, WARNING_LIGHT, Feel
+from operator_side.dualsense.reports.output_report import parse_output_report
 from tests.helpers.python_process import LIMIT_S, ended
 from tests.helpers.repository import ROOT
 from tests.operator_side.stiffness_source import StiffnessSource
@@ -52,7 +52,7 @@ class World:
         self._lines: queue.Queue[str] = queue.Queue()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
-        self.written: list[OutputReport] = []
+        self.written: list[Feel] = []
 
     def plug(self, plugged_in: bool) -> None:
         marker = self._folder / "plugged"
@@ -93,7 +93,7 @@ class World:
     def is_stiff(self) -> bool:
         """What R2 was told last."""
         told = [report.r2 for report in self.written if report.r2 is not None]
-        return bool(told) and told[-1] != Off()
+        return bool(told) and told[-1] != FREE_TRIGGER
 
     def hang(self) -> None:
         """Stop it while the triggers are stiff; anew when a busy machine had it let go of them just before."""
@@ -120,7 +120,7 @@ class World:
 
     def is_released(self) -> bool:
         """Whether a release of everything is what was written last, if perhaps with the usual light."""
-        return bool(self.written) and replace(self.written[-1], lightbar=None) == RELEASED
+        return bool(self.written) and replace(self.written[-1], light=None) == RELEASED
 
     def commands_that_came(self) -> int:
         """All that it has sent so far: the Hellos of now come after them."""
@@ -157,13 +157,13 @@ class World:
         os.close(self._controller)
 
 
-def stiff(report: OutputReport) -> bool:
-    return report.r2 not in (None, Off())
+def stiff(report: Feel) -> bool:
+    return report.r2 not in (None, FREE_TRIGGER)
 
 
-def tells_all(report: OutputReport) -> bool:
+def tells_all(report: Feel) -> bool:
     """It is RELEASED, or what followed so soon that both went out as one."""
-    return report.l2 == Off() and report.r2 is not None and report.rumble is not None
+    return report.l2 == FREE_TRIGGER and report.r2 is not None and report.rumble is not None
 
 
 @pytest.fixture
@@ -195,7 +195,7 @@ def test_an_exception_releases_them_too(world: World, tmp_path: Path) -> None:
 def test_they_are_released_when_the_robot_side_goes_silent(world: World) -> None:
     world.stiffen()
     world.until_in_silence(lambda: not world.is_stiff())
-    world.until_in_silence(lambda: any(report.lightbar == WARNING_LIGHT for report in world.written))
+    world.until_in_silence(lambda: any(report.light == WARNING_LIGHT for report in world.written))
     assert world.process.poll() is None
 
 

@@ -6,9 +6,9 @@ import pytest
 
 from common.status.codes import ConnectionState
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
-from operator_side.dualsense.hid.connection import LOOK_PERIOD_S, Connection
+from operator_side.controller.connection import LOOK_PERIOD_S, Connection
+from operator_side.controller.state import Button
 from operator_side.dualsense.hid.finding import Finder
-from operator_side.dualsense.reports.controller_state import Button
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 from tests.operator_side.dualsense.simulated_system import SimulatedSystem, VirtualSearch

@@ -11,10 +11,9 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import AnyMessage, Hello, LeaseNotice, MotionCommand, Tune
 from common.protocol.session import SessionState
 from common.status.codes import LinkState, Sight
+from operator_side.controller.feel import FREE_TRIGGER, USUAL_LIGHT, WARNING_LIGHT, Rumble
+from operator_side.controller.state import Button
 from operator_side.core import OperatorSide
-from operator_side.dualsense.effects.official import Off
-from operator_side.dualsense.reports.controller_state import Button
-from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, Rumble
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 from tests.helpers.felt import felt, telemetry
 from tests.operator_side.operator_bench import Bench
@@ -36,8 +35,8 @@ def sent(bench: Bench, kind: type[AnyMessage], for_s: float = 0.0) -> list[Any]:
 
 def test_stiffness_reaches_the_trigger_it_is_meant_for_and_only_changes_are_written(bench: Bench) -> None:
     bench.feel(6, rumble=1.0)
-    l2, r2 = bench.device.effects
-    assert (l2, r2.zone_strengths, bench.device.rumble.left) == (Off(), (6,) * 10, 1.0)
+    l2, r2 = bench.device.strengths
+    assert (l2, r2, bench.device.rumble.left) == (FREE_TRIGGER, (6,) * 10, 1.0)
     bench.now_s += 0.001
     bench.feel(6, rumble=1.0)
     assert bench.device.write_count == 1
@@ -49,7 +48,7 @@ def test_another_calibration_changes_what_is_read_and_what_is_felt(bench: Bench)
     assert bench.commands()[0].r2 == pytest.approx(0.5, abs=0.02)
     bench.feel(6)
     # Before the fourth zone nothing is commanded.
-    assert bench.device.effects[1].zone_strengths == (0,) * 3 + (6,) * 7
+    assert bench.device.strengths[1] == (0,) * 3 + (6,) * 7
 
 
 @pytest.mark.parametrize("swapped", [False, True])
@@ -99,18 +98,18 @@ def test_without_haptics_nothing_is_ever_written_and_the_hands_rest_all_the_same
 
 def test_a_controller_that_comes_while_blind_is_released_then_told(bench: Bench) -> None:
     bench.feel(5)
-    assert bench.device.output.lightbar is None
+    assert bench.device.told.light is None
     bench.now_s += 0.201
     bench.notice(SessionState.ARMED)
     bench.write()
     for light in (None, WARNING_LIGHT):
         bench.side.controller_found(bench.now_s) if light is None else None
         bench.write()
-    assert bench.device.output.lightbar == WARNING_LIGHT
+    assert bench.device.told.light == WARNING_LIGHT
     assert bench.side.status(bench.now_s).feel is Sight.BLIND
     bench.feel(5)
-    assert bench.device.output.lightbar == USUAL_LIGHT
-    assert bench.device.effects[1].zone_strengths == (5,) * 10
+    assert bench.device.told.light == USUAL_LIGHT
+    assert bench.device.strengths[1] == (5,) * 10
     assert bench.side.status(bench.now_s).feel is Sight.WAITING
     assert bench.side.summary()["rendering"]["blind"] == 1
 
@@ -158,7 +157,7 @@ def test_the_screen_shows_the_newest_view_of_the_present_epoch(bench: Bench) -> 
         assert bench.side.screen.tool_speed_m_s == 0.25
 
 
-@pytest.mark.parametrize("receive", [OperatorSide.receive, OperatorSide.receive_view, OperatorSide.read_report])
+@pytest.mark.parametrize("receive", [OperatorSide.receive, OperatorSide.receive_view])
 def test_garbage_and_messages_of_the_wrong_kind_are_counted_and_change_nothing(
     bench: Bench, receive: Callable[[OperatorSide, bytes, float], None]
 ) -> None:
@@ -166,7 +165,7 @@ def test_garbage_and_messages_of_the_wrong_kind_are_counted_and_change_nothing(
     receive(bench.side, b"\x93garbage", bench.now_s)
     receive(bench.side, encode(MotionCommand(bench.robot.stamp(1.0), l2=0.0, r2=0.0)), bench.now_s)
     assert bench.side.rejected == 2
-    assert bench.side.output_report(bench.now_s) is None
+    assert bench.side.feel_now(bench.now_s) is None
 
 
 def test_a_robot_side_of_another_version_is_told_apart(bench: Bench) -> None:

@@ -14,8 +14,8 @@ from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import LeaseNotice, MotionCommand, MotionState
 from common.protocol.session import OWNING, SessionState
-from operator_side.dualsense.reports.controller_state import Button
-from operator_side.dualsense.reports.output_report import WARNING_LIGHT, Rumble
+from operator_side.controller.feel import WARNING_LIGHT, Rumble
+from operator_side.controller.state import Button
 from tests.operator_side.operator_bench import Bench
 
 REST: dict[str, Any] = {
@@ -196,7 +196,7 @@ class Core(RuleBasedStateMachine):
             assert device.rumble == Rumble()
         elif self.waited:  # else the bound on writes may keep it back for a twentieth of a second
             assert device.rumble != Rumble()
-            assert device.output.lightbar == WARNING_LIGHT
+            assert device.told.light == WARNING_LIGHT
         self.waited = False
         assert self.bench.side.status(self.bench.now_s).feel == self.sight
         assert (self.bench.side.lease is None) == (self.lease is None)

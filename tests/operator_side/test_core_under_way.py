@@ -9,7 +9,7 @@ from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Compensation, StiffnessUpdate
 from common.protocol.session import SessionState
-from operator_side.dualsense.reports.controller_state import Button
+from operator_side.controller.state import Button
 from tests.helpers.felt import felt, field, ways
 from tests.operator_side.operator_bench import Bench
 
@@ -48,7 +48,7 @@ class Driving(Bench):
 
     @property
     def r2(self) -> tuple[int, ...]:
-        return self.device.effects[1].zone_strengths
+        return self.device.strengths[1]
 
     @property
     def without_history(self) -> int:
@@ -64,7 +64,7 @@ def test_commands_under_way_bring_it_nearer() -> None:
     bench.feel_field(bench.report())
     # δ = 0.25 * 0.2 - 0.25²/6 = 40 mm, w = 0.25 m/s: a zone of 0.184 m/s needs 40 + 55 + 5.6 + 0.7 = 101 mm.
     assert bench.r2 == (0,) * 5 + (8,) * 5
-    assert bench.device.effects[0].zone_strengths == FREE
+    assert bench.device.strengths[0] == FREE
     assert bench.without_history == 0
 
 

@@ -15,8 +15,8 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Compensation, Hello, LeaseNotice, Message, MotionCommand, StiffnessUpdate
 from common.protocol.session import SessionState
 from common.protocol.uniform_field import uniform_field
+from operator_side.controller.state import Button
 from operator_side.core import OperatorSide
-from operator_side.dualsense.reports.controller_state import Button
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from tests.helpers.felt import field, ways
 
@@ -57,10 +57,10 @@ class Approach:
     def _operate(self, now_s: float) -> None:
         for payload in self.back.pop(now_s):
             self.side.receive(payload, now_s)
-        if (output := self.side.output_report(now_s)) is not None:
+        if (output := self.side.feel_now(now_s)) is not None:
             self.device.write(output, now_s)
         if (report := self.device.read(now_s)) is not None:
-            self.side.read_report(report, now_s)
+            self.side.read_state(report, now_s)
         if self.tick % 2 == 0:
             for message in self.side.motion(now_s):
                 self.there.push(now_s, message.payload)

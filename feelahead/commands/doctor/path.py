@@ -105,8 +105,8 @@ def _measured(sockets: OperatorSockets, ports: tuple[int, int], clock: Monotonic
             whole = joining.take(payload) if topic == VIDEO_TOPIC + PIECE else payload
             if settled and whole is not None and topic.startswith(VIDEO_TOPIC):
                 _note_picture(whole, arrivals, now_s)
-        if (report := hands.read(now_s)) is not None:
-            core.read_report(report, now_s)
+        if (state := hands.read(now_s)) is not None:
+            core.read_state(state, now_s)
         for leaving in core.motion(now_s):
             sockets.send(leaving.payload, everywhere=leaving.everywhere)
         if now_s >= watch_s:

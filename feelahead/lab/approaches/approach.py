@@ -14,7 +14,7 @@ from feelahead.lab.approaches.arming import wait_for_pull
 from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
 from feelahead.lab.approaches.outcome import SAMPLE_S, End, Outcome, Samples, reversals, stands
 from feelahead.lab.approaches.spoilt import Spoil, controller
-from operator_side.dualsense.effects.official import MAX_STRENGTH
+from operator_side.controller.feel import MAX_STRENGTH
 from operator_side.people.pulling_hands import Pull, PullingHands, constant_force
 from operator_side.settings import OperatorSettings
 from robot_side.compiled.warm_up import import_kernels, warm_up
@@ -122,7 +122,7 @@ class PullRun(Listener):
         if hands.pull_began_s is None:
             return
         self.onset = onset
-        strengths, travel = run.device.effects[1].zone_strengths, run.device.travel[1]
+        strengths, travel = run.device.strengths[1], run.device.travel[1]
         if now_s >= self._next_s or onset is not None:
             self._next_s = now_s + SAMPLE_S - 1e-9
             speed_m_s, gap_m = self.truth.approach()[1], self.truth.gap_m(run.robot.held)

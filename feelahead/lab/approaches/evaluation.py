@@ -25,7 +25,7 @@ from feelahead.lab.approaches.recording import record_approach
 from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.spoilt import Spoil
 from feelahead.lab.table import Row
-from operator_side.dualsense.effects.official import MAX_STRENGTH
+from operator_side.controller.feel import MAX_STRENGTH
 from robot_side.drivers.mujoco.camera import CameraError
 from robot_side.drivers.mujoco.posed_scene import PosedScene
 from robot_side.drivers.mujoco.scene import Scene, load_scene

@@ -13,8 +13,7 @@ from common.protocol.messages import Header, StiffnessUpdate
 from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
 from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.spoilt import SPOILING_DELAY_S, Spoil
-from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.controller.feel import MAX_STRENGTH, SENSED_TRAVEL, ZONE_COUNT
 from operator_side.feel.commands_under_way import Displacement, Report
 from operator_side.feel.path_ahead import Aside
 from operator_side.feel.rendering import RenderingSettings, TriggerRendering
@@ -102,8 +101,8 @@ class Judged:
             message = _message(sensed, row)
             known, aside = self._under_way(draw.replay, law, sensed, row, felt_s)
             shown = rendering.render(message, (pulled[0], pulled[1]), known, felt_s, aside)
-            for trigger, effect in enumerate((shown.l2, shown.r2)):
-                strengths[number, trigger] = 0 if effect is None else effect.zone_strengths
+            for trigger, zones in enumerate((shown.l2, shown.r2)):
+                strengths[number, trigger] = zones or 0
         return strengths[:, ::-1] if self.spoil == "swapped" else strengths
 
     def _look_around(self, law: SweptLaw, draw: Draw, now_s: float) -> None:

@@ -12,8 +12,7 @@ from typing import Any, Final
 
 from common.errors import ConfigurationError
 from common.protocol.messages import Vector2
-from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.controller.feel import MAX_STRENGTH, SENSED_TRAVEL, ZONE_COUNT
 from operator_side.dualsense.simulated.trigger_model import (
     FINGER_TIME_CONSTANT_S,
     NORMAL_FINGER_FORCE_N,

@@ -12,8 +12,7 @@ from common.reaction import REACTION_S
 from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.meeting import shifted
 from feelahead.lab.approaches.stopping_path import stopping_path
-from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.controller.feel import MAX_STRENGTH, SENSED_TRAVEL, ZONE_COUNT
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.hands.travel_calibration import TriggerTravel
 from robot_side.arm.tool_motion import ToolMotionSettings

@@ -8,7 +8,7 @@ import numpy as np
 from common.arrays import FloatArray
 from common.protocol.messages import Header, MotionCommand
 from feelahead.lab.approaches.recording import POSE_S, TICK_S, RecordedApproach
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.dualsense.simulated.trigger_model import FINGER_TIME_CONSTANT_S
 from operator_side.feel.commands_under_way import CommandsUnderWay
 from operator_side.hands.travel_calibration import TriggerTravel

@@ -4,15 +4,13 @@ from collections import deque
 from dataclasses import replace
 from typing import Literal
 
-from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT, MultiPositionFeedback
-from operator_side.dualsense.reports.output_report import OutputReport
+from operator_side.controller.feel import MAX_STRENGTH, ZONE_COUNT, Feel
+from operator_side.controller.state import ControllerState
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 
 Spoil = Literal["nothing", "delayed", "swapped"]
-"""delayed: effects come 100 ms late. swapped: each trigger has the other's effect."""
-_FULL = OutputReport(
-    l2=MultiPositionFeedback((MAX_STRENGTH,) * ZONE_COUNT), r2=MultiPositionFeedback((MAX_STRENGTH,) * ZONE_COUNT)
-)
+"""delayed: strengths come 100 ms late. swapped: each trigger has the other's strengths."""
+_FULL = Feel(l2=(MAX_STRENGTH,) * ZONE_COUNT, r2=(MAX_STRENGTH,) * ZONE_COUNT)
 SPOILING_DELAY_S = 0.1
 
 
@@ -21,15 +19,15 @@ class DelayedDualSense(SimulatedDualSense):
 
     def __init__(self, strength_step_n: float) -> None:
         super().__init__(strength_step_n=strength_step_n)
-        self._waiting: deque[tuple[float, OutputReport]] = deque()
+        self._waiting: deque[tuple[float, Feel]] = deque()
 
-    def write(self, output: OutputReport, now_s: float) -> None:
+    def write(self, feel: Feel, now_s: float) -> None:
         """Take what it is told, to follow it later."""
-        self._waiting.append((now_s + SPOILING_DELAY_S, output))
+        self._waiting.append((now_s + SPOILING_DELAY_S, feel))
         self._follow(now_s)
 
-    def read(self, now_s: float) -> bytes | None:
-        """Read an input report."""
+    def read(self, now_s: float) -> ControllerState | None:
+        """Read the state."""
         self._follow(now_s)
         return super().read(now_s)
 
@@ -39,23 +37,23 @@ class DelayedDualSense(SimulatedDualSense):
 
 
 class SwappedDualSense(SimulatedDualSense):
-    """A controller with the triggers' effects exchanged."""
+    """A controller with the triggers' strengths exchanged."""
 
-    def write(self, output: OutputReport, now_s: float) -> None:
-        """Do what it is told with the triggers' effects exchanged."""
-        super().write(replace(output, l2=output.r2, r2=output.l2), now_s)
+    def write(self, feel: Feel, now_s: float) -> None:
+        """Do what it is told with the triggers' strengths exchanged."""
+        super().write(replace(feel, l2=feel.r2, r2=feel.l2), now_s)
 
 
 class FullDualSense(SimulatedDualSense):
-    """A controller that always resists with the strongest effect."""
+    """A controller that always resists with full strength."""
 
-    def write(self, output: OutputReport, now_s: float) -> None:
+    def write(self, feel: Feel, now_s: float) -> None:
         """Do something else than it is told."""
-        del output
+        del feel
         super().write(_FULL, now_s)
 
-    def read(self, now_s: float) -> bytes | None:
-        """Read an input report; it resists from the first time on."""
+    def read(self, now_s: float) -> ControllerState | None:
+        """Read the state; it resists from the first time on."""
         if self.released:
             super().write(_FULL, now_s)
         return super().read(now_s)

@@ -9,7 +9,7 @@ from common.protocol.messages import Vector2
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
 from feelahead.lab.approaches.arming import wait_for_pull
 from feelahead.lab.approaches.frozen import ASIDE, GRIPPED, SITE, frozen_scene
-from operator_side.dualsense.effects.official import MAX_STRENGTH
+from operator_side.controller.feel import MAX_STRENGTH
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.people.pulling_hands import PullingHands, constant_force
 from operator_side.settings import OperatorSettings

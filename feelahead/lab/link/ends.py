@@ -18,9 +18,8 @@ from common.sockets.admission import Admission
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from common.timing.ages import LoopAge
+from operator_side.controller.state import ControllerState
 from operator_side.core import OperatorSide
-from operator_side.dualsense.reports.controller_state import ControllerState
-from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.robot_link.commanding import ToRobot
 from robot_side.laws.sensed import Sensed
 from robot_side.operators.operator_session import OperatorSession
@@ -114,7 +113,6 @@ class OperatorEnd(_Side):
         super().__init__(sockets, "to_robot")
         self._sockets, self._report_s = sockets, 0.0
         self._core = OperatorSide(secrets.randbits(53), clock_domain(), full_rate=True)
-        self._report = build_input_report(ControllerState())
 
     def _received(self) -> Any:
         return self._sockets.receive(), self._sockets.receive_view()
@@ -128,7 +126,7 @@ class OperatorEnd(_Side):
     def _tick(self, now_s: float) -> None:
         if now_s - self._report_s >= _REPORT_PERIOD_S:
             self._report_s = now_s
-            self._core.read_report(self._report, now_s)
+            self._core.read_state(ControllerState(), now_s)
         for message in self._core.motion(now_s):
             self._line.push(now_s, message, len(message.payload))
 

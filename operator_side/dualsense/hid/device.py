@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
 from common.errors import DeviceError, NoDriverError, RemoteProtocolError
+from operator_side.controller.feel import Feel
+from operator_side.controller.state import ControllerState
 from operator_side.dualsense.reports.feature_report import (
     ADDRESS_ID,
     FEATURE_LENGTHS,
@@ -13,8 +15,8 @@ from operator_side.dualsense.reports.feature_report import (
     Firmware,
     parse_address,
 )
-from operator_side.dualsense.reports.input_report import is_input_report
-from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport, is_simple_report, transport_of_input
 
 Read = TypeVar("Read")
@@ -69,7 +71,7 @@ class Identity:
 
 
 class HidDualSense:
-    """The Device port on a controller that is open, on USB or Bluetooth: one thread may read, another one write."""
+    """The port on a controller that is open, on USB or Bluetooth: one thread may read, another one write."""
 
     def __init__(self, backend: HidBackend, path: bytes) -> None:
         """Open it and ask for its facts, which takes a few reports' time; DeviceError names the fault.
@@ -86,22 +88,23 @@ class HidDualSense:
         except DeviceError:
             self._close_handles()
             raise
+        self.rejected = 0
+        """Reports that were none."""
         self._closed = False
         self._sequence = 0
         self._written = False
         self._released = True
-        self._told = OutputReport()
+        self._told = Feel()
 
     @property
     def released(self) -> bool:
         """Nothing that was written holds or shakes, as far as it went out."""
         return self._released
 
-    def read(self, now_s: float) -> bytes | None:
-        """The newest input report, or None when there is no new one; never waits. DeviceError when it is gone.
+    def read(self, now_s: float) -> ControllerState | None:
+        """The newest report's state, or None when there is no new one; never waits. DeviceError when it is gone.
 
-        A bad report is passed over as long as there is a good one. Else the newest is returned, and parsing it names
-        the fault.
+        A bad report is passed over and counted.
         """
         del now_s  # a real controller has a clock of its own
         self._require_open()
@@ -114,21 +117,25 @@ class HidDualSense:
                 drained.append(report)
         except OSError as error:
             raise _gone(str(error)) from error
-        # Bluetooth may have begun with simple reports before it was asked for more.
-        reports = [report for report in map(bytes, reversed(drained)) if not is_simple_report(report)]
-        return next(filter(is_input_report, reports), reports[0] if reports else None)
+        for report in map(bytes, reversed(drained)):
+            try:
+                return parse_input_report(report)
+            except RemoteProtocolError:
+                # Bluetooth may have begun with simple reports before it was asked for more.
+                self.rejected += not is_simple_report(report)
+        return None
 
-    def write(self, output: OutputReport, now_s: float) -> None:
+    def write(self, feel: Feel, now_s: float) -> None:
         """Send an output report in this controller's framing; DeviceError when the controller is gone.
 
         ValueError, and nothing sent, where build_output_report refuses: no debug effect code passes it.
         """
         del now_s
         self._require_open()
-        report = self._packed(output)
+        report = self._packed(feel)
         self._written, self._released = True, False
         _write(self._writing, report)
-        self._told = output.following(self._told)
+        self._told = feel.following(self._told)
         self._released = self._told.releases
 
     def close(self) -> None:
@@ -153,8 +160,8 @@ class HidDualSense:
         if self._closed:
             raise DeviceError("the controller is closed; open a new one")
 
-    def _packed(self, output: OutputReport) -> bytes:
-        report = build_output_report(output, self.identity.transport, self._sequence)
+    def _packed(self, feel: Feel) -> bytes:
+        report = build_output_report(feel, self.identity.transport, self._sequence)
         self._sequence += 1
         return report
 

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.errors import DeviceError, NoDeviceError
+from operator_side.controller.feel import RELEASED
+from operator_side.controller.port import OpenController
 from operator_side.dualsense.hid.device import HidBackend, HidDualSense, Identity
-from operator_side.dualsense.hid.search import OpenController
 from operator_side.dualsense.reports.models import PRODUCT_IDS, SONY_VENDOR_ID
-from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
+from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport
 
 LOOKS_FOR_THE_SAME: Final = 3

@@ -3,8 +3,6 @@
 On Bluetooth their last four bytes are a checksum. Layout: Linux hid-playstation and the controllers wiki.
 """
 
-import re
-import reprlib
 import struct
 from dataclasses import dataclass
 from typing import Annotated, Final, Self
@@ -13,6 +11,7 @@ from msgspec import Meta
 
 from common.errors import RemoteProtocolError
 from common.limits import Limited
+from operator_side.controller.port import checked_address
 from operator_side.dualsense.reports.transport import CHECKSUM_LENGTH, Seed, Transport, check, described, sealed
 
 CALIBRATION_ID: Final = 0x05
@@ -21,7 +20,6 @@ FIRMWARE_ID: Final = 0x20
 FEATURE_LENGTHS: Final = {CALIBRATION_ID: 41, ADDRESS_ID: 20, FIRMWARE_ID: 64}
 """In bytes, with the id."""
 
-_ADDRESS: Final = re.compile("[0-9a-f]{2}(:[0-9a-f]{2}){5}")
 _VERSIONS: Final = struct.Struct("<II")
 _HARDWARE, _UPDATE = 24, 44
 
@@ -51,15 +49,6 @@ def build_calibration(transport: Transport) -> bytes:
     """
     gyro, acceleration = (8640, -8640) * 3, (8192, -8192) * 3
     return _finished(CALIBRATION_ID, struct.pack("<17h", 0, 0, 0, *gyro, 540, 540, *acceleration), transport)
-
-
-def checked_address(address: object) -> str:
-    """Return `address` if it has the form "aa:bb:cc:dd:ee:ff"; ValueError for anything else."""
-    if not isinstance(address, str) or not _ADDRESS.fullmatch(address):
-        raise ValueError(
-            f"address = {reprlib.repr(address)}; valid: six pairs of hexadecimal digits like aa:bb:cc:dd:ee:ff"
-        )
-    return address
 
 
 def parse_address(report: bytes, transport: Transport = Transport.USB) -> str:

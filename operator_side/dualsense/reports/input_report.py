@@ -9,7 +9,8 @@ from functools import lru_cache
 from typing import Final
 
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.reports.controller_state import BATTERIES, Button, ControllerState, battery_byte
+from operator_side.controller.state import Button, ControllerState
+from operator_side.dualsense.reports.battery import BATTERIES, battery_byte
 from operator_side.dualsense.reports.transport import (
     CHECKSUM_LENGTH,
     INPUT_FRAMING,
@@ -111,16 +112,13 @@ def parse_input_report(report: bytes) -> ControllerState:
     RemoteProtocolError for any other report, and for the simple ones that Bluetooth starts with.
     """
     start = INPUT_FRAMING[_checked_transport(report)].start
-    left_x, left_y, right_x, right_y, l2, r2, sequence, *buttons, _, _, _, _, battery, _ = _COMMON.unpack_from(
-        report, start
-    )
+    left_x, left_y, right_x, right_y, l2, r2, _, *buttons, _, _, _, _, battery, _ = _COMMON.unpack_from(report, start)
     return ControllerState(
         left_stick=(AXIS[left_x], AXIS_DOWN[left_y]),
         right_stick=(AXIS[right_x], AXIS_DOWN[right_y]),
         l2=TRAVEL[l2],
         r2=TRAVEL[r2],
         pressed=pressed_of(int.from_bytes(buttons, "little")),
-        sequence=sequence,
         battery=BATTERIES[battery],
     )
 
@@ -146,25 +144,25 @@ def _checked_transport(report: bytes) -> Transport:
 
 
 def build_input_report(
-    state: ControllerState, transport: Transport = Transport.USB, sensor_time_s: float = 0.0
+    state: ControllerState, transport: Transport = Transport.USB, sequence: int = 0, sensor_time_s: float = 0.0
 ) -> bytes:
     """Make the full input report of a controller in `state`, rounded to the wire's steps.
 
-    64 bytes on USB, 78 with the checksum on Bluetooth. It lies flat, and nothing touches its pad; `sensor_time_s`: its
-    own clock.
+    64 bytes on USB, 78 with the checksum on Bluetooth. It lies flat, and nothing touches its pad. `sequence`: 0 to 255,
+    one more with each report on USB, on Bluetooth always 1 (controllers wiki); `sensor_time_s`: its own clock.
     """
     framing, (left_x, left_y), (right_x, right_y) = INPUT_FRAMING[transport], state.left_stick, state.right_stick
     report = bytearray(framing.length)
     report[0] = framing.report_id
     if transport is Transport.BLUETOOTH:
-        report[1] = (state.sequence & 0x0F) << 4 | _HAS_STATE
+        report[1] = (sequence & 0x0F) << 4 | _HAS_STATE
     _COMMON.pack_into(
         report,
         framing.start,
         *(byte_of_axis(axis) for axis in (left_x, -left_y, right_x, -right_y)),
         round(state.l2 * 255),
         round(state.r2 * 255),
-        state.sequence,
+        sequence,
         *code_of(state.pressed).to_bytes(3, "little"),
         _GRAVITY,
         round(sensor_time_s * _SENSOR_TICKS_PER_S) % 2**32,

@@ -1,27 +1,20 @@
 """Output reports, values to bytes and back: USB's 0x02, Bluetooth's 0x31.
 
 A report has a flag for each part of the controller that it sets; a part without its flag stays as it is. Only the flags
-of the parts that `OutputReport` sets are set here: the other lights, the mute key and the sound stay the system's.
+of the parts that `Feel` sets are set here: the other lights, the mute key and the sound stay the system's.
 Layout: Linux hid-playstation, SDL and Nielk1's notes, which agree.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from operator import attrgetter
-from typing import Annotated, Any, Final
-
-from msgspec import Meta
+from typing import Final
 
 from common.errors import RemoteProtocolError
-from common.limits import Limited, Share, check_limits
+from operator_side.controller.feel import FREE_TRIGGER, Feel, Rumble
 from operator_side.dualsense.effects.official import (
     COMMANDED_CODES,
     DEBUG_CODES,
     EFFECT_LENGTH,
-    AnyEffect,
-    Off,
-    OtherEffect,
     decode_effect,
+    encode_effect,
 )
 from operator_side.dualsense.reports.transport import (
     CHECKSUM_LENGTH,
@@ -32,13 +25,6 @@ from operator_side.dualsense.reports.transport import (
     described,
     sealed,
 )
-
-Byte = Annotated[int, Meta(ge=0, le=255)]
-Color = tuple[Byte, Byte, Byte]
-
-WARNING_LIGHT: Final[Color] = (255, 0, 0)
-USUAL_LIGHT: Final[Color] = (0, 0, 128)
-"""The color that Linux hid-playstation sets; we set it again after a warning."""
 
 _COMMON_LENGTH: Final = 47
 _USB_MAX_LENGTH: Final = 64  # some programs pad it to the length of an input report
@@ -52,70 +38,19 @@ _CLASSIC_RUMBLE, _SELECT_RUMBLE, _SET_R2_EFFECT, _SET_L2_EFFECT = 0x01, 0x02, 0x
 _SET_LIGHTBAR, _CLASSIC_RUMBLE_V2 = 0x04, 0x04
 
 
-@dataclass(frozen=True, slots=True)
-class Rumble(Limited):
-    """The two motors' drive, 0 to 1 each; 256 steps on the wire."""
-
-    left: Share = 0.0
-    right: Share = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class OutputReport:
-    """The parts of a controller that one output report sets; None leaves a part as it is."""
-
-    l2: AnyEffect | None = None
-    r2: AnyEffect | None = None
-    rumble: Rumble | None = None
-    lightbar: Color | None = None
-    """Red, green and blue, 0 to 255 each."""
-
-    def __post_init__(self) -> None:
-        for name, effect in (("l2", self.l2), ("r2", self.r2)):
-            if effect is not None and not isinstance(effect, AnyEffect):
-                raise ValueError(f"{name} = {effect!r}; valid: a trigger effect or None")
-        if self.lightbar is not None:
-            check_limits(self)
-
-    def following(self, before: "OutputReport") -> "OutputReport":
-        """Join both, this one after `before`: each part by the newest that sets it."""
-        pairs = zip(_parts(self), _parts(before), strict=True)
-        return OutputReport(*(old if new is None else new for new, old in pairs))
-
-    def change_from(self, before: "OutputReport") -> "OutputReport":
-        """The parts of this one that differ from those of `before`; the others are None."""
-        pairs = zip(_parts(self), _parts(before), strict=True)
-        return OutputReport(*(None if new == old else new for new, old in pairs))
-
-    @property
-    def farewell(self) -> "OutputReport":
-        """The report that undoes this one: RELEASED, and the usual light if this one sets a light."""
-        return RELEASED if self.lightbar is None else OutputReport(Off(), Off(), Rumble(), USUAL_LIGHT)
-
-    @property
-    def releases(self) -> bool:
-        """Whether nothing that it sets holds or shakes."""
-        return self.l2 in (None, Off()) and self.r2 in (None, Off()) and self.rumble in (None, Rumble())
-
-
-_parts: Final[Callable[[OutputReport], tuple[Any, ...]]] = attrgetter("l2", "r2", "rumble", "lightbar")
-RELEASED: Final = OutputReport(l2=Off(), r2=Off(), rumble=Rumble())
-"""No effect on either trigger, no rumble."""
-
-
-def build_output_report(output: OutputReport, transport: Transport = Transport.USB, sequence: int = 0) -> bytes:
-    """Make the report that sets what `output` holds: 48 bytes on USB, 78 with the checksum on Bluetooth.
+def build_output_report(feel: Feel, transport: Transport = Transport.USB, sequence: int = 0) -> bytes:
+    """Make the report that sets what `feel` holds: 48 bytes on USB, 78 with the checksum on Bluetooth.
 
     `sequence`: on Bluetooth, one more with each report; four bits of it are sent. Of the two framings of a Bluetooth
     report that are in use this is the one of Linux hid-playstation, whose authors make the controller. ValueError for
-    anything but the two effects of official.py, whatever the type of `output`.
+    packed bytes with any other code than the two of official.py.
     """
     framing = OUTPUT_FRAMING[transport]
     report = bytearray(framing.length)
     report[0] = framing.report_id
     if transport is Transport.BLUETOOTH:
         report[1], report[2] = (sequence & 0x0F) << 4, _KERNEL_TAG
-    report[framing.start : framing.start + _COMMON_LENGTH] = _common_block(output)
+    report[framing.start : framing.start + _COMMON_LENGTH] = _common_block(feel)
     for flag, place in ((_SET_L2_EFFECT, _L2_EFFECT), (_SET_R2_EFFECT, _R2_EFFECT)):
         code = report[framing.start + place]
         # The last gate before the wire, on the very bytes that are sent.
@@ -124,44 +59,63 @@ def build_output_report(output: OutputReport, transport: Transport = Transport.U
     return bytes(report) if transport is Transport.USB else sealed(Seed.OUTPUT, bytes(report[:-CHECKSUM_LENGTH]))
 
 
-def _common_block(output: OutputReport) -> bytearray:
+def _common_block(feel: Feel) -> bytearray:
     block = bytearray(_COMMON_LENGTH)
-    for effect, start, flag in ((output.l2, _L2_EFFECT, _SET_L2_EFFECT), (output.r2, _R2_EFFECT, _SET_R2_EFFECT)):
-        if isinstance(effect, OtherEffect):
-            raise ValueError(f"effect = {effect}; valid: Off, MultiPositionFeedback")
-        if effect is not None:
+    for strengths, start, flag in ((feel.l2, _L2_EFFECT, _SET_L2_EFFECT), (feel.r2, _R2_EFFECT, _SET_R2_EFFECT)):
+        if strengths is not None:
             block[_FLAGS_0] |= flag
-            block[start : start + EFFECT_LENGTH] = effect.encode()
-    if output.rumble is not None:
+            block[start : start + EFFECT_LENGTH] = encode_effect(strengths)
+    if feel.rumble is not None:
         block[_FLAGS_0] |= _CLASSIC_RUMBLE | _SELECT_RUMBLE
-        block[_MOTOR_LEFT] = round(output.rumble.left * 255)
-        block[_MOTOR_RIGHT] = round(output.rumble.right * 255)
-    if output.lightbar is not None:
+        block[_MOTOR_LEFT] = round(feel.rumble.left * 255)
+        block[_MOTOR_RIGHT] = round(feel.rumble.right * 255)
+    if feel.light is not None:
         block[_FLAGS_1] |= _SET_LIGHTBAR
-        block[_LIGHTBAR : _LIGHTBAR + 3] = bytes(output.lightbar)
+        block[_LIGHTBAR : _LIGHTBAR + 3] = bytes(feel.light)
     return block
 
 
-def parse_output_report(report: bytes) -> OutputReport:
+def parse_output_report(report: bytes) -> Feel:
     """Read an output report of either transport; flags for other parts of the controller are passed over.
 
-    USB: 48 to 64 bytes. Bluetooth: 78 bytes in either framing. RemoteProtocolError for another id, length, framing or
-    checksum, and for a debug code in either trigger's place even where its flag is not set.
+    USB: 48 to 64 bytes. Bluetooth: 78 bytes in either framing. Another program's effect holds nothing: free.
+    RemoteProtocolError for another id, length, framing or checksum, and for a debug code in either trigger's place even
+    where its flag is not set.
     """
+    block = _block_of(report)
+    flags = block[_FLAGS_0]
+    rumbles = flags & _CLASSIC_RUMBLE or block[_FLAGS_2] & _CLASSIC_RUMBLE_V2
+    red, green, blue = block[_LIGHTBAR : _LIGHTBAR + 3]
+    l2, r2 = (None if effect is None else decode_effect(effect) or FREE_TRIGGER for effect in _effects(block))
+    return Feel(
+        l2=l2,
+        r2=r2,
+        rumble=Rumble(block[_MOTOR_LEFT] / 255, block[_MOTOR_RIGHT] / 255) if rumbles else None,
+        light=(red, green, blue) if block[_FLAGS_1] & _SET_LIGHTBAR else None,
+    )
+
+
+def encoded_effects(report: bytes) -> tuple[bytes | None, bytes | None]:
+    """The eleven bytes of L2's effect and of R2's, whoever made them; None where not set. As `parse_output_report`."""
+    return _effects(_block_of(report))
+
+
+def _block_of(report: bytes) -> bytes:
     start = _common_start(report)
     block = report[start : start + _COMMON_LENGTH]
     for place in (_L2_EFFECT, _R2_EFFECT):
         if block[place] in DEBUG_CODES:
             raise RemoteProtocolError(f"output report: debug effect code 0x{block[place]:02x}; valid: none")
-    flags = block[_FLAGS_0]
-    rumbles = flags & _CLASSIC_RUMBLE or block[_FLAGS_2] & _CLASSIC_RUMBLE_V2
-    red, green, blue = block[_LIGHTBAR : _LIGHTBAR + 3]
-    return OutputReport(
-        l2=decode_effect(block[_L2_EFFECT : _L2_EFFECT + EFFECT_LENGTH]) if flags & _SET_L2_EFFECT else None,
-        r2=decode_effect(block[_R2_EFFECT : _R2_EFFECT + EFFECT_LENGTH]) if flags & _SET_R2_EFFECT else None,
-        rumble=Rumble(block[_MOTOR_LEFT] / 255, block[_MOTOR_RIGHT] / 255) if rumbles else None,
-        lightbar=(red, green, blue) if block[_FLAGS_1] & _SET_LIGHTBAR else None,
+    return block
+
+
+def _effects(block: bytes) -> tuple[bytes | None, bytes | None]:
+    """The encoded effects of L2 and R2; None for one that is not set."""
+    l2, r2 = (
+        block[place : place + EFFECT_LENGTH] if block[_FLAGS_0] & flag else None
+        for place, flag in ((_L2_EFFECT, _SET_L2_EFFECT), (_R2_EFFECT, _SET_R2_EFFECT))
     )
+    return l2, r2
 
 
 def transport_of_output(report: bytes) -> Transport:

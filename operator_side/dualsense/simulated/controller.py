@@ -6,15 +6,8 @@ from typing import Final
 from msgspec.structs import replace
 
 from common.errors import DeviceError, RemoteProtocolError
-from operator_side.dualsense.effects.official import AnyEffect, Off
-from operator_side.dualsense.reports.controller_state import (
-    SENSED_TRAVEL,
-    Battery,
-    BatteryState,
-    Button,
-    ControllerState,
-    Stick,
-)
+from operator_side.controller.feel import FREE_TRIGGER, RELEASED, SENSED_TRAVEL, Feel, Rumble, Strengths
+from operator_side.controller.state import Battery, BatteryState, Button, ControllerState, Stick
 from operator_side.dualsense.reports.feature_report import (
     ADDRESS_ID,
     CALIBRATION_ID,
@@ -23,15 +16,9 @@ from operator_side.dualsense.reports.feature_report import (
     build_address,
     build_calibration,
 )
-from operator_side.dualsense.reports.input_report import build_input_report
+from operator_side.dualsense.reports.input_report import build_input_report, parse_input_report
 from operator_side.dualsense.reports.models import Model
-from operator_side.dualsense.reports.output_report import (
-    RELEASED,
-    OutputReport,
-    Rumble,
-    parse_output_report,
-    transport_of_output,
-)
+from operator_side.dualsense.reports.output_report import parse_output_report, transport_of_output
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.trigger_model import STRENGTH_STEP_N, SimulatedTrigger
 
@@ -51,7 +38,7 @@ _EDGE_BUTTONS: Final = frozenset({Button.LEFT_FUNCTION, Button.RIGHT_FUNCTION, B
 
 
 class SimulatedDualSense:
-    """The Device port without hardware, in virtual or real time: `now_s` is all it knows of clocks.
+    """The port without hardware, in virtual or real time: `now_s` is all it knows of clocks.
 
     It wakes at the first `now_s` it is given and makes an input report at once, then one a period. What the
     `set_*` methods change holds from the last `now_s` on, until it is set again; at first nobody touches it. Forces are
@@ -74,7 +61,7 @@ class SimulatedDualSense:
         self.model: Final = model
         self.address: Final = address
         self.write_count = 0
-        """Output reports that were accepted from outside."""
+        """Writes that were accepted from outside."""
         self._l2 = SimulatedTrigger(strength_step_n)
         self._r2 = SimulatedTrigger(strength_step_n)
         wireless = transport is Transport.BLUETOOTH
@@ -136,19 +123,19 @@ class SimulatedDualSense:
         return self._l2.travel, self._r2.travel
 
     @property
-    def output(self) -> OutputReport:
+    def told(self) -> Feel:
         """All that it has been told and still does; None where nothing was."""
         return self._told
 
     @property
-    def effects(self) -> tuple[AnyEffect, AnyEffect]:
-        """The effects in force, L2 and R2."""
-        return self._l2.effect, self._r2.effect
+    def strengths(self) -> tuple[Strengths, Strengths]:
+        """The strengths in force, L2 and R2."""
+        return self._l2.strengths, self._r2.strengths
 
     @property
     def released(self) -> bool:
-        """Both triggers are free of any effect."""
-        return self.effects == (Off(), Off())
+        """Both triggers are free."""
+        return self.strengths == (FREE_TRIGGER, FREE_TRIGGER)
 
     @property
     def rumble(self) -> Rumble:
@@ -168,23 +155,18 @@ class SimulatedDualSense:
         self._closed = False
         self._start()
 
-    # The Device port
+    # The port
 
-    def read(self, now_s: float) -> bytes | None:
-        """The newest input report, of the state at its own time, or None until the next one is due.
+    def read(self, now_s: float) -> ControllerState | None:
+        """The newest report's state, in the wire's steps, or None until the next one is due; else as `read_report`."""
+        report = self.read_report(now_s)
+        return None if report is None else parse_input_report(report)
 
-        ValueError when `now_s` runs backwards or is not finite; DeviceError when it is unplugged or closed.
-        """
+    def write(self, feel: Feel, now_s: float) -> None:
+        """Do what `feel` sets from `now_s` on; DeviceError when it is unplugged or closed."""
         self._require_open()
         self._advance(now_s)
-        report, self._unread = self._unread, None
-        return report
-
-    def write(self, output: OutputReport, now_s: float) -> None:
-        """Do what `output` sets from `now_s` on; DeviceError when it is unplugged or closed."""
-        self._require_open()
-        self._advance(now_s)
-        self._apply(output)
+        self._apply(feel)
         self.write_count += 1
 
     def close(self) -> None:
@@ -194,16 +176,26 @@ class SimulatedDualSense:
 
     # The wire, for a system that is offered this controller
 
+    def read_report(self, now_s: float) -> bytes | None:
+        """The newest input report, of the state at its own time, or None until the next one is due.
+
+        ValueError when `now_s` runs backwards or is not finite; DeviceError when it is unplugged or closed.
+        """
+        self._require_open()
+        self._advance(now_s)
+        report, self._unread = self._unread, None
+        return report
+
     def take_report(self, report: bytes, now_s: float) -> None:
         """Take an output report off the wire; ValueError, and nothing changed, for one that cannot be read."""
         self._require_open()
         try:
             if transport_of_output(report) is not self.transport:
                 raise ValueError(f"report: id 0x{report[0]:02x} is not for a controller on {self.transport.value}")
-            output = parse_output_report(report)
+            feel = parse_output_report(report)
         except RemoteProtocolError as error:
             raise ValueError(f"report: {error}") from error
-        self.write(output, now_s)
+        self.write(feel, now_s)
 
     def get_feature(self, report_id: int) -> bytes:
         """Answer a feature report: calibration 0x05, address 0x09, firmware 0x20.
@@ -222,10 +214,10 @@ class SimulatedDualSense:
         if self._closed:
             raise DeviceError("the simulated controller is closed; open a new one")
 
-    def _apply(self, output: OutputReport) -> None:
-        self._told = output.following(self._told)
-        self._l2.set_effect(self._told.l2 or Off())
-        self._r2.set_effect(self._told.r2 or Off())
+    def _apply(self, feel: Feel) -> None:
+        self._told = feel.following(self._told)
+        self._l2.set_strengths(self._told.l2 or FREE_TRIGGER)
+        self._r2.set_strengths(self._told.r2 or FREE_TRIGGER)
 
     def _advance(self, now_s: float) -> None:
         """Let time pass until `now_s`, and make the newest input report on the way that has come due."""
@@ -250,9 +242,9 @@ class SimulatedDualSense:
 
     def _report(self, number: int) -> bytes:
         sequence = number % 256 if self.transport is Transport.USB else _BLUETOOTH_SEQUENCE
-        return build_input_report(self._state(sequence), self.transport, number * INPUT_REPORT_PERIOD_S)
+        return build_input_report(self._state(), self.transport, sequence, number * INPUT_REPORT_PERIOD_S)
 
-    def _state(self, sequence: int) -> ControllerState:
+    def _state(self) -> ControllerState:
         """The present values of the sensors."""
         triggers = {Button.L2: self._l2, Button.R2: self._r2}
         moved = {button for button, trigger in triggers.items() if round(trigger.sensed_travel * 255) > 0}
@@ -261,5 +253,4 @@ class SimulatedDualSense:
             l2=self._l2.sensed_travel,
             r2=self._r2.sensed_travel,
             pressed=self._held.pressed | moved,
-            sequence=sequence,
         )

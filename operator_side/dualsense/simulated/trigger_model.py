@@ -7,8 +7,7 @@ DualSense's trigger forces exists. A steadily pressing finger feels the whole ra
 import math
 from typing import Final
 
-from operator_side.dualsense.effects.official import MAX_STRENGTH, ZONE_COUNT, AnyEffect, Off
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.controller.feel import FREE_TRIGGER, MAX_STRENGTH, SENSED_TRAVEL, ZONE_COUNT, Strengths
 
 SPRING_PRELOAD_N: Final = 0.5
 """Force at which the trigger begins to move (assumed)."""
@@ -58,8 +57,8 @@ class SimulatedTrigger:
 
     def __init__(self, strength_step_n: float = STRENGTH_STEP_N) -> None:
         """`strength_step_n`: resistance of one strength; with 0 effects are shown and not felt."""
-        self.effect: AnyEffect = Off()
-        """The effect in force; `set_effect` changes it."""
+        self.strengths = FREE_TRIGGER
+        """The strengths in force; `set_strengths` changes them."""
         self.travel = 0.0
         """Mechanical travel, 0 to 1."""
         self._strength_step_n = strength_step_n
@@ -74,7 +73,7 @@ class SimulatedTrigger:
 
     def set_finger_force(self, finger_force_n: float) -> None:
         """Press with a constant force from now on; ValueError for a negative or non-finite one."""
-        self._equilibrium = equilibrium_travel(finger_force_n, self.effect.zone_strengths, self._strength_step_n)
+        self._equilibrium = equilibrium_travel(finger_force_n, self.strengths, self._strength_step_n)
         self._finger_force_n, self._held = finger_force_n, None
 
     def hold_at(self, travel: float) -> None:
@@ -84,10 +83,10 @@ class SimulatedTrigger:
         self._finger_force_n = 0.0
         self._held = self.travel = travel
 
-    def set_effect(self, effect: AnyEffect) -> None:
-        """Act like `effect` from now on."""
-        self.effect = effect
-        self._equilibrium = equilibrium_travel(self._finger_force_n, effect.zone_strengths, self._strength_step_n)
+    def set_strengths(self, strengths: Strengths) -> None:
+        """Resist by `strengths` from now on."""
+        self.strengths = strengths
+        self._equilibrium = equilibrium_travel(self._finger_force_n, strengths, self._strength_step_n)
 
     def advance(self, step_s: float) -> None:
         """Let `step_s` pass; ValueError for a negative or non-finite step."""

@@ -139,7 +139,7 @@ class UhidController:
 
     def next_input(self, now_s: float) -> bytes | None:
         """The controller's newest input report for the kernel; None when there is no new one or nobody takes it."""
-        report = self._controller.read(now_s)
+        report = self._controller.read_report(now_s)
         if report is None or not self.driven:
             return None
         self.counts.inputs += 1

@@ -34,7 +34,7 @@ from common.protocol.view_messages import (
 )
 from common.roles import ROLES, Role
 from common.status.phase import phase_of
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts, ShownKind
 
 _NICENESS: Final = 5

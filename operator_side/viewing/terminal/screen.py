@@ -13,7 +13,7 @@ from common.command.live_line import UNKNOWN, millimetres, percent
 from common.command.live_view import LiveView, live_view, number
 from common.command.words import link_words, printable, words
 from common.status.codes import Sight
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL
+from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts
 
 SILENT_AFTER_S: Final = 0.5

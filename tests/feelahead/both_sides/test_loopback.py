@@ -11,7 +11,7 @@ import pytest
 from common.protocol.messages import Compensation
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.lab.approaches.approach import Approach, PullRun
-from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT
+from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT
 from operator_side.people.person import Phase, SimulatedOperator
 from operator_side.people.pulling_hands import Hands
 from operator_side.people.settings import PersonSettings
@@ -64,7 +64,7 @@ def episode(delay_ms: int, compensation: Compensation = "operator") -> Episode:
     while run.clock.now() < end_s:
         run.run_until(run.clock.now() + LOOK_S)
         assert isinstance(run.person, SimulatedOperator)
-        l2, r2 = (effect.zone_strengths for effect in run.device.effects)
+        l2, r2 = (effect for effect in run.device.strengths)
         moments.append(Moment(run.person.phase, tuple(l2), tuple(r2), run.robot.held is not None))
     return Episode(tuple(moments), run.summary())
 
@@ -192,12 +192,12 @@ def test_a_person_who_is_blind_for_a_moment_lets_go_and_then_goes_on() -> None:
     both = loopback("to_operator: outage 400ms at 3.9s")
     both.run_until(4.08)
     assert not both.device.released
-    assert both.device.output.lightbar is None
+    assert both.device.told.light is None
     both.run_until(4.12)
     assert both.device.released
-    assert both.device.output.lightbar == WARNING_LIGHT
+    assert both.device.told.light == WARNING_LIGHT
     both.run_until(4.4)
-    assert both.device.output.lightbar == USUAL_LIGHT
+    assert both.device.told.light == USUAL_LIGHT
     both.run_until(8.5)
     summary = both.summary()
     assert summary["rendering"]["blind"] == 1

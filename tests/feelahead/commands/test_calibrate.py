@@ -14,11 +14,12 @@ from common.loop import process
 from feelahead.main import command
 from operator_side.calibration.procedure import CalibrationError
 from operator_side.calibration.store import calibration_path, load_calibration, read_calibration, write_calibration
+from operator_side.controller import connection
+from operator_side.controller.feel import RELEASED
+from operator_side.controller.state import ControllerState
 from operator_side.core import OperatorSide
-from operator_side.dualsense.hid import connection
-from operator_side.dualsense.reports.controller_state import ControllerState
 from operator_side.dualsense.reports.input_report import build_input_report
-from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
+from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 from tests.helpers.fake_hid import ADDRESS, FakeBackend, FakeHandle
 

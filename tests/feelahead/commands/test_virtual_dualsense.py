@@ -8,11 +8,11 @@ from common.clock import VirtualClock
 from common.errors import ConfigurationError
 from feelahead.commands.virtual_dualsense import DRIVER_PATIENCE_S, PULL_PERIOD_S, VirtualDualSenseSettings, live
 from feelahead.main import command
-from operator_side.dualsense.effects.official import Off
-from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.controller.feel import FREE_TRIGGER, Feel, Rumble
+from operator_side.controller.state import ControllerState
 from operator_side.dualsense.reports.feature_report import parse_address
 from operator_side.dualsense.reports.input_report import parse_input_report
-from operator_side.dualsense.reports.output_report import OutputReport, Rumble, build_output_report
+from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.uhid.file import UHID_PATH
 from tests.helpers.fake_kernel import START, STOP, FakeKernel, get_report, output, said
@@ -43,9 +43,9 @@ def sent_states(kernel: FakeKernel) -> list[ControllerState]:
 def test_it_says_what_it_is_told(transport: str, edge: bool, first: str) -> None:
     by = Transport.USB if transport == "usb" else Transport.BLUETOOTH
     told = [
-        OutputReport(l2=feedback(position=3, strength=6), lightbar=(0, 0, 64)),
-        OutputReport(l2=feedback(position=3, strength=6), r2=Off()),  # nothing new
-        OutputReport(l2=Off(), r2=feedback(position=0, strength=8), rumble=Rumble(left=1.0)),
+        Feel(l2=feedback(position=3, strength=6), light=(0, 0, 64)),
+        Feel(l2=feedback(position=3, strength=6), r2=FREE_TRIGGER),  # nothing new
+        Feel(l2=FREE_TRIGGER, r2=feedback(position=0, strength=8), rumble=Rumble(left=1.0)),
     ]
     events = [(0.0, get_report(1, 0x09)), (0.01, said(START))]
     events += [(0.02, output(build_output_report(one, by))) for one in told]

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from common.protocol.messages import Vector2
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind, force_for, make_pull
-from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
@@ -111,9 +110,8 @@ def deflections(hands: Hands) -> list[Vector2]:
     """How far the left and the right stick count as deflected."""
     device, calibration = SimulatedDualSense(), TravelCalibration()
     device.set_sticks(hands.left_stick, hands.right_stick)
-    report = device.read(0.0)
-    assert report is not None
-    state = parse_input_report(report)
+    state = device.read(0.0)
+    assert state is not None
     sticks = (calibration.left_stick, state.left_stick), (calibration.right_stick, state.right_stick)
     return [rest.deflection(raw) for rest, raw in sticks]
 

@@ -5,8 +5,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+from operator_side.controller.feel import Feel
 from operator_side.dualsense.reports.models import Model
-from operator_side.dualsense.reports.output_report import OutputReport, build_output_report
+from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS
 from operator_side.dualsense.uhid.controller import UhidIdentity
@@ -40,7 +41,7 @@ def test_the_driver_takes_it_its_hands_move_and_it_says_what_it_is_told(tmp_path
                 wait_until("R2 is free, and the stick is left", lambda: device.axes(ABS_RZ)[0] == 0 and _left(device))
             hidraw = view.hidraw()
             assert hidraw is not None
-            hidraw.write_bytes(build_output_report(OutputReport(r2=feedback(position=3, strength=6)), transport))
+            hidraw.write_bytes(build_output_report(Feel(r2=feedback(position=3, strength=6)), transport))
             told_it = "R2: strengths 0 0 0 6 6 6 6 6 6 6"
             wait_until("it says the effect", lambda: told_it in lines(), instead=lines)
             process.send_signal(signal.SIGTERM)

@@ -8,12 +8,10 @@ from typing import Final
 import pytest
 
 from common.errors import DeviceError, NoDeviceError
-from operator_side.dualsense.effects.official import AnyEffect, MultiPositionFeedback, Off
+from operator_side.controller.feel import FREE_TRIGGER, Feel, Rumble, Strengths
+from operator_side.controller.state import Button, ControllerState
 from operator_side.dualsense.hid.device import HidDualSense, load_backend
 from operator_side.dualsense.hid.finding import find_controller, sightings
-from operator_side.dualsense.reports.controller_state import Button, ControllerState
-from operator_side.dualsense.reports.input_report import parse_input_report
-from operator_side.dualsense.reports.output_report import OutputReport, Rumble
 from operator_side.dualsense.simulated.controller import SIMULATED_FIRMWARE
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
 from tests.helpers.felt import feedback
@@ -22,10 +20,10 @@ from tests.kernel.inside.driver import bound
 from tests.kernel.inside.plugged import ADDRESS, Plugged
 
 _NOBODY: Final = 65534
-_EFFECTS: Final[tuple[tuple[AnyEffect, AnyEffect], ...]] = (
-    (feedback(position=3, strength=6), Off()),
-    (Off(), feedback(position=0, strength=8)),
-    (MultiPositionFeedback((0, 1, 2, 3, 4, 5, 6, 7, 8, 0)), MultiPositionFeedback((8, 0, 8, 0, 1, 0, 2, 0, 3, 4))),
+_EFFECTS: Final[tuple[tuple[Strengths, Strengths], ...]] = (
+    (feedback(position=3, strength=6), FREE_TRIGGER),
+    (FREE_TRIGGER, feedback(position=0, strength=8)),
+    ((0, 1, 2, 3, 4, 5, 6, 7, 8, 0), (8, 0, 8, 0, 1, 0, 2, 0, 3, 4)),
     (feedback(position=9, strength=1), feedback(position=1, strength=3)),
 )
 
@@ -44,8 +42,7 @@ def our_device(plugged: Plugged) -> Iterator[HidDualSense]:
 
 def newest_state(device: HidDualSense) -> ControllerState | None:
     """The newest input report."""
-    report = device.read(0.0)
-    return None if report is None else parse_input_report(report)
+    return device.read(0.0)
 
 
 def test_it_is_found_and_says_what_it_is(plugged: Plugged) -> None:
@@ -89,14 +86,14 @@ def test_it_is_told_exactly_what_is_written_and_released_at_the_end(plugged: Plu
     with our_device(plugged) as device:
         before = plugged.ask(lambda controller: controller.write_count)
         for l2, r2 in _EFFECTS:
-            device.write(OutputReport(l2=l2, r2=r2), 0.0)
-            wait_until(f"{l2}, {r2}", lambda l2=l2, r2=r2: plugged.ask(lambda c: c.effects) == (l2, r2))  # type: ignore[misc]
-        device.write(OutputReport(rumble=Rumble(left=1.0, right=0.2)), 0.0)
+            device.write(Feel(l2=l2, r2=r2), 0.0)
+            wait_until(f"{l2}, {r2}", lambda l2=l2, r2=r2: plugged.ask(lambda c: c.strengths) == (l2, r2))  # type: ignore[misc]
+        device.write(Feel(rumble=Rumble(left=1.0, right=0.2)), 0.0)
         wait_until("the motors turn", lambda: plugged.ask(lambda c: c.rumble) == Rumble(left=1.0, right=0.2))
-        assert plugged.ask(lambda c: c.effects) == _EFFECTS[-1], "the rumble changed the triggers"
+        assert plugged.ask(lambda c: c.strengths) == _EFFECTS[-1], "the rumble changed the triggers"
         # Forty more, so that Bluetooth's sequence numbers go round; the kernel keeps 32 for a slow reader.
         for number in range(40):
-            device.write(OutputReport(l2=feedback(number % 10, 1 + number % 8)), 0.0)
+            device.write(Feel(l2=feedback(number % 10, 1 + number % 8)), 0.0)
             if number % 10 == 9:
                 expected = before + len(_EFFECTS) + 2 + number
                 wait_until("all arrive", lambda count=expected: plugged.ask(lambda c: c.write_count) == count)  # type: ignore[misc]
@@ -118,11 +115,11 @@ def test_without_permission_it_says_what_to_do(plugged: Plugged) -> None:
 def test_an_unplugged_one_is_gone_and_found_when_it_is_back(plugged: Plugged) -> None:
     for _ in range(2):
         with our_device(plugged) as device:
-            device.write(OutputReport(l2=feedback(2, 2)), 0.0)
+            device.write(Feel(l2=feedback(2, 2)), 0.0)
             plugged.unplug()
             wait_until("reading says that it is gone", lambda device=device: _is_gone(device))  # type: ignore[misc]
             with pytest.raises(DeviceError, match="gone"):
-                device.write(OutputReport(l2=Off()), 0.0)
+                device.write(Feel(l2=FREE_TRIGGER), 0.0)
         assert not device.released, "it claims to have released what is gone"
         wait_until("nothing is found", _finds_nothing)
         plugged.plug_in()

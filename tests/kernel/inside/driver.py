@@ -3,7 +3,7 @@
 import contextlib
 from collections.abc import Iterator
 
-from operator_side.dualsense.reports.controller_state import Button
+from operator_side.controller.state import Button
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
 from tests.helpers.machines.waiting import wait_until
 from tests.kernel.inside.kernel_view import (
@@ -52,7 +52,7 @@ def test_hid_playstation_takes_it(plugged: Plugged) -> None:
     assert counts.features >= 3
     assert counts.outputs >= 1, "the driver has not set the lights"
     assert counts.refused == 0
-    assert plugged.ask(lambda controller: controller.output.lightbar) is not None
+    assert plugged.ask(lambda controller: controller.told.light) is not None
 
 
 def test_the_kernel_sees_the_hands(plugged: Plugged) -> None:

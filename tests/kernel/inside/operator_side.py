@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from feelahead.both_sides.processes import SideProcess
-from operator_side.dualsense.reports.controller_state import Button
+from operator_side.controller.state import Button
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.trigger_model import NORMAL_FINGER_FORCE_N
 from tests.helpers.machines.waiting import stays, wait_until

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from operator_side.calibration.procedure import CalibrationError, CalibrationProcedure, Step
-from operator_side.dualsense.reports.controller_state import ControllerState
+from operator_side.controller.state import ControllerState
 from operator_side.hands.travel_calibration import StickRest, TriggerTravel
 from tests.helpers.calibrating_hands import REPORT_S, Hands, Wear
 

@@ -6,13 +6,15 @@ from typing import Any
 
 from common.clock import VirtualClock
 from common.errors import DeviceError
-from operator_side.dualsense.hid.background_writes import STALL_S
+from operator_side.controller.background_writes import STALL_S
+from operator_side.controller.feel import Feel
+from operator_side.controller.port import Controller, OpenController
+from operator_side.controller.search import BackgroundSearch
+from operator_side.controller.state import ControllerState
 from operator_side.dualsense.hid.device import HidHandle
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.hid.release_watchdog import SILENCE_S
-from operator_side.dualsense.hid.search import BackgroundSearch, Device, OpenController
 from operator_side.dualsense.reports.models import SONY_VENDOR_ID
-from operator_side.dualsense.reports.output_report import OutputReport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 
 PERIOD_S = 0.004
@@ -37,7 +39,7 @@ class SimulatedHandle:
         if timeout_ms > 0:
             self._system.clock.advance_to(self._system.clock.now() + PERIOD_S)
         try:
-            return list((self._open().read(self._system.clock.now()) or b"")[:max_length])
+            return list((self._open().read_report(self._system.clock.now()) or b"")[:max_length])
         except DeviceError as error:
             raise OSError("read error") from error
 
@@ -92,10 +94,10 @@ class SimulatedSystem:
 class StallingWrites:
     """BackgroundWrites without a thread: what is written while `stalled` goes out when the stall ends."""
 
-    def __init__(self, device: Device, stalled: Callable[[], bool]) -> None:
+    def __init__(self, device: Controller, stalled: Callable[[], bool]) -> None:
         self._device = device
         self._stalled = stalled
-        self._waiting: OutputReport | None = None
+        self._waiting: Feel | None = None
         self._since_s = 0.0
         self._stuck = False
 
@@ -110,13 +112,13 @@ class StallingWrites:
         """Seconds for which a write has waited; 0 for none."""
         return 0.0 if self._waiting is None else max(now_s - self._since_s, 1e-9)
 
-    def read(self, now_s: float) -> bytes | None:
+    def read(self, now_s: float) -> ControllerState | None:
         if not self._stalled() and (waiting := self._waiting) is not None:
             self._waiting = None
             self._device.write(waiting, now_s)
         return self._device.read(now_s)
 
-    def write(self, output: OutputReport, now_s: float) -> None:
+    def write(self, output: Feel, now_s: float) -> None:
         if not self._stalled():
             self._device.write(output if self._waiting is None else output.following(self._waiting), now_s)
             self._waiting = None

@@ -1,27 +1,18 @@
-"""The driver of a real controller against a stand-in for hidapi, and its writes by a thread."""
+"""The driver of a real controller against a stand-in for hidapi."""
 
 import sys
-import threading
 import types
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-import operator_side.dualsense.hid.background_writes
 from common.errors import DeviceError, NoDriverError
-from operator_side.dualsense.effects.official import Off, OtherEffect
-from operator_side.dualsense.hid.background_writes import CLOSE_TIMEOUT_S, STALL_S, BackgroundWrites
+from operator_side.controller.feel import FREE_TRIGGER, RELEASED, USUAL_LIGHT, WARNING_LIGHT, Feel, Rumble
+from operator_side.controller.state import ControllerState
 from operator_side.dualsense.hid.device import HidDualSense, load_backend
-from operator_side.dualsense.reports.output_report import (
-    RELEASED,
-    USUAL_LIGHT,
-    WARNING_LIGHT,
-    OutputReport,
-    Rumble,
-    parse_output_report,
-)
+from operator_side.dualsense.reports import output_report
+from operator_side.dualsense.reports.input_report import build_input_report
+from operator_side.dualsense.reports.output_report import parse_output_report
 from operator_side.dualsense.reports.transport import Transport
 from tests.helpers.fake_hid import (
     ADDRESS,
@@ -37,8 +28,7 @@ from tests.helpers.felt import feedback
 
 PATH = b"/dev/hidraw3"
 TRANSPORTS = pytest.mark.parametrize("transport", [USB, BLUETOOTH])
-STIFF = OutputReport(r2=feedback(3, 6))
-LIMIT_S = 600.0
+STIFF = Feel(r2=feedback(3, 6))
 
 
 def open_fake(handle: FakeHandle) -> HidDualSense:
@@ -65,7 +55,7 @@ def test_bluetooth_is_told_from_short_reports_which_are_passed_over() -> None:
     device = open_fake(handle)
     assert device.identity.first_report == handle.report()
     handle.waiting = [handle.report(1), SIMPLE_REPORT, SIMPLE_REPORT.ljust(78, b"\0")]
-    assert (device.read(0.1), handle.waiting) == (handle.report(1), [])
+    assert (device.read(0.1), device.rejected, handle.waiting) == (ControllerState(), 0, [])
     handle.waiting = [SIMPLE_REPORT]
     assert device.read(0.2) is None
 
@@ -134,13 +124,14 @@ def test_reading_drains_to_the_newest_good_report(transport: Transport, bad: byt
     handle = FakeHandle(transport)
     device = open_fake(handle)
     assert device.read(0.0) is None
-    handle.waiting = [handle.report(1), bad, handle.report(2), bad, bad]
-    assert device.read(0.1) == handle.report(2)
+    pulled = ControllerState(r2=1.0)
+    handle.waiting = [handle.report(1), bad, build_input_report(pulled, transport), bad, bad]
+    assert (device.read(0.1), device.rejected) == (pulled, 2)
     assert device.read(0.2) is None
     handle.waiting = [bad]
-    assert device.read(0.3) == bad  # parsing it says what is wrong
+    assert (device.read(0.3), device.rejected) == (None, 3)
     handle.waiting = [handle.report()] * 1000
-    assert device.read(0.4) == handle.report()
+    assert device.read(0.4) == ControllerState()
     assert len(handle.waiting) > 900
     handle.plugged_in = False
     with pytest.raises(DeviceError, match=r"gone \(read error\): plug it in"):
@@ -164,16 +155,13 @@ def test_each_report_goes_out_in_its_framing_with_the_next_number_and_a_checksum
 
 
 @TRANSPORTS
-def test_no_debug_code_leaves(transport: Transport) -> None:
+def test_no_debug_code_leaves(transport: Transport, monkeypatch: pytest.MonkeyPatch) -> None:
     handle = FakeHandle(transport)
     device = open_fake(handle)
     for code in (0xFC, 0xFD, 0xFE):
-        with pytest.raises(ValueError, match="valid"):
-            device.write(OutputReport(r2=OtherEffect(bytes([code]).ljust(11, b"\0"))), 0.0)
-        foreign: Any = types.SimpleNamespace(encode=lambda code=code: bytes([code]).ljust(11, b"\0"))
-        output: Any = types.SimpleNamespace(l2=foreign, r2=None, rumble=None, lightbar=None)
+        monkeypatch.setattr(output_report, "encode_effect", lambda _, code=code: bytes([code]).ljust(11, b"\0"))
         with pytest.raises(ValueError, match=f"0x{code:02x}"):
-            device.write(output, 0.0)
+            device.write(STIFF, 0.0)
     assert handle.written == []
     assert device.released
 
@@ -181,13 +169,13 @@ def test_no_debug_code_leaves(transport: Transport) -> None:
 def test_it_is_released_when_everything_that_was_written_is_off() -> None:
     handle = FakeHandle()
     device = open_fake(handle)
-    steps: list[tuple[OutputReport, bool]] = [
-        (OutputReport(lightbar=(1, 2, 3)), True),
+    steps: list[tuple[Feel, bool]] = [
+        (Feel(light=(1, 2, 3)), True),
         (STIFF, False),
-        (OutputReport(l2=Off()), False),
-        (OutputReport(rumble=Rumble(left=0.5)), False),
-        (OutputReport(r2=Off()), False),
-        (OutputReport(rumble=Rumble()), True),
+        (Feel(l2=FREE_TRIGGER), False),
+        (Feel(rumble=Rumble(left=0.5)), False),
+        (Feel(r2=FREE_TRIGGER), False),
+        (Feel(rumble=Rumble()), True),
         (STIFF, False),
         (RELEASED, True),
     ]
@@ -208,12 +196,10 @@ def test_it_is_released_when_everything_that_was_written_is_off() -> None:
     [
         ([], []),
         ([STIFF], [RELEASED]),
-        ([OutputReport(lightbar=WARNING_LIGHT), STIFF], [OutputReport(Off(), Off(), Rumble(), USUAL_LIGHT)]),
+        ([Feel(light=WARNING_LIGHT), STIFF], [Feel(FREE_TRIGGER, FREE_TRIGGER, Rumble(), USUAL_LIGHT)]),
     ],
 )
-def test_close_undoes_what_was_written(
-    transport: Transport, told: list[OutputReport], farewell: list[OutputReport]
-) -> None:
+def test_close_undoes_what_was_written(transport: Transport, told: list[Feel], farewell: list[Feel]) -> None:
     handle = FakeHandle(transport)
     device = open_fake(handle)
     device.read(0.0)
@@ -227,109 +213,4 @@ def test_close_undoes_what_was_written(
     with pytest.raises(DeviceError, match="closed"):
         device.read(1.0)
     with pytest.raises(DeviceError, match="closed"):
-        device.write(OutputReport(), 1.0)
-
-
-# Writing by a thread
-
-
-class SlowDevice:
-    """A device whose writes take until they are let through."""
-
-    def __init__(self) -> None:
-        self.written: list[OutputReport] = []
-        self.released = True
-        self.fails: Exception | None = None
-        self.entered = threading.Semaphore(0)
-        self.let = threading.Semaphore(0)
-        self.done = threading.Semaphore(0)
-
-    def read(self, now_s: float) -> bytes | None:
-        del now_s
-        return b"report"
-
-    def write(self, output: OutputReport, now_s: float) -> None:
-        del now_s
-        self.entered.release()
-        assert self.let.acquire(timeout=LIMIT_S)
-        if self.fails is not None:
-            self.done.release()
-            raise self.fails
-        self.written.append(output)
-        self.released = False
-        self.done.release()
-
-    def close(self) -> None:
-        self.written.append(RELEASED)
-        self.released = True
-
-
-@pytest.fixture
-def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[SlowDevice]:
-    # However late the machine lets the thread end.
-    monkeypatch.setattr(operator_side.dualsense.hid.background_writes, "CLOSE_TIMEOUT_S", LIMIT_S)
-    made = SlowDevice()
-    yield made
-    made.let.release(1000)
-
-
-def test_what_waits_is_merged_and_the_newest_wins(slow: SlowDevice) -> None:
-    writes = BackgroundWrites(slow)
-    assert writes.released
-    assert not writes.stalls(100.0)
-    writes.write(STIFF, 0.0)
-    assert slow.entered.acquire(timeout=LIMIT_S)
-    assert (writes.released, writes.stalls(STALL_S), writes.stalls(2 * STALL_S)) == (False, False, True)
-    # The first write hangs; neither reading nor writing waits for it.
-    writes.write(OutputReport(l2=feedback(0, 1), r2=feedback(5, 2)), 0.1)
-    writes.write(OutputReport(rumble=Rumble(left=1.0)), 0.2)
-    writes.write(OutputReport(l2=Off()), 0.3)
-    assert writes.read(0.3) == b"report"
-    slow.let.release(2)
-    for _ in range(2):
-        assert slow.done.acquire(timeout=LIMIT_S)
-    assert slow.written == [STIFF, OutputReport(l2=Off(), r2=feedback(5, 2), rumble=Rumble(left=1.0))]
-    assert not writes.released
-    writes.close()
-    assert writes.released
-    assert not writes.stalls(100.0)
-
-
-def test_a_close_drops_what_waits_and_releases(slow: SlowDevice) -> None:
-    writes = BackgroundWrites(slow)
-    writes.write(STIFF, 0.0)
-    assert slow.entered.acquire(timeout=LIMIT_S)
-    writes.write(OutputReport(r2=feedback(5, 2)), 0.1)
-    slow.let.release()
-    assert slow.done.acquire(timeout=LIMIT_S)
-    slow.let.release(10)
-    writes.close()
-    assert slow.written[-1] == RELEASED
-    assert writes.released
-
-
-def test_a_write_that_never_returns_keeps_nobody_and_is_not_called_released(
-    slow: SlowDevice, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(operator_side.dualsense.hid.background_writes, "CLOSE_TIMEOUT_S", CLOSE_TIMEOUT_S)
-    writes = BackgroundWrites(slow)
-    writes.write(STIFF, 0.0)
-    assert slow.entered.acquire(timeout=LIMIT_S)
-    writes.close()
-    assert not writes.released
-    assert slow.written == []
-
-
-@pytest.mark.parametrize("kind", [DeviceError, RuntimeError])
-def test_a_failed_write_is_told_by_the_next_call(slow: SlowDevice, kind: type[Exception]) -> None:
-    slow.fails = kind("gone")
-    writes = BackgroundWrites(slow)
-    slow.let.release()
-    writes.write(STIFF, 0.0)
-    assert slow.done.acquire(timeout=LIMIT_S)
-    writes._thread.join(LIMIT_S)
-    with pytest.raises(kind, match="gone"):
-        writes.read(0.1)
-    with pytest.raises(kind, match="gone"):
-        writes.write(STIFF, 0.1)
-    writes.close()
+        device.write(Feel(), 1.0)

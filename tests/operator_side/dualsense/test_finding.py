@@ -5,10 +5,12 @@ import threading
 import pytest
 
 from common.errors import DeviceError, NoDeviceError
+from operator_side.controller.feel import RELEASED
+from operator_side.controller.port import OpenController
+from operator_side.controller.search import BackgroundSearch, Find
 from operator_side.dualsense.hid.finding import LOOKS_FOR_THE_SAME, Finder, Sighting, find_controller, sightings
-from operator_side.dualsense.hid.search import BackgroundSearch, Find, OpenController
 from operator_side.dualsense.hid.udev import RULES
-from operator_side.dualsense.reports.output_report import RELEASED, build_output_report
+from operator_side.dualsense.reports.output_report import build_output_report
 from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, USB, FakeBackend, FakeHandle
 
 A, B = b"/dev/hidraw3", b"/dev/hidraw4"

@@ -1,26 +1,19 @@
 """Effects and output reports: exact bytes in each framing, only our flags, round trips, and no debug code anywhere."""
 
 from dataclasses import fields
-from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import RemoteProtocolError
-from operator_side.dualsense.effects.official import (
-    MultiPositionFeedback,
-    Off,
-    OtherEffect,
-    TriggerEffect,
-    decode_effect,
-)
+from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel, Rumble, Strengths
+from operator_side.dualsense.effects.official import decode_effect, encode_effect
+from operator_side.dualsense.reports import output_report
 from operator_side.dualsense.reports.output_report import (
-    RELEASED,
-    OutputReport,
-    Rumble,
     build_output_report,
+    encoded_effects,
     parse_output_report,
     transport_of_output,
 )
@@ -31,15 +24,14 @@ TRANSPORTS = pytest.mark.parametrize("transport", Transport)
 STRENGTHS = st.tuples(*[st.integers(0, 8)] * 10)
 BYTES = st.integers(0, 255)
 DRIVES = BYTES.map(lambda byte: byte / 255)
-EFFECTS = st.none() | st.just(Off()) | STRENGTHS.filter(any).map(MultiPositionFeedback)
 OUTPUTS = st.builds(
-    OutputReport,
-    EFFECTS,
-    EFFECTS,
+    Feel,
+    st.none() | STRENGTHS,
+    st.none() | STRENGTHS,
     st.none() | st.builds(Rumble, DRIVES, DRIVES),
     st.none() | st.tuples(BYTES, BYTES, BYTES),
 )
-FULL = OutputReport(l2=feedback(3, 6), r2=Off(), rumble=Rumble(left=1.0, right=0.2), lightbar=(10, 20, 30))
+FULL = Feel(l2=feedback(3, 6), r2=FREE_TRIGGER, rumble=Rumble(left=1.0, right=0.2), light=(10, 20, 30))
 FULL_BLOCK = bytes.fromhex(
     "0f 04 33 ff 00 00 00 00 00 00"  # flags, motors right and left, nothing of the sound and the mute light
     "05 00 00 00 00 00 00 00 00 00 00"  # R2
@@ -64,24 +56,20 @@ def framings(block: bytes) -> tuple[bytes, bytes, bytes]:
 @pytest.mark.parametrize(
     ("effect", "expected"),
     [
-        (Off(), "05 00 00 00 00 00 00 00 00 00 00"),
+        (FREE_TRIGGER, "05 00 00 00 00 00 00 00 00 00 00"),
         # The public test vector.
         (feedback(3, 6), "21 f8 03 00 da b6 2d 00 00 00 00"),
         # Worked by hand: three bits a zone, strength less one, from bit 3 * zone.
         (feedback(9, 8), "21 00 02 00 00 00 38 00 00 00 00"),
         (feedback(0, 8), "21 ff 03 ff ff ff 3f 00 00 00 00"),
         (feedback(0, 1), "21 ff 03 00 00 00 00 00 00 00 00"),
-        (MultiPositionFeedback((1, 0, 0, 0, 0, 0, 0, 0, 0, 0)), "21 01 00 00 00 00 00 00 00 00 00"),
-        (MultiPositionFeedback((2, 8, 0, 0, 0, 0, 0, 0, 0, 5)), "21 03 02 39 00 00 20 00 00 00 00"),
+        ((1, 0, 0, 0, 0, 0, 0, 0, 0, 0), "21 01 00 00 00 00 00 00 00 00 00"),
+        ((2, 8, 0, 0, 0, 0, 0, 0, 0, 5), "21 03 02 39 00 00 20 00 00 00 00"),
     ],
 )
-def test_exact_bytes_of_effects(effect: TriggerEffect, expected: str) -> None:
-    assert effect.encode() == bytes.fromhex(expected)
+def test_exact_bytes_of_effects(effect: Strengths, expected: str) -> None:
+    assert encode_effect(effect) == bytes.fromhex(expected)
     assert decode_effect(bytes.fromhex(expected)) == effect
-
-
-def test_nothing_to_feel_is_off() -> None:
-    assert feedback(0, 0).encode() == Off().encode()
 
 
 @pytest.mark.parametrize(
@@ -96,15 +84,18 @@ def test_nothing_to_feel_is_off() -> None:
     ],
 )
 def test_what_another_program_says_is_kept_as_it_is_and_holds_nothing(encoded: str) -> None:
-    effect = decode_effect(bytes.fromhex(encoded))
-    assert effect == OtherEffect(bytes.fromhex(encoded))
-    assert effect.zone_strengths == (0,) * 10
+    foreign = bytes.fromhex(encoded)
+    assert decode_effect(foreign) is None
+    block = bytearray(47)
+    block[0], block[10:21] = 0x04, foreign
+    assert parse_output_report(b"\x02" + block) == Feel(r2=FREE_TRIGGER)
+    assert encoded_effects(b"\x02" + block) == (None, foreign)
 
 
 @given(st.binary(min_size=11, max_size=11) | st.binary(min_size=10, max_size=10).map(lambda rest: b"\x21" + rest))
 def test_any_bytes_decode_to_what_encodes_to_them(encoded: bytes) -> None:
-    effect = decode_effect(encoded)
-    assert (effect.encoded if isinstance(effect, OtherEffect) else effect.encode()) == encoded
+    strengths = decode_effect(encoded)
+    assert strengths is None or encode_effect(strengths) == encoded
 
 
 # Reports
@@ -122,15 +113,15 @@ def test_exact_bytes_of_reports(transport: Transport, sequence: int) -> None:
 @pytest.mark.parametrize(
     ("output", "flags"),
     [
-        (OutputReport(), (0x00, 0x00)),
-        (OutputReport(rumble=Rumble()), (0x03, 0x00)),
-        (OutputReport(r2=Off()), (0x04, 0x00)),
-        (OutputReport(l2=Off()), (0x08, 0x00)),
-        (OutputReport(lightbar=(0, 0, 0)), (0x00, 0x04)),
+        (Feel(), (0x00, 0x00)),
+        (Feel(rumble=Rumble()), (0x03, 0x00)),
+        (Feel(r2=FREE_TRIGGER), (0x04, 0x00)),
+        (Feel(l2=FREE_TRIGGER), (0x08, 0x00)),
+        (Feel(light=(0, 0, 0)), (0x00, 0x04)),
         (RELEASED, (0x0F, 0x00)),
     ],
 )
-def test_only_the_flags_of_what_is_set(transport: Transport, output: OutputReport, flags: tuple[int, int]) -> None:
+def test_only_the_flags_of_what_is_set(transport: Transport, output: Feel, flags: tuple[int, int]) -> None:
     report = build_output_report(output, transport)
     start = 1 if transport is Transport.USB else 3
     assert (report[start], report[start + 1]) == flags
@@ -140,7 +131,7 @@ def test_only_the_flags_of_what_is_set(transport: Transport, output: OutputRepor
 @TRANSPORTS
 @given(output=OUTPUTS, sequence=st.integers(0, 100))
 @settings(max_examples=1000)
-def test_round_trip(transport: Transport, output: OutputReport, sequence: int) -> None:
+def test_round_trip(transport: Transport, output: Feel, sequence: int) -> None:
     report = build_output_report(output, transport, sequence)
     assert transport_of_output(report) is transport
     assert parse_output_report(report) == output
@@ -173,35 +164,22 @@ def test_a_debug_code_is_refused_wherever_it_stands(code: int, place: int, flags
             parse_output_report(report)
 
 
-class Disguised(MultiPositionFeedback):  # type: ignore[misc]
-    """An effect in all but its bytes."""
-
-    encoded: ClassVar = b""
-
-    def encode(self) -> bytes:
-        return self.encoded
-
-
 @TRANSPORTS
 @pytest.mark.parametrize("code", [*CODES, 0x00, 0x01, 0x25, 0x26, 0x80, 0xFF])
-def test_nothing_of_any_type_brings_another_code_to_the_wire(transport: Transport, code: int) -> None:
-    bytes_of_code = bytes([code])
+def test_nothing_brings_another_code_to_the_wire(
+    transport: Transport, code: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bytes_of_code, off = bytes([code]), encode_effect(FREE_TRIGGER)
     for encoded in (
         bytes_of_code.ljust(11, b"\0"),
-        Off().encode() + bytes_of_code * 40,  # longer, so that it comes to lie elsewhere
+        off + bytes_of_code * 40,  # longer, so that it comes to lie elsewhere
         b"",
         bytes_of_code * 3,
     ):
-        Disguised.encoded = encoded
-        effect = Disguised((1,) * 10)
-        for one in (OutputReport(l2=effect), OutputReport(r2=effect), OutputReport(effect, effect)):
+        monkeypatch.setattr(output_report, "encode_effect", lambda _, encoded=encoded: encoded)
+        for one in (Feel(l2=FREE_TRIGGER), Feel(r2=FREE_TRIGGER), RELEASED):
             with pytest.raises(ValueError, match="effect code"):
                 build_output_report(one, transport)
-        foreign: Any = SimpleNamespace(l2=effect, r2=None, rumble=None, lightbar=None)
-        with pytest.raises(ValueError, match="effect code"):
-            build_output_report(foreign, transport)
-    with pytest.raises(ValueError, match=r"OtherEffect.*valid: Off, MultiPositionFeedback"):
-        build_output_report(OutputReport(r2=OtherEffect(bytes_of_code.ljust(11, b"\0"))), transport)
 
 
 @pytest.mark.parametrize(
@@ -217,7 +195,7 @@ def test_either_way_to_rumble_is_read(flags: dict[int, int], rumble: Rumble | No
     block[2], block[3] = 51, 255
     for place, value in flags.items():
         block[place] = value
-    assert parse_output_report(b"\x02" + block) == OutputReport(rumble=rumble)
+    assert parse_output_report(b"\x02" + block) == Feel(rumble=rumble)
 
 
 @pytest.mark.parametrize(
@@ -243,16 +221,15 @@ def test_refused_bytes_are_named(report: bytes, message: str) -> None:
     ("kind", "arguments", "message"),
     [
         *(
-            (MultiPositionFeedback, {"zone_strengths": strengths}, f"zone_strengths = {named}.*; valid: a tuple of 10")
+            (Feel, {name: strengths}, f"{name} = {named}.*; valid: a tuple of 10")
+            for name in ("l2", "r2")
             for strengths, named in (
                 *(((1,) * 9, ""), ([1] * 10, r"\[1, "), ((1,) * 9 + (9,), ".*9"), ((-1,) + (0,) * 9, ".*-1")),
-                *(((1.0,) + (0,) * 9, ".*1.0"), (5, "5")),
+                *(((1.0,) + (0,) * 9, ".*1.0"), (5, "5"), (b"\xfc" * 10, "b")),
             )
         ),
-        (OutputReport, {"l2": b"\xfc"}, "l2 = "),
-        (OutputReport, {"r2": SimpleNamespace(encode=lambda: b"\xfc" + bytes(10))}, "r2 = "),
-        (OutputReport, {"lightbar": (0, 0, 256)}, r"lightbar\[2\] = 256"),
-        (OutputReport, {"lightbar": (0, 0.5, 0)}, r"lightbar\[1\] = 0.5"),
+        (Feel, {"light": (0, 0, 256)}, r"light\[2\] = 256"),
+        (Feel, {"light": (0, 0.5, 0)}, r"light\[1\] = 0.5"),
         (Rumble, {"left": 1.5}, "left = 1.5; valid: 0 to 1"),
         (Rumble, {"right": float("nan")}, "right = nan"),
     ],
@@ -263,12 +240,10 @@ def test_refused_values_are_named(kind: Any, arguments: dict[str, Any], message:
 
 
 @given(OUTPUTS, OUTPUTS)
-def test_two_in_a_row_set_what_both_together_set_and_a_change_leads_there(
-    first: OutputReport, second: OutputReport
-) -> None:
+def test_two_in_a_row_set_what_both_together_set_and_a_change_leads_there(first: Feel, second: Feel) -> None:
     both = second.following(first)
-    for part in fields(OutputReport):
+    for part in fields(Feel):
         newer, older = getattr(second, part.name), getattr(first, part.name)
         assert getattr(both, part.name) == (older if newer is None else newer)
     assert both.change_from(first).following(first) == both
-    assert both.change_from(both) == OutputReport()
+    assert both.change_from(both) == Feel()

@@ -9,13 +9,13 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import LeaseNotice, MotionCommand
 from common.protocol.session import SessionState
 from common.status.codes import ConnectionState
+from operator_side.controller.background_writes import STALL_S
+from operator_side.controller.connection import BEAT_PERIOD_S, LOOK_PERIOD_S, Connection
+from operator_side.controller.feel import RELEASED
+from operator_side.controller.state import Button
 from operator_side.core import OperatorSide
-from operator_side.dualsense.hid.background_writes import STALL_S
-from operator_side.dualsense.hid.connection import BEAT_PERIOD_S, LOOK_PERIOD_S, Connection
 from operator_side.dualsense.hid.finding import Finder
 from operator_side.dualsense.hid.release_watchdog import SILENCE_S
-from operator_side.dualsense.reports.controller_state import Button
-from operator_side.dualsense.reports.output_report import RELEASED
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.newest import INTENT_EXPIRES_S
@@ -82,15 +82,15 @@ class Plugs(RuleBasedStateMachine):
             self.core.receive(encode(message), now_s)
         self.must_stop = self.must_stop and self.armed
         self.connection.beat(now_s)
-        if (output := self.core.output_report(now_s)) is not None:
+        if (output := self.core.feel_now(now_s)) is not None:
             assert output == RELEASED or not self.must_release, "told before it was released"
             self.must_release = False
             self.connection.write(output, now_s)
         self.connection.update(now_s)
         now_s = self.now_s  # opening one lets time pass
-        if (report := self.connection.read(now_s)) is not None:
+        if (state := self.connection.read(now_s)) is not None:
             self.report_s = now_s
-            self.core.read_report(report, now_s)
+            self.core.read_state(state, now_s)
         for command in (decode(message.payload) for message in self.core.motion(now_s)):
             if isinstance(command, MotionCommand):
                 assert not self.must_stop, "commanded before the arm was known to stand"
@@ -112,7 +112,7 @@ class Plugs(RuleBasedStateMachine):
             writes = controller.device if controller is not None else None
             assert isinstance(writes, StallingWrites)
             if not writes.waits_since(self.now_s):
-                assert device.effects == (told.l2, told.r2), "it does not do what the core believes"
+                assert device.strengths == (told.l2, told.r2), "it does not do what the core believes"
             elif writes.waits_since(self.now_s) > STALL_S + SILENCE_S + 0.1 and self.system.failing == 0:
                 assert device.released, "stiff while a write hangs"
         left_stiff = [path for path, one in self.system.devices.items() if not one.released and path != connected]

@@ -9,16 +9,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DeviceError
-from operator_side.dualsense.effects.official import MultiPositionFeedback, Off, OtherEffect, TriggerEffect
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button, ControllerState
-from operator_side.dualsense.reports.input_report import parse_input_report
-from operator_side.dualsense.reports.output_report import (
+from operator_side.controller.feel import (
+    FREE_TRIGGER,
+    SENSED_TRAVEL,
     USUAL_LIGHT,
     WARNING_LIGHT,
-    OutputReport,
+    Feel,
     Rumble,
-    build_output_report,
 )
+from operator_side.controller.state import Button, ControllerState
+from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import (
@@ -36,8 +36,7 @@ TRANSPORTS = pytest.mark.parametrize("transport", Transport)
 FORCES = st.floats(0.0, 10.0)
 STEPS = st.floats(0.0, 1.0)
 STRENGTHS = st.tuples(*[st.integers(0, 8)] * 10)
-EFFECTS: st.SearchStrategy[TriggerEffect] = st.just(Off()) | STRENGTHS.map(MultiPositionFeedback)
-STIFF = OutputReport(l2=feedback(3, 6), r2=feedback(0, 8))
+STIFF = Feel(l2=feedback(3, 6), r2=feedback(0, 8))
 NAN, INF = float("nan"), float("inf")
 
 
@@ -96,11 +95,11 @@ def test_relaxation_has_the_stated_time_constant() -> None:
 @pytest.mark.parametrize("strongest_n", [0.0, 1.5, 8 * STRENGTH_STEP_N, 3.0])
 def test_the_strongest_effect_is_eight_steps(strongest_n: float) -> None:
     trigger = SimulatedTrigger(strongest_n / 8)
-    trigger.set_effect(feedback(0, 8))
+    trigger.set_strengths(feedback(0, 8))
     trigger.set_finger_force(4.0)
     trigger.advance(2.0)
     assert trigger.travel == pytest.approx((4.0 - SPRING_PRELOAD_N - strongest_n) / SPRING_RISE_N, abs=1e-9)
-    trigger.set_effect(OtherEffect(b"\x25" + bytes(10)))  # not simulated: it holds nothing
+    trigger.set_strengths(FREE_TRIGGER)
     trigger.advance(2.0)
     assert trigger.travel == pytest.approx((4.0 - SPRING_PRELOAD_N) / SPRING_RISE_N, abs=1e-9)
 
@@ -109,13 +108,20 @@ def test_the_strongest_effect_is_eight_steps(strongest_n: float) -> None:
 
 
 def report_at(device: SimulatedDualSense, now_s: float) -> bytes:
-    report = device.read(now_s)
+    report = device.read_report(now_s)
     assert report is not None
     return report
 
 
 def state_at(device: SimulatedDualSense, now_s: float) -> ControllerState:
-    return parse_input_report(report_at(device, now_s))
+    state = device.read(now_s)
+    assert state is not None
+    return state
+
+
+def number_of(report: bytes) -> int:
+    """The sequence number, by the layout of a USB report."""
+    return report[7]
 
 
 def clock_of(report: bytes) -> float:
@@ -126,21 +132,21 @@ def clock_of(report: bytes) -> float:
 def test_a_report_every_4_ms() -> None:
     device = SimulatedDualSense()
     start_s = 1234.567
-    reports = [device.read(start_s + tick * 0.001) for tick in range(1001)]
+    reports = [device.read_report(start_s + tick * 0.001) for tick in range(1001)]
     assert [tick for tick, report in enumerate(reports) if report is not None] == list(range(0, 1001, 4))
     made = [report for report in reports if report is not None]
-    assert [parse_input_report(report).sequence for report in made] == [number % 256 for number in range(251)]
+    assert [number_of(report) for report in made] == [number % 256 for number in range(251)]
     assert [clock_of(report) for report in made] == pytest.approx([n * 0.004 for n in range(251)], abs=1e-6)
 
 
 def test_a_late_reader_gets_the_newest_report_once_and_clocks_wrap() -> None:
     device = SimulatedDualSense()
     assert state_at(device, 0.0) == ControllerState()
-    assert state_at(device, 0.1015).sequence == 25
+    assert number_of(report_at(device, 0.1015)) == 25
     assert device.read(0.1025) is None
-    assert state_at(device, 0.104).sequence == 26
+    assert number_of(report_at(device, 0.104)) == 26
     report = report_at(device, 2000.0)
-    assert parse_input_report(report).sequence == 500_000 % 256
+    assert number_of(report) == 500_000 % 256
     assert clock_of(report) == pytest.approx(2000.0 - 2**32 / 3e6, abs=1e-6)
 
 
@@ -156,7 +162,7 @@ def test_how_often_it_is_read_does_not_matter(phases: list[tuple[float, tuple[in
         for device in (coarse, fine):
             device.set_finger_force(force_n, force_n / 2)
             if writes:
-                device.write(OutputReport(MultiPositionFeedback(strengths), Off()), tick * 0.0025)
+                device.write(Feel(strengths, FREE_TRIGGER), tick * 0.0025)
         reports = [fine.read((tick + step / 12) * 0.0025) for step in range(1, ticks * 12)]
         tick += ticks
         reports.append(fine.read(tick * 0.0025))
@@ -172,29 +178,29 @@ def test_how_often_it_is_read_does_not_matter(phases: list[tuple[float, tuple[in
 def test_output_reports_change_only_what_they_set(transport: Transport) -> None:
     """A value and a report on the wire do the same."""
     by_value, by_wire = SimulatedDualSense(transport), SimulatedDualSense(transport)
-    third = MultiPositionFeedback((0, 0, 3, 0, 0, 0, 0, 0, 0, 0))
+    third = (0, 0, 3, 0, 0, 0, 0, 0, 0, 0)
     for number, (output, l2, r2) in enumerate(
         (
-            (OutputReport(l2=feedback(3, 6), rumble=Rumble(1.0, 0.2)), feedback(3, 6), Off()),
-            (OutputReport(r2=third, lightbar=(1, 2, 3)), feedback(3, 6), third),
-            (OutputReport(l2=Off(), r2=Off()), Off(), Off()),
+            (Feel(l2=feedback(3, 6), rumble=Rumble(1.0, 0.2)), feedback(3, 6), FREE_TRIGGER),
+            (Feel(r2=third, light=(1, 2, 3)), feedback(3, 6), third),
+            (Feel(l2=FREE_TRIGGER, r2=FREE_TRIGGER), FREE_TRIGGER, FREE_TRIGGER),
         )
     ):
         by_value.write(output, 0.001 * number)
         by_wire.take_report(build_output_report(output, transport, number), 0.001 * number)
         for device in (by_value, by_wire):
-            assert device.effects == (l2, r2)
+            assert device.strengths == (l2, r2)
             assert device.rumble == Rumble(1.0, 0.2)
-            assert device.released is (l2 == r2 == Off())
+            assert device.released is (l2 == r2 == FREE_TRIGGER)
             assert device.write_count == number + 1
-    assert by_wire.output == by_value.output == OutputReport(Off(), Off(), Rumble(1.0, 0.2), (1, 2, 3))
+    assert by_wire.told == by_value.told == Feel(FREE_TRIGGER, FREE_TRIGGER, Rumble(1.0, 0.2), (1, 2, 3))
 
 
 @TRANSPORTS
 def test_a_report_that_cannot_be_read_changes_nothing(transport: Transport) -> None:
     device = SimulatedDualSense(transport)
     device.write(STIFF, 0.0)
-    good = build_output_report(OutputReport(Off(), Off()), transport)
+    good = build_output_report(Feel(FREE_TRIGGER, FREE_TRIGGER), transport)
     other = Transport.BLUETOOTH if transport is Transport.USB else Transport.USB
     debug = bytearray(good)
     debug[11 if transport is Transport.USB else 13] = 0xFC
@@ -206,21 +212,21 @@ def test_a_report_that_cannot_be_read_changes_nothing(transport: Transport) -> N
     ):
         with pytest.raises(ValueError, match=message):
             device.take_report(report, 0.1)
-    assert device.effects == (STIFF.l2, STIFF.r2)
+    assert device.strengths == (STIFF.l2, STIFF.r2)
     assert device.write_count == 1
 
 
 def test_close_releases_puts_a_changed_light_back_and_ends() -> None:
     device = SimulatedDualSense()
-    device.write(OutputReport(feedback(0, 8), feedback(0, 8), Rumble(1.0, 1.0), WARNING_LIGHT), 0.0)
+    device.write(Feel(feedback(0, 8), feedback(0, 8), Rumble(1.0, 1.0), WARNING_LIGHT), 0.0)
     device.close()
     device.close()
-    assert device.output == OutputReport(Off(), Off(), Rumble(), USUAL_LIGHT)
+    assert device.told == Feel(FREE_TRIGGER, FREE_TRIGGER, Rumble(), USUAL_LIGHT)
     assert device.released
     with pytest.raises(DeviceError, match="closed"):
         device.read(0.1)
     with pytest.raises(DeviceError, match="closed"):
-        device.write(OutputReport(), 0.1)
+        device.write(Feel(), 0.1)
 
 
 # Its modes, and the cable
@@ -245,7 +251,7 @@ def test_unplugged_it_is_gone_and_plugged_in_it_starts_anew(transport: Transport
             use()
     device.close()
     device.plug_in()
-    assert state_at(device, 5.0).sequence == (0 if transport is Transport.USB else 1)
+    assert device.read_report(5.0) is not None
     assert device.released
     assert state_at(device, 6.0).r2 == 1.0  # the finger is still there
 
@@ -262,7 +268,7 @@ def used(what: str, *arguments: Any, **named: Any) -> Any:
     ("what", "arguments", "message"),
     [
         *(("read", (now_s,), f"now_s = {now_s}; valid: ") for now_s in (0.9, NAN, INF)),
-        *(("write", (OutputReport(), now_s), f"now_s = {now_s}; valid: ") for now_s in (0.9, NAN, INF)),
+        *(("write", (Feel(), now_s), f"now_s = {now_s}; valid: ") for now_s in (0.9, NAN, INF)),
         *(("set_finger_force", (1.0, force_n), "finger_force_n = ") for force_n in (-1.0, NAN, INF)),
         *(("advance", (step_s,), "step_s = ") for step_s in (-0.1, NAN, INF)),
         *(("hold_at", (travel,), "travel = ") for travel in (-0.1, 1.1, NAN)),

@@ -4,7 +4,7 @@ import itertools
 
 import pytest
 
-from operator_side.dualsense.reports.output_report import WARNING_LIGHT, Rumble
+from operator_side.controller.feel import WARNING_LIGHT, Rumble
 from operator_side.feel.blindness import Blindness
 
 

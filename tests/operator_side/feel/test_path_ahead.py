@@ -14,7 +14,7 @@ from common.protocol.around import AXES, LISTS, PROBES, Around
 from common.protocol.messages import Header, MotionCommand, StiffnessUpdate
 from common.protocol.uniform_field import FAR_M, uniform_field
 from common.reaction import HORIZON_S
-from operator_side.dualsense.effects.official import ZONE_COUNT
+from operator_side.controller.feel import ZONE_COUNT
 from operator_side.feel.blindness import Blindness
 from operator_side.feel.commands_under_way import AT_REST, CommandsUnderWay, Course, Report, Sticks
 from operator_side.feel.haptics import MAP_EXPIRES_S, Haptics
@@ -203,23 +203,23 @@ def haptics() -> Haptics:
 
 def strengths(made: Haptics, update: StiffnessUpdate, now_s: float = 0.4) -> tuple[int, ...]:
     made.take_map(update)
-    report = made.output_report(update, (0.0, 0.8), Blindness(), now_s)
+    report = made.due(update, (0.0, 0.8), Blindness(), now_s)
     effect = None if report is None else report.r2
-    return (0,) * ZONE_COUNT if effect is None else effect.zone_strengths
+    return (0,) * ZONE_COUNT if effect is None else effect
 
 
 def test_the_newest_map_holds_until_it_is_old_or_another_robot_side_speaks() -> None:
     told = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03))
     made = haptics()
     assert strengths(made, message(0.3, told))[-1] == 8
-    assert made.output_report(message(0.32, None), (0.0, 0.8), Blindness(), 0.41) is None  # nothing changes
+    assert made.due(message(0.32, None), (0.0, 0.8), Blindness(), 0.41) is None  # nothing changes
     for later in (message(0.3 + MAP_EXPIRES_S + 0.01, None), message(0.35, None, epoch=2)):
         made = haptics()
         strengths(made, message(0.3, told))
-        report = made.output_report(later, (0.0, 0.8), Blindness(), 0.6)
+        report = made.due(later, (0.0, 0.8), Blindness(), 0.6)
         assert report is not None
         assert report.r2 is not None
-        assert report.r2.zone_strengths[-1] < 8
+        assert report.r2[-1] < 8
 
 
 def test_without_a_map_or_where_the_robot_side_reckons_nothing_is_traced() -> None:
@@ -235,12 +235,12 @@ def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> Non
     told, free = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03)), around({})
     made = haptics()
     assert strengths(made, message(0.3, free)) == (0,) * ZONE_COUNT
-    assert made.output_report(message(0.31, None), (0.0, 0.8), Blindness(), 0.405) is None
+    assert made.due(message(0.31, None), (0.0, 0.8), Blindness(), 0.405) is None
     made.take_map(message(0.32, told))
-    report = made.output_report(message(0.33, None), (0.0, 0.8), Blindness(), 0.406)
+    report = made.due(message(0.33, None), (0.0, 0.8), Blindness(), 0.406)
     assert report is not None
     assert report.r2 is not None
-    assert report.r2.zone_strengths[-1] == 8
+    assert report.r2[-1] == 8
 
 
 def test_what_is_to_be_touched_is_felt_beside_a_stick_in_the_zones_that_touch_it() -> None:
@@ -251,10 +251,10 @@ def test_what_is_to_be_touched_is_felt_beside_a_stick_in_the_zones_that_touch_it
     made = haptics()
     update = message(0.3, told, r2=target)
     made.take_map(update)
-    report = made.output_report(update, (0.0, 0.1), Blindness(), 0.4)
+    report = made.due(update, (0.0, 0.1), Blindness(), 0.4)
     assert report is not None
     assert report.r2 is not None
-    assert report.r2.zone_strengths[1] == 4
+    assert report.r2[1] == 4
 
 
 def test_a_map_counts_that_came_before_arming_or_was_overtaken() -> None:

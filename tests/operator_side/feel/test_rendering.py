@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 
 from common.protocol.messages import Header, StiffnessUpdate, TriggerField
 from common.protocol.uniform_field import FAR_M, uniform_field
-from operator_side.dualsense.effects.official import MultiPositionFeedback, Off
-from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble
+from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel, Rumble
 from operator_side.feel.commands_under_way import Displacement
 from operator_side.feel.rendering import RenderedTrigger, RenderingSettings, TriggerRendering
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
@@ -21,17 +20,17 @@ PARTED = field(ways(0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.10))
 
 
 def rendered(strength: int, trigger: RenderedTrigger, now_s: float) -> tuple[int, ...]:
-    return trigger.render(uniform_field(strength), FAR_M, 0.0, STILL, now_s).zone_strengths
+    return trigger.render(uniform_field(strength), FAR_M, 0.0, STILL, now_s)
 
 
 def update(l2: TriggerField, r2: TriggerField, speed_m_s: float = 0.0, horizon_m: float = 1.0) -> StiffnessUpdate:
     return StiffnessUpdate(HEADER, l2, r2, speed_m_s=speed_m_s, horizon_m=horizon_m, rumble=0.0, state="armed")
 
 
-def zones(output: OutputReport) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def zones(output: Feel) -> tuple[tuple[int, ...], tuple[int, ...]]:
     assert output.l2 is not None
     assert output.r2 is not None
-    return output.l2.zone_strengths, output.r2.zone_strengths
+    return output.l2, output.r2
 
 
 def test_strength_rises_at_once_and_falls_over_a_tenth_of_a_second() -> None:
@@ -50,7 +49,7 @@ def test_a_release_does_not_fall() -> None:
     assert rendered(0, trigger, 1.0) == (0,) * 10
     rendering = TriggerRendering(USUAL, TravelCalibration())
     stiff = rendering.render(felt(HEADER, l2=8, r2=8, rumble=0.5), LET_GO, None, 1.0)
-    assert stiff == OutputReport(MultiPositionFeedback((8,) * 10), MultiPositionFeedback((8,) * 10), Rumble(left=0.5))
+    assert stiff == Feel((8,) * 10, (8,) * 10, Rumble(left=0.5))
     assert rendering.render(None, LET_GO, None, 1.0) == RELEASED
     assert rendering.render(felt(HEADER), LET_GO, None, 1.0) == RELEASED
 
@@ -112,9 +111,9 @@ def test_with_swapped_sides_each_gets_the_others() -> None:
     swapped = TriggerRendering(USUAL, calibration, swap_sides=True).render(ahead, (0.0, 0.3), moved, 0.0)
     plain = RenderedTrigger(USUAL, calibration.l2).render(PARTED, 1.0, 0.0, moved, 0.0)
     assert swapped.l2 == plain
-    assert isinstance(swapped.r2, MultiPositionFeedback)
-    assert swapped.r2.zone_strengths[-1] == 1
-    assert swapped.r2.zone_strengths[0] == 0  # it retreats only once it is pulled farther than what advances
+    assert swapped.r2 is not None
+    assert swapped.r2[-1] == 1
+    assert swapped.r2[0] == 0  # it retreats only once it is pulled farther than what advances
 
 
 def test_another_reaction_time_is_another_free_travel() -> None:
@@ -146,7 +145,7 @@ def test_people_are_told_the_free_way_as_they_are_told_how_far_they_pull() -> No
     trigger.render(field(ways(0.04, 0.045, 0.06)), 1.0, 0.0, STILL, 1.0)
     assert trigger.free_travel == pytest.approx(0.4 / 0.75)
     trigger.release()
-    assert trigger.render(field(ways(0.0855)), 1.0, 0.0, STILL, 2.0) == Off()
+    assert trigger.render(field(ways(0.0855)), 1.0, 0.0, STILL, 2.0) == FREE_TRIGGER
     short = RenderedTrigger(USUAL, TriggerTravel(0.0, 0.88))  # a full pull ends at 0.66
-    assert short.render(field(ways(0.085)), 1.0, 0.0, STILL, 0.0).zone_strengths == (0,) * 7 + (8,) * 3
+    assert short.render(field(ways(0.085)), 1.0, 0.0, STILL, 0.0) == (0,) * 7 + (8,) * 3
     assert short.free_travel == 1.0

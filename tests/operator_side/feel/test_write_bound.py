@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 
 from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
+from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel, Rumble
 from operator_side.core import OperatorSide
-from operator_side.dualsense.effects.official import Off
-from operator_side.dualsense.reports.output_report import RELEASED, OutputReport, Rumble
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.feel.write_bound import MOST_WRITES_PER_S, WriteBound
 from tests.helpers.felt import feedback, felt
@@ -44,7 +43,7 @@ class Run:
         self.tick += 1
         now_s = self.tick / 1000
         self.side.receive(encode(felt(self.robot.stamp(now_s), **fields)), now_s)
-        if (report := self.side.output_report(now_s)) is not None:
+        if (report := self.side.feel_now(now_s)) is not None:
             self.device.write(report, now_s)
             self.written_s.append(now_s)
 
@@ -74,7 +73,7 @@ def test_whatever_comes_it_is_bounded_releases_at_once_and_lets_danger_through(
             assert_released_as_told(run, fields)
     for _ in range(200):
         run.feel(DANGER)
-    assert [effect.zone_strengths for effect in run.device.effects] == [(8,) * 10] * 2
+    assert run.device.strengths == ((8,) * 10, (8,) * 10)
     assert run.device.rumble.left > 0.8
     assert run.most_in_a_second() <= MOST_WRITES_PER_S
 
@@ -87,7 +86,7 @@ def test_triggers_that_stiffen_in_turn_stay_within_it_and_danger_is_felt_soon() 
     assert 80 <= run.most_in_a_second() <= MOST_WRITES_PER_S
     for _ in range(60):
         run.feel(DANGER)
-    assert [effect.zone_strengths for effect in run.device.effects] == [(8,) * 10] * 2
+    assert run.device.strengths == ((8,) * 10, (8,) * 10)
 
 
 def test_a_change_after_a_rest_goes_at_once() -> None:
@@ -102,17 +101,17 @@ def test_what_is_left_waits_while_a_part_goes_off() -> None:
     stiff, stiffer = feedback(0, 3), feedback(0, 5)
     bound, written = WriteBound(), RELEASED
     for number in range(100):
-        wanted = OutputReport(l2=stiffer if number % 2 else stiff, r2=Off(), rumble=Rumble())
+        wanted = Feel(l2=stiffer if number % 2 else stiff, r2=FREE_TRIGGER, rumble=Rumble())
         written = bound.next(written, wanted, 1.0) or written
-    assert written.l2 != Off()
-    wanted = OutputReport(l2=Off(), r2=stiff, rumble=Rumble())
+    assert written.l2 != FREE_TRIGGER
+    wanted = Feel(l2=FREE_TRIGGER, r2=stiff, rumble=Rumble())
     assert bound.next(written, wanted, 1.0) == RELEASED
     assert bound.next(RELEASED, wanted, 1.0) is None
     assert bound.next(RELEASED, wanted, 1.05) == wanted
 
 
 def test_a_controller_that_nobody_knows_is_released_whatever_is_left() -> None:
-    bound, stiff = WriteBound(), OutputReport(l2=feedback(0, 3), r2=Off(), rumble=Rumble())
+    bound, stiff = WriteBound(), Feel(l2=feedback(0, 3), r2=FREE_TRIGGER, rumble=Rumble())
     assert [bound.next(None, stiff, 1.0) for _ in range(100)] == [RELEASED] * 100
     assert bound.next(RELEASED, stiff, 1.0) is None
     assert bound.next(RELEASED, stiff, 1.05) == stiff

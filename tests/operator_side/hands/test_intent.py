@@ -2,7 +2,7 @@
 
 import pytest
 
-from operator_side.dualsense.reports.controller_state import Button, ControllerState
+from operator_side.controller.state import Button, ControllerState
 from operator_side.hands.button_map import BUTTON_OF
 from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel

@@ -6,9 +6,8 @@ import math
 import pytest
 
 from common.protocol.messages import Telemetry, Vector3
-from operator_side.dualsense.effects.official import Off
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
-from operator_side.dualsense.reports.output_report import USUAL_LIGHT, WARNING_LIGHT, Color, OutputReport, Rumble
+from operator_side.controller.feel import FREE_TRIGGER, SENSED_TRAVEL, USUAL_LIGHT, WARNING_LIGHT, Color, Feel, Rumble
+from operator_side.controller.state import Button
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.people.person import FULL_STICK_M_S, FULL_TRIGGER_M_S, GENTLY_M_S
 from operator_side.people.settings import PersonSettings
@@ -124,14 +123,14 @@ def test_the_task_from_waiting_to_withdrawing() -> None:
 def test_who_believes_what_rumbles_lowers_gently_a_reaction_later_and_until_it_stands(trust: float) -> None:
     desk = carried(dataclasses.replace(CLEAR_SIGHTED, trust=trust))
     sinks(desk, UP_AT_M, 0.38, 0.05)
-    desk.tell(OutputReport(rumble=Rumble(left=0.25)))
+    desk.tell(Feel(rumble=Rumble(left=0.25)))
     felt_s = desk.now_s
     sinks(desk, 0.38, 0.35, 0.05)
     eased = [h.now_s for h in desk.hands if h.now_s >= felt_s and stick_speed_m_s(h) < 1.01 * GENTLY_M_S]
     assert bool(eased) == bool(trust)
     assert all(eased_s - felt_s > 0.15 for eased_s in eased)
     # It stays gentle, as what was felt is still there.
-    desk.tell(OutputReport(rumble=Rumble()))
+    desk.tell(Feel(rumble=Rumble()))
     assert (stick_speed_m_s(desk.watch(at_height(0.35), 0.3)[-1]) < 1.01 * GENTLY_M_S) == bool(trust)
 
 
@@ -243,7 +242,7 @@ def test_who_notices_and_believes_a_stiffer_trigger_eases_off_a_reaction_later(
     desk.arm()
     desk.watch(TOWARDS, 1.0)
     force_n, felt_s = desk.hands[-1].r2_n, desk.now_s
-    desk.resist(feedback(0, strength) if strength else Off())
+    desk.resist(feedback(0, strength) if strength else FREE_TRIGGER)
     eased = [hands.now_s for hands in desk.watch(TOWARDS, 0.6) if hands.r2_n < force_n]
     assert bool(eased) is eases
     if eased:
@@ -251,16 +250,16 @@ def test_who_notices_and_believes_a_stiffer_trigger_eases_off_a_reaction_later(
         assert desk.hands[-1].r2_n == pytest.approx(habitual_force_n(GENTLY_M_S / FULL_TRIGGER_M_S))
 
 
-PULSE = OutputReport(rumble=Rumble(left=1.0, right=0.7))
+PULSE = Feel(rumble=Rumble(left=1.0, right=0.7))
 
 
 @pytest.mark.parametrize(("trust", "light"), [(1.0, USUAL_LIGHT), (0.0, USUAL_LIGHT), (1.0, WARNING_LIGHT)])
 def test_who_feels_the_pulse_of_what_stands_lets_go_a_reaction_later(trust: float, light: Color) -> None:
     desk = carried(dataclasses.replace(CLEAR_SIGHTED, trust=trust))
     desk.watch(at_height(UP_AT_M), 0.5)
-    desk.tell(dataclasses.replace(PULSE, lightbar=light))
+    desk.tell(dataclasses.replace(PULSE, light=light))
     seen = desk.watch(at_height(UP_AT_M), 0.08)
-    desk.tell(OutputReport(rumble=Rumble()))
+    desk.tell(Feel(rumble=Rumble()))
     seen += desk.watch(at_height(UP_AT_M), 0.5)
     let_go = [step * TICK_S for step, hands in enumerate(seen) if Button.SQUARE in hands.buttons]
     assert bool(let_go) is (trust == 1.0 and light == USUAL_LIGHT)
@@ -280,11 +279,11 @@ def test_at_the_warning_light_they_rest_their_hands_and_go_on_a_moment_after_it(
     desk = Desk()
     desk.arm()
     desk.watch(TOWARDS, 1.0)
-    desk.tell(OutputReport(lightbar=WARNING_LIGHT))
+    desk.tell(Feel(light=WARNING_LIGHT))
     for hands in desk.watch(TOWARDS, 1.0):
         assert (hands.l2_n, hands.r2_n, hands.left) == (0.0, 0.0, (0.0, 0.0))
         assert hands.buttons == {Button.L1}
-    desk.tell(OutputReport(lightbar=USUAL_LIGHT))
+    desk.tell(Feel(light=USUAL_LIGHT))
     pulled = [hands.r2_n > 0.0 for hands in desk.watch(TOWARDS, 1.0)]
     assert pulled.index(True) * TICK_S == pytest.approx(0.5, abs=2 * TICK_S)
     assert all(pulled[pulled.index(True) :])

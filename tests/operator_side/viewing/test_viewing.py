@@ -14,7 +14,8 @@ from common.protocol.messages import StiffnessUpdate, TriggerField, Watch
 from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC, SceneState
 from common.reaction import HORIZON_S
 from common.status.codes import Hands
-from operator_side.dualsense.reports.controller_state import SENSED_TRAVEL, Button
+from operator_side.controller.feel import SENSED_TRAVEL
+from operator_side.controller.state import Button
 from operator_side.hands.travel_calibration import TriggerTravel
 from operator_side.settings import OperatorSettings
 from operator_side.viewing.console.console import Console, PageWords
@@ -70,7 +71,7 @@ def test_each_trigger_is_told_as_it_is_written_and_where_the_finger_is() -> None
     bench = felt_bench(r2=0.8)
     facts = facts_of(bench)
     assert (facts.r2.raw, facts.r2.travel) == pytest.approx((0.8, TriggerTravel().travel(0.8)), abs=0.01)
-    assert facts.r2.zones == bench.side.haptics.written.r2.zone_strengths  # type: ignore[union-attr]
+    assert facts.r2.zones == bench.side.haptics.written.r2
     first = next(zone for zone, strength in enumerate(facts.r2.zones) if strength)
     assert first > 0
     assert facts.r2.free == pytest.approx(TriggerTravel().travel(first / 10 / SENSED_TRAVEL))

@@ -7,9 +7,8 @@ import pytest
 
 from common.protocol.messages import Telemetry
 from common.status.codes import Hands
-from operator_side.dualsense.reports.controller_state import Button, ControllerState
-from operator_side.dualsense.reports.input_report import parse_input_report
-from operator_side.dualsense.reports.output_report import OutputReport
+from operator_side.controller.feel import Feel
+from operator_side.controller.state import Button, ControllerState
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
@@ -57,8 +56,7 @@ class Desk:
             if says and step % round(PERIOD_S / TICK_S) == 0:
                 self.page.say(self.now_s, **hands)
             self.hands.tick(self.now_s, self.screen, 0.0)
-            if (report := self.device.read(self.now_s)) is not None:
-                state = parse_input_report(report)
+            if (state := self.device.read(self.now_s)) is not None:
                 meant.append(operator_intent(state, self.calibration, swap_sides=self.swap_sides))
             self.ticks += 1
         return meant
@@ -86,7 +84,7 @@ def test_travel_and_sticks_arrive_as_given(calibration: TravelCalibration | None
 def test_what_the_trigger_was_told_takes_nothing_from_the_travel() -> None:
     desk = Desk()
     desk.arm()
-    desk.device.write(OutputReport(l2=feedback(0, 8), r2=feedback(0, 8)), desk.now_s)
+    desk.device.write(Feel(l2=feedback(0, 8), r2=feedback(0, 8)), desk.now_s)
     assert desk.let_pass(0.1, run=True, r2=1.0)[-1].r2 == 1.0
 
 

@@ -6,14 +6,20 @@ import pytest
 
 from common.errors import DeviceError, NoDeviceError, NoDriverError
 from common.status.codes import ConnectionState
-from operator_side.dualsense.hid.connection import BEAT_PERIOD_S, LOOK_PERIOD_S, RETELL_AFTER_S, Connection
-from operator_side.dualsense.hid.release_guard import ReleaseGuard
-from operator_side.dualsense.hid.search import BackgroundSearch, OpenController
-from operator_side.dualsense.reports.output_report import OutputReport
+from operator_side.controller.connection import (
+    BEAT_PERIOD_S,
+    LOOK_PERIOD_S,
+    RETELL_AFTER_S,
+    Connection,
+)
+from operator_side.controller.feel import Feel
+from operator_side.controller.port import OpenController
+from operator_side.controller.search import BackgroundSearch
+from operator_side.controller.state import ControllerState
 from tests.helpers.felt import feedback
-from tests.operator_side.dualsense.simulated_system import PERIOD_S
 
-STIFF = OutputReport(r2=feedback(3, 6))
+PERIOD_S = 0.004
+STIFF = Feel(r2=feedback(3, 6))
 
 
 @dataclass
@@ -24,11 +30,12 @@ class FakeDevice:
     plugged_in: bool = True
     released: bool = True
 
-    def read(self, now_s: float) -> bytes | None:
+    def read(self, now_s: float) -> ControllerState | None:
+        del now_s
         self._check()
-        return b"%d" % round(1e3 * now_s)
+        return ControllerState()
 
-    def write(self, output: OutputReport, now_s: float) -> None:
+    def write(self, output: Feel, now_s: float) -> None:
         del output, now_s
         self._check()
         self.released = False
@@ -65,7 +72,7 @@ class FakeSearch(BackgroundSearch):
         self.closed = True
 
 
-class World(ReleaseGuard):
+class World:
     """A connection whose search, listener and guard are in the test's hands; `log` is what they were told."""
 
     def __init__(self) -> None:

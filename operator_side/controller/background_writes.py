@@ -8,8 +8,9 @@ import threading
 from typing import Final
 
 from common.errors import DeviceError
-from operator_side.dualsense.hid.search import Device
-from operator_side.dualsense.reports.output_report import OutputReport
+from operator_side.controller.feel import Feel
+from operator_side.controller.port import Controller
+from operator_side.controller.state import ControllerState
 
 CLOSE_TIMEOUT_S: Final = 0.3
 """A write that has not returned by then is left to itself; the watchdog releases the triggers."""
@@ -18,13 +19,13 @@ STALL_S: Final = 0.05
 
 
 class BackgroundWrites:
-    """The Device port around a device: reads go straight through, writes go by the thread."""
+    """The port around a device: reads go straight through, writes go by the thread."""
 
-    def __init__(self, device: Device) -> None:
+    def __init__(self, device: Controller) -> None:
         """`device` is written to by the thread alone; its `read` and `write` must bear being called at once."""
         self._device = device
         self._changed = threading.Condition()
-        self._waiting: OutputReport | None = None
+        self._waiting: Feel | None = None
         self._now_s = 0.0
         self._written_since_s: float | None = None
         self._failure: Exception | None = None
@@ -46,16 +47,16 @@ class BackgroundWrites:
         with self._changed:
             return self._written_since_s is not None and now_s - self._written_since_s > STALL_S
 
-    def read(self, now_s: float) -> bytes | None:
+    def read(self, now_s: float) -> ControllerState | None:
         """Read the device; DeviceError also when a write has failed since."""
         self._raise_failure()
         return self._device.read(now_s)
 
-    def write(self, output: OutputReport, now_s: float) -> None:
+    def write(self, feel: Feel, now_s: float) -> None:
         """Have it written soon; DeviceError when an earlier write has failed."""
         self._raise_failure()
         with self._changed:
-            self._waiting = output if self._waiting is None else output.following(self._waiting)
+            self._waiting = feel if self._waiting is None else feel.following(self._waiting)
             self._now_s = now_s
             self._changed.notify()
 
@@ -73,12 +74,12 @@ class BackgroundWrites:
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._ends or self._waiting is not None)
-                output, self._waiting, now_s = self._waiting, None, self._now_s
-                if output is None:
+                feel, self._waiting, now_s = self._waiting, None, self._now_s
+                if feel is None:
                     return
                 self._written_since_s = now_s
             try:
-                self._device.write(output, now_s)
+                self._device.write(feel, now_s)
             except Exception as error:  # raised again where it can be answered
                 self._failure = error
                 return

@@ -1,60 +1,26 @@
-"""The Device port, what feelahead asks of a controller, and the search for one, which keeps nobody waiting.
-
-Input reports come as bytes, to be read by input_report.py; what to do goes as a value. Opening a controller takes a few
-reports and their time, hence a thread.
-"""
+"""The search for a controller, which keeps nobody waiting: opening one takes a few reports and their time."""
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 from common.errors import DeviceError
-from operator_side.dualsense.reports.output_report import OutputReport
+from operator_side.controller.port import OpenController
 
 _CLOSE_TIMEOUT_S = 0.3
 
 
-class Device(Protocol):
-    """A controller that is open. Any method may raise DeviceError; the text says what to do about it."""
+class Search(Protocol):
+    """One look at a time."""
 
-    @property
-    def released(self) -> bool:
-        """Both triggers are free of any effect, as far as anybody can know."""
+    def begin(self, preferred: str | None) -> None:
+        """Start to look, for the controller of this address first, unless a look goes on."""
 
-    def read(self, now_s: float) -> bytes | None:
-        """The newest input report, older unread ones skipped, or None when there is no new one; never waits."""
-
-    def write(self, output: OutputReport, now_s: float) -> None:
-        """Have the controller do what `output` sets; ValueError, and nothing sent, for an effect never to be sent."""
+    def take(self) -> OpenController | DeviceError | None:
+        """The controller, or why there is none; None while a look goes on."""
 
     def close(self) -> None:
-        """Take trigger effects, rumble and a warning light off if any were written, and let the controller go.
-
-        Safe to call again; everything else raises DeviceError afterwards.
-        """
-
-
-def _never_stalls(now_s: float) -> bool:
-    del now_s
-    return False
-
-
-@dataclass(frozen=True)
-class OpenController:
-    """A controller that a search has found and opened."""
-
-    device: Device
-    name: str
-    """Model and transport, for people."""
-    address: str | None = None
-    """Address "aa:bb:cc:dd:ee:ff", the same on USB and Bluetooth; None when it did not answer."""
-    path: bytes | None = None
-    """Device node; None without hardware."""
-    release: bytes = b""
-    """Output report, ready for the wire, that takes every effect off; for the watchdog."""
-    stalls: Callable[[float], bool] = _never_stalls
-    """Whether a write does not return, at `now_s`: then nothing can be said to the controller by `device`."""
+        """Give up; what is found from now on is let go."""
 
 
 Find = Callable[[str | None], OpenController]
@@ -135,6 +101,3 @@ class Ready:
 
     def close(self) -> None:
         """There is nothing to give up."""
-
-
-Search = BackgroundSearch | Ready

@@ -7,9 +7,10 @@ from typing import Final, Protocol
 
 from common.errors import DeviceError, NoDeviceError, NoDriverError
 from common.status.codes import ConnectionState
-from operator_side.dualsense.hid.release_guard import ReleaseGuard
-from operator_side.dualsense.hid.search import OpenController, Search
-from operator_side.dualsense.reports.output_report import OutputReport
+from operator_side.controller.feel import Feel
+from operator_side.controller.port import OpenController
+from operator_side.controller.search import Search
+from operator_side.controller.state import ControllerState
 
 BEAT_PERIOD_S: Final = 0.05
 """From one sign of life for the watchdog to the next, while an effect is on."""
@@ -30,10 +31,26 @@ class Listener(Protocol):
         """There is none any more."""
 
 
+class Guard(Protocol):
+    """The part that releases a controller when we are killed, or hang."""
+
+    def hold(self, path: bytes, release: bytes) -> None:
+        """From now on, should we die, `release` is to be written to the controller at `path`."""
+
+    def let_go(self) -> None:
+        """There is nothing to release any more."""
+
+    def beat(self) -> None:
+        """An effect is on, and we live: should no further beat follow in time, we hang."""
+
+    def rest(self) -> None:
+        """No effect is on: there are no beats until the next one."""
+
+
 class Connection:
     """One controller at a time. None of its methods waits, and none raises DeviceError but `update` (NoDriverError)."""
 
-    def __init__(self, search: Search, listener: Listener, guard: ReleaseGuard | None = None) -> None:
+    def __init__(self, search: Search, listener: Listener, guard: Guard | None = None) -> None:
         self.state = ConnectionState.ABSENT
         self.found = 0
         """Number of times that a controller was found."""
@@ -105,8 +122,8 @@ class Connection:
         if silent:
             self._listener.controller_found(now_s)
 
-    def read(self, now_s: float) -> bytes | None:
-        """The newest input report; None without a new one, or without a controller."""
+    def read(self, now_s: float) -> ControllerState | None:
+        """The newest state; None without a new one, or without a controller."""
         if self._controller is None:
             return None
         try:
@@ -115,7 +132,7 @@ class Connection:
             self._lose(error, now_s)
             return None
 
-    def write(self, output: OutputReport, now_s: float) -> bool:
+    def write(self, feel: Feel, now_s: float) -> bool:
         """Tell the controller, if there is one; whether it went out."""
         if self._controller is None:
             return False
@@ -123,7 +140,7 @@ class Connection:
             self._beat_s = now_s  # before the effect is on: we may hang at once
             self._guard.beat()
         try:
-            self._controller.device.write(output, now_s)
+            self._controller.device.write(feel, now_s)
         except DeviceError as error:
             self._lose(error, now_s)
             return False

@@ -1,0 +1,42 @@
+"""What a recording holds of the controller: values, and in earlier recordings a DualSense's reports."""
+
+from typing import Final
+
+import msgspec
+
+from common.errors import RemoteProtocolError
+from common.recording.entries import Kind
+from operator_side.controller.feel import Feel
+from operator_side.controller.state import ControllerState
+from operator_side.dualsense.reports.input_report import parse_input_report
+from operator_side.dualsense.reports.output_report import build_output_report, parse_output_report
+
+STATES: Final = (Kind.HANDS, Kind.REPORT)
+"""Kinds of entries that hold a state,"""
+FEELS: Final = (Kind.TOLD, Kind.WRITTEN)
+"""and those that hold what was told."""
+
+
+def recorded_state(kind: int, content: bytes) -> ControllerState:
+    """Read an entry of STATES; RemoteProtocolError for what is none."""
+    if kind == Kind.REPORT:
+        return parse_input_report(content)
+    try:
+        return msgspec.msgpack.decode(content, type=ControllerState)
+    except msgspec.MsgspecError as error:
+        raise RemoteProtocolError(f"a recorded state of the controller: {error}") from error
+
+
+def recorded_feel(kind: int, content: bytes) -> Feel:
+    """Read an entry of FEELS; RemoteProtocolError for what is none."""
+    if kind == Kind.WRITTEN:
+        return parse_output_report(content)
+    try:
+        return msgspec.msgpack.decode(content, type=Feel)
+    except msgspec.MsgspecError as error:
+        raise RemoteProtocolError(f"what a controller was told: {error}") from error
+
+
+def as_recorded(kind: int, feel: Feel) -> bytes:
+    """Pack `feel` as an entry of this kind of FEELS holds it."""
+    return build_output_report(feel) if kind == Kind.WRITTEN else msgspec.msgpack.encode(feel)
