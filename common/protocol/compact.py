@@ -11,7 +11,9 @@ and shares are single precision; rumble is eighths, rounded up. All is little-en
 import math
 import struct
 from bisect import bisect_left
-from typing import Final, get_args
+from typing import Any, Final, get_args
+
+from msgspec import inspect
 
 from common.protocol.around import LISTS, PROBES, Around
 from common.protocol.messages import (
@@ -25,7 +27,6 @@ from common.protocol.messages import (
     Telemetry,
     TriggerField,
     Tune,
-    Vector3,
     Watch,
     Ways,
 )
@@ -45,7 +46,6 @@ _PAST: Final = -(2**15)
 _PAST_M: Final = -100.0
 _STATES: Final[tuple[MotionState, ...]] = get_args(MotionState)
 _STANDS = 4
-_HOLDING, _PLACED = 4, 8
 _LARGEST_SINGLE: Final = (2.0 - 2.0**-23) * 2.0**127
 
 _STIFFNESS: Final = struct.Struct("<32h10fiBB")
@@ -53,8 +53,26 @@ _STIFFNESS: Final = struct.Struct("<32h10fiBB")
 a bit for what stands."""
 _AROUND: Final = struct.Struct(f"<f{LISTS * PROBES}s")
 """Behind it, in some: T, the map's steps, and then the map's changes."""
-_TELEMETRY: Final = struct.Struct("<14fB")
-"""Position, target, up; speed, opening, enlargement, L2, R2; state, and bits for holding and a known target."""
+
+
+def _numbers(kind: inspect.Type) -> int:
+    """How many numbers a field of that type is."""
+    match kind:
+        case inspect.UnionType(types=types):
+            return max(map(_numbers, types))
+        case inspect.TupleType(item_types=items):
+            return len(items)
+    return int(isinstance(kind, inspect.FloatType))
+
+
+_VIEW: Final = {one.name: one.type for one in inspect.type_info(Telemetry).fields}  # type: ignore[attr-defined]  # a struct's
+_NUMBERS: Final = {name: count for name, kind in _VIEW.items() if (count := _numbers(kind))}
+_TRUE: Final = [name for name, kind in _VIEW.items() if isinstance(kind, inspect.BoolType)]
+_KNOWN: Final = [name for name in _NUMBERS if isinstance(_VIEW[name], inspect.UnionType)]
+_BITS: Final = {name: 4 << place for place, name in enumerate((*_TRUE, *_KNOWN))}
+"""Above the state's two: one for each field that is true, and for each that may be None and is not."""
+_TELEMETRY: Final = struct.Struct(f"<{sum(_NUMBERS.values())}fB")
+"""All numbers in the order of Telemetry's fields, zeros for None; state, and the bits."""
 
 
 class StiffnessOnWire(Message, frozen=True, tag="stiffness"):
@@ -162,14 +180,14 @@ def _ways(steps: tuple[int, ...], horizon_m: float) -> Ways:
 
 
 def _pack_telemetry(view: Telemetry) -> bytes:
-    placed = view.target_in_tool_m
-    numbers = (
-        *view.tool_position_m,
-        *(placed or (0.0, 0.0, 0.0)),
-        *view.up_in_tool,
-        *(view.tool_speed_m_s, view.gripper_opening_m, view.enlargement_m, view.l2, view.r2),
-    )
-    bits = _STATES.index(view.state) + _HOLDING * view.holding + _PLACED * (placed is not None)
+    numbers: list[float] = []
+    for name, count in _NUMBERS.items():
+        value = getattr(view, name)
+        numbers += [0.0] * count if value is None else value if isinstance(value, tuple) else (value,)
+    bits = _STATES.index(view.state)
+    for name, bit in _BITS.items():
+        if getattr(view, name) not in (None, False):
+            bits += bit
     try:
         return _TELEMETRY.pack(*numbers, bits)
     except OverflowError:
@@ -179,25 +197,13 @@ def _pack_telemetry(view: Telemetry) -> bytes:
 
 def _unpack_telemetry(message: TelemetryOnWire) -> Telemetry:
     *numbers, bits = _TELEMETRY.unpack(message.field)
-    state = bits % _HOLDING
-    if state >= len(_STATES) or bits >= 2 * _PLACED:
-        raise ValueError(f"bits = {bits}; valid: a state of 0 to {len(_STATES) - 1}, and two more bits")
-    speed_m_s, opening_m, enlargement_m, l2, r2 = numbers[9:]
-    return Telemetry(
-        message.header,
-        state=_STATES[state],
-        tool_position_m=_three(numbers, 0),
-        tool_speed_m_s=speed_m_s,
-        target=message.target,
-        target_in_tool_m=_three(numbers, 3) if bits & _PLACED else None,
-        up_in_tool=_three(numbers, 6),
-        gripper_opening_m=opening_m,
-        holding=bool(bits & _HOLDING),
-        enlargement_m=enlargement_m,
-        l2=l2,
-        r2=r2,
-    )
-
-
-def _three(numbers: list[float], first: int) -> Vector3:
-    return numbers[first], numbers[first + 1], numbers[first + 2]
+    state = bits % 4
+    if state >= len(_STATES) or bits >= 4 << len(_BITS):
+        raise ValueError(f"bits = {bits}; valid: a state of 0 to {len(_STATES) - 1}, and {len(_BITS)} more bits")
+    fields: dict[str, Any] = {name: bool(bits & _BITS[name]) for name in _TRUE}
+    first = 0
+    for name, count in _NUMBERS.items():
+        known = name not in _KNOWN or bits & _BITS[name]
+        fields[name] = None if not known else numbers[first] if count == 1 else tuple(numbers[first : first + count])
+        first += count
+    return Telemetry(message.header, state=_STATES[state], target=message.target, **fields)

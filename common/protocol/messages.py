@@ -276,19 +276,20 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
 class Telemetry(Message, frozen=True, tag="telemetry", array_like=False):
     """What the operator's screen shows of the robot; never used for control by the robot side.
 
-    It travels packed (compact.py): named fields are for the page and for recordings.
+    compact.py packs the fields as they stand here: numbers, places, and what is true or known. Recordings, exports, and
+    OperatorFacts.screen have a new one by itself.
     """
 
     state: MotionState
     tool_position_m: _Place
     """Estimated, in the world frame."""
-    tool_speed_m_s: _Far
     target: str | None
     """The present target's name; None when there is none."""
     target_in_tool_m: _Place | None
     """The perceived target's centre in the tool frame; +z is the approach axis."""
     up_in_tool: tuple[_Component, _Component, _Component]
     """The world's upward direction in the tool frame: an artificial horizon."""
+    tool_speed_m_s: _Far
     gripper_opening_m: Annotated[float, Meta(ge=0.0, le=10.0)]
     holding: bool
     enlargement_m: _Far

@@ -41,7 +41,7 @@ def felt(
 def telemetry(header: Header, **changes: Any) -> Telemetry:
     """A tool at the origin that looks downwards, disarmed, and nothing else, unless `changes` say otherwise."""
     still = Telemetry(
-        *(header, "disarmed", (0.0, 0.0, 0.0), 0.0, None, None, (0.0, -1.0, 0.0)),
+        *(header, "disarmed", (0.0, 0.0, 0.0), None, None, (0.0, -1.0, 0.0), 0.0),
         *(0.0, False, 0.0, 0.0, 0.0),
     )
     return msgspec.structs.replace(still, **changes)

@@ -203,7 +203,7 @@ def test_another_receiver_is_told_at_once_and_at_full_rate_everything_is_said() 
 
 def view(x_m: float = 0.0, l2: float = 0.0) -> Telemetry:
     return Telemetry(
-        Header(0, 0, 0.0), "armed", (x_m, 0.0, 0.0), 0.0, "cup", None, (0.0, 0.0, 1.0), 0.08, False, 0.01, l2, 0.0
+        Header(0, 0, 0.0), "armed", (x_m, 0.0, 0.0), "cup", None, (0.0, 0.0, 1.0), 0.0, 0.08, False, 0.01, l2, 0.0
     )
 
 

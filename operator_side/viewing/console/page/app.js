@@ -10,7 +10,27 @@ import { Trigger } from "./triggers.js";
 const SILENCE_MS = 400; // facts come 30 times a second
 const RETRY_MS = 500;
 const MOST_NOTES = 50;
+const FIGURES = {
+  // of the bar: where, and what it is called
+  link: "Link",
+  lease: "Lease",
+  whose: "Hands",
+  delay: "Delay there / back",
+  rate: "Rate / queue / lost",
+  pictures: "Pictures",
+  target: "Target",
+  holding: "Holding",
+};
 const byId = (id) => document.getElementById(id);
+
+for (const [id, title] of Object.entries(FIGURES)) {
+  const place = document.createElement("div");
+  place.append(
+    Object.assign(document.createElement("dt"), { textContent: title }),
+    Object.assign(document.createElement("dd"), { id, textContent: "–" }),
+  );
+  byId("figures").append(place);
+}
 
 const clock = new Clock();
 const views = VIEWS.map((name) => new View(byId(name), clock));

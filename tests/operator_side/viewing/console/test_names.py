@@ -5,6 +5,7 @@ from typing import Final
 
 import msgspec
 
+from common.protocol.messages import Telemetry
 from common.status.statuses import OperatorStatus
 from operator_side.viewing.console.names import PATH, names
 from operator_side.viewing.facts import DelayFacts, HandsFacts, OperatorFacts, TriggerFacts
@@ -20,6 +21,7 @@ _READ: Final = {
     r"\bhands\?\.(\w+)": (HandsFacts,),
     r"\bfacts\.to_(?:robot|operator)\.(\w+)": (DelayFacts,),
     r"\bstatus\??\.(\w+)": (OperatorStatus,),
+    r"\bscreen\??\.(\w+)": (Telemetry,),
 }
 """Where the page reads a struct, with the ones that it may be"""
 
