@@ -29,7 +29,7 @@ class DriverPort(SocketShell):
     def __init__(
         self, bind: str, flag: str, limit_bytes: int, *, insecure: bool = False, keys: RobotKeys | None = None
     ) -> None:
-        """Bind to `bind`, the address after `flag`, for messages of at most `limit_bytes`.
+        """Bind to `bind`, the address after `flag`, for messages of at most `limit_bytes`, 1 KiB or more.
 
         ConfigurationError when the address is malformed, in use, not this machine's, or open to the network with
         neither `keys` nor `insecure`.

@@ -25,6 +25,8 @@ SILENT_S: Final = 0.1
 COMMAND_PERIOD_S: Final = 0.004
 """As often as commands come at most; what stops the arm leaves at once."""
 _REFUSAL_PERIOD_S: Final = 1.0
+_NEWS_PERIOD_S: Final = 1.0
+"""A driver that comes and goes is told no more often."""
 _DECODER: Final = msgspec.msgpack.Decoder(DriverState)
 
 _UNANSWERED: Final = 250
@@ -73,6 +75,7 @@ class DriverSession:
         self._moves = False
         self._refused_s = -math.inf
         self._outgoing: list[tuple[bytes, bytes]] = []
+        self._told_present, self._told_s = False, -math.inf
         self._said: set[Why] = set()
         self._notes: list[str] = []
 
@@ -99,10 +102,13 @@ class DriverSession:
             self._take(peer, said, received_s)
 
     def expire(self, now_s: float) -> None:
-        """Forget a driver that has fallen silent, after all that came was received: another one may speak now."""
+        """After all that came was received: forget a driver that has fallen silent, so that another one may speak."""
         if self._peer is not None and now_s - self._heard_s > SILENT_S:
-            self._notes.append(f"arm lost: nothing heard from the driver for {now_s - self._heard_s:.2f} s")
             self._peer = None
+        if self.present is not self._told_present and now_s - self._told_s >= _NEWS_PERIOD_S:
+            self._told_present, self._told_s = self.present, now_s
+            gone = f"arm lost: nothing heard from the driver for {now_s - self._heard_s:.2f} s"
+            self._notes.append("driver: connected" if self.present else gone)
 
     def command(self, velocities_rad_s: FloatArray, until_s: float) -> None:
         """What the arm is to do until then, by our clock; see `outgoing`. ValueError as for `Arm.command`."""
@@ -164,7 +170,6 @@ class DriverSession:
             if self._last_peer != peer or said.sequence <= self._sequence:
                 self._begin(said.sequence)
             self._peer = self._last_peer = peer
-            self._notes.append("driver: connected")
         if said.sequence <= self._sequence:
             why = f"sequence {said.sequence} after {self._sequence}; valid: rising"
             self._reject("order", why, peer, received_s)

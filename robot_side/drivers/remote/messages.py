@@ -86,7 +86,7 @@ def decoded(payload: bytes, decoder: "msgspec.msgpack.Decoder[Message]", version
         message = decoder.decode(payload)
     except _BAD_BYTES as error:
         _require_version(payload, version)
-        raise RemoteProtocolError(str(error)) from error
+        raise RemoteProtocolError(f"{error}; valid: finite numbers, and fields as in docs/drivers.md") from error
     if (said := getattr(message, "version", None)) != version:
         raise OtherVersionError(f"version {said}; valid: {version}")
     return message

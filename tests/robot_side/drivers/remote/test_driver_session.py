@@ -54,7 +54,7 @@ def test_a_stop_leaves_at_once() -> None:
 
 def test_a_silent_driver_is_told_nothing_more_and_ages() -> None:
     desk = DriverDesk()
-    desk.run(0.5)
+    desk.run(1.5)
     desk.speaks = False
     desk.run(0.3, velocity=0.4)
     assert desk.age_s() == pytest.approx(0.3, abs=0.02)
@@ -77,11 +77,26 @@ def test_a_driver_that_was_stopped_goes_on_and_what_it_said_before_is_known_to_b
     assert desk.age_s() < 0.02
 
 
+def test_one_stale_state_over_and_over_keeps_no_arm_alive_and_is_told_once_a_second() -> None:
+    desk = DriverDesk()
+    desk.run(1.5)
+    said, desk.speaks = desk.drivers_s, False
+    newest = desk.newest
+    assert newest is not None
+    held_s = said - AHEAD_S - newest["sent_s"]
+    for _ in range(150):
+        desk.say(sequence=1, sent_s=said, measured_s=said, echo_s=newest["sent_s"], held_s=held_s)
+        desk.run(0.01, velocity=0.4)
+        assert desk.age_s() >= desk.drivers_s - said - 1e-6
+    assert desk.arm.session.rejected["order"] > 100
+    assert len(desk.notes) <= 4
+
+
 def test_a_driver_that_restarts_begins_anew_with_another_clock() -> None:
     desk = DriverDesk()
-    desk.run(0.5)
+    desk.run(1.5)
     desk.speaks = False
-    desk.run(0.2)
+    desk.run(1.5)
     desk.peer, desk.sequence, desk.newest, desk.speaks = b"another", 0, None, True
     desk.also = {"sent_s": 3.0, "measured_s": 3.0}
     desk.say()
