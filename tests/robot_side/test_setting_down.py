@@ -6,32 +6,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from common.arrays import FloatArray
 from feelahead.lab.faults.session_bench import QUICK, Bench
-from robot_side.arm.port import Arm, ArmState
+from robot_side.arm.port import ArmState
 from robot_side.arm.touching_down import carried_n
 from robot_side.parts import build_parts
 from tests.helpers.repository import DATA
 
 SETTINGS = replace(QUICK, model=DATA / "place_held.xml", site="tool")
+from tests.helpers.passed_on_arm import PassedOnArm
 
 
-class Forgetful(Arm):
+class Forgetful(PassedOnArm):
     """An arm that does not measure loads."""
 
-    joint_count = 0
-
-    def __init__(self, arm: Arm) -> None:
-        self.joint_count, self._arm = arm.joint_count, arm
-
-    def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
-        self._arm.command(joint_velocity_rad_s, valid_until_s)
-
-    def command_gripper(self, closing: float, valid_until_s: float) -> None:
-        self._arm.command_gripper(closing, valid_until_s)
-
     def state(self, now_s: float) -> ArmState:
-        return replace(self._arm.state(now_s), joint_loads_nm=None)
+        return replace(self.arm.state(now_s), joint_loads_nm=None)
 
 
 class Placing(Bench):

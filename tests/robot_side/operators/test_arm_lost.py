@@ -7,23 +7,19 @@ import pytest
 
 from feelahead.lab.faults.session_bench import QUICK, Bench
 from robot_side.arm.port import ArmState
-from robot_side.core import RobotParts
 from robot_side.parts import build_parts
+from tests.helpers.passed_on_arm import PassedOnArm
 
 
-class SlowArm:
+class SlowArm(PassedOnArm):
     """The simulated arm, whose states come late or not at all."""
 
-    def __init__(self, parts: RobotParts) -> None:
-        self._arm = parts.arm
-        self.joint_count = parts.arm.joint_count
-        self.command, self.command_gripper = parts.arm.command, parts.arm.command_gripper
-        self.silent = False
-        self.late_s = 0.0
-        self._newest: ArmState | None = None
+    silent = False
+    late_s = 0.0
+    _newest: ArmState | None = None
 
     def state(self, now_s: float) -> ArmState:
-        measured = self._arm.state(now_s)
+        measured = self.arm.state(now_s)
         if self._newest is None or not self.silent:
             self._newest = replace(measured, time_s=measured.time_s - self.late_s)
         return self._newest
@@ -32,7 +28,7 @@ class SlowArm:
 @pytest.fixture
 def slow() -> tuple[Bench, SlowArm]:
     parts = build_parts(QUICK, 1, "clock")
-    arm = SlowArm(parts)
+    arm = SlowArm(parts.arm)
     return Bench(parts=replace(parts, arm=arm)), arm
 
 
@@ -46,7 +42,7 @@ def test_a_silent_arm_is_told_to_stand_and_goes_on_when_it_is_back_and_armed_aga
     bench.drive(0.2, operator, r2=0.4)
     assert bench.watch.told_to_move - told <= 1
     assert bench.state == "disarmed"
-    because = str(bench.robot.status(bench.now_s)["stopped_because"])
+    because = str(bench.robot.status(bench.now_s).stopped_because)
     assert re.fullmatch(r"arm lost: its newest state is 10[01] ms old", because)
     assert operator.notice is not None
     assert operator.notice.why == "arm lost: nothing new is heard of it"
