@@ -260,7 +260,8 @@ def _prediction_errors(settings: RobotSettings, scene: Scene) -> tuple[Predictio
     if settings.prediction_errors is not None:
         return load_prediction_errors(settings.prediction_errors), ()
     built_in = load_prediction_errors(BUILT_IN)
-    if built_in.arm == scene.robot.fingerprint:
+    # It was measured in the simulation: an arm that is only built alike may move otherwise.
+    if built_in.arm == scene.robot.fingerprint and settings.arm is None:
         return built_in, ()
     note = (
         "what the prediction of the commands under way misses on this arm has not been measured: a fifth of the way"

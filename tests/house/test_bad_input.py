@@ -104,6 +104,12 @@ def complaint(command: str) -> str:
         ("feelahead-robot --bind udp://127.0.0.1:5555", "udp://127.0.0.1:5555", "tcp://HOST:PORT"),
         ("feelahead-robot --bind tcp://0.0.0.0:5555", "0.0.0.0", "--insecure"),
         ("feelahead-robot --bind tcp://0.0.0.0:5555", "--insecure", "feelahead keys make robot"),
+        ("feelahead-robot --bind tcp://127.0.0.1:0 --arm here", "--arm: 'here'", "tcp://HOST:PORT"),
+        (
+            "feelahead-robot --bind tcp://127.0.0.1:0 --objects tcp://0.0.0.0:0",
+            "--objects: 'tcp://0.0.0.0:0'",
+            "--keys",
+        ),
         ("feelahead-robot --bind tcp://127.0.0.1:0 --model missing.xml --site tip", "missing.xml", "MJCF"),
         ("feelahead-robot --bind tcp://127.0.0.1:0 --model / --site tip", "--model /: is a directory", "MJCF"),
         (f"feelahead-robot --bind tcp://127.0.0.1:0 --model {ARM} --site hand", "'hand'", "tool"),

@@ -15,6 +15,7 @@ from robot_side.drivers.remote.messages import STATE_LIMIT_BYTES
 from robot_side.drivers.remote.objects import RemoteObjects
 
 _TURN_S: Final = 0.004
+_AWAITED: Final = {"--arm": "an arm's driver", "--objects": "a process that perceives objects"}
 
 
 class Beside:
@@ -63,16 +64,18 @@ class Beside:
 
     def wait(self) -> None:
         """Wait until the arm has said where it is, and objects have been seen; a signal has to end it."""
-        for flag, part in (("--arm", self._arm), ("--objects", self._objects)):
-            if part is None:
-                continue
-            port, now_s, told = self._ports[flag], self._ports[flag].wait(0.0), False
-            while not (part.begin(now_s) if isinstance(part, RemoteArm) else part.exchange(now_s)):
-                if not told:
-                    told = True
-                    what = "an arm's driver" if flag == "--arm" else "a process that perceives objects"
-                    self._note(f"waiting for {what} at {port.endpoint}")
-                now_s = port.wait(_TURN_S)
+        begin = {
+            flag: part.begin if isinstance(part, RemoteArm) else part.exchange
+            for flag, part in (("--arm", self._arm), ("--objects", self._objects))
+            if part is not None
+        }
+        told: set[str] = set()
+        while waiting := [flag for flag, first in begin.items() if not first(self._ports[flag].wait(0.0))]:
+            for flag in waiting:
+                if flag not in told:
+                    told.add(flag)
+                    self._note(f"waiting for {_AWAITED[flag]} at {self._ports[flag].endpoint}")
+            self._ports[waiting[0]].wait(_TURN_S)
 
     def summary(self) -> dict[str, Any]:
         """What came over each port and what of it was rejected; None for what is not asked for."""

@@ -1,0 +1,58 @@
+"""A robot side whose arm and objects are other processes: the examples of docs/drivers, over real sockets."""
+
+import pytest
+
+from common.errors import ConfigurationError
+from robot_side.core import RobotSide
+from robot_side.drivers.mujoco.scene import Scene
+from robot_side.drivers.remote.beside import Beside
+from robot_side.parts import build_parts
+from robot_side.settings import RobotSettings
+from robot_side.surroundings.perceived import Role
+from tests.helpers.socket_talk import EPHEMERAL
+from tests.robot_side.drivers.remote.test_examples import running
+
+SETTINGS = RobotSettings(arm=EPHEMERAL, objects=EPHEMERAL, roles={"ball": Role.SUPPORT}, seed=1)
+
+
+@pytest.mark.processes
+def test_a_robot_side_waits_for_both_and_knows_no_truth(scene: Scene) -> None:
+    notes: list[str] = []
+    with Beside(SETTINGS.arm, SETTINGS.objects, notes.append) as beside:
+        parts = build_parts(SETTINGS, 1, "clock", scene, beside=beside)
+        assert parts.notes[0].startswith("the driver's joints, in this order: shoulder_pan, shoulder_lift")
+        arm_at, objects_at = (port.endpoint for port in beside._ports.values())
+        with running("example_arm.py", arm_at), running("example_objects.py", objects_at):
+            beside.wait()
+            robot, port = RobotSide(parts), beside._ports["--arm"]
+            for _ in range(200):
+                now_s = port.wait(0.001)
+                robot.tick(now_s)
+                robot.observe(now_s)
+    assert robot.newest is not None
+    objects = robot.newest[1].objects
+    assert dict(zip(objects.names, objects.roles, strict=True)) == {
+        "table": Role.SUPPORT,
+        "target": Role.TARGET,
+        "ball": Role.SUPPORT,
+    }
+    assert [note for note in notes if note.startswith("waiting for")] == [
+        f"waiting for an arm's driver at {arm_at}",
+        f"waiting for a process that perceives objects at {objects_at}",
+    ]
+    summary = robot.summary()
+    assert [summary["contacts"], summary["min_distance_mm"], summary["task"]["placing"]] == [None] * 3
+    assert beside.summary()["arm"].keys() == {"accepted"}
+    # What was measured in the simulation holds for no other arm.
+    assert any("has not been measured" in note for note in parts.notes)
+    with pytest.raises(ConfigurationError, match="roles: there is no object 'ball'"):
+        build_parts(RobotSettings(roles={"ball": Role.SUPPORT}, scene="wall"), 1, "clock")
+
+
+def test_an_address_that_is_taken_is_refused_and_none_stays_open() -> None:
+    with Beside(EPHEMERAL, None, print) as first:
+        taken = first._ports["--arm"].endpoint
+        with pytest.raises(ConfigurationError, match="--objects: cannot bind"):
+            Beside(EPHEMERAL, taken, print)
+    with Beside(taken, None, print):
+        pass
