@@ -1,6 +1,5 @@
 """The process `feelahead-operator`: sockets, clock, controller, core; nothing else."""
 
-import dataclasses
 import functools
 import secrets
 from collections.abc import Sequence
@@ -23,15 +22,11 @@ from common.recording.side import SideRecording, recording_to
 from common.silence import MOTION_PERIOD_S
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
-from operator_side.controller.background_writes import BackgroundWrites
+from operator_side import controllers
 from operator_side.controller.connection import Connection
-from operator_side.controller.port import OpenController
-from operator_side.controller.search import BackgroundSearch, Ready
 from operator_side.core import OperatorSide
-from operator_side.dualsense.hid.device import HidBackend, load_backend
-from operator_side.dualsense.hid.finding import Finder
+from operator_side.dualsense.hid.device import HidBackend
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
-from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.recorded import OperatorEncoder, build_recorded, recorded_status
 from operator_side.robot_link.commanding import ToRobot
 from operator_side.robot_link.sending import Sending
@@ -39,9 +34,9 @@ from operator_side.settings import OperatorSettings
 from operator_side.stored_travel import StoredTravel
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts_of_core import Surroundings
-from operator_side.viewing.following_pages import follow_pages, hands_facts, shared_hands
+from operator_side.viewing.following_pages import follow_pages, hands_facts
 from operator_side.viewing.pages.driving_page import DrivingPage
-from operator_side.viewing.pages.shared_hands import SharedHands
+from operator_side.viewing.pages.shared_hands import Hands
 from operator_side.viewing.terminal.status import TerminalStatus
 from operator_side.viewing.viewing import Viewing, view_topics
 
@@ -87,19 +82,13 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
             status.also = recording.note
         for text in unused_clauses(link, [("to_robot", "haptics")]):
             status.note(text)
-        person: SharedHands | None = None
         with ExitStack() as stack:
-            guard: ReleaseGuard | None = None
-            pages = DrivingPage(may_drive=settings.device != "hid")
-            if settings.device != "hid":
-                simulated = SimulatedDualSense()
-                person = shared_hands(simulated, pages, settings)
-                connection = Connection(Ready(OpenController(simulated, "simulated DualSense")), core)
-            else:
-                loaded = load_backend() if backend is None else backend
-                # A reader leaves nothing behind.
-                guard = stack.enter_context(ReleaseGuard()) if settings.haptics else None
-                connection = Connection(BackgroundSearch(functools.partial(_find, Finder(loaded))), core, guard)
+            pages = DrivingPage(may_drive=settings.device in ("simulated", "browser"))
+            given_to = controllers.Surroundings(settings, core, pages, backend)
+            search, guard, person = controllers.DEVICES[settings.device](given_to)
+            if guard is not None:
+                stack.enter_context(guard)
+            connection = Connection(search, core, guard)
             stack.callback(connection.close)
             # The console before our own priority is raised, which it would inherit.
             viewing = Viewing(
@@ -133,16 +122,10 @@ def _console(settings: OperatorSettings, stack: ExitStack) -> Console | None:
     return stack.enter_context(Console(settings.connect, port=settings.console_port))
 
 
-def _find(find: Finder, preferred: str | None) -> OpenController:
-    found = find(preferred)
-    writes = BackgroundWrites(found.device)
-    return dataclasses.replace(found, device=writes, stalls=writes.stalls)
-
-
 class _People(NamedTuple):
     """The people at this side, besides a real controller's hands."""
 
-    person: SharedHands | None
+    person: Hands | None
     pages: DrivingPage
     viewing: Viewing
 

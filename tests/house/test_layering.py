@@ -82,6 +82,7 @@ ARROWS = """
         robot_side/reporting robot_side/settings.py robot_side/viewing
 
     operator_side/controller: common
+    operator_side/evdev: common operator_side/controller
     operator_side/dualsense/effects: operator_side/controller
     operator_side/dualsense/reports: common operator_side/controller operator_side/dualsense/effects
     operator_side/dualsense/hid: common operator_side/controller operator_side/dualsense/reports
@@ -103,18 +104,18 @@ ARROWS = """
     operator_side/viewing/facts.py: common/command
     operator_side/viewing/terminal: common common/command common/companion operator_side/controller
         operator_side/viewing/facts.py
-    operator_side/viewing/pages: common common/protocol operator_side/dualsense/simulated operator_side/hands
+    operator_side/viewing/pages: common common/protocol operator_side/controller operator_side/hands
         operator_side/people
     operator_side/viewing/console: common common/command common/companion common/protocol common/video
         operator_side/controller operator_side/viewing/facts.py
     operator_side/viewing: common common/command common/protocol common/rate common/recording operator_side/controller
-        operator_side/core.py operator_side/dualsense/simulated operator_side/people operator_side/settings.py
-        operator_side/viewing/console operator_side/viewing/facts.py operator_side/viewing/pages
+        operator_side/core.py operator_side/settings.py operator_side/viewing/console operator_side/viewing/facts.py
+        operator_side/viewing/pages
     operator_side: common common/command common/emulation common/protocol common/realtime common/recording
         common/sockets operator_side/calibration operator_side/controller operator_side/core.py
-        operator_side/dualsense/hid operator_side/dualsense/simulated operator_side/events.py operator_side/hands
-        operator_side/robot_link operator_side/settings.py operator_side/viewing operator_side/viewing/console
-        operator_side/viewing/pages operator_side/viewing/terminal
+        operator_side/dualsense/hid operator_side/dualsense/simulated operator_side/evdev operator_side/events.py
+        operator_side/hands operator_side/people operator_side/robot_link operator_side/settings.py
+        operator_side/viewing operator_side/viewing/console operator_side/viewing/pages operator_side/viewing/terminal
 
     feelahead/both_sides: common/* robot_side/* operator_side/*
     feelahead/recordings: common/* robot_side/* operator_side/*
