@@ -13,10 +13,10 @@ from common.errors import ConfigurationError, DeviceError
 from feelahead.main import command
 from operator_side.calibration.procedure import CalibrationError
 from operator_side.calibration.store import calibration_path, load_calibration, read_calibration, write_calibration
+from operator_side.controller import connection
 from operator_side.controller.feel import RELEASED
 from operator_side.controller.state import ControllerState
 from operator_side.core import OperatorSide
-from operator_side.dualsense.hid import connection
 from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel

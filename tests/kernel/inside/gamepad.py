@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from common.clock import MonotonicClock
 from common.errors import DeviceError, NoDeviceError
 from feelahead.both_sides.processes import SideProcess
 from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel, Rumble
@@ -69,18 +70,25 @@ def test_it_is_found_among_the_nodes_and_its_hands_are_read(plugged: Plugged, pa
 
 
 def test_stiffness_at_the_trigger_shakes_its_motor_which_stops_by_itself(plugged: Plugged, pad: OpenController) -> None:
-    pad.device.write(Feel(l2=feedback(0, 4), r2=FREE_TRIGGER), 0.0)
-    assert rumble(plugged) == STILL
+    clock = MonotonicClock()
+
+    def feels(feel: Feel, left: float, right: float) -> None:
+        pad.device.write(feel, clock.now())
+
+        def shakes() -> bool:
+            pad.device.read(clock.now())  # which says it again
+            return rumble(plugged) == Rumble(left, right)
+
+        wait_until(f"{feel} is felt as {left}, {right}", shakes, instead=lambda: rumble(plugged))
+
+    feels(Feel(l2=feedback(0, 4), r2=FREE_TRIGGER), 0.0, 0.0)
     plugged.ask(lambda controller: controller.set_finger_force(NORMAL_FINGER_FORCE_N, NORMAL_FINGER_FORCE_N))
     wait_until("both are pulled", lambda: reads(pad, l2=1.0, r2=1.0))
-    wait_until("the strong motor turns", lambda: rumble(plugged) == Rumble(HALF, 0.0))
+    feels(Feel(), HALF, 0.0)
     wait_until("nobody says it again", lambda: rumble(plugged) == STILL)
-    pad.device.write(Feel(r2=feedback(5, 8), rumble=Rumble(left=1.0)), 1.0)
-    wait_until("both turn", lambda: rumble(plugged) == Rumble(FULL, FULL))
-    pad.device.write(RELEASED, 1.01)
-    wait_until("they stop", lambda: rumble(plugged) == STILL)
-    pad.device.write(Feel(rumble=Rumble(right=1.0)), 1.02)
-    wait_until("one turns", lambda: rumble(plugged) == Rumble(0.0, FULL))
+    feels(Feel(r2=feedback(5, 8), rumble=Rumble(left=1.0)), FULL, FULL)
+    feels(RELEASED, 0.0, 0.0)
+    feels(Feel(rumble=Rumble(right=1.0)), 0.0, FULL)
     pad.device.close()
     wait_until("closing stops it", lambda: rumble(plugged) == STILL)
 
