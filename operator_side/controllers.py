@@ -21,7 +21,7 @@ from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.pages.shared_hands import Hands, SharedHands
 
 
-class Surroundings(NamedTuple):
+class Given(NamedTuple):
     """What a controller may be opened with."""
 
     settings: OperatorSettings
@@ -41,7 +41,7 @@ class Opening(NamedTuple):
     """Those on it that have to be moved in every turn; None for a person's own"""
 
 
-def _hid(given: Surroundings) -> Opening:
+def _hid(given: Given) -> Opening:
     find = Finder(load_backend() if given.backend is None else given.backend)
     # A reader leaves nothing behind.
     return Opening(
@@ -56,12 +56,12 @@ def _with_background_writes(find: Finder, preferred: str | None) -> OpenControll
     return dataclasses.replace(found, device=writes, stalls=writes.stalls)
 
 
-def _evdev(given: Surroundings) -> Opening:
+def _evdev(given: Given) -> Opening:
     del given
     return Opening(BackgroundSearch(find_pad))
 
 
-def _simulated(given: Surroundings) -> Opening:
+def _simulated(given: Given) -> Opening:
     settings, device = given.settings, SimulatedDualSense()
     calibration, swap_sides = settings.calibration, settings.swap_sides
     person = functools.partial(whoever, device, settings.person, settings.seed, calibration, swap_sides=swap_sides)
@@ -71,12 +71,12 @@ def _simulated(given: Surroundings) -> Opening:
     return Opening(Ready(OpenController(shared, "simulated DualSense")), hands=shared)
 
 
-def _browser(given: Surroundings) -> Opening:
+def _browser(given: Given) -> Opening:
     page = BrowserHands(given.pages, given.core.calibrate, swap_sides=given.settings.swap_sides)
     return Opening(Ready(OpenController(page, "a page of the console")), hands=page)
 
 
-DEVICES: Final[Mapping[DeviceName, Callable[[Surroundings], Opening]]] = {
+DEVICES: Final[Mapping[DeviceName, Callable[[Given], Opening]]] = {
     "hid": _hid,
     "evdev": _evdev,
     "simulated": _simulated,

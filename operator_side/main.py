@@ -22,8 +22,8 @@ from common.recording.side import SideRecording, recording_to
 from common.silence import MOTION_PERIOD_S
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
-from operator_side import controllers
 from operator_side.controller.connection import Connection
+from operator_side.controllers import DEVICES, Given
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.device import HidBackend
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
@@ -83,9 +83,9 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
         for text in unused_clauses(link, [("to_robot", "haptics")]):
             status.note(text)
         with ExitStack() as stack:
-            pages = DrivingPage(may_drive=settings.device in ("simulated", "browser"))
-            given_to = controllers.Surroundings(settings, core, pages, backend)
-            search, guard, person = controllers.DEVICES[settings.device](given_to)
+            pages = DrivingPage()
+            search, guard, person = DEVICES[settings.device](Given(settings, core, pages, backend))
+            pages.may_drive = person is not None
             if guard is not None:
                 stack.enter_context(guard)
             connection = Connection(search, core, guard)
