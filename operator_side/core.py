@@ -174,8 +174,8 @@ class OperatorSide:
 
     def calibrate(self, calibration: TravelCalibration) -> None:
         """Read the triggers and sticks of the controller that has just been found through `calibration`."""
-        self._hear("calibrated", calibration, None)
         if calibration != self.hands.calibration:
+            self._hear("calibrated", calibration, None)
             self.hands.calibration = calibration
             self.haptics.calibrate(calibration)
 

@@ -1,7 +1,5 @@
 """The process `feelahead-operator`: settings, parts, and `run`."""
 
-import dataclasses
-import functools
 import secrets
 from collections.abc import Sequence
 
@@ -13,20 +11,14 @@ from common.loop.process import Process
 from common.silence import MOTION_PERIOD_S
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
-from operator_side.controller.background_writes import BackgroundWrites
 from operator_side.controller.connection import Connection
-from operator_side.controller.port import OpenController
-from operator_side.controller.search import BackgroundSearch, Ready
+from operator_side.controllers import DEVICES, Given
 from operator_side.core import OperatorSide
-from operator_side.dualsense.hid.device import HidBackend, load_backend
-from operator_side.dualsense.hid.finding import Finder
-from operator_side.dualsense.hid.release_guard import ReleaseGuard
-from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.dualsense.hid.device import HidBackend
 from operator_side.recorded import OperatorEncoder, build_recorded
 from operator_side.settings import OperatorSettings
 from operator_side.turns import HELPS, Desk, OperatorTurns
 from operator_side.viewing.console.console import Console
-from operator_side.viewing.following_pages import shared_hands
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.terminal.status import TerminalStatus
 from operator_side.viewing.viewing import view_topics
@@ -57,26 +49,15 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
 
 
 def _desk(settings: OperatorSettings, core: OperatorSide, process: Process, backend: HidBackend | None) -> Desk:
-    """Make the controller, and who may hold it; the console before the priority is raised, which it would inherit."""
-    pages = DrivingPage(may_drive=settings.device != "hid")
-    person, guard = None, None
-    if settings.device != "hid":
-        simulated = SimulatedDualSense()
-        person = shared_hands(simulated, pages, settings)
-        connection = Connection(Ready(OpenController(simulated, "simulated DualSense")), core)
-    else:
-        loaded = load_backend() if backend is None else backend
-        # A reader leaves nothing behind.
-        guard = process.stack.enter_context(ReleaseGuard()) if settings.haptics else None
-        connection = Connection(BackgroundSearch(functools.partial(_find, Finder(loaded))), core, guard)
-    process.stack.callback(connection.close)
-    console = Console(settings.connect, port=settings.console_port) if settings.console else None
-    if console is not None:
-        process.stack.enter_context(console)
+    """Open the controller, and the console before the priority is raised, which it would inherit."""
+    pages, stack = DrivingPage(), process.stack
+    search, guard, person = DEVICES[settings.device](Given(settings, core, pages, backend))
+    pages.may_drive = person is not None
+    if guard is not None:
+        stack.enter_context(guard)
+    connection = Connection(search, core, guard)
+    stack.callback(connection.close)
+    console = None
+    if settings.console:
+        console = stack.enter_context(Console(settings.connect, port=settings.console_port))
     return Desk(connection, guard, person, pages, console)
-
-
-def _find(find: Finder, preferred: str | None) -> OpenController:
-    found = find(preferred)
-    writes = BackgroundWrites(found.device)
-    return dataclasses.replace(found, device=writes, stalls=writes.stalls)

@@ -15,6 +15,9 @@ from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.settings import PersonSettings
 
+DeviceName = Literal["hid", "evdev", "simulated", "browser"]
+"""The names of operator_side/controllers.py"""
+
 
 @dataclass(frozen=True)
 class OperatorSettings(SideOptions):
@@ -38,9 +41,9 @@ class OperatorSettings(SideOptions):
     connections: Annotated[int, Meta(ge=1, le=MOST_CONNECTIONS_EACH)] = CONNECTIONS
     """Messages go to the robot side and back over several connections in turn. A packet that the network loses then
     holds up a part of the messages, and newer ones overtake. 8 help where packets are lost in bursts."""
-    device: Literal["hid", "simulated", "browser"] = "hid"
-    """A real controller, which is waited for while it is not there; a simulated one with a scripted person, out of
-    whose hands a page of the console may take it; or a simulated one that nobody but a page drives."""
+    device: DeviceName = "hid"
+    """A DualSense, which is waited for while it is not there; by evdev (Linux) any gamepad that rumbles; a simulated
+    DualSense with a scripted person, out of whose hands a page of the console may take it; or a page alone."""
     haptics: bool = True
     """Whether the triggers are stiffened at all."""
     compensation: Compensation = "operator"

@@ -20,7 +20,7 @@ from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts_of_core import Surroundings
 from operator_side.viewing.following_pages import follow_pages, hands_facts
 from operator_side.viewing.pages.driving_page import DrivingPage
-from operator_side.viewing.pages.shared_hands import SharedHands
+from operator_side.viewing.pages.shared_hands import MovedHands
 from operator_side.viewing.viewing import Viewing
 
 HELPS: Final = {
@@ -42,8 +42,8 @@ class Desk(NamedTuple):
     connection: Connection
     guard: ReleaseGuard | None
     """The watchdog of a real controller"""
-    person: SharedHands | None
-    """The hands on a simulated controller; None on a real one"""
+    person: MovedHands | None
+    """The hands that have to be moved in every turn; None for a person's own"""
     pages: DrivingPage
     console: Console | None
 

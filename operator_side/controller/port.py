@@ -28,7 +28,7 @@ class Controller(Protocol):
     def close(self) -> None:
         """Take resistance, rumble and a warning light off if any were written, and let the controller go.
 
-        Safe to call again; everything else raises DeviceError afterwards.
+        Safe to call again; nothing else is called afterwards.
         """
 
 

@@ -74,16 +74,6 @@ class StickRest:
         # Rounding must not leave the range.
         return min(max(x * scale, -1.0), 1.0), min(max(y * scale, -1.0), 1.0)
 
-    def raw(self, deflection: Stick) -> Stick:
-        """Where the stick has to be for this deflection, within the unit circle: the inverse of `deflection`."""
-        radius = math.hypot(*deflection)
-        if radius == 0.0:
-            return self.x, self.y
-        span = 1.0 - math.hypot(self.x, self.y) - self.dead_zone
-        scale = (self.dead_zone + min(radius, 1.0) * span) / radius
-        x, y = self.x + deflection[0] * scale, self.y + deflection[1] * scale
-        return min(max(x, -1.0), 1.0), min(max(y, -1.0), 1.0)
-
 
 @dataclass(frozen=True)
 class TravelCalibration:
@@ -93,3 +83,9 @@ class TravelCalibration:
     r2: TriggerTravel = field(default_factory=TriggerTravel)
     left_stick: StickRest = field(default_factory=StickRest)
     right_stick: StickRest = field(default_factory=StickRest)
+
+
+AS_GIVEN: Final = TravelCalibration(
+    TriggerTravel(0.0, 1.0), TriggerTravel(0.0, 1.0), StickRest(dead_zone=0.0), StickRest(dead_zone=0.0)
+)
+"""Of a controller that has neither play nor noise: what it says is what is meant."""

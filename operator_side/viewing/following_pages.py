@@ -1,23 +1,10 @@
 """Hand on the words of the console's pages: hands to a controller, stops and wishes to the core."""
 
-import functools
-
 from operator_side.core import OperatorSide
-from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.people.whoever import whoever
-from operator_side.settings import OperatorSettings
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts import HandsFacts
 from operator_side.viewing.pages.driving_page import DrivingPage
-from operator_side.viewing.pages.shared_hands import SharedHands
-
-
-def shared_hands(device: SimulatedDualSense, pages: DrivingPage, settings: OperatorSettings) -> SharedHands:
-    """Make the hands on the simulated controller: a page, and before it the scripted person where there is one."""
-    calibration, swap_sides = settings.calibration, settings.swap_sides
-    person = functools.partial(whoever, device, settings.person, settings.seed, calibration, swap_sides=swap_sides)
-    alone = settings.device == "browser"
-    return SharedHands(device, pages, None if alone else person, calibration, swap_sides=swap_sides)
+from operator_side.viewing.pages.shared_hands import MovedHands
 
 
 def hear_pages(console: Console, pages: DrivingPage, now_s: float) -> None:
@@ -39,8 +26,8 @@ def follow_pages(pages: DrivingPage, core: OperatorSide, now_s: float) -> None:
         core.tune(wish.probability, wish.link, now_s)
 
 
-def hands_facts(pages: DrivingPage, shared: SharedHands | None, core: OperatorSide, now_s: float) -> HandsFacts:
-    """Facts for the pages; `shared` None for a real controller."""
+def hands_facts(pages: DrivingPage, shared: MovedHands | None, core: OperatorSide, now_s: float) -> HandsFacts:
+    """Facts for the pages; `shared` None for a person's own."""
     rest_s = pages.rest_s(now_s)  # first, as it looks whether the page is still there
     return HandsFacts(
         may_drive=pages.may_drive,

@@ -11,10 +11,10 @@ from typing import Any, Final
 import msgspec
 
 from common.protocol.messages import Telemetry
-from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.intent import OperatorIntent, operator_intent
+from operator_side.hands.travel_calibration import AS_GIVEN
+from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
-from operator_side.viewing.pages.shared_hands import SharedHands
 from tests.console.browser import Browser, Page
 from tests.helpers.repository import ROOT
 from tests.helpers.simulated_desk import VIEW
@@ -81,8 +81,7 @@ class HandsAlone:
     intent: OperatorIntent | None = None
 
     def __post_init__(self) -> None:
-        self.device = SimulatedDualSense()
-        self.shared = SharedHands(self.device, self.pages, None)
+        self.shared = BrowserHands(self.pages, lambda _: None)
         self.let_pass(0.1)
 
     def let_pass(self, for_s: float) -> None:
@@ -105,10 +104,9 @@ class HandsAlone:
             self.state = "stopped"
         screen: Telemetry = msgspec.structs.replace(VIEW, state=self.state)
         self.shared.tick(now_s, screen, 0.0)
-        if (state := self.device.read(now_s)) is not None:
-            self.intent = operator_intent(state)
-            if self.intent.arm:
-                self.state = "armed"
+        self.intent = operator_intent(self.shared.read(now_s), AS_GIVEN)
+        if self.intent.arm:
+            self.state = "armed"
         if self.hears:
             self.page.ask("(facts) => window.hands.show(facts)", self._facts(now_s))
 

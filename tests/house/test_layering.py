@@ -91,6 +91,7 @@ ARROWS = """
     operator_side/dualsense/simulated: common operator_side/controller operator_side/dualsense/reports
     operator_side/dualsense/uhid: common common/realtime operator_side/dualsense/reports
         operator_side/dualsense/simulated
+    operator_side/evdev: common operator_side/controller
     operator_side/hands: operator_side/controller
     operator_side/robot_link: common common/emulation common/protocol common/rate common/sockets common/status
         operator_side/hands
@@ -106,19 +107,18 @@ ARROWS = """
     operator_side/viewing/facts.py: common/protocol common/status
     operator_side/viewing/terminal: common common/command common/companion common/status operator_side/controller
         operator_side/viewing/facts.py
-    operator_side/viewing/pages: common common/protocol common/status operator_side/dualsense/simulated
-        operator_side/hands operator_side/people
+    operator_side/viewing/pages: common common/protocol common/status operator_side/controller operator_side/hands
+        operator_side/people
     operator_side/viewing/console: common common/companion common/protocol common/status common/video
         operator_side/controller operator_side/viewing/facts.py operator_side/viewing/pages
     operator_side/viewing: common common/command common/protocol common/rate common/recording common/status
-        operator_side/controller operator_side/core.py operator_side/dualsense/simulated operator_side/people
-        operator_side/settings.py operator_side/viewing/console operator_side/viewing/facts.py
-        operator_side/viewing/pages
+        operator_side/controller operator_side/core.py operator_side/settings.py operator_side/viewing/console
+        operator_side/viewing/facts.py operator_side/viewing/pages
     operator_side: common common/command common/emulation common/loop common/protocol common/recording common/sockets
         common/status operator_side/calibration operator_side/controller operator_side/core.py
-        operator_side/dualsense/hid operator_side/dualsense/simulated operator_side/events.py operator_side/hands
-        operator_side/robot_link operator_side/settings.py operator_side/viewing operator_side/viewing/console
-        operator_side/viewing/pages operator_side/viewing/terminal
+        operator_side/dualsense/hid operator_side/dualsense/simulated operator_side/evdev operator_side/events.py
+        operator_side/hands operator_side/people operator_side/robot_link operator_side/settings.py
+        operator_side/viewing operator_side/viewing/console operator_side/viewing/pages operator_side/viewing/terminal
 
     feelahead/both_sides: common/* robot_side/* operator_side/*
     feelahead/recordings: common/* robot_side/* operator_side/*

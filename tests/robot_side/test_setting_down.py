@@ -10,10 +10,10 @@ from feelahead.lab.faults.session_bench import QUICK, Bench
 from robot_side.arm.port import ArmState
 from robot_side.arm.touching_down import carried_n
 from robot_side.parts import build_parts
+from tests.helpers.passed_on_arm import PassedOnArm
 from tests.helpers.repository import DATA
 
 SETTINGS = replace(QUICK, model=DATA / "place_held.xml", site="tool")
-from tests.helpers.passed_on_arm import PassedOnArm
 
 
 class Forgetful(PassedOnArm):

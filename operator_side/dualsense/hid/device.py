@@ -1,5 +1,6 @@
 """A real DualSense over HID: the only file that imports hidapi, and only when a controller is looked for."""
 
+import contextlib
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -88,8 +89,6 @@ class HidDualSense:
         except DeviceError:
             self._close_handles()
             raise
-        self.rejected = 0
-        """Reports that were none."""
         self._closed = False
         self._sequence = 0
         self._written = False
@@ -104,7 +103,7 @@ class HidDualSense:
     def read(self, now_s: float) -> ControllerState | None:
         """The newest report's state, or None when there is no new one; never waits. DeviceError when it is gone.
 
-        A bad report is passed over and counted.
+        A bad report is passed over.
         """
         del now_s  # a real controller has a clock of its own
         self._require_open()
@@ -118,11 +117,9 @@ class HidDualSense:
         except OSError as error:
             raise _gone(str(error)) from error
         for report in map(bytes, reversed(drained)):
-            try:
+            # Bluetooth may have begun with simple reports before it was asked for more.
+            with contextlib.suppress(RemoteProtocolError):
                 return parse_input_report(report)
-            except RemoteProtocolError:
-                # Bluetooth may have begun with simple reports before it was asked for more.
-                self.rejected += not is_simple_report(report)
         return None
 
     def write(self, feel: Feel, now_s: float) -> None:

@@ -123,15 +123,6 @@ def parse_input_report(report: bytes) -> ControllerState:
     )
 
 
-def is_input_report(report: bytes) -> bool:
-    """Whether `parse_input_report` can read it: by its id, its length and, where it has one, its checksum."""
-    try:
-        _checked_transport(report)
-    except RemoteProtocolError:
-        return False
-    return True
-
-
 def _checked_transport(report: bytes) -> Transport:
     transport = transport_of_input(report)
     if transport is Transport.BLUETOOTH:

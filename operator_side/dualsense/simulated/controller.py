@@ -6,7 +6,7 @@ from typing import Final
 from msgspec.structs import replace
 
 from common.errors import DeviceError, RemoteProtocolError
-from operator_side.controller.feel import FREE_TRIGGER, RELEASED, SENSED_TRAVEL, Feel, Rumble, Strengths
+from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel, Rumble, Strengths
 from operator_side.controller.state import Battery, BatteryState, Button, ControllerState, Stick
 from operator_side.dualsense.reports.feature_report import (
     ADDRESS_ID,
@@ -91,13 +91,6 @@ class SimulatedDualSense:
         self._l2.set_finger_force(l2_n)
         self._r2.set_finger_force(r2_n)
 
-    def set_travel(self, l2: float, r2: float) -> None:
-        """Hold the triggers at these travels as the controller reports them, 0 to 1, whatever resists, until a force
-        is set; ValueError beyond.
-        """
-        self._l2.hold_at(SENSED_TRAVEL * l2)
-        self._r2.hold_at(SENSED_TRAVEL * r2)
-
     def set_sticks(self, left: Stick = (0.0, 0.0), right: Stick = (0.0, 0.0)) -> None:
         """Hold the sticks at (x, y), -1 to 1 each, right and up positive; ValueError beyond."""
         if (left, right) != (self._held.left_stick, self._held.right_stick):
@@ -114,6 +107,12 @@ class SimulatedDualSense:
             raise ValueError("pressed has a paddle or a function key; valid: only on a DualSense Edge")
         if pressed != self._held.pressed:
             self._held = replace(self._held, pressed=pressed)
+
+    def hands_off(self) -> None:
+        """Let go of everything."""
+        self.set_finger_force(0.0, 0.0)
+        self.set_sticks()
+        self.set_buttons(frozenset())
 
     # State
 

@@ -63,7 +63,6 @@ class SimulatedTrigger:
         """Mechanical travel, 0 to 1."""
         self._strength_step_n = strength_step_n
         self._finger_force_n = 0.0
-        self._held: float | None = None
         self._equilibrium = 0.0
 
     @property
@@ -74,14 +73,7 @@ class SimulatedTrigger:
     def set_finger_force(self, finger_force_n: float) -> None:
         """Press with a constant force from now on; ValueError for a negative or non-finite one."""
         self._equilibrium = equilibrium_travel(finger_force_n, self.strengths, self._strength_step_n)
-        self._finger_force_n, self._held = finger_force_n, None
-
-    def hold_at(self, travel: float) -> None:
-        """Be at this travel from now on, whatever resists, until a force is set; ValueError outside 0 to 1."""
-        if not 0.0 <= travel <= 1.0:
-            raise ValueError(f"travel = {travel}; valid: 0 to 1")
-        self._finger_force_n = 0.0
-        self._held = self.travel = travel
+        self._finger_force_n = finger_force_n
 
     def set_strengths(self, strengths: Strengths) -> None:
         """Resist by `strengths` from now on."""
@@ -92,6 +84,5 @@ class SimulatedTrigger:
         """Let `step_s` pass; ValueError for a negative or non-finite step."""
         if not (math.isfinite(step_s) and step_s >= 0.0):
             raise ValueError(f"step_s = {step_s}; valid: finite, 0 or more")
-        if self._held is None:
-            remaining = math.exp(-step_s / FINGER_TIME_CONSTANT_S)
-            self.travel = self._equilibrium + (self.travel - self._equilibrium) * remaining
+        remaining = math.exp(-step_s / FINGER_TIME_CONSTANT_S)
+        self.travel = self._equilibrium + (self.travel - self._equilibrium) * remaining

@@ -1,1 +1,1 @@
-"""Keyboard, mouse and gamepad of a browser's page: second-class hands on a simulated controller."""
+"""Keyboard, mouse and gamepad of a browser's page: a second-class controller."""

@@ -1,39 +1,40 @@
-"""A browser's hands on a simulated controller: what they do goes the way of any controller's hands."""
+"""A page of the console as a controller: what its hands do is a state like any controller's, and counts as given."""
 
+from collections.abc import Callable
 from typing import Final
 
-from common.protocol.messages import Telemetry, Vector2
-from common.status.codes import Doing, Readiness
-from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from common.protocol.messages import Telemetry
+from common.status.codes import Doing, Hands, Readiness
+from operator_side.controller.feel import RELEASED, Feel
+from operator_side.controller.state import ControllerState
 from operator_side.hands.button_map import Action, button_of
-from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
+from operator_side.hands.travel_calibration import AS_GIVEN, TravelCalibration
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.pages.page_messages import PageHands
 
 _PRESS_S: Final = 0.2
 """For so long the arming button is pressed, and then let go, until the arm is armed: each press is another edge."""
-_REST: Final[Vector2] = (0.0, 0.0)
 _GRIPPER: Final = {1: Action.CLOSE_GRIPPER, -1: Action.OPEN_GRIPPER}
 
 
 class BrowserHands:
     """Hold-to-run arms, once per press; what moves the arm counts from when it was seen at rest while armed."""
 
+    has_person: Final = False
+    hands: Final = Hands.BROWSER
+
     def __init__(
-        self,
-        device: SimulatedDualSense,
-        pages: DrivingPage,
-        calibration: TravelCalibration | None = None,
-        *,
-        swap_sides: bool = False,
+        self, pages: DrivingPage, calibrate: Callable[[TravelCalibration], None], *, swap_sides: bool = False
     ) -> None:
-        self._device = device
+        """`calibrate`: is told how to read the states: a page's travel has no dead zones."""
         self._pages = pages
-        self._calibration = calibration or TravelCalibration()
+        self._calibrate = calibrate
         self._swap_sides = swap_sides
         self._began_s: float | None = None
         self._was_armed = False
         self._moves = False
+        self._state = ControllerState()
+        self._told = RELEASED
 
     @property
     def doing(self) -> Doing:
@@ -43,8 +44,9 @@ class BrowserHands:
         return Doing.AT_REST_FIRST if self._was_armed else Doing.ARMING
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Do with the controller what the page's hands do; the screen says whether the arm is armed."""
+        """Do what the page's hands do; the screen says whether the arm is armed."""
         del delay_s
+        self._calibrate(AS_GIVEN)
         hands = self._pages.hands(now_s)
         armed = screen is not None and screen.state == "armed"
         if hands is not None and self._was_armed and not armed:
@@ -53,7 +55,7 @@ class BrowserHands:
             hands = None
         if hands is None:
             self._began_s, self._was_armed, self._moves = None, False, False
-            self.release()
+            self._state = ControllerState()
             return
         if self._began_s is None:
             self._began_s = now_s
@@ -62,31 +64,38 @@ class BrowserHands:
         pressed = {Action.RUN}
         if not armed and (now_s - self._began_s) % (2.0 * _PRESS_S) < _PRESS_S:
             pressed.add(Action.ARM)
-        self._act(hands, pressed)
+        self._state = self._held(hands, pressed)
 
-    def release(self) -> None:
-        """Take the hands off the controller."""
-        self._device.set_travel(0.0, 0.0)
-        self._device.set_sticks(self._calibration.left_stick.raw(_REST), self._calibration.right_stick.raw(_REST))
-        self._device.set_buttons(frozenset())
+    # The port
 
-    def _act(self, hands: PageHands, pressed: set[Action]) -> None:
+    @property
+    def released(self) -> bool:
+        """Nothing that was told holds or shakes; a page only shows it."""
+        return self._told.releases
+
+    def read(self, now_s: float) -> ControllerState:
+        """The state by the last tick."""
+        del now_s
+        return self._state
+
+    def write(self, feel: Feel, now_s: float) -> None:
+        """Remember it."""
+        del now_s
+        self._told = feel.following(self._told)
+
+    def close(self) -> None:
+        """There is nothing to let go."""
+        self._told = self._told.farewell
+
+    def _held(self, hands: PageHands, pressed: set[Action]) -> ControllerState:
         chosen = {Action.NEXT_TARGET: hands.next_target, Action.HAND_OVER: hands.hand_over}
         pressed |= {action for action, is_pressed in chosen.items() if is_pressed}
-        travel, sticks = (0.0, 0.0), (_REST, _REST)
-        if self._moves:
-            travel, sticks = (hands.l2, hands.r2), (hands.lateral, hands.turning)
-            if hands.gripper in _GRIPPER:
-                pressed.add(_GRIPPER[hands.gripper])
-        order = -1 if self._swap_sides else 1
-        calibration = self._calibration
-        l2, r2 = travel[::order]
-        left, right = sticks[::order]
-        self._device.set_travel(_raw(calibration.l2, l2), _raw(calibration.r2, r2))
-        self._device.set_sticks(calibration.left_stick.raw(left), calibration.right_stick.raw(right))
+        if self._moves and hands.gripper in _GRIPPER:
+            pressed.add(_GRIPPER[hands.gripper])
         button = button_of(swap_sides=self._swap_sides)
-        self._device.set_buttons(frozenset(button[action] for action in pressed))
-
-
-def _raw(calibrated: TriggerTravel, travel: float) -> float:
-    return calibrated.raw(travel) if travel > 0.0 else 0.0
+        held = frozenset(button[action] for action in pressed)
+        if not self._moves:
+            return ControllerState(pressed=held)
+        order = -1 if self._swap_sides else 1
+        (l2, r2), (left, right) = (hands.l2, hands.r2)[::order], (hands.lateral, hands.turning)[::order]
+        return ControllerState(left, right, l2, r2, held)

@@ -6,8 +6,10 @@ from typing import Any
 import pytest
 
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
+from operator_side.controller.connection import Connection
+from operator_side.controllers import DEVICES, Given
 from operator_side.settings import OperatorSettings
-from operator_side.viewing.following_pages import hands_facts, shared_hands
+from operator_side.viewing.following_pages import hands_facts
 from operator_side.viewing.pages.driving_page import DrivingPage
 from robot_side.settings import RobotSettings
 from tests.operator_side.viewing.pages.talking_page import AtThePage, Does, TalkingPage
@@ -23,11 +25,12 @@ def run_of(does: Does, device: Any = "browser", link: str = "", *, permit_tuning
     operator = OperatorSettings(link=link, device=device)
     pages = DrivingPage(may_drive=device != "hid")
     page = TalkingPage(pages)
-    return Loopback(
-        LoopbackSettings(RobotSettings(link=link, permit_tuning=permit_tuning), operator),
-        pages=pages,
-        person=lambda controller: AtThePage(page, shared_hands(controller, pages, operator), does),
-    )
+    run = Loopback(LoopbackSettings(RobotSettings(link=link, permit_tuning=permit_tuning), operator), pages=pages)
+    opening = DEVICES[operator.device](Given(operator, run.operator, pages))
+    assert opening.hands is not None
+    run.connection = Connection(opening.search, run.operator)
+    run.person = AtThePage(page, opening.hands, does)
+    return run
 
 
 def timetable(*rows: tuple[float, dict[str, Any] | None]) -> Does:

@@ -80,6 +80,12 @@ def hold(plugged: Plugged, *buttons: Button, r2_n: float = 0.0) -> None:
 
 def arm_and_pull(desk: Desk) -> None:
     """Arm as a person does, then pull R2 until the arm would move and the trigger is stiff."""
+    arm_and_move(desk)
+    wait_until("the trigger is stiff", lambda: not desk.plugged.ask(lambda controller: controller.released))
+
+
+def arm_and_move(desk: Desk) -> None:
+    """Arm as a person does, then pull R2 until the arm would move."""
     plugged, robot = desk.plugged, desk.robot
     plugged.plug_in()
     robot.r2_stiffness = 0.9
@@ -96,7 +102,6 @@ def arm_and_pull(desk: Desk) -> None:
         return robot.moving
 
     wait_until("the arm would move", moving, _PATIENCE_S, instead=lambda: robot.state)
-    wait_until("the trigger is stiff", lambda: not plugged.ask(lambda controller: controller.released))
 
 
 def test_without_a_controller_it_says_so_and_commands_nothing(desk: Desk) -> None:

@@ -55,7 +55,7 @@ def test_bluetooth_is_told_from_short_reports_which_are_passed_over() -> None:
     device = open_fake(handle)
     assert device.identity.first_report == handle.report()
     handle.waiting = [handle.report(1), SIMPLE_REPORT, SIMPLE_REPORT.ljust(78, b"\0")]
-    assert (device.read(0.1), device.rejected, handle.waiting) == (ControllerState(), 0, [])
+    assert (device.read(0.1), handle.waiting) == (ControllerState(), [])
     handle.waiting = [SIMPLE_REPORT]
     assert device.read(0.2) is None
 
@@ -126,10 +126,10 @@ def test_reading_drains_to_the_newest_good_report(transport: Transport, bad: byt
     assert device.read(0.0) is None
     pulled = ControllerState(r2=1.0)
     handle.waiting = [handle.report(1), bad, build_input_report(pulled, transport), bad, bad]
-    assert (device.read(0.1), device.rejected) == (pulled, 2)
+    assert device.read(0.1) == pulled
     assert device.read(0.2) is None
     handle.waiting = [bad]
-    assert (device.read(0.3), device.rejected) == (None, 3)
+    assert device.read(0.3) is None
     handle.waiting = [handle.report()] * 1000
     assert device.read(0.4) == ControllerState()
     assert len(handle.waiting) > 900

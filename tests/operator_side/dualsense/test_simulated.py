@@ -271,7 +271,6 @@ def used(what: str, *arguments: Any, **named: Any) -> Any:
         *(("write", (Feel(), now_s), f"now_s = {now_s}; valid: ") for now_s in (0.9, NAN, INF)),
         *(("set_finger_force", (1.0, force_n), "finger_force_n = ") for force_n in (-1.0, NAN, INF)),
         *(("advance", (step_s,), "step_s = ") for step_s in (-0.1, NAN, INF)),
-        *(("hold_at", (travel,), "travel = ") for travel in (-0.1, 1.1, NAN)),
         ("set_sticks", ((1.5, 0.0),), "left_stick"),
         ("set_buttons", (frozenset({Button.L2}),), "pressed has L2 or R2"),
         ("set_buttons", (frozenset({Button.UP, Button.DOWN}),), "down and up"),

@@ -1,5 +1,6 @@
-"""A browser's hands on a simulated controller, and who has it: the person, the page, or nobody."""
+"""A page as a controller, and whose hands count: the person's, the page's, or nobody's."""
 
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -13,6 +14,7 @@ from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 from operator_side.people.pulling_hands import PullingHands, constant_force
+from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.pages.shared_hands import SharedHands
 from tests.helpers.felt import feedback
@@ -23,23 +25,30 @@ TICK_S = 0.004
 WORN = TravelCalibration(
     TriggerTravel(0.2, 0.9), TriggerTravel(0.0, 0.7), StickRest(0.1, -0.05, 0.2), StickRest(-0.1, 0.1, 0.05)
 )
+"""The person's controller"""
 
 
 class Desk:
     """A page, a controller, and a screen that the test sets."""
 
-    def __init__(self, calibration: TravelCalibration | None = None, *, swap_sides: bool = False, person: bool = False):
-        self.calibration = calibration or TravelCalibration()
+    def __init__(self, *, swap_sides: bool = False, person: bool = False):
         self.swap_sides = swap_sides
         self.device = SimulatedDualSense()
         self.pages = DrivingPage()
         self.page = TalkingPage(self.pages)
         self.screen: Telemetry | None = VIEW
         self.people = 0
-        self.hands = SharedHands(
-            self.device, self.pages, self.new_person if person else None, calibration, swap_sides=swap_sides
-        )
+        self.calibrate(WORN)
+        self.hands: BrowserHands | SharedHands = BrowserHands(self.pages, self.calibrate, swap_sides=swap_sides)
+        if person:
+            calibrate = partial(self.calibrate, WORN)
+            self.hands = SharedHands(
+                self.pages, self.hands, self.device, self.new_person, self.device.hands_off, calibrate
+            )
         self.ticks = 0
+
+    def calibrate(self, calibration: TravelCalibration) -> None:
+        self.calibration = calibration
 
     def new_person(self) -> PullingHands:
         self.people += 1
@@ -50,13 +59,13 @@ class Desk:
         return self.ticks * TICK_S
 
     def let_pass(self, for_s: float, says: bool = True, **hands: Any) -> list[OperatorIntent]:
-        """The page says the same, or nothing; what the controller's reports mean."""
+        """The page says the same, or nothing; what the controller's states mean."""
         meant = []
         for step in range(round(for_s / TICK_S)):
             if says and step % round(PERIOD_S / TICK_S) == 0:
                 self.page.say(self.now_s, **hands)
             self.hands.tick(self.now_s, self.screen, 0.0)
-            if (state := self.device.read(self.now_s)) is not None:
+            if (state := self.hands.read(self.now_s)) is not None:
                 meant.append(operator_intent(state, self.calibration, swap_sides=self.swap_sides))
             self.ticks += 1
         return meant
@@ -68,24 +77,29 @@ class Desk:
         assert not self.let_pass(0.1, run=True)[-1].arm
 
 
-@pytest.mark.parametrize("calibration", [None, WORN])
+@pytest.mark.parametrize("person", [False, True])
 @pytest.mark.parametrize("swap_sides", [False, True])
-def test_travel_and_sticks_arrive_as_given(calibration: TravelCalibration | None, swap_sides: bool) -> None:
-    desk = Desk(calibration, swap_sides=swap_sides)
+def test_travel_and_sticks_arrive_as_given(person: bool, swap_sides: bool) -> None:
+    desk = Desk(swap_sides=swap_sides, person=person)
     desk.arm()
     given: dict[str, Any] = {"l2": 0.25, "r2": 0.75, "lateral": (0.3, -0.4), "turning": (-1.0, 0.0), "gripper": -1}
     meant = desk.let_pass(0.1, run=True, **given)[-1]
-    assert (meant.l2, meant.r2) == pytest.approx((0.25, 0.75), abs=0.005)
-    assert meant.lateral == pytest.approx((0.3, -0.4), abs=0.02)
-    assert meant.turning == pytest.approx((-1.0, 0.0), abs=0.02)
+    assert (meant.l2, meant.r2, meant.turning) == (0.25, 0.75, (-1.0, 0.0))
+    assert meant.lateral == pytest.approx((0.3, -0.4), abs=1e-15)
     assert (meant.run, meant.gripper, meant.emergency_stop) == (True, -1, False)
 
 
-def test_what_the_trigger_was_told_takes_nothing_from_the_travel() -> None:
-    desk = Desk()
+@pytest.mark.parametrize("person", [False, True])
+def test_what_the_trigger_was_told_takes_nothing_from_the_travel_and_waits_for_who_goes_on(person: bool) -> None:
+    desk = Desk(person=person)
     desk.arm()
-    desk.device.write(Feel(l2=feedback(0, 8), r2=feedback(0, 8)), desk.now_s)
+    stiff = Feel(l2=feedback(0, 8), r2=feedback(0, 8))
+    desk.hands.write(stiff, desk.now_s)
     assert desk.let_pass(0.1, run=True, r2=1.0)[-1].r2 == 1.0
+    assert not desk.hands.released
+    assert not person or desk.device.strengths == (stiff.l2, stiff.r2)
+    desk.hands.close()
+    assert desk.hands.released
 
 
 def test_silence_releases_everything() -> None:
@@ -135,7 +149,7 @@ def test_the_person_lets_go_when_a_page_drives_and_silence_gives_nothing_back() 
     desk.page.say(desk.now_s, driving=False, give_back=True)
     first = desk.let_pass(0.1, says=False)
     assert (desk.hands.hands, desk.hands.doing, desk.people) == (Hands.PERSON, "resting", 2)
-    assert (first[0].r2, first[0].run) == (0.0, False)
+    assert (first[0].r2, first[0].arm) == (0.0, False)
 
 
 def test_a_stop_takes_the_controller_from_the_person_for_good_and_nobody_goes_on_where_there_is_nobody() -> None:

@@ -3,12 +3,12 @@
 import pytest
 
 from common.errors import ConfigurationError
+from common.roles import Role
 from robot_side.core import RobotSide
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.drivers.remote.beside import Beside
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
-from robot_side.surroundings.perceived import Role
 from tests.helpers.socket_talk import EPHEMERAL
 from tests.robot_side.drivers.remote.test_examples import running
 

@@ -1,0 +1,84 @@
+"""Every --device by its name, and how it is opened. Another controller is a file of its own, and a line here."""
+
+import dataclasses
+import functools
+from collections.abc import Callable, Mapping
+from typing import Final, NamedTuple
+
+from operator_side.controller.background_writes import BackgroundWrites
+from operator_side.controller.port import OpenController
+from operator_side.controller.search import BackgroundSearch, Ready, Search
+from operator_side.core import OperatorSide
+from operator_side.dualsense.hid.device import HidBackend, load_backend
+from operator_side.dualsense.hid.finding import Finder
+from operator_side.dualsense.hid.release_guard import ReleaseGuard
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.evdev.pad import find_pad
+from operator_side.people.whoever import whoever
+from operator_side.settings import DeviceName, OperatorSettings
+from operator_side.viewing.pages.browser_hands import BrowserHands
+from operator_side.viewing.pages.driving_page import DrivingPage
+from operator_side.viewing.pages.shared_hands import MovedHands, SharedHands
+
+
+class Given(NamedTuple):
+    """What a controller may be opened with."""
+
+    settings: OperatorSettings
+    core: OperatorSide
+    pages: DrivingPage
+    backend: HidBackend | None = None
+    """hidapi, unless given"""
+
+
+class Opening(NamedTuple):
+    """How the controller is found, and what else it takes."""
+
+    search: Search
+    guard: ReleaseGuard | None = None
+    """Releases it should we be killed; its context is still to be opened"""
+    hands: MovedHands | None = None
+    """Those on it that have to be moved in every turn; None for a person's own"""
+
+
+def _hid(given: Given) -> Opening:
+    find = Finder(load_backend() if given.backend is None else given.backend)
+    # A reader leaves nothing behind.
+    return Opening(
+        BackgroundSearch(functools.partial(_with_background_writes, find)),
+        ReleaseGuard() if given.settings.haptics else None,
+    )
+
+
+def _with_background_writes(find: Finder, preferred: str | None) -> OpenController:
+    found = find(preferred)
+    writes = BackgroundWrites(found.device)
+    return dataclasses.replace(found, device=writes, stalls=writes.stalls)
+
+
+def _evdev(given: Given) -> Opening:
+    del given
+    return Opening(BackgroundSearch(find_pad))
+
+
+def _simulated(given: Given) -> Opening:
+    settings, device = given.settings, SimulatedDualSense()
+    calibration, swap_sides = settings.calibration, settings.swap_sides
+    person = functools.partial(whoever, device, settings.person, settings.seed, calibration, swap_sides=swap_sides)
+    page = BrowserHands(given.pages, given.core.calibrate, swap_sides=swap_sides)
+    calibrate = functools.partial(given.core.calibrate, calibration)
+    shared = SharedHands(given.pages, page, device, person, device.hands_off, calibrate)
+    return Opening(Ready(OpenController(shared, "simulated DualSense")), hands=shared)
+
+
+def _browser(given: Given) -> Opening:
+    page = BrowserHands(given.pages, given.core.calibrate, swap_sides=given.settings.swap_sides)
+    return Opening(Ready(OpenController(page, "a page of the console")), hands=page)
+
+
+DEVICES: Final[Mapping[DeviceName, Callable[[Given], Opening]]] = {
+    "hid": _hid,
+    "evdev": _evdev,
+    "simulated": _simulated,
+    "browser": _browser,
+}

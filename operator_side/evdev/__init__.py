@@ -1,0 +1,1 @@
+"""Gamepads without adaptive triggers, through Linux evdev."""

@@ -1,0 +1,274 @@
+"""A gamepad with rumble through Linux evdev: what a trigger cannot resist, the motors say.
+
+The strength that a finger would meet where its trigger is now drives a motor: L2 the strong one, R2 the weak one; with
+the rumble that is asked for, the greater counts. Layout of events and ioctls: linux/input.h. The kernel erases a
+file's effects when that is closed, so that a killed process leaves nothing behind; each effect ends by itself soon,
+so that a process that hangs does not either.
+"""
+
+import contextlib
+import fcntl
+import os
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from common.errors import DeviceError, NoDeviceError
+from operator_side.controller.feel import MAX_STRENGTH, Feel, Strengths, met
+from operator_side.controller.port import OpenController, checked_address
+from operator_side.controller.state import Battery, BatteryState, Button, ControllerState
+
+NODES: Final = Path("/dev/input")
+LENGTH_S: Final = 0.2
+"""An effect ends so long after it was last said, as the release watchdog's patience."""
+_AGAIN_S: Final = LENGTH_S / 2
+RELEASED_TRAVEL: Final = 0.05
+"""A trigger up to this is let go: nothing is felt of it."""
+_FULL: Final = 0xFFFF
+
+_SYN, _KEY, _ABS, _FF = 0x00, 0x01, 0x03, 0x15
+_SYN_DROPPED, _FF_RUMBLE = 3, 0x50
+_X, _Y, _Z, _RX, _RY, _RZ, _HAT_X, _HAT_Y = 0, 1, 2, 3, 4, 5, 16, 17
+_AXES: Final = (_X, _Y, _Z, _RX, _RY, _RZ)
+BUTTONS: Final = {
+    0x130: Button.CROSS,
+    0x131: Button.CIRCLE,
+    0x133: Button.TRIANGLE,
+    0x134: Button.SQUARE,
+    0x136: Button.L1,
+    0x137: Button.R1,
+    0x138: Button.L2,
+    0x139: Button.R2,
+    0x13A: Button.CREATE,
+    0x13B: Button.OPTIONS,
+    0x13C: Button.PS,
+    0x13D: Button.L3,
+    0x13E: Button.R3,
+}
+"""By the kernel's gamepad rules: south, east, north, west; shoulders and triggers; select, start, mode; sticks."""
+_HATS: Final = {
+    (_HAT_X, -1): Button.LEFT,
+    (_HAT_X, 1): Button.RIGHT,
+    (_HAT_Y, -1): Button.UP,
+    (_HAT_Y, 1): Button.DOWN,
+}
+_EVENT: Final = struct.Struct("@llHHi")
+_ABSINFO: Final = struct.Struct("=6i")
+_EFFECT: Final = struct.Struct("@HhHHHHH2xHH")
+_EFFECT_SIZE: Final = 16 + struct.calcsize("@HHhhH4HIP")
+"""The largest member of its union is a periodic effect."""
+_MOST_EVENTS: Final = 64
+_UNKNOWN_BATTERY: Final = Battery(None, BatteryState.UNKNOWN)
+
+Ioctl = Callable[[int, int, Any], Any]
+
+
+def _request(direction: int, number: int, size: int) -> int:
+    """_IOC of linux/ioctl.h for type "E"; direction: 1 writes, 2 reads."""
+    return direction << 30 | size << 16 | ord("E") << 8 | number
+
+
+_KEY_BYTES, _BIT_BYTES, _NAME_BYTES = 96, 96, 256
+GET_NAME: Final = _request(2, 0x06, _NAME_BYTES)
+GET_UNIQUE: Final = _request(2, 0x08, _NAME_BYTES)
+GET_KEYS: Final = _request(2, 0x18, _KEY_BYTES)
+GET_BITS: Final = _request(2, 0x20, _BIT_BYTES)
+"""One more for each kind of event"""
+GET_AXIS: Final = _request(2, 0x40, _ABSINFO.size)
+"""One more for each axis"""
+SEND_EFFECT: Final = _request(1, 0x80, _EFFECT_SIZE)
+
+
+class Axis(NamedTuple):
+    """The range of one axis."""
+
+    least: int
+    most: int
+
+    def share(self, value: int) -> float:
+        """Place in the range, 0 to 1."""
+        return min(max((value - self.least) / max(self.most - self.least, 1), 0.0), 1.0)
+
+    def deflection(self, value: int) -> float:
+        """Place in the range, -1 to 1."""
+        return 2.0 * self.share(value) - 1.0
+
+
+class EvdevPad:
+    """The port on an open node; one thread reads and writes. A state comes with each read, as the kernel keeps it."""
+
+    def __init__(self, descriptor: int, ioctl: Ioctl = fcntl.ioctl) -> None:
+        """`descriptor`: open without waiting, and closed with this. DeviceError when it goes away meanwhile."""
+        self._descriptor: int | None = descriptor
+        self._ioctl = ioctl
+        self._changed = True
+        self._state = ControllerState()
+        self._told = Feel()
+        with contextlib.ExitStack() as failing, _going_wrong():
+            failing.callback(self.close)
+            keys, axes, effects = (self._bits(GET_BITS + kind) for kind in (_KEY, _ABS, _FF))
+            self.is_pad = min(BUTTONS) in keys and axes.issuperset(_AXES) and _FF_RUMBLE in effects
+            """Whether it has two sticks, two triggers and motors."""
+            self.name = self._text(GET_NAME)
+            self.address = _address(self._text(GET_UNIQUE))
+            self._hats = axes & {_HAT_X, _HAT_Y}
+            self._ranges: dict[int, Axis] = {}
+            self._values: dict[int, int] = {}
+            self._down: set[int] = set()
+            if self.is_pad:
+                self._ask()
+            failing.pop_all()
+        self._effect_id = -1
+        self._drives = (0, 0)
+        self._said_s = 0.0
+
+    @property
+    def released(self) -> bool:
+        """Nothing that was told holds or shakes."""
+        return self._told.releases
+
+    def read(self, now_s: float) -> ControllerState | None:
+        """The state after all events until now, and the motors by it."""
+        descriptor = self._open_descriptor()
+        with _going_wrong(), contextlib.suppress(BlockingIOError):
+            while True:
+                content = os.read(descriptor, _MOST_EVENTS * _EVENT.size)
+                if not content:
+                    raise DeviceError("the gamepad is gone (end of its events): plug it in again")
+                for _, _, kind, code, value in _EVENT.iter_unpack(content):
+                    self._take(kind, code, value)
+        if self._changed:
+            self._changed, self._state = False, self._made()
+        self._shake(now_s)
+        return self._state
+
+    def write(self, feel: Feel, now_s: float) -> None:
+        """Feel it as rumble from now on; a light is passed over."""
+        self._open_descriptor()
+        self._told = feel.following(self._told)
+        self._shake(now_s)
+
+    def close(self) -> None:
+        """Stop the motors and let the pad go."""
+        descriptor, self._descriptor = self._descriptor, None
+        if descriptor is not None:
+            self._told = self._told.farewell
+            os.close(descriptor)  # with it, the kernel erases our effects
+
+    def _take(self, kind: int, code: int, value: int) -> None:
+        if kind == _KEY and code in BUTTONS:
+            (self._down.add if value else self._down.discard)(code)
+        elif kind == _ABS and code in self._values:
+            self._values[code] = value
+        elif kind == _SYN and code == _SYN_DROPPED:
+            self._ask()  # events are missing
+        else:
+            return
+        self._changed = True
+
+    def _ask(self) -> None:
+        """Ask for what is held now."""
+        for axis in (*_AXES, *self._hats):
+            content = bytearray(_ABSINFO.size)
+            self._ioctl(self._open_descriptor(), GET_AXIS + axis, content)
+            self._values[axis], least, most, *_ = _ABSINFO.unpack(content)
+            self._ranges[axis] = Axis(least, most)
+        self._down = self._bits(GET_KEYS) & BUTTONS.keys()
+
+    def _made(self) -> ControllerState:
+        across = {axis: self._ranges[axis].deflection(self._values[axis]) for axis in (_X, _Y, _RX, _RY)}
+        hats = {_HATS[axis, value] for axis in self._hats if (axis, value := self._values[axis]) in _HATS}
+        return ControllerState(
+            left_stick=(across[_X], -across[_Y]),
+            right_stick=(across[_RX], -across[_RY]),
+            l2=self._ranges[_Z].share(self._values[_Z]),
+            r2=self._ranges[_RZ].share(self._values[_RZ]),
+            pressed=frozenset(BUTTONS[code] for code in self._down) | hats,
+            battery=_UNKNOWN_BATTERY,
+        )
+
+    def _shake(self, now_s: float) -> None:
+        """Drive the motors by what was told and by where the triggers are; again before it would end."""
+        told, state = self._told, self._state
+        left, right = (0.0, 0.0) if told.rumble is None else (told.rumble.left, told.rumble.right)
+        drives = (
+            round(_FULL * max(left, _share(told.l2, state.l2))),
+            round(_FULL * max(right, _share(told.r2, state.r2))),
+        )
+        if drives == self._drives and (not any(drives) or 0.0 <= now_s - self._said_s < _AGAIN_S):
+            return
+        self._drives, self._said_s = drives, now_s
+        with _going_wrong():
+            descriptor = self._open_descriptor()
+            effect = bytearray(_EFFECT_SIZE)
+            _EFFECT.pack_into(effect, 0, _FF_RUMBLE, self._effect_id, 0, 0, 0, round(1e3 * LENGTH_S), 0, *drives)
+            self._ioctl(descriptor, SEND_EFFECT, effect)
+            self._effect_id = _EFFECT.unpack_from(effect)[1]
+            os.write(descriptor, _EVENT.pack(0, 0, _FF, self._effect_id, int(any(drives))))
+
+    def _bits(self, request: int) -> set[int]:
+        content = bytearray(_BIT_BYTES)
+        self._ioctl(self._open_descriptor(), request, content)
+        return {8 * place + bit for place, byte in enumerate(content) for bit in range(8) if byte >> bit & 1}
+
+    def _text(self, request: int) -> str:
+        content = bytearray(_NAME_BYTES)
+        with contextlib.suppress(OSError):  # some have none
+            self._ioctl(self._open_descriptor(), request, content)
+        return content.partition(b"\0")[0].decode(errors="replace")
+
+    def _open_descriptor(self) -> int:
+        if self._descriptor is None:
+            raise DeviceError("the gamepad is closed; open it anew")
+        return self._descriptor
+
+
+def find_pad(preferred: str | None) -> OpenController:
+    """Open the gamepad of the address `preferred`, else the first with rumble; NoDeviceError says why there is none."""
+    found: list[tuple[Path, EvdevPad]] = []
+    denied: list[str] = []
+    for path in sorted(NODES.glob("event*"), key=lambda path: (len(path.name), path.name)):
+        try:
+            found.append((path, EvdevPad(os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC))))
+        except PermissionError:
+            denied.append(path.name)
+        except (OSError, DeviceError):
+            continue  # gone meanwhile
+    chosen = min(
+        (pair for pair in found if pair[1].is_pad),
+        key=lambda pair: preferred is not None and pair[1].address != preferred,
+        default=None,
+    )
+    for pair in found:
+        if pair is not chosen:
+            pair[1].close()
+    if chosen is None:
+        hidden = (
+            f"; not permitted to look at {', '.join(denied)}: a seat at this machine, or the group input, permits it"
+        )
+        raise NoDeviceError(f"no gamepad with two sticks, two triggers and rumble in {NODES}{hidden if denied else ''}")
+    path, pad = chosen
+    return OpenController(pad, f"{pad.name} at {path}, rumble in place of stiffness", pad.address)
+
+
+def _share(strengths: Strengths | None, travel: float) -> float:
+    return 0.0 if strengths is None or travel <= RELEASED_TRAVEL else met(strengths, travel) / MAX_STRENGTH
+
+
+def _address(unique: str) -> str | None:
+    try:
+        return checked_address(unique.lower())
+    except ValueError:
+        return None
+
+
+@contextlib.contextmanager
+def _going_wrong() -> Iterator[None]:
+    """DeviceError for what the system says of a node; nothing to read is no trouble."""
+    try:
+        yield
+    except BlockingIOError:
+        raise
+    except OSError as error:
+        raise DeviceError(f"the gamepad is gone ({os.strerror(error.errno or 0)}): plug it in again") from error

@@ -1,0 +1,118 @@
+"""A gamepad with rumble on a fake node: hands are read as the kernel keeps them, and stiffness becomes rumble."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import pytest
+
+from common.errors import DeviceError
+from operator_side.controller.feel import FREE_TRIGGER, RELEASED, WARNING_LIGHT, Feel, Rumble
+from operator_side.controller.state import Button, ControllerState
+from operator_side.evdev.pad import LENGTH_S, EvdevPad
+from tests.helpers.felt import feedback
+from tests.operator_side.evdev.fake_node import FakeNode
+
+KEY, ABS, DROPPED = 1, 3, (0, 3, 0)
+
+
+@pytest.fixture
+def node() -> Iterator[FakeNode]:
+    made = FakeNode()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def pad(node: FakeNode) -> EvdevPad:
+    return EvdevPad(node.descriptor, node.ioctl)
+
+
+def state_of(pad: EvdevPad, now_s: float = 0.0) -> ControllerState:
+    state = pad.read(now_s)
+    assert state is not None
+    return state
+
+
+def test_what_is_held_already_is_known_and_a_hand_that_holds_still_is_told_again(node: FakeNode) -> None:
+    node.values |= {0: 255, 5: 51, 17: -1}
+    node.down = {0x136, 0x120}
+    pad = EvdevPad(node.descriptor, node.ioctl)
+    assert (pad.is_pad, pad.name, pad.address) == (True, "Pad", "aa:bb:cc:00:00:01")
+    for _ in range(2):
+        state = state_of(pad)
+        assert (state.left_stick[0], state.r2, state.l2) == (1.0, 0.2, 0.0)
+        assert state.pressed == {Button.L1, Button.UP}
+
+
+def test_each_axis_and_button_has_its_place_and_the_newest_wins(node: FakeNode, pad: EvdevPad) -> None:
+    node.send((ABS, 1, 255), (ABS, 2, 255))
+    node.send((ABS, 1, 0), (ABS, 3, 0), (ABS, 4, 255), (ABS, 5, 102), (KEY, 0x130, 1), (KEY, 0x131, 1), (ABS, 16, 1))
+    node.send((KEY, 0x130, 0), (KEY, 0x13B, 1), (KEY, 0x13A, 1))
+    state = state_of(pad)
+    assert state.left_stick == pytest.approx((0.0, 1.0), abs=0.005)
+    assert state.right_stick == (-1.0, -1.0)
+    assert (state.l2, state.r2) == (1.0, 0.4)
+    assert state.pressed == {Button.CIRCLE, Button.OPTIONS, Button.CREATE, Button.RIGHT}
+
+
+def test_after_lost_events_the_kernel_is_asked(node: FakeNode, pad: EvdevPad) -> None:
+    node.send((KEY, 0x136, 1))
+    assert state_of(pad).pressed == {Button.L1}
+    node.values[5], node.down = 255, set()
+    node.send(DROPPED)
+    state = state_of(pad)
+    assert (state.r2, state.pressed) == (1.0, frozenset())
+
+
+def test_a_pulled_trigger_is_felt_where_it_is_and_the_greater_rumble_counts(node: FakeNode, pad: EvdevPad) -> None:
+    pad.write(Feel(l2=feedback(0, 4), r2=feedback(3, 8), rumble=Rumble(0.25, 0.0), light=WARNING_LIGHT), 0.0)
+    assert node.uploaded.pop() == (3, round(1e3 * LENGTH_S), round(0.25 * 0xFFFF), 0)
+    assert not pad.released
+    node.send((ABS, 2, 128), (ABS, 5, 100))  # R2 is before its first stiff zone
+    pad.read(0.01)
+    assert node.uploaded.pop()[2:] == (round(0.5 * 0xFFFF), 0)
+    node.send((ABS, 5, 110))
+    pad.read(0.02)
+    assert node.uploaded.pop()[2:] == (round(0.5 * 0xFFFF), 0xFFFF)
+    node.plays()
+    node.send((ABS, 2, 0), (ABS, 5, 0))
+    pad.read(0.03)
+    pad.write(RELEASED, 0.04)
+    assert pad.released
+    assert (node.uploaded.pop()[2:], node.plays()) == ((0, 0), [(3, 1), (3, 0)])
+
+
+def test_rumble_is_said_again_before_it_ends_and_no_more_once_it_is_over(node: FakeNode, pad: EvdevPad) -> None:
+    pad.write(Feel(rumble=Rumble(left=1.0)), 0.0)
+    node.plays()
+    said_s = [0.0]
+    for turn in range(1, 251):
+        pad.read(0.004 * turn)
+        if node.plays():
+            said_s.append(0.004 * turn)
+    assert len(said_s) == 10
+    assert max(later - earlier for earlier, later in pairwise(said_s)) < 0.6 * LENGTH_S
+    pad.write(Feel(rumble=Rumble()), 1.0)
+    assert node.plays()[-1] == (3, 0)
+    for turn in range(100):
+        pad.read(1.0 + 0.004 * turn)
+    assert node.plays() == []
+
+
+def test_unplugged_it_is_gone_and_closed_it_is_released(node: FakeNode, pad: EvdevPad) -> None:
+    pad.write(Feel(l2=FREE_TRIGGER, r2=feedback(0, 8)), 0.0)
+    node.unplug()
+    with pytest.raises(DeviceError, match=r"gamepad is gone .*: plug it in again"):
+        pad.read(0.1)
+    pad.close()
+    pad.close()
+    assert pad.released
+    with pytest.raises(DeviceError, match="closed"):
+        pad.read(0.2)
+
+
+@pytest.mark.parametrize("lacks", [{"keys": (0x110,)}, {"effects": (0x51,)}])
+def test_a_mouse_and_a_pad_that_cannot_rumble_are_none(lacks: dict[str, tuple[int, ...]]) -> None:
+    node = FakeNode(**lacks)
+    assert not EvdevPad(node.descriptor, node.ioctl).is_pad
+    node.close()
