@@ -11,7 +11,7 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup
 # Bytecode is kept whatever the machine is set to: else each of the many processes compiles every source anew.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test quick types test-kernel test-netem test-two-hosts wide-area test-containers test-console pictures figures latency-experiment soak lock clean
+.PHONY: demo test quick types test-kernel test-netem test-two-hosts wide-area test-containers test-console pictures latency-experiment lock clean
 
 # The environment is rebuilt only when the lock or the package's metadata change.
 $(VENV)/.installed: requirements.lock pyproject.toml
@@ -77,17 +77,9 @@ test-console: $(VENV)/.installed $(VENV)/.kernels ## the console in a real brows
 pictures: $(VENV)/.installed $(VENV)/.kernels ## the documents' pictures of console, terminal view and plot, made anew
 	$(BIN)/python -m tests.console.pictures $(ARGS)
 
-# Hours: each command that stands beside a figure. One alone: make figures ARGS="--only scenes".
-figures: $(VENV)/.installed $(VENV)/.kernels ## every figure of the documents anew, and which of them changed
-	$(BIN)/python -m feelahead.lab.docs_figures $(ARGS)
-	@git status --short docs
-
 # Also in virtual time and over loopback, the same links: half an hour and more. Needs Docker.
 latency-experiment: $(VENV)/.installed ## links by name, in containers and emulated: what the delay does to the hand
 	$(BIN)/feelahead try latency --compose --csv latency.csv --picture latency.png $(ARGS)
-
-soak: $(VENV)/.installed ## one owner and eight observers for ten minutes: does anything grow?
-	$(BIN)/feelahead try soak --observers 8 --minutes 10 $(ARGS)
 
 EXPORT = uv export --quiet --no-emit-project --no-header
 lock: ## pin every dependency anew (needs uv); the files hold hashes and no addresses

@@ -89,8 +89,6 @@ try_out = Menu(
         "demo": "robot,operator",
         "haptics": "robot,operator",
         "latency": "robot,operator,experiments",
-        "faults": "robot,operator",
         "hostile": "robot,operator",
-        "soak": "robot,operator",
     },
 )

@@ -1,1 +1,1 @@
-"""The parts of `try faults`: each fault of the table, in virtual time or with real processes."""
+"""The table of faults of docs/link.md, row by row in virtual time; tests hold each one."""

@@ -1,4 +1,4 @@
-"""The table of faults: its rows register here, and each one says what came of it."""
+"""The rows of the table of faults: each registers here, and says what came of it."""
 
 from collections.abc import Callable
 from typing import Final, NamedTuple
@@ -12,24 +12,15 @@ class Outcome(NamedTuple):
     measured: str
 
 
-class Fault(NamedTuple):
-    """One row of the table."""
-
-    safe_behaviour: str
-    number: str
-    """The number to hold."""
-    run: Callable[[], Outcome]
-
-
-FAULTS: Final[dict[str, Fault]] = {}
+FAULTS: Final[dict[str, Callable[[], Outcome]]] = {}
 """Rows by the fault."""
 
 
-def fault(name: str, safe_behaviour: str, number: str) -> Callable[[Callable[[], Outcome]], Callable[[], Outcome]]:
+def fault(name: str) -> Callable[[Callable[[], Outcome]], Callable[[], Outcome]]:
     """Register a row."""
 
     def register(run: Callable[[], Outcome]) -> Callable[[], Outcome]:
-        FAULTS[name] = Fault(safe_behaviour, number, run)
+        FAULTS[name] = run
         return run
 
     return register

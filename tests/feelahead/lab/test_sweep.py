@@ -419,8 +419,8 @@ def test_ctrl_c_before_the_first_cell_is_one_line_too(
         raise KeyboardInterrupt
 
     monkeypatch.setattr("feelahead.commands.bench_and_try.import_module", interrupted)
-    assert try_out(["soak"]) == 130
-    assert capsys.readouterr().err == "feelahead try soak: interrupted\n"
+    assert try_out(["demo"]) == 130
+    assert capsys.readouterr().err == "feelahead try demo: interrupted\n"
 
 
 def test_a_table_that_cannot_be_written_is_still_shown(capsys: pytest.CaptureFixture[str]) -> None:
