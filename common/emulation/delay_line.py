@@ -9,7 +9,7 @@ import numpy as np
 
 from common.emulation.clauses import Chance
 from common.emulation.distribution import delays_at
-from common.emulation.figures import LinkFigures, expected
+from common.emulation.figures import LinkFigures
 from common.emulation.loss import decisions, uniform_blocks
 from common.emulation.profile import LinkProfile
 from common.emulation.spec import Direction, Stream
@@ -140,12 +140,11 @@ class DelayLine(Generic[Item]):
         return len(self._queue)
 
     def summary(self) -> dict[str, Any]:
-        """`asked`, in the grammar's words, with model and seed, what is `expected` and was `achieved`."""
+        """`asked`, in the grammar's words, with model and seed, and what was `achieved`."""
         return {
             "asked": self.profile.words,
             "model": self.profile.model,
             "seed": self.profile.seed,
-            "expected": expected(self.profile),
             "achieved": self.figures.achieved() | {"waiting": self.waiting},
         }
 

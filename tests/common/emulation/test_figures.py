@@ -5,12 +5,10 @@ from typing import Any
 
 import pytest
 
-from common.emulation.clauses import LinkModel
 from common.emulation.delay_line import DelayLine
-from common.emulation.figures import expected, report_lines
+from common.emulation.figures import report_lines
 from common.emulation.profile import LinkProfile
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
-from feelahead.lab.link.samples import play
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 
@@ -59,45 +57,9 @@ def test_the_other_side_sees_what_the_line_let_through(summary: dict[str, Any]) 
 def test_a_line_of_text_for_each_link(summary: dict[str, Any]) -> None:
     lines = report_lines(summary["link"])
     assert len(lines) == 3
-    assert lines[0].startswith(
-        "link to_robot: asked delay 20ms duplicate 10% (20.00 ± 0.00 ms, p99 20.0 ms); achieved 20.00 ± 0.00 ms"
-    )
+    assert lines[0].startswith("link to_robot: asked delay 20ms duplicate 10%; achieved 20.00 ± 0.00 ms")
     assert "% doubled" in lines[0]
-    assert "(30.00 ± 5.00 ms, p99 41.6 ms, 5.00 % lost); achieved" in lines[1]
     idle: DelayLine[bytes] = DelayLine(LinkProfile.parse("rate 1mbit"))
     assert report_lines({"to_robot": idle.summary()}) == ["link to_robot: asked rate 1mbit; nothing of 0 delivered"]
     plain: DelayLine[bytes] = DelayLine(LinkProfile())
-    assert report_lines({"to_robot": plain.summary()})[0].startswith("link to_robot: asked no delay (0.00 ± 0.00 ms")
-
-
-@pytest.mark.parametrize(
-    ("spec", "model", "mean_ms", "loss_share"),
-    [
-        ("", "datagram", 0.0, 0.0),
-        ("delay 50ms 10ms distribution pareto", "datagram", 49.665, 0.0),
-        ("delay 50ms 10ms distribution exponential", "datagram", 60.0, 0.0),
-        ("delay 5ms loss gemodel 1% 25%", "datagram", 5.0, 0.01 / 0.26),
-        ("delay 5ms loss 10% 50%", "datagram", 5.0, None),
-        ("delay 5ms loss 10% outage 1s at 1s", "datagram", 5.0, None),
-        ("delay 5ms rate 1mbit", "datagram", None, 0.0),
-        ("delay 5ms", "stream", 5.0, 0.0),
-        ("delay 5ms 1ms", "stream", None, 0.0),
-        ("delay 5ms loss 1%", "stream", None, 0.0),
-    ],
-)
-def test_what_theory_knows_is_expected(
-    spec: str, model: LinkModel, mean_ms: float | None, loss_share: float | None
-) -> None:
-    known = expected(LinkProfile.parse(spec, model=model))
-    assert known["delay_ms"]["mean"] == (None if mean_ms is None else pytest.approx(mean_ms, abs=2e-3))
-    assert known["loss_share"] == (None if loss_share is None else pytest.approx(loss_share))
-
-
-def test_long_runs_come_to_what_is_expected() -> None:
-    profile = LinkProfile.parse("delay 50ms 10ms distribution paretonormal loss gemodel 2% 30%", seed=8)
-    _, line = play(profile, [1e-3 * number for number in range(60_000)], 0)
-    said = line.summary()
-    for name, tolerance_ms in (("mean", 0.15), ("sd", 0.15), ("p50", 0.2), ("p95", 0.4), ("p99", 0.6)):
-        assert said["achieved"]["delay_ms"][name] == pytest.approx(said["expected"]["delay_ms"][name], abs=tolerance_ms)
-    # Bursts: sqrt(s (1 - s) (1 + c) / (1 - c) / n) = 0.0022 with a share s = 0.0625 and c = 1 - p - r.
-    assert said["achieved"]["loss_share"] == pytest.approx(said["expected"]["loss_share"], abs=4 * 0.0022)
+    assert report_lines({"to_robot": plain.summary()})[0].startswith("link to_robot: asked no delay; nothing of 0")
