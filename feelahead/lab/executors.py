@@ -1,6 +1,6 @@
 """Run cells in several processes of this machine, or on a cluster of dask.distributed, through one interface.
 
-Both are executors of concurrent.futures. LostWorkersError is raised where a process, or the whole cluster, went away.
+Both are executors of concurrent.futures. FeelaheadError is raised where a process, or the whole cluster, went away.
 """
 
 import logging
@@ -21,10 +21,6 @@ _LOOK_S = 1.0
 _CONNECT_S = "10s"
 
 
-class LostWorkersError(FeelaheadError):
-    """Work was lost because what ran it was ended from outside."""
-
-
 @contextmanager
 def processes(workers: int) -> Iterator[Executor]:
     """Yield a pool of processes of this machine; none of them outlives this one, not even after kill -9."""
@@ -41,7 +37,7 @@ def processes(workers: int) -> Iterator[Executor]:
         for child in multiprocessing.active_children():
             child.terminate()
         if isinstance(error, BrokenProcessPool):
-            raise LostWorkersError("a worker process was ended from outside") from error
+            raise FeelaheadError("a worker process was ended from outside") from error
         raise
     finally:
         pool.shutdown(cancel_futures=True)
@@ -70,7 +66,7 @@ def cluster(address: str, own_file: str | None) -> Iterator[Executor]:
             client.upload_file(own_file)
         yield cast(Executor, client.get_executor(pure=False, retries=2))
     except (CancelledError, CommClosedError, distributed.KilledWorker) as error:
-        raise LostWorkersError(f"--scheduler {address}: the scheduler or its workers are gone") from error
+        raise FeelaheadError(f"--scheduler {address}: the scheduler or its workers are gone") from error
     finally:
         client.close(timeout=1)
 

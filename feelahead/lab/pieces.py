@@ -13,12 +13,10 @@ import msgspec
 import numpy as np
 
 from common.errors import ConfigurationError, FeelaheadError
-from feelahead.lab.executors import LostWorkersError, cluster, processes
+from feelahead.lab.executors import cluster, processes
 from feelahead.lab.progress import Shown
 from feelahead.lab.table import Row
 
-_RESTARTS = 3
-"""Restarts of a pool after one of its processes was killed."""
 _WORKERS = 2
 
 
@@ -58,29 +56,22 @@ def results(
         return
     if settings.scheduler is None:
         question.prepare()
-    left, lost = list(todo), 0
-    while left:
-        before = len(left)
-        if settings.scheduler:
-            pool = cluster(settings.scheduler, _own_file(module))
-        else:
-            pool = processes(settings.workers or _WORKERS)
-        try:
-            with pool as executor:
-                futures: dict[Future[list[Row] | str], Piece] = {
-                    executor.submit(run_piece, module, piece.cell, piece.seed): piece for piece in left
-                }
-                shown.begin(str(left[0]))
-                for future in as_completed(futures):
-                    found = future.result()
-                    left.remove(futures[future])
-                    if left:
-                        shown.begin(str(left[0]))  # the one that has waited longest
-                    yield futures[future], found
-        except LostWorkersError:
-            lost += 1
-            if settings.scheduler or lost > _RESTARTS or len(left) == before:
-                raise
+    if settings.scheduler:
+        pool = cluster(settings.scheduler, _own_file(module))
+    else:
+        pool = processes(settings.workers or _WORKERS)
+    left = list(todo)
+    with pool as executor:
+        futures: dict[Future[list[Row] | str], Piece] = {
+            executor.submit(run_piece, module, piece.cell, piece.seed): piece for piece in left
+        }
+        shown.begin(str(left[0]))
+        for future in as_completed(futures):
+            found = future.result()
+            left.remove(futures[future])
+            if left:
+                shown.begin(str(left[0]))  # the one that has waited longest
+            yield futures[future], found
 
 
 def run_piece(module: str, cell: Any, seed: int) -> list[Row] | str:

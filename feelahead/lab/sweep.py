@@ -183,8 +183,8 @@ class Swept:
 def sweep(question: Question[S, C], settings: S) -> Swept:
     """Run all that the journal does not hold.
 
-    A cell that raises FeelaheadError fails by itself. Ctrl-C, workers that are killed again and again and a journal
-    that cannot be written end the sweep with what is done. ConfigurationError for a grid that cannot be run.
+    A cell that raises FeelaheadError fails by itself. Ctrl-C, a worker that is killed and a journal that cannot be
+    written end the sweep with what is done. ConfigurationError for a grid that cannot be run.
     """
     if question.timed and (settings.scheduler or settings.workers not in (None, 1)):
         flag = f"--scheduler {settings.scheduler}" if settings.scheduler else f"--workers {settings.workers}"

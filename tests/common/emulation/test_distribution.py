@@ -20,41 +20,12 @@ def test_tables_have_netems_size_and_resolution(shape: str) -> None:
     assert not quantiles.flags.writeable
 
 
-def test_the_normal_table_spans_what_netems_does() -> None:
-    quantiles = table("normal")
-    assert quantiles is not None
-    assert quantiles[0] == -4.0
-    assert quantiles[-1] == pytest.approx(3.52, abs=0.005)
-
-
 def test_the_normal_table_holds_normal_quantiles() -> None:
     normal = statistics.NormalDist()
     quantiles = table("normal")
     assert quantiles is not None
     for entry, quantile in list(enumerate(quantiles.tolist()))[1:]:
         assert normal.cdf(quantile) == pytest.approx((entry + 0.125) / 4096, abs=normal.pdf(quantile) / 16000)
-
-
-def test_the_pareto_table_has_the_figures_of_netems() -> None:
-    quantiles = table("pareto")
-    assert quantiles is not None
-    assert quantiles[0] == pytest.approx(-2.0 / 3.0, abs=1e-4)
-    assert quantiles[-1] == pytest.approx(4.0, abs=2e-4)
-    assert quantiles.mean() == pytest.approx(-0.03, abs=0.005)
-    assert quantiles.std() == pytest.approx(0.82, abs=0.005)
-    # Below the limit the survival function falls with the third power.
-    values = 1.5 + 0.75 * quantiles[quantiles < 3.9]
-    assert values**-3.0 == pytest.approx(1.0 - np.arange(values.size) / 4096, abs=3e-4)
-
-
-def test_paretonormal_is_a_quarter_normal() -> None:
-    normal, pareto, mixed = table("normal"), table("pareto"), table("paretonormal")
-    assert normal is not None
-    assert pareto is not None
-    assert mixed is not None
-    assert mixed[1:] == pytest.approx(0.25 * normal[1:] + 0.75 * pareto[1:], abs=1.0 / 8192)
-    assert mixed.mean() == pytest.approx(-0.025, abs=0.001)
-    assert mixed.std() == pytest.approx(0.834, abs=0.001)
 
 
 @pytest.mark.skipif(not IPROUTE2_TABLES.is_dir(), reason="iproute2's tables are not on this machine")

@@ -24,7 +24,6 @@ def written(folder: Path, content: str, name: str = "trace.csv") -> Path:
         ("delay_ns,note\n1000000,a\n,lost\n2000000,b\n", [1.0, None, 2.0]),
         ("sent_ns,delay_ns\n5,1000000\n3,2000000\n4,\n", [2.0, None, 1.0]),
         ("sent_ns,received_ns\n0,1000000\n1000000,\n2000000,2500000\n", [1.0, None, 0.5]),
-        ("seq,sent_ns,received_ns\n0,0,1000000\n1,1000000,\n2,2000000,2500000\n", [1.0, None, 0.5]),
         # In order of arrival, and nothing of number 1: what a receiver can write down.
         ("seq,sent_ns,delay_ns\n3,3,5000000\n0,0,9000000\n2,2,7000000\n", [9.0, None, 7.0, 5.0]),
         ("\ufeffdelay_ns\n1000000\n", [1.0]),
@@ -54,14 +53,11 @@ def test_lost_messages_were_sent_between_their_neighbours(tmp_path: Path) -> Non
     ("content", "named"),
     [
         ("", "the columns none"),
-        ("1000000\n2000000\n", "the columns 1000000"),
         ("sent_ns\n1\n", "the columns sent_ns"),
         ("delay_ns\n\n", "no message arrives"),
-        ("delay_ns,x\n,1\n", "no message arrives"),
         ("delay_ns\nsoon\n", "row 1: delay_ns = 'soon'"),
         ("delay_ns\n5\nnan\n", "row 2: delay_ns = 'nan'"),
         ("delay_ns\n-5\n", "row 1: a delay of -5 ns"),
-        ("sent_ns,received_ns\n7,5\n", "row 1: a delay of -2 ns"),
         ("sent_ns,received_ns\n,5\n", "row 1: sent_ns is empty"),
         ("seq,delay_ns\n0,5\n99999999,5\n", "seq jumps from 0 to 99999999"),
     ],

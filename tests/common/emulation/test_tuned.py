@@ -35,16 +35,10 @@ def test_delay_jitter_and_loss_are_tuned(words: str, delay_s: float, jitter_s: f
         "loss 21%",
         "trace /etc/passwd",
         "delay 10ms 1ms distribution /etc/passwd",
-        "delay 10ms 1ms distribution 7/etc/passwd",
         "outage 2s at 1s",
-        "rate 1bit",
-        "limit 1",
         "to_robot: delay 1ms",
-        "loss state 1%",
         "wifi",
-        "delay",
         "delay -1ms",
-        "'",
     ],
 )
 def test_nothing_else_is(words: str) -> None:

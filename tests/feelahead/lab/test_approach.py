@@ -15,9 +15,8 @@ from feelahead.lab.approaches.outcome import End, Outcome, Trace
 from feelahead.lab.figures import LAW_COLOURS
 from feelahead.lab.questions import approach as module
 from feelahead.lab.questions import haptics
-from feelahead.lab.questions.approach import QUESTION, ApproachSettings, comparison, figures, sentence
+from feelahead.lab.questions.approach import QUESTION, figures
 from feelahead.lab.sweep import ask
-from feelahead.lab.table import Table
 from tests.helpers.refusal import refusal
 from tests.helpers.repository import DATA
 
@@ -200,25 +199,6 @@ def test_an_end_that_says_nothing_of_the_law_fails_and_is_drawn_as_well(runs: Ma
         assert tried("--model", WALL, "--force", *forces, "--picture", str(picture)) == 1
         assert picture.read_bytes().startswith(b"\x89PNG")
     assert tried("--model", WALL, "--force", "3") == 0
-
-
-def test_each_end_has_its_sentence_and_names_are_printed_as_they_are() -> None:
-    approach = Approach(Path("some/wall.xml"), 3.0, law="none")
-    assert "stops 5.0 mm off (6.0 mm along the approach)" in sentence(row(approach, outcome("stopped", 5.0)))
-    assert "undecided" in sentence(row(approach, outcome("undecided")))
-    [shown] = module.show(ApproachSettings(), Table([row(approach, outcome()) | {"contact_with": "[red]wall"}]))
-    assert "touches [red]wall at" in str(shown)
-
-
-def test_the_table_counts_how_runs_ended() -> None:
-    ends = [outcome(figure=140.0), outcome(figure=150.0), outcome("stopped", 5.0), outcome("undecided", turns=9)]
-    paths = [Path(folder, "wall.xml") for folder in ("near", "far")]
-    shown = comparison(Table(row(Approach(path, 3.0), end) for path in paths for end in ends))
-    assert [column.header for column in shown.columns] == ["scene", "link", "N", "effect, N", "swept"]
-    # Scenes of one name in two folders are two rows.
-    assert [str(text) for text in shown.columns[0].cells] == ["near/wall.xml", "far/wall.xml"]
-    counted = "2/4 at 145 [140 to 150] mm/s, 1/4 stop 5.0 mm off, 1/4 ?, R 9"
-    assert [str(text) for text in shown.columns[-1].cells] == [counted, counted]
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from feelahead.lab.approaches.approach import Approach, PullRun
 from feelahead.lab.approaches.evaluation import LINKS, Placed, Pulls, draws_needed, evaluate, interval
 from feelahead.lab.approaches.felt_by import Draw, Judged
-from feelahead.lab.approaches.frozen import AHEAD, ASIDE, PASSED, SITE, frozen_scene
+from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from feelahead.lab.approaches.judging import (
     false_alarms,
     lateness_s,
@@ -27,9 +27,9 @@ from feelahead.lab.approaches.pulls import PullKind, make_pull
 from feelahead.lab.approaches.recording import RecordedApproach, record_approach
 from feelahead.lab.approaches.replay import Replay, coasting_s
 from feelahead.lab.approaches.spoilt import Spoil
-from feelahead.lab.questions.coverage import QUESTION, CoverageSettings, pooled_alarms
+from feelahead.lab.questions.coverage import QUESTION
 from feelahead.lab.sweep import ask
-from feelahead.lab.table import Row, Table
+from feelahead.lab.table import Row
 from operator_side.people.pulling_hands import Hands
 from robot_side.drivers.mujoco.camera import CameraError
 from robot_side.drivers.mujoco.posed_scene import PosedScene
@@ -253,12 +253,6 @@ def test_places_after_whose_judging_the_stick_moves_are_counted_apart() -> None:
     assert row["reported"] < row["draws"]
 
 
-def test_alarms_are_counted_over_all_time_that_was_judged() -> None:
-    rows = ({"alarms": 3, "alarm_s": 0.6, "judged_s": 30.0}, {"alarms": 0, "alarm_s": 0.0, "judged_s": 90.0})
-    assert pooled_alarms(Table(rows)) == ("1.50", "0.50%")
-    assert pooled_alarms(Table([])) == ("", "")
-
-
 @pytest.mark.parametrize("link", ["0 ms", "200 ms"])
 @pytest.mark.parametrize("around_s", [-0.02, 0.02])
 def test_full_physics_does_as_reckoned_around_the_last_moment(link: str, around_s: float) -> None:
@@ -271,23 +265,6 @@ def test_full_physics_does_as_reckoned_around_the_last_moment(link: str, around_
     for _ in run.go_on(touch_s + 1.0):
         pass
     assert (run.onset is not None) is (around_s > 0.0)
-
-
-def test_the_plans() -> None:
-    full = CoverageSettings().pulls()
-    cells = [(pulls.pull, pulls.link, cell) for pulls in full for cell in pulls.cells]
-    assert len({cell.key(pull, link) for pull, link, cell in cells}) == len(cells) == 191
-    kinds = {(pulls.pull, pulls.link) for pulls in full}
-    for kind in kinds:
-        assert sum(len(one.cells) * one.judged_s for one in full if (one.pull, one.link) == kind) == pytest.approx(
-            600.0
-        )
-    names = {cell.scene for _, _, cell in cells}
-    assert names == {*AHEAD, *ASIDE, *PASSED} - {"moving", "fleeing", "place_held", "terrain_ahead"}
-    assert {link for _, link, _ in cells} == set(LINKS)
-    quick = CoverageSettings(quick=True, only=("wall/bell",)).pulls()
-    assert [(pulls.pull, pulls.link, pulls.cells) for pulls in quick] == [("bell", "200 ms", (Placed("wall"),))]
-    assert set(quick[0].cells) < {cell for _, _, cell in cells}
 
 
 def test_the_question_is_answered_whole(

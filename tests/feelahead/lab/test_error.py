@@ -18,13 +18,11 @@ from feelahead.lab.approaches.recording import RecordedApproach
 from feelahead.lab.propagation import (
     BATCHES,
     NOISE_RAD,
-    SINGULAR,
     Chain,
     PosedGripper,
     linear_sd_m,
     measure,
     monte_carlo_sd_m,
-    places,
     unscented_sd_m,
 )
 from feelahead.lab.questions import error as module
@@ -90,16 +88,6 @@ def test_little_noise_is_linear_and_once_is_never_below_a_sampled_sphere() -> No
             assert row["unscented_sd_error_percent"] == pytest.approx(row["linear_sd_error_percent"], abs=0.1)
         if row["point"] == "far sphere":
             assert row["once_sd_error_percent"] >= row["linear_sd_error_percent"]
-
-
-def test_the_singular_place_errs_least_along_the_approach() -> None:
-    def share(place: FloatArray) -> float:
-        pose = gripper().at(place)
-        jacobian = pose.tool_jacobian[:3]
-        return linear_sd_m(jacobian, 1.0, pose.tool_rotation[:, 2]) / float(np.linalg.norm(jacobian))
-
-    found = places(gripper(), 3, 0)
-    assert min(found, key=lambda name: share(found[name])) == SINGULAR
 
 
 # Prediction
@@ -195,21 +183,6 @@ def test_a_constant_speed_is_speed_times_the_delay_and_a_quantile_of_it_too_far(
     np.testing.assert_allclose(judged["robot"], speed_m_s * (0.2 - 0.25), atol=1e-9)
     # The age of the newest command that the report knew of has up to a period in it for which it was held.
     np.testing.assert_allclose(judged["momentary"], -speed_m_s * at.echo_held_s, atol=1e-9)
-
-
-def test_moments_are_those_that_can_be_compared() -> None:
-    record = recorded(bells(), 200, 100)
-    at = moments(record)
-    # Every 10 ms, the newest command of each; the last ones have not arrived within the record.
-    assert len(at) == pytest.approx((END_S - BEGAN_S - 0.2) / 0.01, abs=2)
-    np.testing.assert_allclose(at.reported_s, at.now_s - 0.1)
-    np.testing.assert_allclose(at.arrives_s, at.now_s + 0.2)
-    assert (at.arrives_s <= record.pose_time_s[-1]).all()
-    deaf = replace(record, seen_sent_s=np.full_like(record.seen_sent_s, np.nan))
-    assert judge(deaf, pose_at, LIMITS, FULL_M_S)["way_m"] == []
-    gap = record.applied_sent_s.copy()
-    gap[(record.tick_time_s > 3.0) & (record.tick_time_s < 3.5)] = np.nan
-    assert len(at) - len(moments(replace(record, applied_sent_s=gap))) == pytest.approx(50, abs=2)
 
 
 def test_ways_are_along_the_axis_at_their_beginning_and_reach_has_an_edge() -> None:

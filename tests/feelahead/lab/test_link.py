@@ -25,10 +25,9 @@ from feelahead.lab.link.samples import (
     independent_delays,
     judge,
     pair_of_runs,
-    play,
     read_link_sample,
 )
-from feelahead.lab.questions.link import QUESTION, LinkSweep, ratio
+from feelahead.lab.questions.link import QUESTION, LinkSweep
 from feelahead.lab.questions.link import goals as judged
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Table
@@ -108,13 +107,6 @@ def test_another_link_is_told_apart(spec: str) -> None:
     assert "missed" in {goal.verdict for goal in held("normal", spec, 5)}
 
 
-def test_of_two_copies_the_first_counts() -> None:
-    sample, line = play(LinkProfile.parse("delay 50ms 10ms duplicate 100%"), [0.1 * n for n in range(2000)], SIZE_BYTES)
-    assert line.figures.delivered == 4000
-    # The lesser of two uniform numbers: a third of the range from its bottom.
-    assert sample.mean_s == pytest.approx(0.040 + 0.020 / 3.0, abs=0.5e-3)
-
-
 def test_figures_of_samples_are_what_they_are_defined_to_be() -> None:
     def delays(*values: float) -> LinkSample:
         return LinkSample(np.arange(len(values), dtype=np.float64), np.array(values))
@@ -163,12 +155,6 @@ def test_our_ends_drive_and_feel_with_messages_of_the_size_that_bare_ends_send(r
     for kind, size in zip((StiffnessUpdate, MotionCommand), BYTES, strict=True):
         sizes = [len(payload) for payload in sent if isinstance(decode(payload), kind)]
         assert abs(statistics.median(sizes) - size) <= 0.1 * size
-
-
-def test_each_turn_is_compared_with_the_peer_of_the_same_turn() -> None:
-    shares = {"whole ends": (0.6, 0.3), "bare ZeroMQ": (0.5, 0.25)}
-    turns = Table({"kind": kind, "robot": one, "operator": 0.0} for kind, both in shares.items() for one in both)
-    assert ratio(turns) == pytest.approx(1.2)
 
 
 @pytest.mark.processes

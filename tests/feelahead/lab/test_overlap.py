@@ -3,7 +3,6 @@
 import csv
 import math
 import shutil
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +10,6 @@ import numpy as np
 import pytest
 
 import feelahead.main
-from common.arrays import FloatArray
-from common.clock import VirtualClock
 from feelahead.lab.questions.overlap import HEADER, KERNEL, OURS, OverlapSweep, goals
 from feelahead.lab.reference import published
 from feelahead.lab.reference.approximations import monte_carlo, satellite_points, satellites
@@ -21,7 +18,6 @@ from feelahead.lab.reference.errors import kernel_volumes
 from feelahead.lab.reference.pairs import Pairs
 from feelahead.lab.reference.published import CompiledHeader, package_corners
 from feelahead.lab.table import Row, Table
-from feelahead.lab.turns import in_turns, least_ns
 
 SMALL = ("--quick", "--adversarial", "200", "--truths", "2", "--timed", "100")
 FAKE_HEADER = """
@@ -127,24 +123,3 @@ def test_the_driver_reads_pairs_and_writes_volumes(tmp_path: Path, monkeypatch: 
         assert (times_ns >= 0.0).all()
     header.write_text("#error this is not the header")
     assert CompiledHeader(header).missing.startswith("does not compile: ")
-
-
-def test_what_takes_turns_counts_by_the_least_time_of_each_part() -> None:
-    given = {"first": [[40.0, 20.0], [30.0, 90.0]], "second": [[7.0], [9.0]]}
-    order: list[str] = []
-
-    def turn(name: str) -> FloatArray:
-        order.append(name)
-        return np.array(given[name][order.count(name) - 1])
-
-    assert in_turns({name: partial(turn, name) for name in given}, 2) == {"first": 50.0, "second": 7.0}
-    assert order == ["first", "second", "first", "second"]
-    # Calls that take 3 ms, then 1 ms each, of which there are enough to fill a turn.
-    clock, taken = VirtualClock(), [0.003]
-
-    def run() -> None:
-        clock.advance_to(clock.now() + taken[-1])
-        taken.append(0.001)
-
-    assert least_ns([run, run], clock) == pytest.approx([1e6, 1e6])
-    assert 0.03 <= sum(taken) <= 0.034

@@ -11,7 +11,7 @@ from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind, force_for, make
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import SimulatedTrigger
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
-from operator_side.people.pulling_hands import Hands, Pull, constant_force
+from operator_side.people.pulling_hands import Hands, Pull
 
 STEP_S = 0.001
 SEEDS = range(4)
@@ -82,30 +82,6 @@ def test_presses_and_rests_are_as_long_and_strong_as_said_and_the_trigger_comes_
             assert phase[-1][1] == 0.0
 
 
-def test_a_bell_rises_to_its_middle_and_falls_as_it_rose() -> None:
-    pull = make_pull("bell", 1)
-    forces = [hands.r2_n for hands in itertools.takewhile(lambda hands: hands.r2_n > 0.0, samples(pull)[1:])]
-    middle = forces.index(max(forces))
-    assert middle == pytest.approx(len(forces) / 2, abs=2)
-    assert forces == sorted(forces[:middle]) + sorted(forces[middle:], reverse=True)
-    # Minimum jerk: at a quarter 16 (3/16)² of the peak's travel.
-    quarter = forces[round(len(forces) / 4)]
-    assert settled_travel(quarter) / settled_travel(max(forces)) == pytest.approx(16 * (3 / 16) ** 2, abs=0.01)
-
-
-def test_a_random_pull_wanders_over_the_whole_travel_without_jumping() -> None:
-    paths = [[settled_travel(hands.r2_n) for hands in samples(make_pull("random", seed), 19.0, 0.01)] for seed in SEEDS]
-    travels = [travel for path in paths for travel in path]
-    assert min(travels) == 0.0
-    assert max(travels) == pytest.approx(1.0)
-    assert sum(travels) / len(travels) == pytest.approx(0.5, abs=0.1)
-    for path in paths:
-        assert max(abs(later - one) for one, later in itertools.pairwise(path)) < 0.3
-        # Correlated over 0.4 s: it is on the same side of its middle for a while.
-        crossings = sum((later - 0.5) * (one - 0.5) < 0.0 for one, later in itertools.pairwise(path))
-        assert 5 <= crossings <= 120
-
-
 def deflections(hands: Hands) -> list[Vector2]:
     """How far the left and the right stick count as deflected."""
     device, calibration = SimulatedDualSense(), TravelCalibration()
@@ -114,17 +90,6 @@ def deflections(hands: Hands) -> list[Vector2]:
     assert state is not None
     sticks = (calibration.left_stick, state.left_stick), (calibration.right_stick, state.right_stick)
     return [rest.deflection(raw) for rest, raw in sticks]
-
-
-@pytest.mark.parametrize("wanted", [(0.5, 0.0), (-0.6, 0.8), (0.0, -0.05)])
-def test_sticks_count_as_far_as_said_for_a_second_and_a_half(wanted: Vector2) -> None:
-    for pull, own in ((constant_force(2.5, wanted), 0), (constant_force(2.5, (0, 0), wanted), 1)):
-        for time_s in (0.0, 1.49):
-            found = deflections(pull(time_s))
-            assert found[own] == pytest.approx(wanted, abs=0.01)
-            assert found[1 - own] == (0.0, 0.0)
-        assert pull(0.0).r2_n == 2.5
-        assert pull(1.5) == pull(100.0) == Hands(r2_n=2.5)
 
 
 @pytest.mark.parametrize(("kind", "own"), [("drift", 0), ("yaw", 1)])
@@ -139,15 +104,3 @@ def test_drift_and_yaw_deflect_one_stick_to_the_full_to_either_side(kind: PullKi
         assert 0.25 <= settled_travel(pull(1.0).r2_n) <= 1.0
         assert pull(0.0) == pull(30.0)
     assert sides == {-1, 1}
-
-
-def test_a_swerve_swaps_one_stick_from_side_to_side() -> None:
-    turned = set()
-    for seed in range(8):
-        seen = samples(make_pull("swerve", seed), 19.0, 0.01)
-        turned.add(turns := any(any(hands.right_stick) for hands in seen))
-        sides = [(hands.right_stick if turns else hands.left_stick)[0] for hands in seen]
-        assert 0.4 <= max(sides) == -min(sides) <= 0.8
-        lasts_s = [0.01 * len(list(run)) for _, run in itertools.groupby(sides)]
-        assert all(0.29 <= last_s <= 0.71 for last_s in lasts_s[:-1])
-    assert turned == {False, True}

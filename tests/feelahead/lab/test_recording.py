@@ -1,7 +1,6 @@
 """Recorded approaches: what each side knew when, what the arm did, and what it would have done from then on."""
 
 import functools
-import math
 from dataclasses import fields
 
 import numpy as np
@@ -10,11 +9,10 @@ import pytest
 from common.reaction import HORIZON_S
 from feelahead.lab.approaches.evaluation import LINKS
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
-from feelahead.lab.approaches.pulls import PullKind, make_pull
+from feelahead.lab.approaches.pulls import PullKind
 from feelahead.lab.approaches.recording import POSE_S, TICK_S, RecordedApproach, record_approach
 from feelahead.lab.approaches.replay import Replay
 from feelahead.lab.approaches.stopping_path import stopping_path
-from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from robot_side.drivers.mujoco.posed_scene import PosedScene
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.settings import EncoderSettings
@@ -51,34 +49,6 @@ def test_what_was_sent_arrives_one_delay_later() -> None:
     assert seen_s.min() >= DELAY_S - 1e-9
     # Stiffness comes with each tick, or every few of them.
     assert seen_s.max() < DELAY_S + 0.01
-
-
-@recordings
-def test_a_command_reaches_the_arm_after_the_delay_and_later_ones_no_sooner() -> None:
-    one = recorded()
-    sent = one.command_time_s[(one.command_time_s >= one.began_s) & (one.command_time_s < one.began_s + 1.5)]
-    arrives = np.array([one.arrives_s(float(time_s)) for time_s in sent])
-    assert len(sent) > 300
-    np.testing.assert_allclose(arrives - sent, DELAY_S, atol=TICK_S + 1e-9)
-    assert (np.diff(arrives) > 0.0).all()
-    # In between it is the next command that counts.
-    assert one.arrives_s(float(sent[0]) + 0.001) == one.arrives_s(float(sent[1]))
-    assert one.arrives_s(one.tick_time_s[-1]) == math.inf
-    assert one.arrives_s(one.began_s + DURATION_S - DELAY_S / 2.0) == math.inf
-
-
-@recordings
-def test_the_hand_pulls_as_the_pull_says_and_the_command_follows_it() -> None:
-    one = recorded()
-    before, settled = one.tick_time_s < one.began_s - 0.004, one.tick_time_s > one.began_s + 0.5
-    assert one.travel[before].max() == 0.0
-    force_n = make_pull("steady", SEED)(1.0).r2_n
-    np.testing.assert_allclose(one.travel[settled, 1], (force_n - SPRING_PRELOAD_N) / SPRING_RISE_N, atol=1e-3)
-    assert one.travel[:, 0].max() == 0.0
-    sensed = one.travel[settled, 1][0] / 0.75
-    commanded = one.command[one.command_time_s > one.began_s + 0.5]
-    np.testing.assert_allclose(commanded, (sensed - 0.05) / (0.98 - 0.05), atol=0.005)
-    assert one.command[one.command_time_s < one.began_s].max() == 0.0
 
 
 @recordings

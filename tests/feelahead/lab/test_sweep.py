@@ -135,11 +135,8 @@ def test_bad_input_ends_the_sweep_at_once(tmp_path: Path) -> None:
         (["--workers", "2"], "--workers 2: try counting measures time"),
         (["--scheduler", "tcp://127.0.0.1:1"], "--scheduler tcp://127.0.0.1:1: try counting measures time"),
         (["--scheduler", ""], "--scheduler '': valid: as tcp://127.0.0.1:8786"),
-        (["--scheduler", "foo"], "--scheduler 'foo': valid: as tcp://127.0.0.1:8786"),
         (["--picture", "/a.png"], "--picture /a.png: try counting has no figure"),
-        (["--picture", "/a.bmp"], "ends in .png, .svg, .pdf"),
         (["--workers", "0"], "--workers = 0; valid: at least 1"),
-        (["--seeds", "0"], "--seeds = 0; valid: at least 1"),
         (["--seeds", "1000000000000"], "3 cells with 1000000000000 seeds each; valid: one value or more"),
         (["--numbers"], "0 cells with 1 seeds each; valid: one value or more"),
         (["--csv", "/nowhere/a.csv"], "--csv /nowhere/a.csv: is a folder, or its folder is not there"),
@@ -201,33 +198,15 @@ def test_the_example_of_the_readme_runs_and_is_short(tmp_path: Path, capsys: pyt
     assert [row["overtaken"] == "0" for row in rows] == [True, True] + [False] * 6
 
 
-def test_in_a_log_a_line_a_minute_says_how_far_it_is_and_what_is_at_work(
+def test_in_a_log_a_line_says_how_far_it_is_and_what_is_at_work(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("feelahead.lab.progress._EVERY_S", 1e-3)
-    said: list[str] = []
+    monkeypatch.setattr("feelahead.lab.progress._EVERY_S", 0.0)
     with progress("baking", 4.0) as shown:
         for piece, share in (("rye", 1.0), ("oats", 3.0)):
             shown.begin(piece)
-            while not said or f", {piece} for 0 min" not in said[-1]:
-                said += capsys.readouterr().err.splitlines()
             shown.advance(share)
-    # The first line may be older than the first piece.
-    assert next(line for line in said if "rye" in line) == "baking: 0 %, time left unknown, rye for 0 min"
-    assert said[-1] == "baking: 25 %, about 0 min left, oats for 0 min"
-
-
-def test_on_a_terminal_the_cell_at_work_has_a_spinner_and_its_own_time(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("FORCE_COLOR", "1")
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    with progress("baking", 4.0) as shown:
-        shown.begin("rye")
-        drawn: set[str] = set()
-        while len(drawn) < 2:
-            drawn |= set(re.findall(r"(\S)\x1b\[0m [^\n]*rye[^\n]*0:0", capsys.readouterr().err))
+    assert capsys.readouterr().err == "baking: 0 %, rye\nbaking: 25 %, oats\n"
 
 
 # With processes that are killed
@@ -271,18 +250,7 @@ def _dask(workers: int) -> Iterator[tuple[str, list["subprocess.Popen[str]"]]]:
 
 
 @pytest.mark.processes
-def test_a_killed_worker_process_costs_no_row(tmp_path: Path, expected: bytes) -> None:
-    assert _asked(tmp_path, "--workers", "2", name="two.csv") == expected
-    (tmp_path / "3-1").write_text("kill")
-    killed = _asked(tmp_path, "--folder", str(tmp_path), "--workers", "2", name="killed.csv")
-    assert _without_folder(killed) == _without_folder(expected)
-
-
-@pytest.mark.processes
-def test_a_worker_that_is_killed_again_and_again_leaves_what_is_finished(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("feelahead.lab.pieces._RESTARTS", 0)
+def test_a_worker_that_is_killed_leaves_what_is_finished(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "3-2").write_text("kill")
     rows = tmp_path / "rows.csv"
     folder = ["--folder", str(tmp_path), "--wait-s", "0.05"]
