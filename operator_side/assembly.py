@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from operator_side.core import OperatorSide
+from operator_side.core import CoreSettings, OperatorSide
 from operator_side.events import Listener
 from operator_side.settings import OperatorSettings
 
@@ -11,9 +11,7 @@ def build_operator_side(
     settings: OperatorSettings, epoch: int, clock_domain: str, listeners: Sequence[Listener] = ()
 ) -> OperatorSide:
     """Put an operator side together. listeners: hear what happens to it."""
-    return OperatorSide(
-        epoch,
-        clock_domain,
+    core = CoreSettings(
         haptics=settings.haptics,
         calibration=settings.calibration,
         rendering=settings.rendering,
@@ -22,5 +20,5 @@ def build_operator_side(
         seed=settings.seed,
         asymmetry_s=settings.asymmetry_s(),
         full_rate=settings.full_rate,
-        listeners=listeners,
     )
+    return OperatorSide(epoch, clock_domain, core, listeners)

@@ -8,6 +8,7 @@ view payloads ─▶ receive_view ─▶ screen
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from msgspec import UNSET
@@ -27,13 +28,29 @@ from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.intent import OperatorIntent
 from operator_side.hands.newest import Hands
 from operator_side.hands.travel_calibration import TravelCalibration
-from operator_side.robot_link.commanding import STOPPING, HeldCommand, StopButton, ToRobot, motion_command
+from operator_side.robot_link.commanding import STOPPING, ToRobot
+from operator_side.robot_link.commands import HEARTBEAT_PERIOD_S, Commands
 from operator_side.robot_link.newest import STIFFNESS_EXPIRES_S, NewestStiffness, NewestView
 from operator_side.robot_link.standing import Standing
 from operator_side.robot_link.tuner import Tuner
 
-HEARTBEAT_PERIOD_S = 0.2
-"""A Hello this often while nothing else is sent: it opens the session, and then shows that we are alive."""
+
+@dataclass(frozen=True, kw_only=True)
+class CoreSettings:
+    """How an operator side feels and commands."""
+
+    haptics: bool = True
+    """Whether the triggers are stiffened at all"""
+    calibration: TravelCalibration = field(default_factory=TravelCalibration)
+    rendering: RenderingSettings = field(default_factory=RenderingSettings)
+    compensation: Compensation = "operator"
+    swap_sides: bool = False
+    """Left and right of the controller swapped"""
+    seed: int = 0
+    asymmetry_s: float = 0.0
+    """See LinkEnd"""
+    full_rate: bool = False
+    """See HeldCommand"""
 
 
 class OperatorSide:
@@ -43,45 +60,28 @@ class OperatorSide:
         self,
         epoch: int,
         clock_domain: str,
-        *,
-        haptics: bool = True,
-        calibration: TravelCalibration | None = None,
-        rendering: RenderingSettings | None = None,
-        compensation: Compensation = "operator",
-        swap_sides: bool = False,
-        seed: int = 0,
-        asymmetry_s: float = 0.0,
-        full_rate: bool = False,
+        settings: CoreSettings | None = None,
         listeners: Sequence[Listener] = (),
     ) -> None:
-        """swap_sides: left and right of the controller swapped. asymmetry_s: see LinkEnd; full_rate: see HeldCommand.
-
-        listeners: hear what happens.
-        """
-        self.link = LinkEnd("operator", epoch, clock_domain, seed, asymmetry_s)
-        self.felt, self.view = NewestStiffness(seed), NewestView()
-        self.hands = Hands(calibration or TravelCalibration(), swap_sides=swap_sides)
-        self.rejected = self.motion_sent = 0
-        self.other_version: str | None = None
-        """What the robot side's messages said when they were of another version; None once they are not."""
-        self._haptics_enabled = haptics
-        self._compensation: Compensation = compensation
-        self._swap_sides = swap_sides
+        """listeners: hear what happens."""
+        self.settings = settings = settings or CoreSettings()
+        self.link = LinkEnd("operator", epoch, clock_domain, settings.seed, settings.asymmetry_s)
+        self.felt, self.view = NewestStiffness(settings.seed), NewestView()
+        self.hands = Hands(settings.calibration, swap_sides=settings.swap_sides)
         self.haptics = Haptics(
-            rendering or RenderingSettings(),
-            self.hands.calibration,
-            enabled=haptics,
-            swap_sides=swap_sides,
-            compensation=compensation,
+            settings.rendering,
+            settings.calibration,
+            enabled=settings.haptics,
+            swap_sides=settings.swap_sides,
+            compensation=settings.compensation,
         )
         """What the fingers are told, and why."""
-        self.stop_button = StopButton()
-        self.held_command = HeldCommand(full_rate=full_rate)
+        self.commands = Commands(self.link, settings.compensation, full_rate=settings.full_rate)
         self.tuner = Tuner()
+        self.rejected = 0
         self._listeners = tuple(listeners)
         self._blindness = Blindness()
         self._standing = Standing()
-        self._hello_s = -math.inf
 
     @property
     def lease(self) -> LeaseNotice | None:
@@ -111,12 +111,12 @@ class OperatorSide:
         except RemoteProtocolError as error:
             self.rejected += 1
             if isinstance(error, OtherVersionError):
-                self.other_version = str(error)
+                self._standing.other_version = str(error)
             return
         if not isinstance(message, Hello | LeaseNotice | LinkReport | StiffnessUpdate):
             self.rejected += 1
             return
-        self.other_version = None
+        self._standing.other_version = None
         if isinstance(message, LinkReport):
             # In a sequence of its own, which must not be taken for the order of what is felt.
             if message.header.epoch == self.link.peer_epoch:
@@ -146,7 +146,7 @@ class OperatorSide:
             self.link.begin_anew()
         if not self._standing.owns:
             self._blindness.end()
-            self.stop_button.forget()
+            self.commands.stop_button.forget()
 
     def receive_view(self, payload: bytes, now_s: float) -> None:
         """Take one view payload; only the newest of the robot's present epoch is kept."""
@@ -192,7 +192,7 @@ class OperatorSide:
     def press_stop(self, now_s: float) -> None:
         """Stop the arm: somebody pressed it away from the controller."""
         self._hear("stopped", b"", now_s)
-        self.stop_button.press(now_s)
+        self.commands.stop_button.press(now_s)
 
     def _hear(self, what: Input, content: object, now_s: float | None) -> None:
         for one in self._listeners:
@@ -203,20 +203,17 @@ class OperatorSide:
         self._look(now_s)
         self._standing.expire(now_s)
         linked = self.felt.within(2 * HEARTBEAT_PERIOD_S, now_s)
-        messages = []
-        lease = self.lease
-        intent = self._meant(now_s)
+        messages: list[ToRobot] = []
+        lease, intent = self.lease, self._meant(now_s)
         if intent is None or lease is None:
-            self.held_command.forget()
+            self.commands.forget()
             self.haptics.silent(now_s, owns=self._standing.owns)
-        elif (leaving := self.held_command.due(intent, lease.token, now_s)) is not None:
-            command = motion_command(self.link.stamp(now_s), intent, lease.token, self._compensation)
+        elif (due := self.commands.due(intent, lease.token, now_s)) is not None:
+            message, command = due
             self.haptics.commanded(command)
-            self.motion_sent += 1
-            messages.append(leaving._replace(payload=encode(command)))
-        if (intent is None or not linked) and now_s - self._hello_s >= HEARTBEAT_PERIOD_S:
-            self._hello_s = now_s
-            messages.append(ToRobot(encode(self.link.hello(now_s)), everywhere=True))
+            messages.append(message)
+        if intent is None or not linked:
+            messages += self.commands.hello(now_s)
         if (tune := self.tuner.due(self.lease, self.link, now_s)) is not None:
             messages.append(ToRobot(encode(tune)))
         for one in self._listeners:
@@ -228,7 +225,7 @@ class OperatorSide:
         if self.lease is None or not self._standing.owns:
             return None
         state = None if self.stiffness is None else self.stiffness.state
-        intent = STOPPING if self.stop_button.holds(now_s, state) else self.hands.present(now_s)
+        intent = STOPPING if self.commands.stop_button.holds(now_s, state) else self.hands.present(now_s)
         # The arm may still be armed from before the controller was lost: then silence disarms it.
         if intent is None or (self.hands.lost_s is not None and not intent.emergency_stop):
             return None
@@ -255,10 +252,10 @@ class OperatorSide:
         """What a person is shown; what the process knows beside it is not in it."""
         mean_s, lease, screen, felt = self.link.delay.mean, self.lease, self.screen, self.stiffness
         intent, rendering = self.hands.present(now_s), self.haptics.rendering
-        order, linked = -1 if self._swap_sides else 1, self.felt.within(STIFFNESS_EXPIRES_S, now_s)
+        order, linked = -1 if self.settings.swap_sides else 1, self.felt.within(STIFFNESS_EXPIRES_S, now_s)
         left, right = ((None, None) if felt is None else (felt.l2.stiffness, felt.r2.stiffness))[::order]
         left_pulled, right_pulled = ((None, None) if intent is None else (intent.l2, intent.r2))[::order]
-        link = self._standing.status_fields(self.other_version, now_s, linked=linked, heard=self.felt.count > 0)
+        link = self._standing.status_fields(now_s, linked=linked, heard=self.felt.count > 0)
         seen = screen if link["link"] is LinkState.UP else None
         centre_m = None if seen is None else seen.target_in_tool_m
         return OperatorStatus(
@@ -271,7 +268,7 @@ class OperatorSide:
             r2_pulled=right_pulled,
             l2_free=rendering.l2.free_travel,
             r2_free=rendering.r2.free_travel,
-            haptics=self._haptics_enabled,
+            haptics=self.settings.haptics,
             feel=self._blindness.sight,
             delay_ms=None if mean_s is None else 1e3 * mean_s,
             stands=None if felt is None else felt.stands,
@@ -286,12 +283,12 @@ class OperatorSide:
         return {
             "messages": {
                 "stiffness_received": self.felt.count,
-                "motion_sent": self.motion_sent,
+                "motion_sent": self.commands.sent,
                 "rejected": self.rejected,
                 "stale": self.link.stale,
             },
             "lease_states": self._standing.history,
-            "stops_pressed_elsewhere": self.stop_button.presses,
+            "stops_pressed_elsewhere": self.commands.stop_button.presses,
             "tuning": self.tuner.summary(),
             "zones": self.haptics.rendering.zones(),
             "rendering": self.haptics.summary() | {"blind": self._blindness.times},

@@ -24,6 +24,8 @@ class Standing:
         """None before the first notice and once it has expired."""
         self.history: list[str] = []
         """Each standing that we had in turn, the latest ones."""
+        self.other_version: str | None = None
+        """What the robot side's messages said when they were of another version; None once they are not"""
         self._heard_s = self._reported_s = 0.0
         self._report: LinkReport | None = None
         self._anew_s = -math.inf
@@ -54,9 +56,9 @@ class Standing:
         if known is None or report.header.epoch != known.header.epoch or report.header.sequence > known.header.sequence:
             self._report, self._reported_s = report, now_s
 
-    def status_fields(self, other_version: str | None, now_s: float, *, linked: bool, heard: bool) -> dict[str, Any]:
+    def status_fields(self, now_s: float, *, linked: bool, heard: bool) -> dict[str, Any]:
         """The fields of a status that tell of the link. linked: stiffness comes; heard: some came once."""
-        link, reason = self._link(other_version, linked=linked, heard=heard)
+        link, reason = self._link(linked=linked, heard=heard)
         fields: dict[str, Any] = {"link": link, "link_reason": reason}
         if self.lease is not None:
             lease = self.lease
@@ -65,10 +67,10 @@ class Standing:
             fields |= self._report.values()
         return fields
 
-    def _link(self, other_version: str | None, *, linked: bool, heard: bool) -> tuple[LinkState, str | None]:
+    def _link(self, *, linked: bool, heard: bool) -> tuple[LinkState, str | None]:
         lease = self.lease
-        if other_version is not None:
-            return LinkState.REFUSED, other_version
+        if self.other_version is not None:
+            return LinkState.REFUSED, self.other_version
         if lease is not None and lease.session is SessionState.OBSERVING:
             return LinkState.OBSERVING, None
         if lease is not None and lease.session not in OWNING:

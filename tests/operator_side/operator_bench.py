@@ -7,7 +7,7 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import LeaseNotice, MotionCommand, MotionState, StiffnessUpdate
 from common.protocol.session import SessionState
 from operator_side.controller.state import Button, ControllerState
-from operator_side.core import OperatorSide
+from operator_side.core import CoreSettings, OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from tests.helpers.felt import felt
 
@@ -16,7 +16,7 @@ class Bench:
     """An operator side with a simulated controller, and the robot side's end of the link in the test's hands."""
 
     def __init__(self, **options: Any) -> None:
-        self.side = OperatorSide(2, "clock", **options)
+        self.side = OperatorSide(2, "clock", CoreSettings(**options))
         self.robot = LinkEnd("robot", 1, "clock")
         self.device = SimulatedDualSense()
         self.now_s = 1.0

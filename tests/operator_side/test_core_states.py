@@ -200,7 +200,7 @@ class Core(RuleBasedStateMachine):
         self.waited = False
         assert self.bench.side.status(self.bench.now_s).feel == self.sight
         assert (self.bench.side.lease is None) == (self.lease is None)
-        assert self.bench.side.stop_button.presses == self.presses
+        assert self.bench.side.commands.stop_button.presses == self.presses
 
 
 def fields_of(command: MotionCommand) -> dict[str, Any]:

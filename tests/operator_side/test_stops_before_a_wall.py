@@ -16,7 +16,7 @@ from common.protocol.messages import Compensation, Hello, LeaseNotice, Message, 
 from common.protocol.session import SessionState
 from common.protocol.uniform_field import uniform_field
 from operator_side.controller.state import Button
-from operator_side.core import OperatorSide
+from operator_side.core import CoreSettings, OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from tests.helpers.felt import field, ways
 
@@ -34,7 +34,7 @@ class Approach:
     """A finger of constant force on R2 from one second on, and an arm on a line before a wall."""
 
     def __init__(self, delay_s: float, jitter_s: float = 0.0, compensation: Compensation = "operator") -> None:
-        self.side = OperatorSide(2, "clock", compensation=compensation)
+        self.side = OperatorSide(2, "clock", CoreSettings(compensation=compensation))
         self.robot = LinkEnd("robot", 1, "clock")
         self.device = SimulatedDualSense()
         self.device.set_buttons(frozenset({Button.L1}))

@@ -20,7 +20,7 @@ from common.rate.pieces import PIECE, Joining
 from common.sockets.operator import OperatorSockets
 from common.sockets.tcp_figures import TcpFigures, connected_to, tcp_figures
 from feelahead.commands.doctor.link_facts import Way
-from operator_side.core import OperatorSide
+from operator_side.core import CoreSettings, OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 
 MEASURE_S: Final = 5.0
@@ -82,7 +82,7 @@ def measure_path_along(way: Way) -> PathFacts:
 
 
 def _measured(sockets: OperatorSockets, ports: tuple[int, int], clock: MonotonicClock) -> PathFacts:
-    core = OperatorSide(secrets.randbits(53), clock_domain(), haptics=False)
+    core = OperatorSide(secrets.randbits(53), clock_domain(), CoreSettings(haptics=False))
     hands = SimulatedDualSense()
     begin_s = clock.now() + _SETTLE_S
     end_s, watch_s = begin_s + MEASURE_S, 0.0

@@ -19,7 +19,7 @@ from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from common.timing.ages import LoopAge
 from operator_side.controller.state import ControllerState
-from operator_side.core import OperatorSide
+from operator_side.core import CoreSettings, OperatorSide
 from operator_side.robot_link.commanding import ToRobot
 from robot_side.laws.sensed import Sensed
 from robot_side.operators.operator_session import OperatorSession
@@ -112,7 +112,7 @@ class OperatorEnd(_Side):
     def __init__(self, sockets: OperatorSockets) -> None:
         super().__init__(sockets, "to_robot")
         self._sockets, self._report_s = sockets, 0.0
-        self._core = OperatorSide(secrets.randbits(53), clock_domain(), full_rate=True)
+        self._core = OperatorSide(secrets.randbits(53), clock_domain(), CoreSettings(full_rate=True))
 
     def _received(self) -> Any:
         return self._sockets.receive(), self._sockets.receive_view()
