@@ -201,10 +201,12 @@ class EvdevPad:
         self._drives, self._said_s = drives, now_s
         with _going_wrong():
             descriptor = self._open_descriptor()
-            effect = bytearray(_EFFECT_SIZE)
-            _EFFECT.pack_into(effect, 0, _FF_RUMBLE, self._effect_id, 0, 0, 0, round(1e3 * LENGTH_S), 0, *drives)
-            self._ioctl(descriptor, SEND_EFFECT, effect)
-            self._effect_id = _EFFECT.unpack_from(effect)[1]
+            # Stopped as it is: the kernel (ff-memless) lets the motors run on where an effect changes and then stops.
+            if any(drives):
+                effect = bytearray(_EFFECT_SIZE)
+                _EFFECT.pack_into(effect, 0, _FF_RUMBLE, self._effect_id, 0, 0, 0, round(1e3 * LENGTH_S), 0, *drives)
+                self._ioctl(descriptor, SEND_EFFECT, effect)
+                self._effect_id = _EFFECT.unpack_from(effect)[1]
             os.write(descriptor, _EVENT.pack(0, 0, _FF, self._effect_id, int(any(drives))))
 
     def _bits(self, request: int) -> set[int]:
