@@ -105,6 +105,9 @@ class EvdevPad:
         self._changed = True
         self._state = ControllerState()
         self._told = Feel()
+        self._effect_id = -1
+        self._drives = (0, 0)
+        self._said_s = 0.0
         with contextlib.ExitStack() as failing, _going_wrong():
             failing.callback(self.close)
             keys, axes, effects = (self._bits(GET_BITS + kind) for kind in (_KEY, _ABS, _FF))
@@ -119,9 +122,6 @@ class EvdevPad:
             if self.is_pad:
                 self._ask()
             failing.pop_all()
-        self._effect_id = -1
-        self._drives = (0, 0)
-        self._said_s = 0.0
 
     @property
     def released(self) -> bool:
@@ -152,9 +152,13 @@ class EvdevPad:
     def close(self) -> None:
         """Stop the motors and let the pad go."""
         descriptor, self._descriptor = self._descriptor, None
-        if descriptor is not None:
+        if descriptor is None:
+            return
+        with contextlib.suppress(OSError):  # it is gone: nothing more can be told to it
+            if any(self._drives):
+                os.write(descriptor, _played(self._effect_id, 0))
             self._told = self._told.farewell
-            os.close(descriptor)  # with it, the kernel erases our effects
+        os.close(descriptor)
 
     def _take(self, kind: int, code: int, value: int) -> None:
         if kind == _KEY and code in BUTTONS:
@@ -201,11 +205,13 @@ class EvdevPad:
         self._drives, self._said_s = drives, now_s
         with _going_wrong():
             descriptor = self._open_descriptor()
-            effect = bytearray(_EFFECT_SIZE)
-            _EFFECT.pack_into(effect, 0, _FF_RUMBLE, self._effect_id, 0, 0, 0, round(1e3 * LENGTH_S), 0, *drives)
-            self._ioctl(descriptor, SEND_EFFECT, effect)
-            self._effect_id = _EFFECT.unpack_from(effect)[1]
-            os.write(descriptor, _EVENT.pack(0, 0, _FF, self._effect_id, int(any(drives))))
+            # Stopped as it is: the kernel (ff-memless) lets the motors run on where an effect changes and then stops.
+            if any(drives):
+                effect = bytearray(_EFFECT_SIZE)
+                _EFFECT.pack_into(effect, 0, _FF_RUMBLE, self._effect_id, 0, 0, 0, round(1e3 * LENGTH_S), 0, *drives)
+                self._ioctl(descriptor, SEND_EFFECT, effect)
+                self._effect_id = _EFFECT.unpack_from(effect)[1]
+            os.write(descriptor, _played(self._effect_id, int(any(drives))))
 
     def _bits(self, request: int) -> set[int]:
         content = bytearray(_BIT_BYTES)
@@ -250,6 +256,10 @@ def find_pad(preferred: str | None) -> OpenController:
         raise NoDeviceError(f"no gamepad with two sticks, two triggers and rumble in {NODES}{hidden if denied else ''}")
     path, pad = chosen
     return OpenController(pad, f"{pad.name} at {path}, rumble in place of stiffness", pad.address)
+
+
+def _played(effect_id: int, times: int) -> bytes:
+    return _EVENT.pack(0, 0, _FF, effect_id, times)
 
 
 def _share(strengths: Strengths | None, travel: float) -> float:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +15,17 @@ from common.protocol import codec
 from common.protocol.codec import PROTOCOL_VERSION, decode, encode
 from common.protocol.compact import STEP_M
 from common.protocol.messages import StiffnessUpdate
-from common.recording.entries import Kind, split_text
+from common.recording.entries import Entry, Kind, split_text
 from common.recording.reading import Recording, open_recording
 from common.silence import KEEP_ALIVE_S
 from feelahead.commands.recordings import replay
 from feelahead.recordings import replay as replaying
 from feelahead.recordings.comparison import Comparison, recorded_entries
+from feelahead.recordings.controller import recorded_feel, recorded_state
 from feelahead.recordings.playback import Playback, Seen, seen
 from feelahead.recordings.replay import replay_operator, replay_robot
+from operator_side.dualsense.reports.input_report import build_input_report
+from operator_side.dualsense.reports.output_report import build_output_report
 from robot_side.compiled.warm_up import kernel_digests
 from robot_side.parts import build_parts
 from tests.feelahead.recordings.conftest import DURATION_S
@@ -40,8 +44,31 @@ def test_the_operator_side_sends_and_writes_the_same(run: Recording) -> None:
     compared = replay_operator(run)
     assert compared.made == compared.equal > DURATION_S / KEEP_ALIVE_S
     assert compared.within
-    written = [one for one in recorded_entries(run, "operator", []) if one.kind == Kind.WRITTEN]
-    assert len(written) > 10  # the person felt something, or nothing was compared
+    told = [one for one in recorded_entries(run, "operator", []) if one.kind == Kind.TOLD]
+    assert len(told) > 10  # the person felt something, or nothing was compared
+
+
+def test_a_recording_of_reports_is_made_again_too(run: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    kinds = set()
+
+    def as_reports(*of: Any) -> Iterator[Entry]:
+        for one in recorded_entries(*of):
+            kinds.add(one.kind)
+            if one.kind == Kind.HANDS:
+                state = recorded_state(one.kind, one.content)
+                yield Entry(Kind.REPORT, one.now_s, build_input_report(state))
+                yield Entry(Kind.REPORT, one.now_s, b"garbled")
+            elif one.kind == Kind.TOLD:
+                feel = recorded_feel(one.kind, one.content)
+                yield Entry(Kind.WRITTEN, one.now_s, build_output_report(feel))
+            else:
+                yield one
+
+    monkeypatch.setattr(replaying, "recorded_entries", as_reports)
+    compared = replay_operator(run)
+    assert kinds.issuperset({Kind.HANDS, Kind.TOLD})
+    assert compared.made == compared.equal > DURATION_S / KEEP_ALIVE_S
+    assert (compared.worst_eighths, compared.worst_m) == (0.0, 0.0)
 
 
 def test_the_command_says_so_and_another_setting_makes_other_stiffness(

@@ -77,9 +77,10 @@ def test_a_pulled_trigger_is_felt_where_it_is_and_the_greater_rumble_counts(node
     node.plays()
     node.send((ABS, 2, 0), (ABS, 5, 0))
     pad.read(0.03)
+    assert (node.uploaded.pop()[2:], node.plays()) == ((round(0.25 * 0xFFFF), 0), [(3, 1)])
     pad.write(RELEASED, 0.04)
     assert pad.released
-    assert (node.uploaded.pop()[2:], node.plays()) == ((0, 0), [(3, 1), (3, 0)])
+    assert (node.uploaded, node.plays()) == ([], [(3, 0)])
 
 
 def test_rumble_is_said_again_before_it_ends_and_no_more_once_it_is_over(node: FakeNode, pad: EvdevPad) -> None:
@@ -99,14 +100,20 @@ def test_rumble_is_said_again_before_it_ends_and_no_more_once_it_is_over(node: F
     assert node.plays() == []
 
 
-def test_unplugged_it_is_gone_and_closed_it_is_released(node: FakeNode, pad: EvdevPad) -> None:
-    pad.write(Feel(l2=FREE_TRIGGER, r2=feedback(0, 8)), 0.0)
-    node.unplug()
-    with pytest.raises(DeviceError, match=r"gamepad is gone .*: plug it in again"):
-        pad.read(0.1)
+@pytest.mark.parametrize("unplugged", [False, True])
+def test_closed_it_is_released_unless_it_was_unplugged_with_motors_on(
+    node: FakeNode, pad: EvdevPad, unplugged: bool
+) -> None:
+    pad.write(Feel(l2=FREE_TRIGGER, rumble=Rumble(right=1.0)), 0.0)
+    assert node.plays() == [(3, 1)]
+    if unplugged:
+        node.unplug()
+        with pytest.raises(DeviceError, match=r"gamepad is gone .*: plug it in again"):
+            pad.read(0.1)
     pad.close()
     pad.close()
-    assert pad.released
+    assert pad.released is not unplugged
+    assert unplugged or node.plays() == [(3, 0)]
     with pytest.raises(DeviceError, match="closed"):
         pad.read(0.2)
 
