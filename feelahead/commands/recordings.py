@@ -16,7 +16,7 @@ from common.errors import ConfigurationError, FeelaheadError
 from common.limits import Limited
 from common.recording.packages import require_packages
 from common.recording.reading import Recording, open_recording
-from feelahead.recordings.playback import require_protocol
+from feelahead.recordings.playback import require_protocol, require_statuses
 
 _BOTH_SIDES = "pip install 'feelahead[robot,operator,record]'"
 
@@ -97,6 +97,7 @@ def replay(arguments: Sequence[str]) -> int:
         require_protocol(recording)
         if settings.check:
             return _check(recording)
+        require_statuses(recording)
         from feelahead.commands.replay_player import play_in_terminal, play_on_page  # noqa: PLC0415
 
         if settings.tui:

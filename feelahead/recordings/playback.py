@@ -37,15 +37,7 @@ class Seen(NamedTuple):
 
 
 def require_protocol(recording: Recording) -> None:
-    """Raise a ConfigurationError where a side's first message or status is of another release than ours."""
-    for topic, struct in ((_FACTS, OperatorFacts), (_ROBOT, RobotStatus)):
-        for message in recording.messages((topic,)):
-            try:
-                msgspec.json.decode(message.content, type=struct)
-            except msgspec.ValidationError as error:
-                why = f"{recording.path}: {topic} of another release ({error}); valid: feelahead export"
-                raise ConfigurationError(why) from error
-            break
+    """Raise a ConfigurationError where the first message that a side sent is of another protocol than ours."""
     for message in recording.messages([f"/{side}/inputs" for side in recording.headers]):
         for entry in unpack_block(message.content).unpacked():
             if entry.kind == Kind.SENT:
@@ -54,6 +46,18 @@ def require_protocol(recording: Recording) -> None:
                 except OtherVersionError as error:
                     raise ConfigurationError(f"{recording.path}: recorded with {error}") from error
                 return
+
+
+def require_statuses(recording: Recording) -> None:
+    """Raise a ConfigurationError where a side's first status is of a release that said other things."""
+    for topic, struct in ((_FACTS, OperatorFacts), (_ROBOT, RobotStatus)):
+        for message in recording.messages((topic,)):
+            try:
+                msgspec.json.decode(message.content, type=struct)
+            except msgspec.ValidationError as error:
+                why = f"{topic} of another release ({error}); valid: feelahead export, or replay --check"
+                raise ConfigurationError(f"{recording.path}: {why}") from error
+            break
 
 
 def seen(recording: Recording) -> Iterator[Seen]:
