@@ -22,7 +22,7 @@ from operator_side.core import OperatorSide
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
 from robot_side.arm.port import Arm, ArmState
-from robot_side.compiled.warm_up import kernel_digests, warm_up
+from robot_side.compiled.warm_up import import_kernels, kernel_digests, warm_up
 from robot_side.core import RobotSide
 from robot_side.parts import build_parts
 from robot_side.recording.inputs import FrameUnpacker, unpack_state
@@ -71,17 +71,19 @@ def replay_robot(recording: Recording) -> Comparison:
     frames = FrameUnpacker(parts.camera.perceive(0.0))
     # Nobody observes what is true: nothing moves in the simulation.
     core = RobotSide(replace(parts, arm=given, camera=given, truth=None))
+    compared, recorded = Comparison("robot", "stiffness messages"), _by_last_names(header.get("kernels", {}))
+    if not recorded.keys() <= _by_last_names(kernel_digests()).keys():
+        import_kernels()  # of other scenes and laws
     warm_up()
-    compared = Comparison("robot", "stiffness messages")
-    # There may be more of them here, for other scenes and laws.
-    here, recorded = kernel_digests(), header.get("kernels", {})
+    here = _by_last_names(kernel_digests())
     if gone := [name for name in recorded if name not in here]:
         raise ConfigurationError(
             f"recorded by an older version, with {len(gone)} kernels that are gone, such as {gone[0]}: its robot side"
             " cannot be computed anew; valid: feelahead replay without --check, export and plot"
         )
     kernels = {name: here.get(name) for name in recorded}
-    compared.notes += differing_origin(header, {"processor": processor_name(), "kernels": kernels})
+    origin = {"processor": processor_name(), "kernels": kernels}
+    compared.notes += differing_origin({**header, "kernels": recorded}, origin)
     made: deque[bytes] = deque()
     for entry in recorded_entries(recording, "robot", compared.notes):
         if entry.kind == Kind.RECEIVED:
@@ -100,6 +102,11 @@ def replay_robot(recording: Recording) -> Comparison:
             compared.take(payload, made.popleft() if made else None)
     _compare_rest(compared, made)
     return compared
+
+
+def _by_last_names(digests: Mapping[str, str]) -> dict[str, str]:
+    """Kernels by file and function: one that only moved to another room is the same."""
+    return {".".join(name.split(".")[-2:]): digest for name, digest in digests.items()}
 
 
 _INPUTS: Final[Mapping[int, Callable[[OperatorSide, bytes, float], object]]] = {

@@ -96,7 +96,10 @@ class SweptLaw:
         """Work out one tick; ValueError for what is not finite or does not fit: what was seen before still holds."""
         pose, scene = situation.pose, self.surroundings.see(situation.objects)
         self._make_room(pose, scene)
-        _, classes, closing = self._classes_of(situation)
+        if (found := self._classes_of(situation)) is not self._classes:
+            self._look_around_anew()
+            self._classes = found
+        _, classes, closing = found
         velocities, (right, up) = situation.objects.velocities_m_s, situation.lateral
         if situation.objects is not self._frame:
             self._frame = situation.objects
@@ -215,20 +218,22 @@ class SweptLaw:
         self.memory.kernels[:] = [kernel.address for kernel in (find_ability, find_prospect, look, sum_overlaps)]
 
     def _classes_of(self, situation: Situation) -> tuple[object, IntArray, IntArray]:
-        """What each object is to the field (k,), and what while the fingers move: what they close on, they touch."""
+        """What each object is to the field (k,), and what while the fingers move: what they close on, they touch.
+
+        The newest tick's own where roles and what is held are those of then; kept by a tick alone, not by who explains.
+        """
         roles, held = situation.objects.roles, situation.held
-        if self._classes is None or self._classes[0] != (roles, held):
-            of_role = {
-                Role.TARGET: TARGET,
-                Role.IGNORED: PASSED_OVER,
-                Role.SUPPORT: OBSTACLE if held is None else TOUCHABLE,
-            }
-            classes = np.array([of_role.get(role, OBSTACLE) for role in roles], dtype=np.int64)
-            if held is not None:
-                classes[held] = PASSED_OVER
-            self._look_around_anew()
-            self._classes = (roles, held), classes, np.where(classes == TARGET, PASSED_OVER, classes)
-        return self._classes
+        if self._classes is not None and self._classes[0] == (roles, held):
+            return self._classes
+        of_role = {
+            Role.TARGET: TARGET,
+            Role.IGNORED: PASSED_OVER,
+            Role.SUPPORT: OBSTACLE if held is None else TOUCHABLE,
+        }
+        classes = np.array([of_role.get(role, OBSTACLE) for role in roles], dtype=np.int64)
+        if held is not None:
+            classes[held] = PASSED_OVER
+        return (roles, held), classes, np.where(classes == TARGET, PASSED_OVER, classes)
 
     def _refuse(self, situation: Situation, now_s: float = 0.0) -> NoReturn:
         """Raise the ValueError that says what is not finite, or of which there are too few or too many."""

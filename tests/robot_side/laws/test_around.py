@@ -255,3 +255,19 @@ def test_errors_of_the_prediction_shorten_these_ways_too() -> None:
         made = asking(prediction=PredictionErrors({"operator": ((1.0, mean_m, 0.0),), "robot": ((1.0, 0.0, 0.0),)}))
         told.append(around(made, walls(0.1)).r2_m[0])
     assert told[0] - told[1] == pytest.approx(0.005, abs=2e-3)
+
+
+def test_who_explains_what_was_before_a_grip_changes_nothing() -> None:
+    """What counts of a map begins again once a thing is held; what people look at is older than the newest tick."""
+    until_s = []
+    for explains in (True, False):
+        law, before = asking(), situation(ball_pose(), post(0.05, 0.0), loop_age_s=LOOP_S)
+        sensed = law.sense(before, 0.0)
+        held = replace(before, held=0)
+        law.sense(held, 0.1)
+        if explains:
+            law.explain("r2", before, sensed)
+        # Shorter by less than what asks for another map.
+        law.sense(replace(held, loop_age_s=0.99 * LOOP_S), 0.2)
+        until_s.append(float(law.memory.state["until"][0]))
+    assert until_s[0] == until_s[1] == pytest.approx(FULL_S)
