@@ -10,8 +10,8 @@ from feelahead.lab.faults.session_bench import QUICK, Bench
 from robot_side.arm.port import ArmState
 from robot_side.arm.touching_down import carried_n
 from robot_side.parts import build_parts
-from tests.helpers.passed_on_arm import PassedOnArm
 from tests.helpers.repository import DATA
+from tests.robot_side.passed_on_arm import PassedOnArm
 
 SETTINGS = replace(QUICK, model=DATA / "place_held.xml", site="tool")
 

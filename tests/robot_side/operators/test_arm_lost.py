@@ -8,7 +8,7 @@ import pytest
 from feelahead.lab.faults.session_bench import QUICK, Bench
 from robot_side.arm.port import ArmState
 from robot_side.parts import build_parts
-from tests.helpers.passed_on_arm import PassedOnArm
+from tests.robot_side.passed_on_arm import PassedOnArm
 
 
 class SlowArm(PassedOnArm):
