@@ -198,7 +198,11 @@ def test_a_taken_over_routing_id_gives_another_key_neither_the_group_nor_its_ans
         [claimed] = [name for name, payload in heard if payload == b"as anna"]
         assert claimed != peer
         for number in range(20):
-            assert robot.send(peer, b"anna's %d" % number, everywhere=number % 2 == 0)
+            # On a busy machine her connections may be full for a moment.
+            for _ in range(ROUNDS):
+                if robot.send(peer, b"anna's %d" % number, everywhere=number % 2 == 0):
+                    break
+                robot.wait(1e-3)
             assert anna.wait(PATIENT_S)
             anna.receive()
         assert robot.send(claimed, b"ben's")
