@@ -68,7 +68,7 @@ class SimulationObserver:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SimulatedParts(RobotParts):
+class SceneParts(RobotParts):
     """Parts in front of a scene, and the scene: simulated, or followed where arm or objects are beside."""
 
     kinematics: MujocoKinematics
@@ -98,7 +98,7 @@ def build_parts(
     scene: Scene | None = None,
     announce: Callable[[str], None] | None = None,
     beside: Beside | None = None,
-) -> SimulatedParts:
+) -> SceneParts:
     """Make the parts; ConfigurationError for a model that cannot be used.
 
     scene: instead of loading the one that the settings name, so that the caller can look at it. announce: told once,
@@ -130,7 +130,7 @@ def build_parts(
         settings.motion,
         surroundings,
     )
-    return SimulatedParts(
+    return SceneParts(
         arm=arm,
         kinematics=kinematics,
         camera=seen_elsewhere or _camera(settings, scene, int(camera_noise)),

@@ -32,7 +32,7 @@ from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotParts, RobotSide
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.main import TICK_PERIOD_S
-from robot_side.parts import SimulatedParts, build_parts
+from robot_side.parts import SceneParts, build_parts
 from robot_side.settings import RobotSettings
 
 _WALL = MonotonicClock()
@@ -51,7 +51,7 @@ class LoopbackSettings:
     operator: OperatorSettings = field(default_factory=OperatorSettings)
 
 
-def robot_parts(settings: RobotSettings, scene: Scene | None = None) -> SimulatedParts:
+def robot_parts(settings: RobotSettings, scene: Scene | None = None) -> SceneParts:
     """Make the robot side's parts for a virtual clock, in this scene or the one that the settings name."""
     return build_parts(settings, 1, VIRTUAL_CLOCK, scene)
 
