@@ -98,8 +98,10 @@ def test_a_pose_that_is_refused_changes_nothing_that_was_seen() -> None:
 
 
 def test_what_an_object_is_is_worked_out_when_roles_or_the_held_object_change() -> None:
-    law = swept()
-    first = law.asked(R2, situation(ball_pose(), walls(0.1, 0.1))).classes
+    law, ticked = swept(), situation(ball_pose(), walls(0.1, 0.1))
+    law.sense(ticked, 0.0)
+    first = law.asked(R2, ticked).classes
+    law.sense(situation(ball_pose(), walls(0.2, 0.1)), 0.001)
     assert law.asked(R2, situation(ball_pose(), walls(0.2, 0.1))).classes is first
     held = law.asked(R2, situation(ball_pose(), walls(0.2, 0.1), held=1)).classes
     assert held.tolist() != first.tolist()
