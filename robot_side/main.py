@@ -53,11 +53,11 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
     open_sockets = partial(RobotSockets, settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys)
     status, loop = Status(settings.status, "robot"), Loop(TICK_PERIOD_S, HELPS, settings.seed)
     with Process(settings, "robot", status, RobotEncoder(), loop) as process:
-        # A port that is taken is said at once.
-        open_sockets().close()
         epoch, recording = secrets.randbits(53), process.recording
         beside = Beside(settings.arm, settings.objects, process.note, insecure=settings.insecure, keys=keys)
         process.stack.enter_context(beside)
+        # A port that is taken is said at once, by the ports just opened, too.
+        open_sockets().close()
         parts = build_parts(settings, epoch, clock_domain(), announce=process.note, beside=beside)
         recorder = [] if recording is None else [Recorder(recording.noted.append)]
         core = build(parts, [StageTiming(loop.stages), *recorder])

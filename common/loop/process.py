@@ -47,7 +47,6 @@ class Process:
         with ExitStack() as opened:
             opened.enter_context(self.status)
             self.recording = opened.enter_context(recording_to(self._settings.record, self._side, self._encoder))
-            self.status.also = None if self.recording is None else self.recording.note
             self.stack = opened.pop_all()
         return self
 
@@ -62,21 +61,28 @@ class Process:
         """Open the side's sockets, run it, and write the summary; return the exit code. Raises what ended the run."""
         stop = self.stack.enter_context(StopSignal())
         self._leaving.summary = None
+        if self.recording is not None:
+            self.status.also = self.recording.note
         raise_priority()
         for text in make_realtime() if self._settings.realtime else ():
             self.note(text)
-        # Last: no crowd at a port takes what is still to be opened.
-        side = open_side()
+        side: Summarized[Received] | None = None
         failure: Exception | None = None
         try:
+            # Last: no crowd at a port takes what is still to be opened.
+            side = open_side()
             self.loop.run(side, stop, self._settings.duration, self.note)
         except BrokenPipeError:
             ignore_broken_output()  # no failure: the reader of our output has left
         except Exception as error:
             failure = error
-        finally:
-            side.close()
-        summary = {**self.loop.summary(self._side), **side.summary()}
+        summary = self.loop.summary(self._side)
+        if side is not None:
+            try:
+                side.close()
+            except Exception as error:
+                failure = failure or error
+            summary |= side.summary()
         if self.recording is not None:
             summary["recording"] = self.recording.close()
         summary["errors"] = [] if failure is None else [str(failure)]

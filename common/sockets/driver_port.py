@@ -79,6 +79,17 @@ class DriverPort(SocketShell):
         self.dropped += not taken
         return taken
 
+    def refresh_keys(self) -> list[str]:
+        """Look at the allow-list before anybody else does; return a line for each unknown key that was refused."""
+        if self._keys is None or self._authenticator is None:
+            return []
+        self._keys.allowed.refresh()
+        folder = self._keys.allowed.folder
+        return [
+            f"refused an unknown key; to let it in: {folder.command(f'allow NAME {key}')}"
+            for key in self._authenticator.unknown_keys()
+        ]
+
     def wait(self, timeout_s: float) -> float:
         """Wait for a message, at most `timeout_s`; the time by our monotonic clock then."""
         self.wait_for(timeout_s, [self._inbox], self._authenticator)

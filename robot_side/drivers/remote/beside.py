@@ -75,6 +75,9 @@ class Beside:
                 if flag not in told:
                     told.add(flag)
                     self._note(f"waiting for {_AWAITED[flag]} at {self._ports[flag].endpoint}")
+                # Keys may be allowed meanwhile; nobody else looks at them yet.
+                for text in self._ports[flag].refresh_keys():
+                    self._note(text)
             self._ports[waiting[0]].wait(_TURN_S)
 
     def summary(self) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from msgspec import Meta, Struct
 
 from common.arrays import FloatArray
 from common.errors import OtherVersionError, RemoteProtocolError
-from common.limits import Finite
 
 DRIVER_VERSION: Final = 1
 STATE_LIMIT_BYTES: Final = 4096
@@ -16,6 +15,10 @@ MOST_JOINTS: Final = 64
 
 _Count = Annotated[int, Meta(ge=0, le=2**53)]
 _Duration = Annotated[float, Meta(ge=0.0, lt=1e6)]
+_Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
+"""s; beyond, a double no longer tells milliseconds apart"""
+_Opening = Annotated[float, Meta(ge=0.0, le=1.0)]
+"""m"""
 _Value = Annotated[float, Meta(ge=-1e6, le=1e6)]
 _Values = Annotated[tuple[_Value, ...], Meta(max_length=MOST_JOINTS)]
 Message = TypeVar("Message", bound=Struct)
@@ -27,20 +30,20 @@ class DriverState(Struct, frozen=True, forbid_unknown_fields=True):
     version: int
     sequence: _Count
     """Rises with every message of one connection"""
-    sent_s: Finite
-    measured_s: Finite
+    sent_s: _Stamp
+    measured_s: _Stamp
     """No later than `sent_s`"""
     joint_positions: _Values
     """(n,) in the model's order; rad, or m for a prismatic joint"""
     joint_velocities: _Values
     """(n,) in rad/s or m/s"""
-    echo_s: Finite | None = None
+    echo_s: _Stamp | None = None
     """`sent_s` of the newest command that it has read; None before the first"""
     held_s: _Duration = 0.0
     """How long ago it read that, at `sent_s`"""
     finger_positions: _Values | None = None
     """(f,) of the joints beyond the tool's, in the model's order"""
-    opening_m: _Duration | None = None
+    opening_m: _Opening | None = None
     holding: bool = False
     joint_loads: _Values | None = None
     """(n,) N m, or N: what it carries"""

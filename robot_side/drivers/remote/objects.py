@@ -58,7 +58,8 @@ class RemoteObjects:
 
     def exchange(self, now_s: float) -> bool:
         """Take the frames that have come; whether there has ever been one."""
-        for peer, payload, received_s in self._wire.receive():
+        newest = {peer: (payload, received_s) for peer, payload, received_s in self._wire.receive()}
+        for peer, (payload, received_s) in newest.items():
             self._receive(peer, payload, received_s)
         old = self._frame is not None and now_s - self._taken_s > OLD_S
         if old is not self._is_old:

@@ -100,3 +100,29 @@ def test_with_keys_only_who_is_allowed_gets_in_and_who_is_revoked_is_not_heard(t
             if port.revoked:
                 return
         pytest.fail("it is let in still")
+
+
+def test_a_key_that_is_allowed_while_the_robot_side_waits_gets_in(tmp_path: Path) -> None:
+    folder, (robot, secret), (public, ours) = KeyFolder(tmp_path), make_key_pair(), make_key_pair()
+    folder.write_pair("robot", robot, secret)
+    told: list[str] = []
+    with (
+        DriverPort(EPHEMERAL, "--arm", LIMIT_BYTES, keys=RobotKeys.load(tmp_path)) as port,
+        zmq.Context() as context,
+        context.socket(zmq.DEALER) as part,
+    ):
+        part.setsockopt(zmq.LINGER, 0)
+        OperatorKeys(ours, robot).secure(part)
+        part.connect(port.endpoint)
+        for _ in range(_ROUNDS):
+            port.wait(0.01)
+            if told := port.refresh_keys():
+                break
+        assert told == [f"refused an unknown key; to let it in: {folder.command(f'allow NAME {public}')}"]
+        folder.allow("driver", public)
+        assert port.refresh_keys() == []
+        # ZeroMQ gives up a connection that was refused.
+        part.disconnect(port.endpoint)
+        part.connect(port.endpoint)
+        part.send(b"state")
+        assert [payload for _, payload in heard(port)] == [b"state"]

@@ -24,8 +24,9 @@ from common.sockets.authentication import make_key_pair
 from common.sockets.keys import KeyFolder
 from feelahead.both_sides.processes import SideFailedError, SideProcess
 from feelahead.lab.hostile.raw_zmtp import RawConnection, port_of
+from operator_side.turns import OperatorTurns
 from robot_side.operators.safety import SafetySettings
-from robot_side.turns import KEYS_PERIOD_S
+from robot_side.turns import KEYS_PERIOD_S, RobotTurns
 from tests.helpers.python_process import LIMIT_S, ended, start
 
 pytestmark = pytest.mark.processes
@@ -209,20 +210,27 @@ def test_a_summary_on_a_full_disk_is_one_line_and_the_old_one_stays(tmp_path: Pa
 
 
 @pytest.mark.parametrize(
-    ("command", "arguments"),
-    [(operator_side.main.command, NOWHERE), (robot_side.main.command, ROBOT)],
+    ("command", "arguments", "side"),
+    [(operator_side.main.command, NOWHERE, OperatorTurns), (robot_side.main.command, ROBOT, RobotTurns)],
     ids=["operator", "robot"],
 )
+@pytest.mark.parametrize("fails_in", ["opening", "running", "closing"])
 def test_a_run_that_fails_in_whatever_way_has_its_summary(
-    command: Callable[[Sequence[str]], int], arguments: Sequence[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: Callable[[Sequence[str]], int],
+    arguments: Sequence[str],
+    side: type,
+    fails_in: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def fail(*_: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise RuntimeError("of no kind that was thought of")
 
-    monkeypatch.setattr(Loop, "run", fail)
+    part, method = {"opening": (side, "__init__"), "running": (Loop, "run"), "closing": (side, "close")}[fails_in]
+    monkeypatch.setattr(part, method, fail)
     path = tmp_path / "out.json"
     with pytest.raises(RuntimeError, match="of no kind"):
-        command([*arguments, f"--summary={path}", "--status=none"])
+        command([*arguments, f"--summary={path}", "--status=none", "--duration=0.1"])
     assert json.loads(path.read_text())["errors"] == ["of no kind that was thought of"]
 
 

@@ -129,6 +129,8 @@ def test_a_second_driver_is_refused_and_hears_why() -> None:
         ({"measured_s": 1e9}, "malformed", "measured_s"),
         ({"sent_s": 2000.0, "measured_s": 2000.0}, "clock", "clock jumped"),
         ({"extra": 1}, "malformed", "extra"),
+        ({"opening_m": 85.0}, "malformed", "opening_m"),
+        ({"sent_s": 1.7e308, "measured_s": -1.7e308}, "malformed", "s"),
     ],
 )
 def test_what_cannot_be_is_rejected_whole_counted_and_told_once(wrong: dict[str, Any], why: str, says: str) -> None:
