@@ -79,7 +79,7 @@ class OperatorTurns:
         timed = process.loop.stages.timed
         self._take, self._feel = timed("messages", self._take_in), timed("feeling", self._tell_controller)
         self.turn = timed("hands", self._move)
-        self.wait, self.next_due = sockets.wait, self._sending.next_due
+        self.wait, self.next_due, self.note = sockets.wait, self._sending.next_due, self._viewing.note
         self._guard_s = 0.0
 
     @property
@@ -108,12 +108,12 @@ class OperatorTurns:
         recording, status = self._process.recording, self._process.status
         if recording is not None:
             for text in recording.idle(now_s, lambda: self._core.status(now_s)):
-                self._viewing.note(text)
+                self.note(text)
         self._say_what_is_new()
         if self._guard is not None and now_s >= self._guard_s:
             self._guard_s = now_s + _GUARD_PERIOD_S
             for text in self._guard.take_notes():
-                self._viewing.note(text)
+                self.note(text)
         shows, tells = self._viewing.facts_due(now_s), status.due(now_s)
         if shows or tells:
             said = self._status(now_s)
@@ -167,7 +167,7 @@ class OperatorTurns:
 
     def _say_what_is_new(self) -> None:
         for text in self._connection.take_notes():
-            self._viewing.note(text)
+            self.note(text)
 
     def _status(self, now_s: float) -> OperatorStatus:
         """The core's status with what the process knows."""

@@ -62,6 +62,7 @@ class RobotTurns:
         )
         self._next_keys_s = self._clock.now()
         self.wait, self.receive, self.next_due = sockets.wait, sockets.receive, self._sending.next_due
+        self.note = process.note
 
     @property
     def resting(self) -> bool:

@@ -1,6 +1,6 @@
 """The loop of a side: turns at absolute deadlines, messages as they come, all that may wait after they have left."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, Final, Protocol, TypeVar
 
 from common.clock import Clock, MonotonicClock, ThreadClock
@@ -11,7 +11,7 @@ from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.stages import Stages
 
 Received = TypeVar("Received")
-WAITING: Final = "sockets"
+SOCKETS: Final = "sockets"
 """The stage of receiving and sending."""
 
 
@@ -21,6 +21,9 @@ class Side(Protocol[Received]):
     @property
     def resting(self) -> bool:
         """Nothing moves: there is time to collect garbage."""
+
+    def note(self, text: str) -> None:
+        """Tell one line to all people who look at this side."""
 
     def receive(self) -> Received:
         """Return what has arrived."""
@@ -58,11 +61,9 @@ class Loop:
         self._keeping_up = KeepingUp(self.pacer, self.stages, self.clock, self.computed, helps)
         self._collection = IdleCollection(self.clock)
 
-    def run(
-        self, side: Side[Received], stop: StopSignal, duration_s: float | None, note: Callable[[str], None]
-    ) -> None:
-        """Go on until `stop`, or for `duration_s`. note: told once, in words, when the period cannot be kept."""
-        receive, send = self.stages.timed(WAITING, side.receive), self.stages.timed(WAITING, side.send)
+    def run(self, side: Side[Received], stop: StopSignal, duration_s: float | None) -> None:
+        """Go on until `stop`, or for `duration_s`; say once, in words, when the period cannot be kept."""
+        receive, send = self.stages.timed(SOCKETS, side.receive), self.stages.timed(SOCKETS, side.send)
         pacer, clock = self.pacer, self.clock
         with self._collection:
             self.start_s = clock.now()
@@ -85,7 +86,7 @@ class Loop:
                     side.rest(rest_s, now_s)
                     self._collection.idle(rest_s, resting=side.resting)
                 if (said := self._keeping_up.end(turned=turned)) is not None:
-                    note(said)
+                    side.note(said)
                 wait_for_turn(pacer, clock, side.wait, side.next_due())
 
     def summary(self, side: str) -> dict[str, Any]:

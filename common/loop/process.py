@@ -1,8 +1,8 @@
 """The process of a side, from its settings to its exit code.
 
-Order of a start: settings, files and keys are checked; everything is built and compiled; then the sockets open, and the
-loop runs. Until then a stop signal ends the process at once, with code 0. Each run writes its summary, one that failed
-or never began, too.
+Order of a start: settings, files and keys are checked; everything is built and compiled; then ports are bound, and the
+loop runs. Until then a stop signal ends the process at once, with code 0 and the summary of a run that never began.
+A run that failed has its summary, too; a start that is refused has none.
 """
 
 from collections.abc import Callable, Mapping
@@ -58,7 +58,7 @@ class Process:
         self.status.note(text)
 
     def run(self, open_side: Callable[[], Summarized[Received]]) -> int:
-        """Open the side's sockets, run it, and write the summary; return the exit code. Raises what ended the run."""
+        """Make the side, run it, and write the summary; return the exit code. Raises what ended the run."""
         stop = self.stack.enter_context(StopSignal())
         self._leaving.summary = None
         if self.recording is not None:
@@ -71,7 +71,7 @@ class Process:
         try:
             # Last: no crowd at a port takes what is still to be opened.
             side = open_side()
-            self.loop.run(side, stop, self._settings.duration, self.note)
+            self.loop.run(side, stop, self._settings.duration)
         except BrokenPipeError:
             ignore_broken_output()  # no failure: the reader of our output has left
         except Exception as error:

@@ -17,7 +17,10 @@ class Steps:
 
     def __init__(self, clock: VirtualClock) -> None:
         self.clock, self.done = clock, list[tuple[str, float]]()
-        self._looks = 0
+        self._looks, self.told = 0, list[str]()
+
+    def note(self, text: str) -> None:
+        self.told.append(text)
 
     def receive(self) -> str:
         self._looks += 1
@@ -51,10 +54,9 @@ def side() -> Steps:
     clock = VirtualClock()
     side = Steps(clock)
     loop = Loop(PERIOD_S, {"sockets": "", "": ""}, 0, clock)
-    told: list[str] = []
-    loop.run(side, StopSignal(), STOPPED_S + 10 * PERIOD_S, told.append)
-    assert len(told) == 1
-    assert "turns are left out" in told[0]
+    loop.run(side, StopSignal(), STOPPED_S + 10 * PERIOD_S)
+    assert len(side.told) == 1
+    assert "turns are left out" in side.told[0]
     assert loop.summary("robot")["pacing"]["robot"]["overruns"] == pytest.approx(STOPPED_S / PERIOD_S, rel=1e-3)
     return side
 
