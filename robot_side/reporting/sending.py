@@ -5,6 +5,7 @@ from typing import Any, Final, NamedTuple, Protocol
 
 from common.emulation.delay_line import BitFlip, DelayLine, link_summary
 from common.emulation.spec import LinkSpec, Stream
+from common.emulation.tuned import tuned_link
 from common.rate.budget import Budget
 from common.rate.outgoing_queue import OutgoingQueue
 from common.rate.pieces import PIECE
@@ -41,7 +42,7 @@ class Sending:
     def __init__(self, link: LinkSpec, sockets: Sockets, first_number: int) -> None:
         """first_number: of what leaves in pieces; another one in each run."""
         self.budget: Budget[OutgoingStream] = Budget(_PACED, first_number)
-        self._sockets = sockets
+        self._link, self._sockets = link, sockets
         self._lines: dict[Stream, DelayLine[_Leaving]] = {
             stream: DelayLine(link.profile("to_operator", stream), corrupt=_corrupted) for stream in SENT_STREAMS
         }
@@ -74,10 +75,11 @@ class Sending:
     def _enter(self, message: Outgoing, topic: bytes, now_s: float) -> None:
         self._lines[message.stream].push(now_s, _Leaving(message, topic), len(message.payload))
 
-    def change(self, link: LinkSpec) -> None:
-        """From now on do to messages what `link` says."""
+    def tune(self, words: str) -> None:
+        """Do to messages what `words` say, from now on."""
+        self._link = tuned_link(self._link, words)
         for stream, line in self._lines.items():
-            line.change(link.profile("to_operator", stream))
+            line.change(self._link.profile("to_operator", stream))
 
     def next_due(self) -> float | None:
         """When the next message is due in the emulated link; None while nothing waits there."""

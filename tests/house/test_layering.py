@@ -81,8 +81,9 @@ ARROWS = """
         robot_side/drivers/mujoco robot_side/drivers/remote robot_side/enlargement robot_side/gripper robot_side/laws
         robot_side/laws/named.py robot_side/operators robot_side/outcome robot_side/settings.py robot_side/surroundings
     robot_side: common common/command common/emulation common/loop common/protocol common/realtime common/sockets
-        common/status robot_side/compiled robot_side/core.py robot_side/drivers/remote robot_side/events.py
-        robot_side/parts.py robot_side/recording robot_side/reporting robot_side/settings.py robot_side/viewing
+        common/status robot_side/arm robot_side/compiled robot_side/core.py robot_side/drivers/remote
+        robot_side/events.py robot_side/parts.py robot_side/recording robot_side/reporting robot_side/settings.py
+        robot_side/viewing
 
     operator_side/controller: common common/status
     operator_side/dualsense/effects: operator_side/controller

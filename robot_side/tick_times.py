@@ -1,0 +1,63 @@
+"""The time that ticks take, and whether the arm keeps up with real time."""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final
+
+from common.command.live_view import SLOW
+from common.loop.loop import Loop
+from common.realtime.stages import microseconds
+from common.statistics import RunningStatistics
+from robot_side.arm.port import Arm
+
+_LATEST: Final = 1000
+
+
+class TickTimes:
+    """Measures each tick; `paced` tells of those since it was last called."""
+
+    def __init__(self, loop: Loop, arm: Arm, note: Callable[[str], None], seed: int) -> None:
+        """note: hears once that the arm does not keep up."""
+        self._loop, self._arm, self._note = loop, arm, note
+        self._wall, self._processor = RunningStatistics(seed), RunningStatistics(seed)
+        self._latest_s: deque[float] = deque(maxlen=_LATEST)
+        self._told_slow = False
+
+    def begin(self) -> tuple[float, float]:
+        """Return both clocks, for `end`."""
+        return self._loop.clock.now(), self._loop.computed.now()
+
+    def end(self, began: tuple[float, float]) -> float:
+        """Count a tick; return its wall time in seconds."""
+        self._processor.add(self._loop.computed.now() - began[1])
+        took_s = self._loop.clock.now() - began[0]
+        self._wall.add(took_s)
+        self._latest_s.append(took_s)
+        return took_s
+
+    def paced(self) -> dict[str, float | int]:
+        """Return the status's figures of the ticks since the last call."""
+        share = self._arm.take_share_of_real_time()
+        if max(share, self._arm.share_of_real_time) < SLOW and not self._told_slow:
+            self._told_slow = True
+            self._note(
+                f"the simulation runs at {100.0 * share:.0f} % of real time: fewer free bodies, a longer timestep or"
+                ' <flag sleep="enable"/> in the model would help'
+            )
+        latest_s = sorted(self._latest_s) or [0.0]
+        self._latest_s.clear()
+        return {
+            "tick_us": 1e6 * latest_s[len(latest_s) // 2],
+            "tick_p99_us": 1e6 * latest_s[len(latest_s) * 99 // 100],
+            "overruns": self._loop.pacer.overruns,
+            "late_us": 1e6 * self._loop.pacer.take_latest_s(),
+            "real_time": share,
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """Return the figures of the run."""
+        return {
+            "tick_us": microseconds(self._wall),
+            "tick_cpu_us": microseconds(self._processor),
+            "simulation": {"share_of_real_time": self._arm.share_of_real_time},
+        }
