@@ -3,9 +3,11 @@
 The state machine beside this file holds what needs no arm: who commands, which commands count, and stops.
 """
 
+import math
 from collections import deque
 from collections.abc import Callable
 
+import msgpack
 import numpy as np
 import pytest
 
@@ -140,3 +142,24 @@ def test_the_arm_bears_it_and_without_the_guard_it_does_not(
     disable(monkeypatch)
     with pytest.raises((AssertionError, StopIteration)):
         fault()
+
+
+def test_a_spoilt_command_of_the_owner_is_rejected_whole_and_counted() -> None:
+    bench, operator = cruising()
+    last = bench.robot.session.safety.command
+    spoilt = [
+        (2, math.nan),
+        (3, math.inf),
+        (3, 1.01),
+        (4, [0.0, math.nan]),
+        (5, [0.0]),
+        (7, 1),
+        (12, -1),
+        (13, "nobody"),
+    ]
+    for place, value in spoilt:
+        version, content = msgpack.unpackb(operator.command(bench.now_s, r2=1.0))
+        content[place] = value
+        bench.robot.receive(operator.peer, msgpack.packb([version, content]), bench.now_s)
+        assert bench.robot.session.safety.command is last
+    assert bench.robot.session.rejected == len(spoilt)
