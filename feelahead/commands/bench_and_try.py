@@ -78,7 +78,6 @@ bench = Menu(
         "coverage": "robot,operator,experiments",
         "felt": "robot,operator,experiments",
         "link": "robot,operator",
-        "pictures": "robot,operator,video",
         "tick": "robot,operator",
     },
 )
@@ -89,6 +88,5 @@ try_out = Menu(
         "demo": "robot,operator",
         "haptics": "robot,operator",
         "latency": "robot,operator,experiments",
-        "hostile": "robot,operator",
     },
 )

@@ -10,12 +10,11 @@ import numpy as np
 
 from common.arrays import FloatArray
 from feelahead.lab.figures import figure
+from feelahead.lab.propagation import PosedGripper
 from feelahead.lab.table import Row, Table
-from robot_side.arm.port import ArmState, GripperPose
 from robot_side.drivers.mujoco.gripper_cover import cover_gripper, link_solids, placed_corners
 from robot_side.drivers.mujoco.gripper_measurement import open_gap
-from robot_side.drivers.mujoco.kinematics import MujocoKinematics
-from robot_side.drivers.mujoco.scene import Scene, load_scene
+from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.gripper.solids import Solid
 from robot_side.overlap.meshes.mesh import Mesh
 from robot_side.overlap.meshes.mesh_library import MeshLibrary, nearest_mesh_pairs
@@ -113,12 +112,6 @@ def _pieces(points: FloatArray) -> list[FloatArray]:
     return [points[first : first + _AT_A_TIME] for first in range(0, len(points), _AT_A_TIME)]
 
 
-def home_pose(scene: Scene) -> GripperPose:
-    """Measure the gripper's pose where the scene starts."""
-    joints, fingers = scene.data.qpos[scene.robot.arm_positions], scene.data.qpos[scene.robot.finger_positions]
-    return MujocoKinematics(scene).pose(ArmState(0.0, joints, np.zeros_like(joints), fingers, 0.0, False))
-
-
 def draw_cover(table: Table, path: Path) -> None:
     """Draw each gripper's geoms in black on its spheres, from the front and from the side, the approach upwards."""
     from matplotlib.collections import EllipseCollection, PolyCollection  # noqa: PLC0415  # slow to load
@@ -127,7 +120,8 @@ def draw_cover(table: Table, path: Path) -> None:
     with figure(path, 2, len(grippers), figsize=(3.2 * len(grippers), 6.4), squeeze=False) as (_, axes):
         for column, ((name, model, site), _rows) in enumerate(grippers):
             scene = load_scene(None if model is None else Path(model), site)
-            pose = home_pose(scene)
+            gripper = PosedGripper(scene)
+            pose = gripper.at(gripper.home_rad)
             centers = 1e3 * (pose.sphere_centers_m - pose.tool_position_m) @ pose.tool_rotation
             corners = placed_corners(scene.model, scene.data, scene.robot.gripper_geoms) - pose.tool_position_m
             corners, sizes = 1e3 * corners @ pose.tool_rotation, 2e3 * pose.sphere_radii_m

@@ -8,7 +8,7 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Header, MotionCommand, StiffnessUpdate
 from common.silence import KEEP_ALIVE_S
 from common.timing.clock_offset import MAX_SKEW
-from feelahead.lab.link.clocks import Estimate, Scenario, Traffic, Way
+from tests.common.link_traffic import Estimate, Scenario, Traffic, Way
 from tests.helpers.felt import felt
 
 CLOCK = "one clock"
@@ -134,7 +134,7 @@ def last_estimates(traffic: Traffic) -> dict[str, Estimate]:
 @pytest.mark.parametrize(("to_robot", "to_operator"), [(QUEUES, QUEUES), (QUEUES, Way("exponential", 0.050, 0.001))])
 @pytest.mark.parametrize("skew", [20e-6, -100e-6])
 def test_both_ends_know_the_offset_after_five_seconds_of_queues(to_robot: Way, to_operator: Way, skew: float) -> None:
-    traffic = Traffic(Scenario("", to_robot, to_operator, skew), seed=1, duration_s=5.0)
+    traffic = Traffic(Scenario(to_robot, to_operator, skew), seed=1, duration_s=5.0)
     for estimate in last_estimates(traffic).values():
         assert estimate.offset_error_s is not None
         assert estimate.one_way_error_s is not None
@@ -145,7 +145,7 @@ def test_both_ends_know_the_offset_after_five_seconds_of_queues(to_robot: Way, t
 
 def test_reordering_does_not_pull_the_mean() -> None:
     # Echoes of the newest stamps alone would be 10 ms off here: at 1 kHz the newest to have arrived is an early one.
-    traffic = Traffic(Scenario("", JITTER, JITTER, 20e-6), seed=1, duration_s=10.0)
+    traffic = Traffic(Scenario(JITTER, JITTER, 20e-6), seed=1, duration_s=10.0)
     for estimate in last_estimates(traffic).values():
         assert estimate.offset_error_s is not None
         assert abs(estimate.offset_error_s) < 0.6e-3
@@ -156,7 +156,7 @@ def test_reordering_does_not_pull_the_mean() -> None:
 def test_an_asymmetry_that_both_ends_are_told_costs_nothing() -> None:
     nearer = Way("exponential", 0.030, 0.010)
     for told_s, expected_s in ((0.0, 0.010), (0.020, 0.0)):
-        traffic = Traffic(Scenario("", QUEUES, nearer, 20e-6, told_s), seed=2, duration_s=3.0)
+        traffic = Traffic(Scenario(QUEUES, nearer, 20e-6, told_s), seed=2, duration_s=3.0)
         for estimate in last_estimates(traffic).values():
             assert estimate.offset_error_s is not None
             assert abs(estimate.offset_error_s) == pytest.approx(expected_s, abs=0.3e-3)
@@ -176,7 +176,7 @@ ways = st.builds(
 def test_the_bound_holds_on_every_arrival_whatever_the_link(
     to_robot: Way, to_operator: Way, skew: float, asymmetry_s: float, seed: int
 ) -> None:
-    traffic = Traffic(Scenario("", to_robot, to_operator, skew, asymmetry_s), seed, duration_s=1.0)
+    traffic = Traffic(Scenario(to_robot, to_operator, skew, asymmetry_s), seed, duration_s=1.0)
     for estimate in traffic:
         if estimate.offset_error_s is not None:
             assert estimate.bound_s is not None

@@ -86,7 +86,6 @@ def complaint(command: str) -> str:
         ("feelahead bench error --workers 2", "--workers 2: bench error measures time", "valid"),
         ("feelahead bench link --link 'delay 5'", "'5'", "50ms"),
         ("feelahead bench link --rate 0", "0", "1 to 100000"),
-        ("feelahead bench link --virtual --estimates", "--estimates", "one of them"),
         ("feelahead bench link --against x.csv", "--against", "--virtual"),
         ("feelahead bench link --virtual --against nowhere.csv", "nowhere.csv", "delay_ns"),
         ("feelahead bench link --workers 2", "--workers 2", "--workers 1"),

@@ -9,7 +9,6 @@ from tests.helpers.repository import ROOT
 
 REGISTRIES = {
     ("robot_side/compiled/kernel.py", "_kernels"),  # filled while modules are imported
-    ("feelahead/lab/faults/fault.py", "FAULTS"),
 }
 PACKAGES = ("common", "robot_side", "operator_side", "feelahead")
 CHANGES = {

@@ -145,7 +145,7 @@ LIBRARIES = {
     "mujoco": ("robot_side/drivers/mujoco", "robot_side/viewing"),
     "numba": ("robot_side/compiled",),
     "llvmlite": ("robot_side/compiled",),
-    "av": ("common/video", "robot_side/viewing", "feelahead/lab/questions/pictures.py"),
+    "av": ("common/video", "robot_side/viewing"),
     "foxglove": ("common/recording",),
     "mcap": ("common/recording",),
     # A wall clock that jumps by an hour must not be there to trip over; a recording's stamps are that clock's.

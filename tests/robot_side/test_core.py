@@ -10,7 +10,6 @@ from common.protocol.messages import Header
 from common.roles import Role
 from common.silence import KEEP_ALIVE_S
 from common.status.codes import LinkState
-from feelahead.lab.faults.session_bench import QUICK, TICK_S, Bench, Operator
 from robot_side.core import RobotSide
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.events import Listener, Tick
@@ -18,6 +17,7 @@ from robot_side.gripper.held_object import grip
 from robot_side.laws.law import Situation
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
+from tests.robot_side.session_bench import QUICK, TICK_S, Bench, Operator
 
 
 def test_an_armed_robot_moves_as_asked_and_stops_when_commands_stop(bench: Bench) -> None:

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feelahead.lab.faults.session_bench import QUICK, Bench
 from robot_side.arm.port import ArmState
 from robot_side.arm.touching_down import carried_n
 from robot_side.parts import build_parts
 from tests.helpers.repository import DATA
 from tests.robot_side.passed_on_arm import PassedOnArm
+from tests.robot_side.session_bench import QUICK, Bench
 
 SETTINGS = replace(QUICK, model=DATA / "place_held.xml", site="tool")
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from common.arrays import FloatArray
 from common.emulation.clauses import LinkModel
@@ -13,8 +14,9 @@ from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_part
 from feelahead.lab.approaches.arming import wait_for_pull
 from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
 from feelahead.lab.approaches.outcome import SAMPLE_S, End, Outcome, Samples, reversals, stands
-from feelahead.lab.approaches.spoilt import Spoil, controller
-from operator_side.controller.feel import MAX_STRENGTH
+from operator_side.controller.feel import MAX_STRENGTH, ZONE_COUNT, Feel
+from operator_side.controller.state import ControllerState
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.people.pulling_hands import Pull, PullingHands, constant_force
 from operator_side.settings import OperatorSettings
 from robot_side.compiled.warm_up import import_kernels, warm_up
@@ -22,6 +24,23 @@ from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.drivers.mujoco.true_contact import ContactOnset, TrueContact
 from robot_side.events import Listener
 from robot_side.settings import Assist, CameraSettings, RobotSettings
+
+_FULL: Final = Feel(l2=(MAX_STRENGTH,) * ZONE_COUNT, r2=(MAX_STRENGTH,) * ZONE_COUNT)
+
+
+class FullDualSense(SimulatedDualSense):
+    """A controller that always resists with full strength."""
+
+    def write(self, feel: Feel, now_s: float) -> None:
+        """Do something else than it is told."""
+        del feel
+        super().write(_FULL, now_s)
+
+    def read(self, now_s: float) -> ControllerState | None:
+        """Read the state; it resists from the first time on."""
+        if self.released:
+            super().write(_FULL, now_s)
+        return super().read(now_s)
 
 
 @dataclass(frozen=True)
@@ -41,7 +60,6 @@ class Approach:
     """From the beginning of the pull."""
     seed: int = 0
     grip: bool = False
-    spoil: Spoil = "nothing"
     stick: Vector2 = (0.0, 0.0)
     """The left stick, as it counts: across."""
     turn: Vector2 = (0.0, 0.0)
@@ -73,7 +91,8 @@ class PullRun(Listener):
         )
         scene = load_scene(robot.model, robot.site, robot.roles)
         self.truth = TrueContact(scene)
-        device = controller(approach.strongest_n / MAX_STRENGTH, "full" if approach.law == "full" else approach.spoil)
+        kind = FullDualSense if approach.law == "full" else SimulatedDualSense
+        device = kind(strength_step_n=approach.strongest_n / MAX_STRENGTH)
         self.hands = PullingHands(
             device, pull or constant_force(approach.force_n, approach.stick, approach.turn), grip=approach.grip
         )

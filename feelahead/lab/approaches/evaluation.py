@@ -17,13 +17,12 @@ from common.arrays import FloatArray
 from common.reaction import REACTION_S
 from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.frozen import PASSED, SITE, frozen_scene
-from feelahead.lab.approaches.judging import false_alarms, lateness_s, stood
+from feelahead.lab.approaches.judging import false_alarms, stood
 from feelahead.lab.approaches.laws import Law
 from feelahead.lab.approaches.meeting import Collision, first_touch_s, place
 from feelahead.lab.approaches.pulls import PullKind
 from feelahead.lab.approaches.recording import record_approach
 from feelahead.lab.approaches.replay import Replay
-from feelahead.lab.approaches.spoilt import Spoil
 from feelahead.lab.table import Row
 from operator_side.controller.feel import MAX_STRENGTH
 from robot_side.drivers.mujoco.camera import CameraError
@@ -83,9 +82,6 @@ class Pulls:
     """Number of approaches, and of places of the objects for each."""
     probabilities: tuple[float, ...]
     laws: tuple[Law, ...]
-    spoil: Spoil = "nothing"
-    full_rate: bool = True
-    """Of the stiffness, as record_approach's."""
     judged_s: float = 60.0
     """Time in which R2 is pulled, of each cell, that is judged for false alarms at least."""
 
@@ -98,8 +94,6 @@ class _Counts:
     draws: list[int] = field(default_factory=list)
     reported: int = 0
     reported_hits: int = 0
-    strength: int = 0
-    late_s: list[float] = field(default_factory=list)
     alarms: int = 0
     alarm_s: float = 0.0
     judged_s: float = 0.0
@@ -140,9 +134,7 @@ def evaluate(pulls: Pulls, seed: int) -> Iterator[Row]:
     """Make a row for each cell, law and P; the same seed gives the same rows."""
     approaches, places = pulls.sizes
     records = [
-        record_approach(
-            pulls.pull, LINKS[pulls.link], seed_of(seed, number), scene_name=pulls.home, full_rate=pulls.full_rate
-        )
+        record_approach(pulls.pull, LINKS[pulls.link], seed_of(seed, number), scene_name=pulls.home)
         for number in range(approaches)
     ]
     for cell in pulls.cells:
@@ -151,7 +143,7 @@ def evaluate(pulls: Pulls, seed: int) -> Iterator[Row]:
         staged = [_stage(cell, Replay(record, scene, encoder, record.seed), places) for record in records]
         for probability in pulls.probabilities:
             for name in pulls.laws:
-                counts, law = _Counts(), Judged(name, probability, pulls.spoil)
+                counts, law = _Counts(), Judged(name, probability)
                 _count_covered(counts, law, cell, staged)
                 _count_alarms(counts, law, cell, staged, pulls.judged_s)
                 row: Row = {"cell": cell.key(pulls.pull, pulls.link), "scene": cell.shown}
@@ -189,16 +181,11 @@ def _count_covered(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[
         for number in range(each):
             collision, last_release_s = one.knowable[number % len(one.knowable)]
             draw = one.draw(collision.shift_m, cell, number)
-            strength = stood(law, draw, last_release_s)
-            covered = strength == MAX_STRENGTH
+            covered = stood(law, draw, last_release_s) == MAX_STRENGTH
             hits += covered
             if one.replay.knows_aside(last_release_s - REACTION_S):
                 counts.reported += 1
                 counts.reported_hits += covered
-            counts.strength += strength
-            if number < len(one.knowable):
-                late_s = 0.0 if covered else lateness_s(law, draw, last_release_s, collision.touch_s)
-                counts.late_s.append(late_s)
         counts.hits.append(hits)
         counts.draws.append(each)
 
@@ -251,16 +238,13 @@ def interval(hits: Sequence[int], draws: Sequence[int]) -> tuple[float, float]:
 def _figures(counts: _Counts, staged: Sequence[_Staged], probability: float) -> Row:
     """Turn counts into figures; None for a coverage where nothing collides, or no release avoids it.
 
-    holds: the interval's lower end is at least P - 0.1 (1 - P), over 10 approaches or more. late_ms: the median over
-    the places in which full strength stands before the touch; never: the share of the others. reported: draws in which
+    holds: the interval's lower end is at least P - 0.1 (1 - P), over 10 approaches or more. reported: draws in which
     the operator side has a report of the drift or turn, if any, 0.25 s before the last moment; reported_coverage is of
-    these alone. mean_strength: in the zone that the finger reaches, at that time. Places without draws: unavoidable, as
-    no release avoids the contact, and unknowable, as the sticks are moved after that. alarm_share: of the time in
-    which R2 was pulled, judged_s.
+    these alone. Places without draws: unavoidable, as no release avoids the contact, and unknowable, as the sticks are
+    moved after that. alarm_share: of the time in which R2 was pulled, judged_s.
     """
     draws, covered = sum(counts.draws), len(counts.hits) > 0
     low, high = interval(counts.hits, counts.draws) if covered else (None, None)
-    came = [late_s for late_s in counts.late_s if late_s < math.inf]
     enough = len(counts.hits) >= _LEAST_APPROACHES
     return {
         "coverage": sum(counts.hits) / draws if covered else None,
@@ -269,11 +253,8 @@ def _figures(counts: _Counts, staged: Sequence[_Staged], probability: float) -> 
         "draws": draws,
         "approaches": len(counts.hits),
         "holds": None if low is None else enough and low >= probability - 0.1 * (1.0 - probability),
-        "late_ms": 1e3 * float(np.median(came)) if came else None,
-        "never": 1.0 - len(came) / len(counts.late_s) if counts.late_s else None,
         "reported": counts.reported,
         "reported_coverage": counts.reported_hits / counts.reported if counts.reported else None,
-        "mean_strength": counts.strength / draws if draws else None,
         "places": sum(len(one.collisions) for one in staged),
         "not_found": sum(one.sought - len(one.collisions) for one in staged),
         "unavoidable": sum(len(one.collisions) - len(one.avoidable) for one in staged),

@@ -12,7 +12,6 @@ from common.protocol.around import PERIOD_S
 from common.protocol.messages import Header, StiffnessUpdate
 from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
 from feelahead.lab.approaches.replay import Replay
-from feelahead.lab.approaches.spoilt import SPOILING_DELAY_S, Spoil
 from operator_side.controller.feel import MAX_STRENGTH, SENSED_TRAVEL, ZONE_COUNT
 from operator_side.feel.commands_under_way import Displacement, Report
 from operator_side.feel.path_ahead import Aside
@@ -77,7 +76,6 @@ class Judged:
 
     law: Law
     probability: float
-    spoil: Spoil = "nothing"
 
     def felt(self, draw: Draw, times_s: FloatArray) -> IntArray:
         """Compute strengths (t, 2, 10), 0 to 8, of L2's and R2's zones at rising times (t,) of the operator side."""
@@ -87,8 +85,7 @@ class Judged:
             return strengths
         record = draw.replay.record
         law, rendering = self._law(draw), TriggerRendering(RenderingSettings(), TravelCalibration())
-        for number, time_s in enumerate(times_s):
-            felt_s = float(time_s) - (SPOILING_DELAY_S if self.spoil == "delayed" else 0.0)
+        for number, felt_s in enumerate(times_s.tolist()):
             tick = record.tick_row(felt_s)
             sent_s = record.seen_sent_s[tick]
             if np.isnan(sent_s) or sent_s < record.pose_time_s[0]:
@@ -103,7 +100,7 @@ class Judged:
             shown = rendering.render(message, (pulled[0], pulled[1]), known, felt_s, aside)
             for trigger, zones in enumerate((shown.l2, shown.r2)):
                 strengths[number, trigger] = zones or 0
-        return strengths[:, ::-1] if self.spoil == "swapped" else strengths
+        return strengths
 
     def _look_around(self, law: SweptLaw, draw: Draw, now_s: float) -> None:
         """Look from around, where that is older than it ever gets, as long ago as it is on average."""

@@ -1,4 +1,4 @@
-"""Criteria of coverage: full strength in time, its lateness, and false alarms."""
+"""Criteria of coverage: full strength in time, and false alarms."""
 
 import math
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ from common.reaction import REACTION_S
 from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.meeting import shifted
 from feelahead.lab.approaches.stopping_path import stopping_path
-from operator_side.controller.feel import MAX_STRENGTH, SENSED_TRAVEL, ZONE_COUNT
+from operator_side.controller.feel import SENSED_TRAVEL, ZONE_COUNT
 from operator_side.dualsense.simulated.trigger_model import zone_of
 from operator_side.hands.travel_calibration import TriggerTravel
 from robot_side.arm.tool_motion import ToolMotionSettings
@@ -23,7 +23,6 @@ ALARM_STRENGTH: Final = 4
 CLEAR_M: Final = 0.015
 """The clearance beyond D_σ from which on strength is a false alarm."""
 ALARM_STEP_S: Final = 0.02
-_LATE_STEP_S: Final = 0.01
 _R2 = 1
 _TRAVEL = TriggerTravel()
 
@@ -37,19 +36,6 @@ def stood(law: Judged, draw: Draw, last_release_s: float) -> int:
     record = draw.replay.record
     reached = record.travel[record.tick_row(at_s) : record.tick_row(last_release_s) + 1, _R2].max()
     return int(law.felt(draw, np.array([at_s]))[0, _R2, zone_of(float(reached))])
-
-
-def lateness_s(law: Judged, draw: Draw, last_release_s: float, touch_s: float) -> float:
-    """Measure how late full strength first stands in the zone under the finger; infinite for never.
-
-    Every 10 ms is looked at, from 0.25 s before the last moment to let go until the touch.
-    """
-    due_s = last_release_s - REACTION_S
-    times = np.arange(due_s, touch_s, _LATE_STEP_S)
-    record = draw.replay.record
-    zones = [zone_of(float(record.travel[record.tick_row(time_s), _R2])) for time_s in times]
-    full = law.felt(draw, times)[np.arange(len(times)), _R2, zones] == MAX_STRENGTH
-    return float(times[int(np.argmax(full))] - due_s) if full.any() else math.inf
 
 
 def zone_speed_m_s(zone: int) -> float:

@@ -10,7 +10,6 @@ from feelahead.lab.approaches.evaluation import LINKS
 from feelahead.lab.approaches.frozen import frozen_scene
 from feelahead.lab.approaches.laws import Law
 from feelahead.lab.approaches.pulls import make_pull
-from feelahead.lab.approaches.spoilt import Spoil
 from feelahead.lab.table import Row
 
 RACED: Final = ("empty", "cluttered")
@@ -21,7 +20,7 @@ _LINK: Final = "200 ms"
 _PROBABILITY: Final = 0.99
 
 
-def race(scene: str, law: Law, seeds: Sequence[int], spoil: Spoil = "nothing") -> Row:
+def race(scene: str, law: Law, seeds: Sequence[int]) -> Row:
     """Compare the time to a goal with that without haptics, for the same hands and seeds.
 
     The ratio is the median over the seeds, half of them with bells and half with steady pulls; None where most never
@@ -29,7 +28,7 @@ def race(scene: str, law: Law, seeds: Sequence[int], spoil: Spoil = "nothing") -
     """
     ratios = []
     for seed in seeds:
-        free_s, felt_s = _time_s(scene, "none", seed, "nothing"), _time_s(scene, law, seed, spoil)
+        free_s, felt_s = _time_s(scene, "none", seed), _time_s(scene, law, seed)
         if free_s is not None:
             ratios.append(felt_s / free_s if felt_s is not None else float("inf"))
     arrived, middle = sum(ratio < float("inf") for ratio in ratios), median(ratios) if ratios else float("inf")
@@ -38,7 +37,7 @@ def race(scene: str, law: Law, seeds: Sequence[int], spoil: Spoil = "nothing") -
 
 
 @cache
-def _time_s(scene: str, law: Law, seed: int, spoil: Spoil) -> float | None:
+def _time_s(scene: str, law: Law, seed: int) -> float | None:
     """Bring the tool to the goal; None where it touches or is late."""
     approach = Approach(
         model=frozen_scene(scene),
@@ -48,7 +47,6 @@ def _time_s(scene: str, law: Law, seed: int, spoil: Spoil) -> float | None:
         probability=_PROBABILITY,
         duration_s=_LIMIT_S,
         seed=seed,
-        spoil=spoil,
     )
     run = PullRun(approach, make_pull("bell" if seed % 2 else "steady", seed))
     began_s = run.arm()

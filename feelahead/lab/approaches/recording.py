@@ -88,15 +88,12 @@ def record_approach(
     seed: int,
     duration_s: float = 4.0,
     scene_name: str = "empty",
-    *,
-    full_rate: bool = True,
 ) -> RecordedApproach:
     """Record the pull of this kind and seed from the home pose of a frozen scene, whose objects let it through.
 
-    full_rate: of the stiffness. Without it as little leaves as in the free: near things it is more.
     FeelaheadError where the robot is not armed in time, or its arm is stopped on the way.
     """
-    robot = RobotSettings(model=frozen_scene(scene_name), site=SITE, link=link, seed=seed, full_rate=full_rate)
+    robot = RobotSettings(model=frozen_scene(scene_name), site=SITE, link=link, seed=seed, full_rate=True)
     operator = OperatorSettings(link=link, seed=seed, haptics=False, full_rate=True)
     scene = load_scene(robot.model, robot.site, robot.roles)
     let_through(scene)

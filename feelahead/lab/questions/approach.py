@@ -25,7 +25,6 @@ from feelahead.lab.approaches.frozen import AHEAD, ASIDE, GRIPPED, SCENES, SITE,
 from feelahead.lab.approaches.laws import Law, compensation_of, in_words, with_compensation, without_compensation
 from feelahead.lab.approaches.links import mean_loop_s, require_young_loop
 from feelahead.lab.approaches.outcome import Outcome
-from feelahead.lab.approaches.spoilt import Spoil
 from feelahead.lab.figures import LAW_COLOURS, figure
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
@@ -86,8 +85,6 @@ class ApproachSettings(Sweep):
     """Both sides send everything, whatever can be felt of it."""
     camera_mm: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MM")] = 3.0
     """Standard deviation of the camera's error, which the law knows."""
-    spoil: Spoil = "nothing"
-    """Spoil what is felt, to see that the figures notice: 100 ms late, or on the other trigger."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -132,7 +129,6 @@ def cells(settings: ApproachSettings) -> Iterator[Approach]:
             probability=settings.probability,
             duration_s=settings.duration,
             grip=settings.grip or (frozen and model.stem in GRIPPED),
-            spoil=settings.spoil,
             stick=stick,
             turn=turn,
             assist=settings.assist,

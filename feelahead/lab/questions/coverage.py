@@ -20,7 +20,6 @@ from feelahead.lab.approaches.frozen import AHEAD, PASSED, frozen_hash
 from feelahead.lab.approaches.laws import LAWS, Law
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
 from feelahead.lab.approaches.race import RACED, race
-from feelahead.lab.approaches.spoilt import Spoil
 from feelahead.lab.figures import LAW_COLOURS, figure
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
@@ -59,10 +58,6 @@ class CoverageSettings(Sweep):
     """Number of seeds for the time to a goal; 10 unless given, 2 with --quick; 0 leaves it out."""
     only: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TEXT...")] = ()
     """Only cells whose name contains one of these, as in 'wall/bell/200 ms'."""
-    spoil: Spoil = "nothing"
-    """Spoil the laws on purpose, to see that the figures notice: 100 ms late, or on the other trigger."""
-    full_rate: bool = True
-    """Each stiffness leaves. --no-full-rate: as few as a deadband ever lets go, 50 a second."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -85,7 +80,7 @@ class CoverageSettings(Sweep):
         of_kind = Counter((pull, link) for (pull, link, _), cells in found.items() for _ in cells)
         motions = [
             Pulls(
-                *(pull, link, home, tuple(cells), sizes, chosen, self.laws, self.spoil, self.full_rate),
+                *(pull, link, home, tuple(cells), sizes, chosen, self.laws),
                 judged_s=judged_s / of_kind[pull, link],
             )
             for (pull, link, home), cells in found.items()
@@ -100,14 +95,13 @@ class Race:
     scene: str
     law: Law
     count: int
-    spoil: Spoil
 
 
 def cells(settings: CoverageSettings) -> Iterator[Pulls | Race]:
     """Lay out motions and races."""
     yield from settings.pulls()
     if count := settings.raced if settings.raced is not None else (2 if settings.quick else 10):
-        yield from (Race(scene, law, count, settings.spoil) for scene in RACED for law in settings.laws)
+        yield from (Race(scene, law, count) for scene in RACED for law in settings.laws)
 
 
 def full_cells() -> Iterator[tuple[PullKind, str, Placed]]:
@@ -145,7 +139,7 @@ def run(cell: Pulls | Race, seed: int) -> Iterator[Row]:
         yield from evaluate(cell, seed)
     else:
         first = cell.count * seed
-        yield race(cell.scene, cell.law, range(first, first + cell.count), cell.spoil)
+        yield race(cell.scene, cell.law, range(first, first + cell.count))
 
 
 def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
@@ -216,18 +210,17 @@ def _where(rows: Table, name: str, value: float, form: str) -> str:
 def by_law(table: Table, laws: Sequence[str]) -> Shown:
     """Make a row for each law and P, over all cells, with the cost in time."""
     found, raced = judged(table), Table(row for row in table if "slowdown" in row)
-    figures = {"coverage": ".3f", "mean_strength": ".2f", "late_ms": ".0f", "never": ".0%"}
     entries = [
         (
             *(law, f"{probability:g}", f"{sum(rows.values('holds'))} of {len(rows.values('coverage'))}"),
-            *(mean(rows, name, form) for name, form in figures.items()),
+            mean(rows, "coverage"),
             *pooled_alarms(rows),
             *(_slowdown(row) for scene in RACED for row in raced.where(law=law, scene=scene)),
         )
         for law in laws
         for (probability,), rows in found.where(law=law).groups("probability")
     ]
-    headings = ("law", "P", "cells that hold", "covered", "strength that stood", "too late by, ms", "never")
+    headings = ("law", "P", "cells that hold", "covered")
     slow = (f"slowdown, {scene}" for scene in RACED if len(raced))
     title = "the laws side by side, means over the cells, alarms over all their time; slowdown at 200 ms (arrived)"
     return shown(title, (*headings, "false alarms a minute", "share", *slow), entries)

@@ -1,8 +1,7 @@
-"""How near is the emulated link to the kernel's netem, what do clock estimates miss, and what do both ends cost?
+"""How near is the emulated link to the kernel's netem, and what do both ends cost?
 
 feelahead bench link
 feelahead bench link --virtual --against tests/data/netem/normal.csv.gz --seeds 20
-feelahead bench link --estimates --seeds 100
 """
 
 import time
@@ -23,7 +22,6 @@ from common.emulation.figures import report_lines
 from common.emulation.profile import LinkProfile
 from common.emulation.spec import LinkSpec
 from feelahead.lab.goals import Goal
-from feelahead.lab.link.clocks import SCENARIOS, errors
 from feelahead.lab.link.pair import Kind, pair
 from feelahead.lab.link.samples import band_of, compare_one, judge, needs_band, pair_of_runs, play, read_link_sample
 from feelahead.lab.shown import shown
@@ -31,12 +29,10 @@ from feelahead.lab.sweep import Question, Sweep, cell_of
 from feelahead.lab.table import Row, Table
 
 _BARE_LIMIT: Final = 1.3
-_ERROR_LIMIT_MS: Final = 0.5
 _KINDS: Final[tuple[Kind, ...]] = ("whole ends", "bare ZeroMQ")
 _TURNS: Final = 7
 _PAIRS: Final = 10
 """Pairs of the model's own runs, for each seed."""
-_ESTIMATED: Final = ("offset_error_ms", "one_way_error_ms", "bound_ms")
 _COMPARED: Final = (
     *("seed", "distance", "mean_error_ms", "sd_error_ms"),
     *("late_share", "loss_share", "mean_burst", "stalls"),
@@ -71,23 +67,16 @@ class LinkSweep(Played, Sweep):
     """Both ends at 1 kHz each way, between law and controller, beside bare ZeroMQ, in turns.
 
     With --virtual: the model of the link beside its words, and beside a recording of the kernel's netem.
-    With --estimates: how well each side knows the other's clock and the delays, beside the truth.
     """
 
     virtual: bool = False
     """The emulated link alone, in virtual time."""
-    estimates: bool = False
-    """Estimates of clock offsets and one-way delays instead."""
-    seconds: Annotated[float, Meta(ge=1.0, le=3600.0), tyro.conf.arg(metavar="SECONDS")] = 5.0
-    """Traffic of each run of --estimates."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self.profile(0)
         if self.against is not None and not self.virtual:
             raise ValueError(f"--against {self.against}: valid: with --virtual")
-        if self.virtual and self.estimates:
-            raise ValueError("--virtual with --estimates; valid: one of them")
 
 
 @dataclass(frozen=True)
@@ -98,31 +87,14 @@ class Turns:
     turns: int
 
 
-@dataclass(frozen=True)
-class Clocks:
-    """One link between two clocks."""
-
-    link: str
-    skew_ppm: float
-    seconds: float
-
-
-def cells(settings: LinkSweep) -> Iterator[Turns | Played | Clocks]:
+def cells(settings: LinkSweep) -> Iterator[Turns | Played]:
     """Lay out what the flags choose."""
-    if settings.estimates:
-        skews = (20.0,) if settings.quick else (20.0, 100.0)
-        yield from (Clocks(link, skew, settings.seconds) for link in SCENARIOS for skew in skews)
-    elif settings.virtual:
-        yield cell_of(Played, settings)
-    else:
-        yield Turns(settings.rate, 2 if settings.quick else _TURNS)
+    yield cell_of(Played, settings) if settings.virtual else Turns(settings.rate, 2 if settings.quick else _TURNS)
 
 
-def run(cell: Turns | Played | Clocks, seed: int) -> Iterator[Row]:
+def run(cell: Turns | Played, seed: int) -> Iterator[Row]:
     """Run one of them."""
-    if isinstance(cell, Clocks):
-        yield from errors(cell.link, cell.skew_ppm, cell.seconds, seed)
-    elif isinstance(cell, Played):
+    if isinstance(cell, Played):
         yield _play(cell, seed)
     else:
         with ExitStack() as stack:
@@ -159,12 +131,7 @@ def _play(cell: Played, seed: int) -> Row:
 
 def show(settings: LinkSweep, table: Table) -> Iterator[RenderableType]:
     """Say what was asked and achieved; show the figures."""
-    if settings.estimates:
-        for (link, skew), rows in table.groups("link", "skew_ppm"):
-            sizes = {name: np.abs(rows.values(name) or [np.nan]) for name in _ESTIMATED}
-            lines = ((name, np.sqrt(np.mean(of**2)), np.quantile(of, 0.99), of.max()) for name, of in sizes.items())
-            yield shown(f"{link}, {skew:g} ppm: errors in ms at the end", ("estimate", "rms", "p99", "max"), lines)
-    elif settings.virtual:
+    if settings.virtual:
         yield from map(Text, report_lines({"in virtual time": table.rows[0]["line"]}))
         us = float(np.median(table.values("us_a_message")))
         share = 2e-4 * settings.rate * us
@@ -188,16 +155,7 @@ def ratio(turns: Table) -> float:
 
 def goals(settings: LinkSweep, table: Table) -> Iterator[Goal]:
     """Hold the figures against their limits."""
-    if settings.estimates:
-        first = table.where(link=next(iter(SCENARIOS)))
-        for name in _ESTIMATED[:2]:
-            found = first.values(name)
-            # A missing figure must not pass for a good one.
-            worst = max(map(abs, found)) if len(found) == len(first) else None
-            yield Goal(f"{name} of the first link, the worst", worst, _ERROR_LIMIT_MS, detail=f"{len(first)} estimates")
-        judged = f"{sum(table.values('judged'))} arrivals"
-        yield Goal("violations of the bound", sum(table.values("violations")), 0, detail=judged)
-    elif settings.against is not None:
+    if settings.against is not None:
         profile = settings.profile(0)
         reference, _ = read_link_sample(settings.against, "--against").without_stalls(profile)
         pairs = [one for row in table for one in row.get("band", ())]

@@ -19,8 +19,8 @@ from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from common.sockets.shell import CONTROL_LIMIT_BYTES
-from feelahead.lab.hostile.inputs import Attacker
-from feelahead.lab.hostile.raw_zmtp import GREETING, RawConnection, frame, message, port_of, ready
+from tests.helpers.hostile.inputs import Attacker
+from tests.helpers.hostile.raw_zmtp import GREETING, RawConnection, frame, message, port_of, ready
 from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S, ROUNDS
 
 

@@ -33,7 +33,7 @@ from common.sockets.turns import (
     new_group,
     routing_id,
 )
-from feelahead.lab.hostile.raw_zmtp import RawConnection, message, port_of
+from tests.helpers.hostile.raw_zmtp import RawConnection, message, port_of
 from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S, ROUNDS, drain_all, greet, publish_until_seen
 
 STIFFNESS = bytes(461)

@@ -23,10 +23,10 @@ from common.protocol.session import OWNING
 from common.sockets.authentication import make_key_pair
 from common.sockets.keys import KeyFolder
 from feelahead.both_sides.processes import SideFailedError, SideProcess
-from feelahead.lab.hostile.raw_zmtp import RawConnection, port_of
 from operator_side.turns import OperatorTurns
 from robot_side.operators.safety import SafetySettings
 from robot_side.turns import KEYS_PERIOD_S, RobotTurns
+from tests.helpers.hostile.raw_zmtp import RawConnection, port_of
 from tests.helpers.python_process import LIMIT_S, ended, start
 
 pytestmark = pytest.mark.processes

@@ -80,7 +80,7 @@ def row(approach: Approach, ended: Outcome) -> dict[str, Any]:
 
 def test_every_flag_reaches_the_run(runs: MadeUp) -> None:
     arguments = "--force 2.5 --site grip --strongest-effect 3 --link-model stream --law paper --probability 0.9"
-    more = "--duration 4 --seed 7 --grip --spoil swapped --stick 0.5 -0.5 --turn 0 1 --assist speed --camera-mm 1"
+    more = "--duration 4 --seed 7 --grip --stick 0.5 -0.5 --turn 0 1 --assist speed --camera-mm 1"
     assert tried("--model", WALL, "--link", "delay 5ms", *arguments.split(), *more.split()) == 0
     assert runs.asked == [
         Approach(
@@ -95,7 +95,6 @@ def test_every_flag_reaches_the_run(runs: MadeUp) -> None:
             duration_s=4.0,
             seed=7,
             grip=True,
-            spoil="swapped",
             stick=(0.5, -0.5),
             turn=(0.0, 1.0),
             assist="speed",
@@ -155,7 +154,6 @@ def test_one_run_is_a_sentence_and_its_own_summary(
         "duration_s": 8.0,
         "seed": 0,
         "grip": False,
-        "spoil": "nothing",
         "stops_at_mm": None,
         "way_left_mm": None,
         "reversals": 1,

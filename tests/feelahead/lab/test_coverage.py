@@ -1,6 +1,5 @@
 """When a release still avoids a contact, what a false alarm is, and what `bench coverage` makes of them."""
 
-import math
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -16,7 +15,6 @@ from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from feelahead.lab.approaches.judging import (
     false_alarms,
-    lateness_s,
     statistical_distance_m,
     stood,
     zone_speed_m_s,
@@ -26,7 +24,6 @@ from feelahead.lab.approaches.meeting import first_touch_s, last_release_s
 from feelahead.lab.approaches.pulls import PullKind, make_pull
 from feelahead.lab.approaches.recording import RecordedApproach, record_approach
 from feelahead.lab.approaches.replay import Replay, coasting_s
-from feelahead.lab.approaches.spoilt import Spoil
 from feelahead.lab.questions.coverage import QUESTION
 from feelahead.lab.sweep import ask
 from feelahead.lab.table import Row
@@ -108,12 +105,12 @@ def test_moving_objects_are_touched_where_they_are_by_then(speed_m_s: float) -> 
     np.testing.assert_allclose(then.velocities_m_s, [speed_m_s * replay.axis])
 
 
-# Covered, late, alarmed
+# Covered, alarmed
 
 
-def strength(law: Law, spoil: Spoil = "nothing", link: str = "0 ms", ahead_m: float = 0.0) -> int:
+def strength(law: Law, link: str = "0 ms", ahead_m: float = 0.0) -> int:
     draw, _, last_s = approaching(link, ahead_m)
-    return stood(Judged(law, 0.99, spoil), draw, last_s)
+    return stood(Judged(law, 0.99), draw, last_s)
 
 
 @pytest.mark.parametrize(("link", "ahead_m"), [("0 ms", 0.0), ("200 ms", -0.15)])
@@ -122,23 +119,6 @@ def test_a_steady_pull_is_covered_by_either_compensation_and_not_by_the_plain_la
     found = {law: strength(law, link=link, ahead_m=ahead_m) for law in laws}
     assert found["full"] == found["swept"] == found["swept_robot"] == 8
     assert max(found["paper"], found["none"]) < 8
-    assert strength("swept", "swapped", link, ahead_m) == 0
-
-
-def test_spoilt_laws_show_late_or_on_the_other_trigger() -> None:
-    draw, touch_s, last_s = approaching()
-    times = np.array([touch_s - 0.4, touch_s - 0.3])
-    spoils: tuple[Spoil, ...] = ("nothing", "delayed", "swapped")
-    whole, delayed, swapped = (Judged("swept", 0.99, spoil).felt(draw, times) for spoil in spoils)
-    # Farther zones are stiff earlier, on R2 alone.
-    assert 0 < np.count_nonzero(whole[0, 1]) < np.count_nonzero(whole[1, 1]) < 10
-    assert whole[1, 1].max() == 8
-    assert whole[:, 0].max() == 0
-    assert (delayed[1] == whole[0]).all()
-    assert (swapped == whole[:, ::-1]).all()
-    late_s = [lateness_s(Judged("swept", 0.5, spoil), draw, last_s, touch_s) for spoil in spoils]
-    assert late_s[0] == 0.0 < late_s[1] <= 0.1
-    assert late_s[2] == lateness_s(Judged("none", 0.5), draw, last_s, touch_s) == math.inf
 
 
 def test_strength_without_cause_is_an_alarm_and_only_that() -> None:
@@ -219,30 +199,33 @@ def test_intervals_are_over_approaches() -> None:
     assert 0.8 < low < 0.92 < high < 1.0
 
 
-@cache
-def judged(spoil: Spoil = "nothing") -> list[Row]:
+def judged(*laws: Law) -> list[Row]:
     both = (Placed("wall"), Placed("wall_beside"))
-    return list(evaluate(Pulls("bell", "200 ms", "empty", both, (1, 2), (0.5,), ("swept", "none", "full"), spoil), 1))
+    return list(evaluate(Pulls("bell", "200 ms", "empty", both, (1, 2), (0.5,), laws), 1))
 
 
 def test_a_cell_has_what_it_takes_to_judge_it() -> None:
-    wall = {row["law"]: row for row in judged() if row["scene"] == "wall"}
+    rows = judged("swept", "none", "full")
+    wall = {row["law"]: row for row in rows if row["scene"] == "wall"}
     assert {(row["places"], row["unavoidable"], row["draws"]) for row in wall.values()} == {(2, 0, 20)}
     assert wall["full"]["coverage"] == wall["full"]["low"] == wall["swept"]["coverage"] == 1.0
     # One approach is too few to say so.
     assert wall["full"]["holds"] is False
     assert wall["none"]["coverage"] == wall["none"]["high"] == wall["none"]["alarms_per_min"] == 0.0
     assert wall["full"]["alarms_per_min"]
-    beside = {row["law"]: row for row in judged() if row["scene"] == "wall_beside"}
+    beside = {row["law"]: row for row in rows if row["scene"] == "wall_beside"}
     assert beside["full"]["coverage"] is beside["full"]["holds"] is None
     assert beside["full"]["alarm_share"] > 0.5
     assert beside["swept"]["alarms_per_min"] == 0.0
-    spoilt = {row["law"]: row for row in judged("swapped") if row["scene"] == "wall"}
-    assert (spoilt["swept"]["coverage"], spoilt["swept"]["mean_strength"]) == (0.0, 0.0)
-    assert wall["swept"]["mean_strength"] > 6.0
     for row in (*wall.values(), *beside.values()):
         assert 60.0 <= row["judged_s"] < 65.0
         assert row["alarm_s"] == pytest.approx(row["alarm_share"] * row["judged_s"])
+
+
+def test_strengths_on_the_other_trigger_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    felt = Judged.felt
+    monkeypatch.setattr(Judged, "felt", lambda *asked: felt(*asked)[:, ::-1])
+    assert [row["coverage"] for row in judged("swept")] == [0.0, None]
 
 
 def test_places_after_whose_judging_the_stick_moves_are_counted_apart() -> None:

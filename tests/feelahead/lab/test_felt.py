@@ -22,9 +22,6 @@ from robot_side.drivers.mujoco.gripper_cover import GripperCover, cover_gripper
 from tests.helpers.arm_models import planar_arm
 from tests.helpers.repository import DATA
 
-LIMIT = 1e-12
-REACH_M = 0.25
-ENCODER_SIGMA_RAD = np.full(6, 2e-3)
 HORIZON_M = 0.5
 WALL = str(DATA / "wall.xml")
 COVER_MM, RAMP_MM = 3.0, 12.0

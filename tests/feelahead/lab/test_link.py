@@ -1,4 +1,4 @@
-"""`bench link`: the model beside recordings of the kernel's netem, real ends beside bare ones, and clock estimates."""
+"""`bench link`: the model beside recordings of the kernel's netem, real ends beside bare ones."""
 
 import csv
 import functools
@@ -15,7 +15,6 @@ from common.protocol.messages import MotionCommand, StiffnessUpdate
 from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from feelahead.lab.goals import Goal
-from feelahead.lab.link.clocks import SCENARIOS, errors
 from feelahead.lab.link.ends import BYTES, OperatorEnd, RobotEnd
 from feelahead.lab.link.samples import (
     LinkSample,
@@ -27,10 +26,8 @@ from feelahead.lab.link.samples import (
     pair_of_runs,
     read_link_sample,
 )
-from feelahead.lab.questions.link import QUESTION, LinkSweep
-from feelahead.lab.questions.link import goals as judged
+from feelahead.lab.questions.link import QUESTION
 from feelahead.lab.sweep import ask
-from feelahead.lab.table import Table
 from tests.helpers.repository import DATA
 from tests.helpers.socket_talk import EPHEMERAL, PATIENT_S
 
@@ -165,28 +162,3 @@ def test_both_kinds_of_ends_are_measured(tmp_path: Path, capsys: pytest.CaptureF
     written = rows(path)
     assert [row["kind"] for row in written] == ["whole ends", "bare ZeroMQ"] * 2
     assert min(float(row["sent_per_s"]) for row in written if row["kind"] == "bare ZeroMQ") > 10.0
-
-
-# Estimates of clocks
-
-
-def test_estimates_say_errors_of_both_sides(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "rows.csv"
-    assert ask(QUESTION, ["--estimates", "--quick", "--seconds", "2", "--csv", str(path)]) == 0
-    assert "violations of the bound: 0" in capsys.readouterr().out
-    written = rows(path)
-    assert {row["link"] for row in written} == set(SCENARIOS)
-    assert {row["side"] for row in written} == {"robot", "operator"}
-
-
-def test_a_bound_that_is_too_tight_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("common.timing.clock_offset.ClockOffset.bound_at", lambda *_: 1e-9)
-    assert sum(row["violations"] for row in errors("N(50, 10) both ways", 20.0, 1.0, 0)) > 100
-
-
-def test_a_missing_estimate_never_passes_for_a_good_one() -> None:
-    link = next(iter(SCENARIOS))
-    complete = {"link": link, "offset_error_ms": 0.1, "one_way_error_ms": 0.1, "judged": 1, "violations": 0}
-    lacking = {"link": link, "judged": 0, "violations": 0}
-    found = judged(LinkSweep(estimates=True), Table([complete, lacking]))
-    assert [goal.verdict for goal in found] == ["not measured", "not measured", "met"]

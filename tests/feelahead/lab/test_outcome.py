@@ -13,10 +13,7 @@ import pytest
 from feelahead.lab.approaches.approach import Approach, robot_settings, run_approach
 from feelahead.lab.approaches.frozen import ASIDE
 from feelahead.lab.approaches.outcome import SAMPLE_S, Outcome, Trace, reversals, stands
-from feelahead.lab.approaches.spoilt import controller
-from operator_side.controller.feel import FREE_TRIGGER, Feel
 from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
-from tests.helpers.felt import feedback
 from tests.helpers.repository import DATA
 
 pytestmark = pytest.mark.long
@@ -258,27 +255,3 @@ def test_the_gripper_stands_when_it_has_been_slow_for_a_second(last_m_s: list[fl
     times_s, still = np.linspace(0.0, SAMPLE_S * (rows - 1), rows), np.zeros(rows)
     trace = Trace(times_s, np.array(speeds_m_s), still, still, np.zeros((rows, 10), dtype=np.int64))
     assert stands(trace) is standing
-
-
-# Controllers
-
-
-def test_a_delayed_controller_does_the_same_100_ms_later_and_a_swapped_one_on_the_other_trigger() -> None:
-    device = controller(0.25, "delayed")
-    device.read(0.0)
-    device.write(Feel(r2=feedback(3, 6)), 0.01)
-    device.write(Feel(r2=feedback(2, 1), l2=feedback(1, 1)), 0.05)
-    after_ms = {}
-    for milliseconds in range(51, 200):
-        device.read(1e-3 * milliseconds)
-        after_ms[milliseconds] = device.strengths
-    assert after_ms[109] == (FREE_TRIGGER, FREE_TRIGGER)
-    assert after_ms[111] == after_ms[149] == (FREE_TRIGGER, feedback(3, 6))
-    assert after_ms[151] == after_ms[199] == (feedback(1, 1), feedback(2, 1))
-    device = controller(0.25, "swapped")
-    device.read(0.0)
-    device.write(Feel(l2=feedback(1, 1), r2=feedback(3, 6)), 0.01)
-    assert device.strengths == (feedback(3, 6), feedback(1, 1))
-    # Telling one of them leaves the other as it is.
-    device.write(Feel(r2=feedback(5, 5)), 0.03)
-    assert device.strengths == (feedback(5, 5), feedback(1, 1))

@@ -14,9 +14,9 @@ from common.arrays import FloatArray
 from feelahead.lab.reference.classes import MAKERS, frozen_class, frozen_classes
 from feelahead.lab.reference.contact import contacts, exact_contact, exact_corners
 from feelahead.lab.reference.errors import count_failures
-from feelahead.lab.reference.meshes import TETRAHEDRON_TRIANGLES
 from feelahead.lab.reference.oracle import Truth, true_mesh_overlap, true_overlap, true_overlaps
 from feelahead.lab.reference.pairs import BOX_QUADRILATERALS, Pairs
+from tests.helpers.meshes import TETRAHEDRON_TRIANGLES
 
 Point = list[Any]
 

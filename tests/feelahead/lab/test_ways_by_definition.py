@@ -20,8 +20,8 @@ from robot_side.overlap import Mesh
 from robot_side.surroundings.perceived import PerceivedObjects
 from tests.helpers.field.fields import AHEAD, RADIUS_M, along, ball_pose
 from tests.helpers.gripper_poses import free_pose
+from tests.helpers.meshes import cup
 from tests.helpers.perceived_scenes import Scene, random_rotation
-from tests.helpers.scene_meshes import cup
 
 MARGIN_M, REACH_M, STEP_M = 0.012, 0.06, 3e-5
 ENCODER_SIGMA_RAD = np.full(6, 2e-3)

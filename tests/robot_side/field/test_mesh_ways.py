@@ -8,14 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray, IntArray
-from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, surface_of
 from robot_side.field.look import MARGIN_M
 from robot_side.overlap import Mesh
 from robot_side.surroundings.kinds.layout import LEAST_WAY_M
 from tests.helpers.field.fields import AHEAD, EQUAL_M, along, ball_pose, judged
 from tests.helpers.field.first_contact import first_contact_m
+from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, cup, grid_tetrahedra, surface_of
 from tests.helpers.perceived_scenes import Scene, random_rotation
-from tests.helpers.scene_meshes import cup
 
 REACH_M = 0.15
 seeds = st.integers(0, 2**32 - 1)

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, surface_of
 from robot_side.field.scratch import Count
 from robot_side.overlap import Mesh
 from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
 from robot_side.surroundings.perceived import PerceivedObjects
 from tests.helpers.field.fields import AHEAD, EQUAL_M, RADIUS_M, along, ball_pose, look, ways_of
 from tests.helpers.gripper_poses import free_pose, gripper_pose
+from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, surface_of
 from tests.helpers.perceived_scenes import Scene, random_rotation
 
 

@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from feelahead.lab.reference.solids import Solids
 from robot_side.field.object_class import PASSED_OVER
 from robot_side.field.total_overlap import total_overlap_m3
@@ -14,6 +13,7 @@ from robot_side.overlap import Mesh, sphere_sphere
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import scene_table
 from tests.helpers.field.fields import REACH_M, along, ball_pose, ways_of
+from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
 

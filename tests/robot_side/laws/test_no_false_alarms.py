@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray
 from common.roles import Role
-from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra
 from robot_side.overlap import Mesh
 from robot_side.surroundings.perceived import PerceivedObjects
 from tests.helpers.field.fields import AHEAD, RADIUS_M, along, ball_pose, look, ways_of
 from tests.helpers.gripper_poses import free_pose, gripper_pose
+from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra
 from tests.helpers.perceived_scenes import Scene, random_rotation
 
 INFLATED_M = 0.007

@@ -10,7 +10,6 @@ from scipy.linalg import expm
 
 from common.arrays import FloatArray
 from common.reaction import HORIZON_S
-from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.arm.port import GripperPose
 from robot_side.field.field import Ahead, Along
 from robot_side.field.object_class import OBSTACLE
@@ -31,6 +30,7 @@ from tests.helpers.field.situations import (
     swept,
 )
 from tests.helpers.gripper_poses import free_pose, gripper_pose
+from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation
 
 LOOP_S = 0.1

@@ -8,9 +8,9 @@ from common.protocol.codec import PROTOCOL_VERSION, decode, encode
 from common.protocol.messages import AnyMessage, Hello, LeaseNotice, StiffnessUpdate
 from common.protocol.session import SessionState
 from common.silence import KEEP_ALIVE_S
-from feelahead.lab.faults.session_bench import CRUISE, Bench, Operator
 from robot_side.operators.lease import MOST_OBSERVERS
 from robot_side.reporting.reports import OBSERVER_PERIOD_S
+from tests.robot_side.session_bench import CRUISE, Bench, Operator
 
 
 @pytest.fixture

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import pytest
 
-from feelahead.lab.faults.session_bench import QUICK, Bench
 from robot_side.arm.port import ArmState
 from robot_side.parts import build_parts
 from tests.robot_side.passed_on_arm import PassedOnArm
+from tests.robot_side.session_bench import QUICK, Bench
 
 
 class SlowArm(PassedOnArm):

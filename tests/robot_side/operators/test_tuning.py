@@ -6,10 +6,10 @@ import pytest
 
 from common.protocol.codec import encode
 from common.protocol.messages import Header, Tune
-from feelahead.lab.faults.session_bench import QUICK, Bench, Operator
 from robot_side.enlargement.distance import standard_quantile
 from robot_side.laws.named import LawName
 from robot_side.operators.tuning import Tuning
+from tests.robot_side.session_bench import QUICK, Bench, Operator
 
 
 @pytest.fixture

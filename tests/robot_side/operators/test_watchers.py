@@ -4,8 +4,8 @@ import pytest
 
 from common.protocol.codec import encode
 from common.protocol.messages import Watch
-from feelahead.lab.faults.session_bench import Bench, Operator
 from robot_side.operators.watchers import WATCH_S, Watchers
+from tests.robot_side.session_bench import Bench, Operator
 
 
 def watch(bench: Bench, operator: Operator, **what: Any) -> None:

@@ -5,16 +5,10 @@ import pytest
 from mpmath import mpf
 
 from common.arrays import FloatArray, IntArray
-from feelahead.lab.reference.meshes import (
-    CUBE_CORNERS,
-    CUBE_TRIANGLES,
-    grid_tetrahedra,
-    round_mesh,
-    surface_of,
-    torus,
-)
+from feelahead.lab.reference.meshes import torus
 from feelahead.lab.reference.oracle import true_mesh_overlap
 from robot_side.overlap import Mesh
+from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, round_mesh, surface_of
 
 WORST = 1e-15
 """Of the sphere's volume, surface and, for the gradient, great circle."""

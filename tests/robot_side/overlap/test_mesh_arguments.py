@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, TETRAHEDRON_TRIANGLES
 from robot_side.overlap import Mesh, MeshLibrary, sphere_mesh
+from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, TETRAHEDRON_TRIANGLES
 
 TETRAHEDRON = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 WITH_NAN = np.where(np.arange(12).reshape(4, 3) == 7, np.nan, TETRAHEDRON)

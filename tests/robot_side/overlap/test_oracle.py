@@ -33,11 +33,11 @@ from feelahead.lab.reference.errors import (
     shrinking,
 )
 from feelahead.lab.reference.features import FEATURES
-from feelahead.lab.reference.meshes import CUBE_TRIANGLES, TETRAHEDRON_TRIANGLES
 from feelahead.lab.reference.oracle import Truth, true_overlap, true_overlaps
 from feelahead.lab.reference.pairs import Pairs, Solid
 from robot_side.overlap import Mesh, sphere_box, sphere_half_space, sphere_sphere, sphere_tetrahedron
 from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
+from tests.helpers.meshes import CUBE_TRIANGLES, TETRAHEDRON_TRIANGLES
 
 EACH = 12
 WORST = 1e-15

@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
 from common.roles import Role
-from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.overlap import Mesh
 from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
 from robot_side.surroundings.distances import object_distances
@@ -26,6 +25,7 @@ from tests.helpers.field.nearest_point import (
     nearest_on_sphere,
     nearest_on_tetrahedron,
 )
+from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
 ORIGIN = np.zeros(3)

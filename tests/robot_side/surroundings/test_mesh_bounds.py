@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
 
-from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.overlap import Mesh, MeshLibrary
 from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
+from tests.helpers.meshes import CELL_M, CUBE_CORNERS, CUBE_TRIANGLES, cup
 from tests.helpers.perceived_scenes import random_rotation
-from tests.helpers.scene_meshes import CELL_M, cup
 
 MESHES = {
     "cube": Mesh(0.5 * CUBE_CORNERS, CUBE_TRIANGLES),

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray, IntArray
-from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, round_mesh, surface_of, torus
+from feelahead.lab.reference.meshes import torus
 from robot_side.overlap import Mesh, MeshLibrary
 from robot_side.overlap.meshes.mesh_library import mesh_pairs
 from robot_side.overlap.meshes.mesh_shapes import capsule_mesh
 from robot_side.surroundings.placed_meshes import overlap_one_mesh
 from robot_side.surroundings.scene_table import scene_table
+from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, cup, grid_tetrahedra, round_mesh, surface_of
 from tests.helpers.perceived_scenes import Scene, random_rotation
-from tests.helpers.scene_meshes import cup
 
 COUNT, EQUAL = 300, 1e-12
 Surface = tuple[FloatArray, IntArray]

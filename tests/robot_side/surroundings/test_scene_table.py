@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray
 from common.roles import Role
-from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.overlap import Mesh
 from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
 from robot_side.surroundings import surroundings as module
@@ -26,6 +25,7 @@ from robot_side.surroundings.validity import require_valid
 from tests.helpers.field.fields import along, ball_pose, look
 from tests.helpers.field.primitive_rows import object_bound
 from tests.helpers.field.primitive_rows import rows_of as rows_of_primitives
+from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
 

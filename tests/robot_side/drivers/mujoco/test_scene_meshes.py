@@ -10,11 +10,11 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 
-from common.arrays import FloatArray
+from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import Compiled
 from robot_side.core import RobotSide
 from robot_side.drivers.mujoco.camera import MujocoCamera
-from robot_side.drivers.mujoco.scene import Scene
+from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.field.object_class import OBSTACLE, PASSED_OVER
 from robot_side.field.total_overlap import total_overlap_m3
 from robot_side.overlap import sphere_sphere, warm_up
@@ -24,8 +24,8 @@ from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import scene_table
 from tests.helpers.arm_models import planar_arm
 from tests.helpers.field.nearest_point import distance_to_object
+from tests.helpers.meshes import CELL_M, cup
 from tests.helpers.repository import ROOT
-from tests.helpers.scene_meshes import CELL_M, cup, mesh_asset, scene_with
 
 TURNED = 'pos="0.9 0.3 0.2" euler="20 30 40"'
 ROUND = {
@@ -40,6 +40,18 @@ VOLUMES_M3 = {
     "ball": 4.0 / 3.0 * math.pi * 0.04**3,
     "ellipsoid": 4.0 / 3.0 * math.pi * 0.03 * 0.04 * 0.06,
 }
+
+
+def mesh_asset(name: str, vertices: FloatArray, triangles: IntArray, inertia: str = "convex") -> str:
+    """An MJCF asset with just these vertices and triangles."""
+    numbers = " ".join(f"{value:.17g}" for value in vertices.ravel())
+    indices = " ".join(str(index) for index in triangles.ravel())
+    return f'<asset><mesh name="{name}" inertia="{inertia}" vertex="{numbers}" face="{indices}"/></asset>'
+
+
+def scene_with(path: Path, world: str, assets: str = "") -> Scene:
+    """The planar arm at the objects `world`."""
+    return load_scene(planar_arm(path, world=world, extra_top=assets), "tcp")
 
 
 def placed(scene: Scene, in_body_m: FloatArray, body: str = "round") -> FloatArray:

@@ -10,13 +10,10 @@ from common.arrays import FloatArray
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Hello, MotionCommand, StiffnessUpdate
 from common.protocol.uniform_field import FAR_M, uniform_field
-from feelahead.lab.table import Row
 
 ROBOT_PERIOD_S = 1 / 1000
 OPERATOR_PERIOD_S = 1 / 250
 _HELLO_S = 0.25
-_LAST_S = 0.5
-"""One-way delays are judged over the end of a run."""
 _FREE = uniform_field(0)
 
 Shape = Literal["normal", "exponential"]
@@ -44,7 +41,6 @@ class Way:
 class Scenario:
     """A link and two clocks."""
 
-    name: str
     to_robot: Way
     to_operator: Way
     skew: float
@@ -155,39 +151,3 @@ def _judged(
         bound_s,
         None if one_way_s is None else one_way_s - delay_s,
     )
-
-
-_QUEUES, _JITTER = Way("exponential", 0.050, 0.010), Way("normal", 0.050, 0.010)
-_NEARER = Way("exponential", 0.030, 0.010)
-SCENARIOS = {
-    "50 + exp(10) both ways": (_QUEUES, _QUEUES, 0.0),
-    "N(50, 10) both ways": (_JITTER, _JITTER, 0.0),
-    "50 + exp(10) / 50 + exp(1)": (_QUEUES, Way("exponential", 0.050, 0.001), 0.0),
-    "50 + exp(10) / 30 + exp(10)": (_QUEUES, _NEARER, 0.0),
-    "likewise, asymmetry told": (_QUEUES, _NEARER, 0.020),
-}
-"""Links in milliseconds: to the robot, to the operator, and the asymmetry in seconds that both ends know.
-
-50 + exp(10) is a floor of 50 with exponential delays of mean 10 above it. The goals are about the first one.
-"""
-
-
-def errors(link: str, skew_ppm: float, seconds: float, seed: int) -> Iterator[Row]:
-    """Let traffic happen over one of these links; yield each side's errors at the end.
-
-    The clock gains `skew_ppm`. One-way delays: rms of the errors over the last half second.
-    """
-    to_robot, to_operator, asymmetry_s = SCENARIOS[link]
-    estimates = list(Traffic(Scenario(link, to_robot, to_operator, 1e-6 * skew_ppm, asymmetry_s), seed, seconds))
-    for side in ("robot", "operator"):
-        own = [one for one in estimates if one.side == side and one.offset_error_s is not None]
-        bounded = [(one.offset_error_s or 0.0, one.bound_s) for one in own if one.bound_s is not None]
-        row: Row = {"side": side, "judged": len(bounded)}
-        row["violations"] = sum(abs(error_s) > bound_s for error_s, bound_s in bounded)
-        late_s = [
-            one.one_way_error_s for one in own if one.at_s > seconds - _LAST_S and one.one_way_error_s is not None
-        ]
-        if bounded and late_s:
-            row |= {"offset_error_ms": 1e3 * bounded[-1][0], "bound_ms": 1e3 * bounded[-1][1]}
-            row["one_way_error_ms"] = 1e3 * float(np.sqrt(np.mean(np.square(late_s))))
-        yield row

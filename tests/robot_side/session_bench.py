@@ -1,6 +1,5 @@
-"""A robot side in virtual time with operators in our hands; every message arrives at once unless it is kept back."""
+"""A robot side in virtual time with operators in our hands; every message arrives at once."""
 
-from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
@@ -23,7 +22,6 @@ from common.protocol.messages import (
 from common.protocol.session import SessionState
 from robot_side.arm.port import ArmState
 from robot_side.core import RobotParts, RobotSide
-from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.events import Listener, Tick
 from robot_side.operators.safety import SafetySettings
 from robot_side.parts import build_parts
@@ -36,9 +34,6 @@ QUICK = RobotSettings(safety=SafetySettings(healthy_s=0.1))
 """Arms after a tenth of a second, because nobody learns anything from a longer one."""
 CRUISE = 0.4
 """Travel of R2 at which the built-in arm advances at 0.1 m/s."""
-_EVEN_TICKS = 20
-_MOVING_RAD_S = 0.05
-_DECELERATION_RAD_S2 = MotionLimits().deceleration_rad_s2
 
 
 class ArmWatch(Listener):
@@ -49,43 +44,18 @@ class ArmWatch(Listener):
         """(when, the largest joint speed) of each state."""
         self.told_to_move = 0
         """Commands that were not to stand still."""
-        self.not_finite = 0
-        """Commands that held NaN or infinity."""
-        self._accepted_s: list[float] = []
-        """When the newest of those commands was accepted, for each state."""
-        self._newest_s = 0.0
 
     def on_tick(self, tick: Tick) -> None:
         """Note a tick's state, and then its command."""
         if tick.measured is not None:
             self.note(tick.measured)
-        if tick.found is not None and (velocity := tick.found.commanded_rad_s) is not None:
-            if np.any(velocity):
-                self.told_to_move += 1
-                self._newest_s = tick.found.permission.valid_until_s - QUICK.safety.gap_s
-            self.not_finite += not np.isfinite(velocity).all()
+        if tick.found is not None and tick.found.commanded_rad_s is not None:
+            self.told_to_move += bool(np.any(tick.found.commanded_rad_s))
 
     def note(self, state: ArmState) -> None:
         """Note a measured state."""
         if not self.speeds_rad_s or state.time_s > self.speeds_rad_s[-1][0]:
             self.speeds_rad_s.append((state.time_s, float(np.abs(state.joint_velocities_rad_s).max())))
-            self._accepted_s.append(self._newest_s)
-
-    def decelerations_s(self) -> list[float]:
-        """Return when each deceleration began after an even stretch, since the newest command was accepted."""
-        found, since = [], 0
-        for place, (measured_s, speed) in enumerate(self.speeds_rad_s):
-            before = [past for _, past in self.speeds_rad_s[max(since, place - _EVEN_TICKS) : place]]
-            if len(before) == _EVEN_TICKS and _slowed(max(before), speed) and not _slowed(max(before), min(before)):
-                # It has slowed down for a while by now, at a rate that is known.
-                onset_s = measured_s - (max(before) - speed) / _DECELERATION_RAD_S2
-                found.append(onset_s - self._accepted_s[place])
-                since = place
-        return found
-
-
-def _slowed(from_rad_s: float, to_rad_s: float) -> bool:
-    return from_rad_s > _MOVING_RAD_S and to_rad_s < 0.95 * from_rad_s
 
 
 class Operator:
@@ -138,13 +108,6 @@ class Bench:
         self.ticks = 0
         self.operators: dict[bytes, Operator] = {}
         self.views: list[Telemetry] = []
-        self.applied: dict[int, float] = {}
-        """Sequence numbers of the commands that the arm was to follow, in turn, and how old each was at first."""
-        self.moved_by: set[int] = set()
-        """Epochs of those commands' operators."""
-        self.answer_delay_s = 0.0
-        """Delay of all messages from the robot side."""
-        self._under_way: deque[tuple[float, Operator, StiffnessUpdate | Hello | LeaseNotice]] = deque()
 
     @property
     def now_s(self) -> float:
@@ -200,15 +163,8 @@ class Bench:
                 elif (operator := self.operators.get(outgoing.peer)) is not None and not isinstance(
                     message, MotionCommand | Watch | Tune | LinkReport
                 ):
-                    self._under_way.append((self.now_s + self.answer_delay_s, operator, message))
-            while self._under_way and self._under_way[0][0] <= self.now_s:
-                _, receiver, arrived = self._under_way.popleft()
-                receiver.take(arrived, self.now_s)
+                    operator.take(message, self.now_s)
             self.robot.observe(self.now_s)
-            command = self.robot.session.safety.permission(self.now_s).command
-            if command is not None:
-                self.applied.setdefault(command.header.sequence, self.now_s - command.header.sent_s)
-                self.moved_by.add(command.header.epoch)
 
     def silence(self, duration_s: float) -> None:
         """Tick while nobody says anything."""
@@ -236,11 +192,3 @@ class Bench:
         """Arm, and advance at an even speed."""
         self.arm_it(operator)
         self.drive(duration_s, operator, r2=CRUISE)
-
-
-def cruising() -> tuple[Bench, Operator]:
-    """Make a robot side whose arm an operator moves at an even speed."""
-    bench = Bench()
-    operator = bench.join(2)
-    bench.cruise(operator)
-    return bench, operator

@@ -1,19 +1,18 @@
 """Inputs of a hostile or broken peer: a seeded, endless mixture."""
 
+import contextlib
 import random
-from collections import Counter
 from collections.abc import Callable
 
 import msgpack
 
 from common.protocol.codec import MAXIMUM_BYTES, PROTOCOL_VERSION, encode
 from common.protocol.messages import Header, Hello, MotionCommand
-from feelahead.lab.hostile.raw_zmtp import GREETING, RawConnection, frame, message, ready
+from tests.helpers.hostile.raw_zmtp import GREETING, RawConnection, frame, message, ready
 
 _STRANGERS = 8
 _HANGING = 128
 """Connections that never finish their handshake, at any time."""
-_VIEWERS = 20
 
 
 def payload(generator: random.Random) -> bytes:
@@ -46,51 +45,28 @@ class Attacker:
     """Sends one hostile input after the other to a robot side's two ports."""
 
     def __init__(self, control_port: int, view_port: int, seed: int) -> None:
-        self.sent: Counter[str] = Counter()
-        """Inputs by kind."""
-        self.refused = 0
-        """Inputs that the robot side, or the system, cut short."""
         self._control_port = control_port
         self._view_port = view_port
         self._generator = random.Random(seed)  # noqa: S311  # repeatable, not secret
         self._strangers: list[RawConnection] = []
         self._hanging: list[RawConnection] = []
-        self._viewers: list[RawConnection] = []
-        kinds: list[tuple[str, int, Callable[[], None]]] = [
-            ("payload", 780, self._send_payload),
-            ("frames", 60, self._send_frames),
-            ("oversize", 20, self._send_oversize),
-            ("garbage", 60, self._connect_with_garbage),
-            ("handshake", 50, self._connect_halfway),
-            ("view", 30, self._disturb_view),
-        ]
-        self._kinds = [(name, send) for name, _, send in kinds]
-        self._weights = [weight for _, weight, _ in kinds]
+        self._kinds: dict[Callable[[], None], int] = {
+            self._send_payload: 780,
+            self._send_frames: 60,
+            self._send_oversize: 20,
+            self._connect_with_garbage: 60,
+            self._connect_halfway: 50,
+            self._disturb_view: 30,
+        }
 
     def send(self) -> None:
-        """One hostile input."""
-        [(name, send)] = self._generator.choices(self._kinds, self._weights)
-        try:
+        """One hostile input; the robot side, or the system, may cut it short."""
+        [send] = self._generator.choices(list(self._kinds), list(self._kinds.values()))
+        with contextlib.suppress(OSError):
             send()
-        except OSError:
-            self.refused += 1
-        self.sent[name] += 1
-
-    def watch(self) -> None:
-        """Subscribe to all views, from several connections, and never read."""
-        for _ in range(_VIEWERS):
-            viewer = RawConnection.introduced(self._view_port, b"SUB", buffer_bytes=2048)
-            viewer.send(message(b"\x01"))
-            self._viewers.append(viewer)
-
-    def leave(self) -> None:
-        """Watch no more."""
-        while self._viewers:
-            self._viewers.pop().close()
 
     def close(self) -> None:
         """Hang up everywhere."""
-        self.leave()
         for connection in (*self._strangers, *self._hanging):
             connection.close()
 

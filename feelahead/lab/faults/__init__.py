@@ -1,1 +1,0 @@
-"""The table of faults of docs/link.md, row by row in virtual time; tests hold each one."""

@@ -1,1 +1,0 @@
-"""Strangers and hostile input at a real robot side's port."""

@@ -1,0 +1,1 @@
+"""Strangers and hostile input at a real port."""
