@@ -37,15 +37,24 @@ _COMPILING: Final = (
 _OPEN_TO_ALL: Final = "WITHOUT KEYS: anyone who reaches the port can move the arm"
 
 
+Adapted = tuple[RobotParts, Sequence[Listener]]
+"""What an experiment makes of the parts, and who listens besides."""
+
+
 def main() -> None:
     """The console script."""
     run_command("feelahead-robot", command)
 
 
-def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[Listener]], RobotSide] = RobotSide) -> int:
+def as_built(parts: RobotParts) -> Adapted:
+    """Change nothing."""
+    return parts, ()
+
+
+def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = as_built) -> int:
     """Run the robot side until --duration, Ctrl-C or SIGTERM; the arm stands still on every way out.
 
-    build: makes the core.
+    adapt: gives an experiment's parts and listeners.
     """
     settings = parse_settings(RobotSettings, "feelahead-robot", arguments)
     keys = None if settings.keys is None else RobotKeys.load(settings.keys)
@@ -60,7 +69,8 @@ def command(arguments: Sequence[str], build: Callable[[RobotParts, Sequence[List
         open_sockets().close()
         parts = build_parts(settings, epoch, clock_domain(), announce=process.note, beside=beside)
         recorder = [] if recording is None else [Recorder(recording.noted.append)]
-        core = build(parts, [StageTiming(loop.stages), *recorder])
+        core_parts, others = adapt(parts)
+        core = RobotSide(core_parts, [StageTiming(loop.stages), *recorder, *others])
         sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
         unused = unused_clauses(settings.link_spec(), [("to_operator", stream) for stream in sent])
         for text in (*parts.notes, *unused):

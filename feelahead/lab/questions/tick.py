@@ -108,9 +108,9 @@ def run(cell: Case | Concave, seed: int) -> Iterator[Row]:
 def rows(turns: FloatArray, stages: bool, overruns: int | None) -> Iterator[Row]:
     """Give quantiles of processor time of each stage, of sums of them, of "mixed", and of the tick's wall time."""
     of_mixed = turns[:, COLUMNS.index("run")] % 2 == 1
-    ticks, mixed_s = turns[~of_mixed], turns[of_mixed, COLUMNS.index("tick_s")]
+    ticks, mixed_s = turns[~of_mixed], turns[of_mixed, COLUMNS.index("spent_s")]
     spent = dict(zip(COLUMNS, ticks.T, strict=True))
-    tick_s = spent["tick_s"]
+    tick_s = spent["spent_s"]
     within = sum(spent[name] for name in STAGES if name != "frame")
     found = {name: spent[name] for name in STAGES} | {"the rest": tick_s - within}
     found = found | {"whole look": spent["law"][spent["looks"] > 0.0]} if stages else {}
@@ -121,7 +121,7 @@ def rows(turns: FloatArray, stages: bool, overruns: int | None) -> Iterator[Row]
         "tick, wall time": spent["wall_s"],
         "mixed": mixed_s,
     }
-    together = np.diff(spent["run"]) == 0.0
+    together = np.diff(spent["run"]) == 0.0  # without the turns of "mixed"
     share = float(np.diff(spent["thread_s"])[together].sum() / np.diff(spent["now_s"])[together].sum())
     for name, values in found.items():
         if values.size:

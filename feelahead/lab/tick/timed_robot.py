@@ -2,11 +2,10 @@
 
 --objects=N puts N more perceived objects around, which physics knows nothing of; --only takes the scene's own away.
 
-The peer "mixed" (see `Mixed`) is measured here, too, in the place of 4 ticks of each 17. Its turns are paced by the
-loop as ticks are, after the same sleep. What a turn reads was last read a millisecond before, by the turn before it:
-that makes a tick cold, and so the first of the 4 does not count. Run beside a tick, after its messages have left, it
-was 10 % faster: MuJoCo's code was still warm. The arm follows its command for 100 ms and notices nothing of 4. The
-next 2 ticks do not count: they catch up with the physics. 17 is prime to the periods of looks and frames.
+The peer "mixed" (see `Mixed`) is measured here, too, at the start of 4 ticks of each 17; these ticks do not count. It
+is as cold as a tick: both begin after the loop's sleep. Run after a tick's messages it was 10 % faster, as MuJoCo's
+code was still warm. The first of the 4 does not count, nor do the 2 ticks after them. 17 is prime to the periods of
+looks and frames.
 """
 
 import itertools
@@ -23,9 +22,9 @@ import robot_side.main
 from common.command.command_line import parse_settings, run_command
 from feelahead.lab.tick.crowd import CrowdedCamera
 from feelahead.lab.tick.mixed import Mixed
-from robot_side.core import RobotParts, RobotSide
-from robot_side.events import Listener, Step
-from robot_side.reporting.outgoing_messages import Outgoing
+from robot_side.core import RobotParts
+from robot_side.events import Listener, Step, Tick
+from robot_side.laws.law import Law
 
 PROGRAM: Final = "feelahead.lab.tick.timed_robot"
 STAGES: Final = ("physics", "look", "frame", "law", "motion", "figures", "message")
@@ -40,9 +39,9 @@ _OF_STEPS: Final[dict[Step, str]] = {
     "listeners": "figures",
     "messages": "message",
 }
-COLUMNS: Final = ("now_s", "run", "tick_s", "thread_s", "wall_s", "looks", *STAGES)
-"""Columns of the log: time, the run of turns that count (even: ticks, odd: "mixed"), the turn's processor time, the
-thread's until then, the turn's wall time, how many looks the tick began, each stage's processor time."""
+COLUMNS: Final = ("now_s", "run", "spent_s", "thread_s", "wall_s", "looks", *STAGES)
+"""Columns of the log: time; the run of turns that count (even: ticks, odd: "mixed"); processor time of the tick or of
+"mixed"; the thread's until then; wall time; how many looks the tick began; each stage's processor time."""
 _TURNS: Final = 17
 _MIXED: Final = 4
 _UNCOUNTED: Final = (0, _MIXED, _MIXED + 1)
@@ -62,63 +61,66 @@ class TimedSettings:
     """Leave out the scene's own."""
 
 
-class StepTimes(Listener):
-    """Adds up the processor time of each stage."""
+class TimedTicks(Listener):
+    """Times ticks and their stages, does "mixed" before some of them, and keeps a row for each turn that counts."""
 
-    def __init__(self, *, all_stages: bool) -> None:
-        """all_stages: or else those alone that are no part of look to message."""
+    def __init__(self, law: Law, rows: list[tuple[float, ...]], *, all_stages: bool) -> None:
+        """rows: filled, see COLUMNS. all_stages: or else those alone that are no part of look to message."""
         self.steps = get_args(Step) if all_stages else ("arm", "pose", "frame", "end")
-        self.took_s = np.zeros(len(STAGES))
+        self._rows, self._law, self._mixed, self._turns = rows, law, Mixed(), itertools.count()
+        self._stages_s = np.zeros(len(STAGES))
         self._places = {
             step: STAGES.index(stage) for step, stage in _OF_STEPS.items() if all_stages or stage in OUTSIDE
         }
-        self._place: int | None = None
-        self._began_s = 0.0
+        self._stage: tuple[int, float] | None = None
+        self._begun: tuple[int, int, float, float] | None = None
+        self._mixed_row: tuple[float, ...] = ()
+        self._row: tuple[float, ...] = ()
+        self._now_s = 0.0
+
+    def on_tick(self, tick: Tick) -> None:
+        """Note when it began."""
+        self._now_s = tick.now_s
 
     def on_step(self, step: Step) -> None:
-        """End the stage before, and begin the step's."""
+        """End the stage before, and begin the step's; a tick is from `arm` to the first `end`."""
+        if step == "arm":
+            self._begin()
         place = self._places.get(step)
-        if place is None and self._place is None:
-            return
-        now_s = time.thread_time()
-        if self._place is not None:
-            self.took_s[self._place] += now_s - self._began_s
-        self._place, self._began_s = place, now_s
+        if place is not None or self._stage is not None:
+            now_s = time.thread_time()
+            if self._stage is not None:
+                self._stages_s[self._stage[0]] += now_s - self._stage[1]
+            self._stage = None if place is None else (place, now_s)
+        if step == "end" and self._begun is not None:
+            self._end(*self._begun)
+            self._begun = None
 
-
-class RobotInTurns(RobotSide):
-    """A core that does "mixed" in the place of some ticks, and adds a row for each turn that counts."""
-
-    def __init__(
-        self, parts: RobotParts, listeners: Sequence[Listener], settings: TimedSettings, ticks: list[tuple[float, ...]]
-    ) -> None:
-        if settings.objects or settings.only:
-            parts = replace(parts, camera=CrowdedCamera(parts.camera, settings.objects, only=settings.only))
-        self._times, self._mixed, self._turns = StepTimes(all_stages=settings.stages), Mixed(), itertools.count()
-        self._rows, self._last = ticks, list[float]()
-        super().__init__(parts, [*listeners, self._times])
-
-    def tick(self, now_s: float) -> list[Outgoing]:
-        """Tick, or do the other work."""
-        if self._last:  # Only now is it known what came after its messages.
-            self._rows.append((*self._last, *self._times.took_s.tolist()))
-            self._last.clear()
-        self._times.took_s[:] = 0.0
-        (round_, turn), began_wall_s = divmod(next(self._turns), _TURNS), time.perf_counter()
-        looks, outgoing = self._looks(), list[Outgoing]()
-        began_s = time.thread_time()
-        if turn < _MIXED:
+    def _begin(self) -> None:
+        if self._row:  # Only now is it known what came after its messages.
+            self._rows.append((*self._row, *self._stages_s.tolist()))
+        self._stages_s[:] = 0.0
+        self._row = self._mixed_row = ()
+        number = next(self._turns)
+        if number % _TURNS < _MIXED:
+            began_wall_s, began_s = time.perf_counter(), time.thread_time()
             self._mixed.work()
+            ended_s = time.thread_time()
+            self._mixed_row = ended_s - began_s, ended_s, time.perf_counter() - began_wall_s, 0.0
+        self._begun = number, self._looks(), time.perf_counter(), time.thread_time()
+
+    def _end(self, number: int, looks: int, began_wall_s: float, began_s: float) -> None:
+        ended_s, (round_, turn) = time.thread_time(), divmod(number, _TURNS)
+        if turn in _UNCOUNTED:
+            return
+        if self._mixed_row:
+            self._rows.append((self._now_s, 2 * round_ + 1, *self._mixed_row, *np.zeros(len(STAGES)).tolist()))
         else:
-            outgoing = super().tick(now_s)
-        ended_s = time.thread_time()
-        if turn not in _UNCOUNTED:
-            wall_s, looks = time.perf_counter() - began_wall_s, self._looks() - looks
-            self._last[:] = now_s, 2 * round_ + (turn < _MIXED), ended_s - began_s, ended_s, wall_s, looks
-        return outgoing
+            spent = ended_s - began_s, ended_s, time.perf_counter() - began_wall_s, self._looks() - looks
+            self._row = self._now_s, 2 * round_, *spent
 
     def _looks(self) -> int:
-        return self.parts.law.summary().get("fields", 0)
+        return self._law.summary().get("fields", 0)
 
 
 def command(arguments: Sequence[str]) -> int:
@@ -126,12 +128,19 @@ def command(arguments: Sequence[str]) -> int:
     ours = tuple(f"--{one.name}=" for one in fields(TimedSettings))
     mine = [argument for argument in arguments if argument.startswith(ours)]
     settings = parse_settings(TimedSettings, PROGRAM, mine)
-    ticks: list[tuple[float, ...]] = []
     others = [argument for argument in arguments if argument not in mine]
+    rows: list[tuple[float, ...]] = []
+
+    def adapt(parts: RobotParts) -> tuple[RobotParts, Sequence[Listener]]:
+        if settings.objects or settings.only:
+            parts = replace(parts, camera=CrowdedCamera(parts.camera, settings.objects, only=settings.only))
+        timed = TimedTicks(parts.law, rows, all_stages=settings.stages)
+        return parts, [timed]
+
     try:
-        return robot_side.main.command(others, lambda parts, listeners: RobotInTurns(parts, listeners, settings, ticks))
+        return robot_side.main.command(others, adapt)
     finally:
-        np.save(settings.log, np.array(ticks).reshape(-1, len(COLUMNS)))
+        np.save(settings.log, np.array(rows).reshape(-1, len(COLUMNS)))
 
 
 if __name__ == "__main__":

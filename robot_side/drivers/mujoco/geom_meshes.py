@@ -19,7 +19,6 @@ from robot_side.overlap.meshes.mesh_shapes import (
     capsule_mesh,
     convex_hull_mesh,
     cylinder_mesh,
-    ellipsoid_mesh,
 )
 
 _LARGEST_VOLUME_ERROR = 0.01
@@ -99,8 +98,6 @@ def _around(kind: GeomKind, size: tuple[float, ...], fineness: int) -> ShapeMesh
             return cylinder_mesh(size[0], size[1], fineness)
         case GeomKind.CAPSULE:
             return capsule_mesh(size[0], size[1], fineness)
-        case GeomKind.ELLIPSOID:
-            return ellipsoid_mesh(size, fineness)
         case _:
             return None
 

@@ -50,12 +50,12 @@ def test_alone_a_crowd_is_all_there_is() -> None:
 
 
 def test_look_to_message_leaves_out_physics_and_frames_and_stands_beside_mixed() -> None:
-    tick = dict.fromkeys(COLUMNS, 0.0) | {"tick_s": 80e-6, "physics": 30e-6, "frame": 20e-6, "law": 40e-6}
+    tick = dict.fromkeys(COLUMNS, 0.0) | {"spent_s": 80e-6, "physics": 30e-6, "frame": 20e-6, "law": 40e-6}
     turns = np.array([[tick[column] for column in COLUMNS]] * 4)
     turns[:, COLUMNS.index("run")] = 0, 0, 0, 1
     turns[:, 0], turns[:, COLUMNS.index("thread_s")] = (0.0, 1.0, 2.0, 3.0), (0.0, 0.5, 1.0, 2.0)
     turns[1, COLUMNS.index("looks")], turns[1, COLUMNS.index("law")] = 1, 60e-6
-    turns[3, COLUMNS.index("tick_s")] = 200e-6
+    turns[3, COLUMNS.index("spent_s")] = 200e-6
     found = {row["stage"]: row for row in rows(turns, stages=True, overruns=0)}
     assert found["look to message"]["p50_us"] == pytest.approx(50.0)
     assert found["look to message"]["p50_of_mixed"] == pytest.approx(0.25)
