@@ -4,6 +4,7 @@ import contextlib
 import importlib.metadata
 import os
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from operator_side.dualsense.hid.udev import RULE_FILE, RULE_FOLDERS, installing
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.models import PRODUCT_IDS, SONY_VENDOR_ID
 
-_UHID: Final = "/dev/uhid"
+UHID: Final = Path("/dev/uhid")
 
 
 @dataclass(frozen=True)
@@ -34,33 +35,31 @@ class ControllerSeen:
     """Why it cannot be used, and what to do; None if it can."""
 
 
-def check_hidapi(platform: str, version: str | None, packages: Sequence[str], trouble: str | None) -> Finding:
-    """Whether hidapi is there, and no other package in its place.
-
-    `version`: None where it is not installed; `packages`: all that install a module called `hid`; `trouble`: why it
-    cannot be used.
-    """
-    name = "hidapi"
-    if version is None:
+def check_hidapi() -> Finding:
+    """Whether hidapi is there, and no other package in its place."""
+    name, again = "hidapi", "pip install --force-reinstall hidapi"
+    try:
+        version = importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
         return Finding(name, Verdict.NOTE, "not installed (for a real controller)", "pip install 'feelahead[operator]'")
-    again = "pip install --force-reinstall hidapi"
-    if strangers := [package for package in packages if package.lower() != "hidapi"]:
+    trouble = None
+    try:
+        load_backend()
+    except NoDriverError as error:
+        trouble = str(error)
+    if strangers := sorted({*importlib.metadata.packages_distributions().get("hid", [])} - {name}):
         # On Linux ours is the module hidraw, which nobody else brings.
-        verdict = Verdict.NOTE if platform == "linux" and trouble is None else Verdict.MISSING
+        verdict = Verdict.NOTE if sys.platform == "linux" and trouble is None else Verdict.MISSING
         said = f"{version}, but the package {' and '.join(strangers)} installs a module called hid, too"
         return Finding(name, verdict, said, f"pip uninstall {' '.join(strangers)} && {again}")
-    if trouble is not None:
-        return Finding(name, Verdict.MISSING, trouble, again)
-    return Finding(name, Verdict.OK, version)
+    return Finding(name, Verdict.MISSING, trouble, again) if trouble else Finding(name, Verdict.OK, version)
 
 
-def check_permission(
-    platform: str, *, is_root: bool, rules: Mapping[str, str], controllers: Sequence[ControllerSeen]
-) -> Finding:
+def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Sequence[ControllerSeen]) -> Finding:
     """Whether a controller may be opened: seen to be so, or by udev's rules (`rules`: file -> text)."""
     name = "udev rule"
-    if platform != "linux":
-        return Finding(name, Verdict.OK, f"not needed on {platform}")
+    if sys.platform != "linux":
+        return Finding(name, Verdict.OK, f"not needed on {sys.platform}")
     if controllers and all(seen.trouble is None for seen in controllers):
         return Finding(name, Verdict.OK, "the controller can be opened")
     if not (missing := missing_grants(rules)):
@@ -77,16 +76,16 @@ def check_permission(
 def missing_grants(rules: Mapping[str, str]) -> list[str]:
     """The models and transports that no rule in these files opens to the person at the machine."""
     lines = [line for text in rules.values() for line in text.splitlines() if not line.lstrip().startswith("#")]
-    granting = [line for line in lines if "hidraw" in line and re.search(r'uaccess|MODE\s*:?=\s*"066', line)]
-    missing = []
-    for product, model in PRODUCT_IDS.items():
+    granting = "\n".join(line for line in lines if "hidraw" in line and re.search(r'uaccess|MODE\s*:?=\s*"066', line))
+    wanted = {
+        f"a {model} on {transport}": pattern
+        for product, model in PRODUCT_IDS.items()
         for transport, pattern in (
             ("USB", rf'idProduct\}}\s*==\s*"{product:04x}"'),
             ("Bluetooth", rf'KERNELS\s*==\s*"[^"]*{SONY_VENDOR_ID:04X}:{product:04X}'),
-        ):
-            if not any(re.search(pattern, line, re.IGNORECASE) for line in granting):
-                missing.append(f"a {model} on {transport}")
-    return missing
+        )
+    }
+    return [what for what, pattern in wanted.items() if not re.search(pattern, granting, re.IGNORECASE)]
 
 
 def check_controllers(controllers: Sequence[ControllerSeen] | None) -> list[Finding]:
@@ -100,17 +99,17 @@ def check_controllers(controllers: Sequence[ControllerSeen] | None) -> list[Find
     return [_described(seen) for seen in controllers]
 
 
-def check_uhid(platform: str, *, exists: bool, writable: bool) -> Finding:
+def check_uhid() -> Finding:
     """Whether `feelahead virtual-dualsense` can show a controller to the system."""
-    purpose = "for feelahead virtual-dualsense"
-    if platform != "linux":
-        return Finding(_UHID, Verdict.NOTE, f"Linux alone has it ({purpose})")
-    if not exists:
-        return Finding(_UHID, Verdict.NOTE, f"not there ({purpose})", "sudo modprobe uhid")
-    if not writable:
-        command = f"sudo setfacl -m u:{os.environ.get('USER', 'YOU')}:rw {_UHID}"
-        return Finding(_UHID, Verdict.NOTE, f"no permission ({purpose})", command)
-    return Finding(_UHID, Verdict.OK, f"can be used ({purpose})")
+    name, purpose = str(UHID), "for feelahead virtual-dualsense"
+    if sys.platform != "linux":
+        return Finding(name, Verdict.NOTE, f"Linux alone has it ({purpose})")
+    if not UHID.exists():
+        return Finding(name, Verdict.NOTE, f"not there ({purpose})", "sudo modprobe uhid")
+    if not os.access(UHID, os.R_OK | os.W_OK):
+        command = f"sudo setfacl -m u:{os.environ.get('USER', 'YOU')}:rw {UHID}"
+        return Finding(name, Verdict.NOTE, f"no permission ({purpose})", command)
+    return Finding(name, Verdict.OK, f"can be used ({purpose})")
 
 
 def _described(seen: ControllerSeen) -> Finding:
@@ -120,22 +119,6 @@ def _described(seen: ControllerSeen) -> Finding:
         return Finding("controller", Verdict.MISSING, f"{place}: {said}", remedy or None)
     parts = (seen.address, f"firmware {seen.firmware or 'unknown'}", f"battery {seen.battery or 'unknown'}")
     return Finding("controller", Verdict.OK, f"{place} on {seen.transport}: {', '.join(filter(None, parts))}")
-
-
-# Looking
-
-
-def hidapi_finding(platform: str) -> Finding:
-    """Look at what is installed under hidapi's names."""
-    version = trouble = None
-    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-        version = importlib.metadata.version("hidapi")
-    try:
-        load_backend()
-    except NoDriverError as error:
-        trouble = str(error)
-    packages = importlib.metadata.packages_distributions().get("hid", [])
-    return check_hidapi(platform, version, sorted(set(packages)), trouble)
 
 
 def controllers_seen() -> list[ControllerSeen] | None:
@@ -151,11 +134,6 @@ def udev_rules() -> dict[str, str]:
     """The text of each file of udev's rules."""
     paths = [path for folder in RULE_FOLDERS for path in sorted(Path(folder).glob("*.rules"))]
     return {str(path): path.read_text(encoding="utf-8", errors="replace") for path in paths if os.access(path, os.R_OK)}
-
-
-def uhid_finding(platform: str) -> Finding:
-    """Look at /dev/uhid."""
-    return check_uhid(platform, exists=Path(_UHID).exists(), writable=os.access(_UHID, os.R_OK | os.W_OK))
 
 
 def _look_at(backend: HidBackend, path: bytes, model: str) -> ControllerSeen:

@@ -1,4 +1,4 @@
-"""Checks of this machine: Python, packages, compiled kernels, rendering, priority, ports."""
+"""Checks of this machine: packages, compiled kernels, rendering, priority, ports."""
 
 import json
 import os
@@ -15,29 +15,20 @@ from rich.progress import Progress
 
 from common.errors import ConfigurationError
 from feelahead.commands.doctor.finding import Finding, Verdict
+from robot_side.viewing.off_screen import BACKENDS, REMEDY
 
-OLDEST_PYTHON: Final = (3, 11)
-EXTRAS: Final[Mapping[str, tuple[str, ...]]] = {
-    "robot": ("mujoco", "numba", "simplejpeg"),
-    "operator": ("hidapi", "viser", "trimesh"),
-    "video": ("av",),
-    "record": ("foxglove", "mcap"),
-    "experiments": ("matplotlib", "pyarrow", "distributed"),
+EXTRAS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
+    "robot": ("the simulated arm: the demo and feelahead-robot", ("mujoco", "numba", "simplejpeg")),
+    "operator": (
+        "a real controller and the browser console",
+        ("hidraw" if sys.platform == "linux" else "hid", "viser", "trimesh"),
+    ),
+    "video": ("pictures in H.264, a tenth of JPEG's bytes", ("av",)),
+    "record": ("recording runs", ("foxglove", "mcap")),
+    "experiments": ("sweeps over many runs", ("matplotlib", "pyarrow", "distributed")),
 }
-"""Each extra with what it brings; hidapi's module is `hidraw` on Linux and `hid` elsewhere."""
-_PACKAGES: Final = {"mujoco": "mujoco-core", "hidraw": "hidapi", "hid": "hidapi", "foxglove": "foxglove-sdk"}
-"""The package that brings a module, where its name is another."""
-_PURPOSES: Final = {
-    "robot": "the simulated arm: the demo and feelahead-robot",
-    "operator": "a real controller and the browser console",
-    "video": "pictures in H.264, a tenth of JPEG's bytes",
-    "record": "recording runs",
-    "experiments": "sweeps over many runs",
-}
+"""Each extra with its purpose, and the modules that it brings."""
 COMPILE: Final = "feelahead doctor --compile"
-RENDERING: Final = ("egl", "osmesa") if sys.platform == "linux" else ("",)
-"""The order of robot_side/viewing."""
-RENDERING_PACKAGES: Final = "sudo apt-get install libegl1 libgl1-mesa-dri (or: libosmesa6)"
 PORTS: Final = {
     5555: "the control port of feelahead-robot; another one: --bind tcp://127.0.0.1:5557",
     5556: "the view port of feelahead-robot; another one: --view-bind tcp://127.0.0.1:5558",
@@ -78,32 +69,17 @@ class KernelFacts:
     writable: bool
 
 
-def check_python(version: tuple[int, int, int]) -> Finding:
-    """Whether this Python is new enough."""
-    said, oldest = ".".join(map(str, version)), ".".join(map(str, OLDEST_PYTHON))
-    if version[:2] >= OLDEST_PYTHON:
-        return Finding("Python", Verdict.OK, said, for_demo=True)
-    remedy = f"install Python {oldest} or later"
-    return Finding("Python", Verdict.MISSING, f"{said}, older than {oldest}", remedy, for_demo=True)
-
-
 def check_extra(extra: str, failures: Mapping[str, str]) -> Finding:
     """Whether every module of an extra could be imported; `failures`: what Python said of those that could not."""
-    name, for_demo = f"extra {extra}", extra == "robot"
+    (purpose, modules), name = EXTRAS[extra], f"extra {extra}"
     if not failures:
-        return Finding(name, Verdict.OK, f"{', '.join(EXTRAS[extra])}: {_PURPOSES[extra]}", for_demo=for_demo)
+        return Finding(name, Verdict.OK, f"{', '.join(modules)}: {purpose}")
     absent = [module for module, reason in failures.items() if "No module named" in reason]
     broken = [f"{module} ({reason})" for module, reason in failures.items() if module not in absent]
     told = {"not installed": absent, "cannot be imported": broken}
-    said = "; ".join(f"{how}: {', '.join(modules)}" for how, modules in told.items() if modules)
-    again = " ".join(_PACKAGES.get(module, module) for module in failures)
-    return Finding(
-        name,
-        Verdict.MISSING if for_demo else Verdict.NOTE,
-        f"{said} (for {_PURPOSES[extra]})",
-        f"pip install --force-reinstall {again}" if broken else f"pip install 'feelahead[{extra}]'",
-        for_demo=for_demo,
-    )
+    said = "; ".join(f"{how}: {', '.join(found)}" for how, found in told.items() if found)
+    remedy = f"pip install {'--force-reinstall ' if broken else ''}'feelahead[{extra}]'"
+    return Finding(name, Verdict.MISSING if extra == "robot" else Verdict.NOTE, f"{said} (for {purpose})", remedy)
 
 
 def check_kernels(facts: KernelFacts | None) -> list[Finding]:
@@ -126,13 +102,13 @@ def check_rendering(troubles: Mapping[str, str | None]) -> Finding:
     if working:
         return Finding("cameras", Verdict.OK, f"rendered without a screen by way of {working[0].upper() or 'OpenGL'}")
     said = "; ".join(trouble for trouble in troubles.values() if trouble is not None)
-    remedy = RENDERING_PACKAGES if "egl" in troubles else None
+    remedy = REMEDY if "egl" in troubles else None
     return Finding("cameras", Verdict.NOTE, f"no pictures, the arm is driven without: {said}", remedy)
 
 
-def check_realtime(platform: str, notes: Sequence[str]) -> list[Finding]:
+def check_realtime(notes: Sequence[str]) -> list[Finding]:
     """Whether `--realtime` would be granted; `notes` are its own, one for each thing that is not."""
-    if platform != "linux":
+    if sys.platform != "linux":
         return [Finding("--realtime", Verdict.NOTE, "Linux alone has it; the sides run without")]
     findings = []
     for note in notes:
@@ -156,15 +132,9 @@ def check_ports(troubles: Mapping[int, str | None]) -> list[Finding]:
 # Looking
 
 
-def modules_of(extra: str, platform: str) -> tuple[str, ...]:
-    """The modules to import to see whether an extra is there; `platform` as in sys.platform."""
-    hidapi = "hidraw" if platform == "linux" else "hid"
-    return tuple(hidapi if module == "hidapi" else module for module in EXTRAS[extra])
-
-
 def failed_imports() -> dict[str, dict[str, str]]:
     """For each extra the modules that cannot be imported, and why; each in a process of its own, which may crash."""
-    pairs = [(extra, module) for extra in EXTRAS for module in modules_of(extra, sys.platform)]
+    pairs = [(extra, module) for extra in EXTRAS for module in EXTRAS[extra][1]]
     with ThreadPoolExecutor(max_workers=2) as pool:
         said = list(pool.map(lambda pair: _output_of(_IMPORT, pair[1]), pairs))
     failures: dict[str, dict[str, str]] = {extra: {} for extra in EXTRAS}
@@ -180,9 +150,9 @@ def kernel_facts() -> KernelFacts | None:
     return None if said is None else KernelFacts(*json.loads(said))
 
 
-def rendering_troubles(backends: Sequence[str] = RENDERING) -> dict[str, str | None]:
+def rendering_troubles() -> dict[str, str | None]:
     """For each way to render without a screen why it does not work, None if it does; each in a process of its own."""
-    outputs = {backend: _output_of(_RENDER, backend) for backend in backends}
+    outputs = {backend: _output_of(_RENDER, backend) for backend in BACKENDS}
     ended = "trying it ends Python, or takes too long"
     return {backend: ended if said is None else json.loads(said) for backend, said in outputs.items()}
 
@@ -191,11 +161,6 @@ def realtime_notes() -> list[str]:
     """The notes of `--realtime`, tried in a process of its own."""
     notes: list[str] = json.loads((sys.platform == "linux" and _output_of(_REALTIME)) or "[]")
     return notes
-
-
-def port_troubles() -> dict[int, str | None]:
-    """Try each default port on loopback: the reason why it cannot be bound, or None."""
-    return {port: _trouble_at(port) for port in PORTS}
 
 
 def _output_of(program: str, *arguments: str) -> str | None:
@@ -210,7 +175,8 @@ def _output_of(program: str, *arguments: str) -> str | None:
     return done.stdout.strip().splitlines()[-1]
 
 
-def _trouble_at(port: int) -> str | None:
+def port_trouble(port: int) -> str | None:
+    """Try a port on loopback: the reason why it cannot be bound, or None."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         # As the sides bind: what still lingers of an ended connection is no obstacle.
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
