@@ -18,7 +18,6 @@ from rich.text import Text
 from common.command.command_line import parse_settings
 from common.sockets.authentication import OperatorKeys
 from feelahead.commands.doctor import controllers, link, machine
-from feelahead.commands.doctor.controllers import ControllerSeen
 from feelahead.commands.doctor.finding import Finding, Verdict, fit_for_demo
 from feelahead.commands.doctor.path import measure_path_along, path_line
 from feelahead.commands.doctor.port import Way
@@ -76,15 +75,10 @@ def doctor(arguments: Sequence[str]) -> int:
         return _look_along(settings, settings.connect)
     if settings.compile:
         return machine.compile_kernels(as_json=settings.json)
-    seen = controllers.controllers_seen()
-    findings = examine(seen)
+    findings = examine()
     fit = fit_for_demo(findings)
     if settings.json:
-        found = {
-            "demo": fit,
-            "findings": [dataclasses.asdict(finding) for finding in findings],
-            "controllers": None if seen is None else [dataclasses.asdict(one) for one in seen],
-        }
+        found = {"demo": fit, "findings": [dataclasses.asdict(finding) for finding in findings]}
         sys.stdout.write(json.dumps(found, indent=2) + "\n")
     else:
         show(findings, Console(width=None if sys.stdout.isatty() else _WIDTH_WITHOUT_TERMINAL))
@@ -106,15 +100,16 @@ def _look_along(settings: DoctorSettings, connect: str) -> int:
     return 0 if error is None else 1
 
 
-def examine(seen: list[ControllerSeen] | None) -> list[Finding]:
+def examine() -> list[Finding]:
     """Every check of this machine, in the order of the table."""
+    seen = controllers.controllers_seen()
     rules, is_root = controllers.udev_rules(), hasattr(os, "geteuid") and os.geteuid() == 0
     return [
         Finding("Python", Verdict.OK, platform.python_version()),
-        *(machine.check_extra(extra, failures) for extra, failures in machine.failed_imports().items()),
+        *(machine.check_extra(extra, machine.failed_imports(extra)) for extra in machine.EXTRAS),
         controllers.check_hidapi(),
-        controllers.check_permission(is_root=is_root, rules=rules, controllers=seen or []),
-        *controllers.check_controllers(seen),
+        controllers.check_permission(is_root=is_root, rules=rules, controllers=seen),
+        *seen,
         controllers.check_uhid(),
         *machine.check_kernels(machine.kernel_facts()),
         machine.check_rendering(machine.rendering_troubles()),

@@ -6,7 +6,6 @@ import os
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -19,20 +18,7 @@ from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.models import PRODUCT_IDS, SONY_VENDOR_ID
 
 UHID: Final = Path("/dev/uhid")
-
-
-@dataclass(frozen=True)
-class ControllerSeen:
-    """A controller that the system has, and what it says of itself; None for what it does not say."""
-
-    model: str
-    path: str
-    transport: str | None = None
-    address: str | None = None
-    firmware: str | None = None
-    battery: str | None = None
-    trouble: str | None = None
-    """Why it cannot be used, and what to do; None if it can."""
+_NAME: Final = "controller"
 
 
 def check_hidapi() -> Finding:
@@ -55,19 +41,19 @@ def check_hidapi() -> Finding:
     return Finding(name, Verdict.MISSING, trouble, again) if trouble else Finding(name, Verdict.OK, version)
 
 
-def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Sequence[ControllerSeen]) -> Finding:
-    """Whether a controller may be opened: seen to be so, or by udev's rules (`rules`: file -> text)."""
+def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Sequence[Finding]) -> Finding:
+    """Whether a controller may be opened: found to be so, or by udev's rules (`rules`: file -> text)."""
     name = "udev rule"
     if sys.platform != "linux":
         return Finding(name, Verdict.OK, f"not needed on {sys.platform}")
-    if controllers and all(seen.trouble is None for seen in controllers):
+    if all(seen.verdict is Verdict.OK for seen in controllers):
         return Finding(name, Verdict.OK, "the controller can be opened")
     if not (missing := missing_grants(rules)):
         return Finding(name, Verdict.OK, "there, for USB and Bluetooth")
     remedy = installing_command()
     if is_root:
         return Finding(name, Verdict.OK, "not needed by root, who you are; what is below is for everybody else", remedy)
-    denied = any("permission" in (seen.trouble or "") for seen in controllers)
+    denied = any("no permission" in seen.said for seen in controllers)
     opened = f"lets you open {', '.join(missing)}; plug the controller in again after it"
     verdict = Verdict.MISSING if denied else Verdict.NOTE
     return Finding(name, verdict, f"none in {RULE_FILE} or elsewhere {opened}", remedy)
@@ -88,17 +74,6 @@ def missing_grants(rules: Mapping[str, str]) -> list[str]:
     return [what for what, pattern in wanted.items() if not re.search(pattern, granting, re.IGNORECASE)]
 
 
-def check_controllers(controllers: Sequence[ControllerSeen] | None) -> list[Finding]:
-    """Each controller that is connected; None: without hidapi nobody can know."""
-    name = "controller"
-    if controllers is None:
-        return [Finding(name, Verdict.NOTE, "cannot be looked for without hidapi")]
-    if not controllers:
-        how = "connect one by USB, or pair one by Bluetooth: hold Create and PS until its light flashes"
-        return [Finding(name, Verdict.NOTE, "none is connected (the demo simulates one)", how)]
-    return [_described(seen) for seen in controllers]
-
-
 def check_uhid() -> Finding:
     """Whether `feelahead virtual-dualsense` can show a controller to the system."""
     name, purpose = str(UHID), "for feelahead virtual-dualsense"
@@ -112,22 +87,15 @@ def check_uhid() -> Finding:
     return Finding(name, Verdict.OK, f"can be used ({purpose})")
 
 
-def _described(seen: ControllerSeen) -> Finding:
-    place = f"{seen.model} at {seen.path}"
-    if seen.trouble is not None:
-        said, _, remedy = seen.trouble.partition(": ")
-        return Finding("controller", Verdict.MISSING, f"{place}: {said}", remedy or None)
-    parts = (seen.address, f"firmware {seen.firmware or 'unknown'}", f"battery {seen.battery or 'unknown'}")
-    return Finding("controller", Verdict.OK, f"{place} on {seen.transport}: {', '.join(filter(None, parts))}")
-
-
-def controllers_seen() -> list[ControllerSeen] | None:
-    """Every controller that is connected, opened for a moment; None without hidapi."""
+def controllers_seen() -> list[Finding]:
+    """Every controller that is connected, opened for a moment, or why there is none."""
     try:
         backend = load_backend()
     except NoDriverError:
-        return None
-    return [_look_at(backend, seen.path, seen.model) for seen in sightings(backend)]
+        return [Finding(_NAME, Verdict.NOTE, "cannot be looked for without hidapi")]
+    how = "connect one by USB, or pair one by Bluetooth: hold Create and PS until its light flashes"
+    none = Finding(_NAME, Verdict.NOTE, "none is connected (the demo simulates one)", how)
+    return [_look_at(backend, seen.path, seen.model) for seen in sightings(backend)] or [none]
 
 
 def udev_rules() -> dict[str, str]:
@@ -136,17 +104,20 @@ def udev_rules() -> dict[str, str]:
     return {str(path): path.read_text(encoding="utf-8", errors="replace") for path in paths if os.access(path, os.R_OK)}
 
 
-def _look_at(backend: HidBackend, path: bytes, model: str) -> ControllerSeen:
-    name = os.fsdecode(path)
+def _look_at(backend: HidBackend, path: bytes, model: str) -> Finding:
+    place = f"{model} at {os.fsdecode(path)}"
     try:
         device = HidDualSense(backend, path)
     except DeviceError as error:
-        return ControllerSeen(model, name, trouble=str(error))
-    identity, firmware, battery = device.identity, None, None
+        said, _, remedy = str(error).partition(": ")
+        return Finding(_NAME, Verdict.MISSING, f"{place}: {said}", remedy or None)
+    identity, firmware, battery = device.identity, "unknown", "unknown"
     device.close()
     if (told := identity.firmware) is not None:
         firmware = f"0x{told.firmware_version:08x} (hardware 0x{told.hardware_version:08x})"
     with contextlib.suppress(RemoteProtocolError):
         state = parse_input_report(identity.first_report).battery
         battery = f"{'' if state.fraction is None else f'about {state.fraction:.0%}, '}{state.state.value}"
-    return ControllerSeen(model, name, identity.transport.value, identity.address, firmware, battery)
+    parts = (identity.address, f"firmware {firmware}", f"battery {battery}")
+    said = f"{place} on {identity.transport.value}: {', '.join(filter(None, parts))}"
+    return Finding(_NAME, Verdict.OK, said)

@@ -19,7 +19,6 @@ from feelahead.commands.doctor.port import (
     VIEW_CONNECT,
     Way,
     WayError,
-    Wrong,
     host_and_port,
     judge_port,
     judge_view,
@@ -81,7 +80,7 @@ def told(way: Way, talk: Talk, error: WayError | None) -> dict[str, object]:
         "connect": host_and_port(way.control),
         "view_connect": host_and_port(way.view),
         "reached": error is None,
-        "wrong": error and error.wrong.value,
+        "wrong": error and error.wrong,
         "said": error and error.said,
         "remedy": error and error.remedy,
         "protocol": PROTOCOL_VERSION,
@@ -146,7 +145,7 @@ class _Questions:
         if not self._until(_TELEMETRY_LIMIT_S + 2.0 * self._round_trip_s, lambda: self._telemetry):
             place = host_and_port(self._way.view)
             said = f"{place} is no view port of a robot side, or not of this one: it sends no telemetry"
-            raise WayError(Wrong.VIEW, f"the control port works, but {said}", VIEW_CONNECT)
+            raise WayError("view port", f"the control port works, but {said}", VIEW_CONNECT)
 
     def expect_large(self) -> None:
         """WayError unless a question gets through behind packets of full size."""
@@ -157,7 +156,7 @@ class _Questions:
         if not any(self._ask() and self._answered(_LARGE_LIMIT_S / 2) for _ in range(2)):
             said = f"small packets reach {self._place}, large ones do not: the way swallows what is too long for it"
             remedy = "a smaller MTU here, such as: sudo ip link set DEVICE mtu 1280 (VPNs and tunnels need that)"
-            raise WayError(Wrong.LARGE, said, remedy)
+            raise WayError("large packets", said, remedy)
 
     def _no_handshake(self) -> WayError:
         place = self._place
@@ -166,18 +165,18 @@ class _Questions:
         if self._sockets.key_refused:
             said = f"the robot side at {place} does not let this key in: it was never allowed there, or was revoked"
             return WayError(
-                Wrong.OUR_KEY, said, f"run there: feelahead keys allow NAME {public_part(self._way.keys.secret)}"
+                "our key", said, f"run there: feelahead keys allow NAME {public_part(self._way.keys.secret)}"
             )
         said = f"the program at {place} has another key than --robot-key says, or is no such port of a robot side"
         remedy = "--robot-key with what is shown on the robot's machine by: feelahead keys show robot"
-        return WayError(Wrong.ROBOT_KEY, said, remedy)
+        return WayError("robot key", said, remedy)
 
     def _no_answer(self) -> WayError:
         said = (
             f"{self._place} speaks ZeroMQ and does not answer: a robot side that still starts or stands still, its view"
         )
         remedy = "wait until it says that it listens (its first start compiles for a minute), and say its control port"
-        return WayError(Wrong.SILENT, f"{said} port, or another program", remedy)
+        return WayError("no answer", f"{said} port, or another program", remedy)
 
     def _ask(self) -> bool:
         """A command under no lease of an epoch that has not begun: it is answered, and moves nothing."""
@@ -205,7 +204,7 @@ class _Questions:
             message = decode(payload)
         except OtherVersionError as error:
             said = f"the robot side speaks {str(error).partition(';')[0]}, this machine {PROTOCOL_VERSION}"
-            raise WayError(Wrong.VERSION, said, "install the same release of feelahead on both") from error
+            raise WayError("version", said, "install the same release of feelahead on both") from error
         except RemoteProtocolError:
             return
         self._telemetry |= isinstance(message, Telemetry)

@@ -4,7 +4,6 @@ import errno
 import os
 import socket
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import Final
 
 from common.clock import MonotonicClock
@@ -20,27 +19,10 @@ _STEPS: Final = "feelahead keys --help has the steps on both machines"
 VIEW_CONNECT: Final = "say --view-connect tcp://HOST:PORT with the port that the robot side names at its start"
 
 
-class Wrong(StrEnum):
-    """The kinds of faults, in the order of looking."""
-
-    NAME = "name"
-    ROUTE = "route"
-    CLOSED = "closed port"
-    FIREWALL = "firewall"
-    OTHER = "something else"
-    KEYS = "keys"
-    ROBOT_KEY = "robot key"
-    OUR_KEY = "our key"
-    SILENT = "no answer"
-    VERSION = "version"
-    VIEW = "view port"
-    LARGE = "large packets"
-
-
 class WayError(Exception):
-    """The first thing that is wrong with the way."""
+    """The first thing that is wrong with the way; `wrong` is its kind in a word or two."""
 
-    def __init__(self, wrong: Wrong, said: str, remedy: str) -> None:
+    def __init__(self, wrong: str, said: str, remedy: str) -> None:
         super().__init__(f"{wrong}: {said}; to mend it: {remedy}")
         self.wrong, self.said, self.remedy = wrong, said, remedy
 
@@ -86,10 +68,10 @@ def judge_port(way: Way, port: Endpoint, opening: Opening, *, loopback: bool = F
             return
         case "CURVE", _:
             said = f"the robot side at {place} asks for keys, and none were given"
-            raise WayError(Wrong.KEYS, said, f"--keys FOLDER --robot-key KEY ({_STEPS})")
+            raise WayError("keys", said, f"--keys FOLDER --robot-key KEY ({_STEPS})")
         case "NULL", _:
             remedy = f"start it with --keys FOLDER ({_STEPS}), or leave --keys out if anyone may move the arm"
-            raise WayError(Wrong.KEYS, f"the robot side at {place} runs without keys, and --keys was given", remedy)
+            raise WayError("keys", f"the robot side at {place} runs without keys, and --keys was given", remedy)
     if opening.said:
         said = f"at {place} is something that begins with {opening.said[:24]!r}, and no robot side"
     elif opening.hung_up:
@@ -101,7 +83,7 @@ def judge_port(way: Way, port: Endpoint, opening: Opening, *, loopback: bool = F
     else:
         said = f"{place} takes connections and says nothing: no robot side, or one that stands still"
         see_who += "; a stopped process goes on after: kill -CONT PID"
-    raise WayError(Wrong.OTHER, said, see_who)
+    raise WayError("something else", said, see_who)
 
 
 def judge_view(way: Way, opening: Opening, *, loopback: bool = False) -> None:
@@ -109,8 +91,8 @@ def judge_view(way: Way, opening: Opening, *, loopback: bool = False) -> None:
     try:
         judge_port(way, way.view, opening, loopback=loopback)
     except WayError as error:
-        remedy = f"{error.remedy}; or {VIEW_CONNECT}" if error.wrong is Wrong.FIREWALL else VIEW_CONNECT
-        raise WayError(Wrong.VIEW, f"the control port works, but not the view port: {error.said}", remedy) from error
+        remedy = f"{error.remedy}; or {VIEW_CONNECT}" if error.wrong == "firewall" else VIEW_CONNECT
+        raise WayError("view port", f"the control port works, but not the view port: {error.said}", remedy) from error
 
 
 def _no_connection(way: Way, port: Endpoint, error: int, *, loopback: bool) -> WayError:
@@ -120,7 +102,7 @@ def _no_connection(way: Way, port: Endpoint, error: int, *, loopback: bool) -> W
         if not loopback:
             remedy = f"start feelahead-robot there with --bind tcp://0.0.0.0:{port.port} and --keys FOLDER: without"
             remedy += " --bind it listens on its own loopback alone"
-        return WayError(Wrong.CLOSED, f"{place} refuses connections: nothing listens there", remedy)
+        return WayError("closed port", f"{place} refuses connections: nothing listens there", remedy)
     if error == errno.ETIMEDOUT:
         ports = list(dict.fromkeys(str(each.port) for each in (way.control, way.view)))
         said = f"{place} gave no answer in {_CONNECT_LIMIT_S:g} s: a firewall drops what is sent there, or nothing has"
@@ -128,13 +110,13 @@ def _no_connection(way: Way, port: Endpoint, error: int, *, loopback: bool) -> W
             f"let TCP ports {' and '.join(ports)} in on the robot's machine, such as: sudo ufw allow proto tcp from"
         )
         remedy += f" any to any port {','.join(ports)}; whether it is on: ping {port.host}"
-        return WayError(Wrong.FIREWALL, f"{said} that address", remedy)
+        return WayError("firewall", f"{said} that address", remedy)
     reason = {
         errno.EHOSTUNREACH: "no machine has that address, no router knows a way, or a firewall rejects it",
         errno.ENETUNREACH: "this machine is in no network from which it can be reached",
     }.get(error, "this machine does not send there")
     remedy = f"see that the robot's machine is on, and both are in one network: ip route get {port.host}"
-    return WayError(Wrong.ROUTE, f"no way to {place} ({os.strerror(error)}): {reason}", remedy)
+    return WayError("route", f"no way to {place} ({os.strerror(error)}): {reason}", remedy)
 
 
 def resolved(port: Endpoint, flag: str) -> Endpoint:
@@ -143,7 +125,7 @@ def resolved(port: Endpoint, flag: str) -> Endpoint:
         return replace(port, host=resolve(port.host, port.address, flag)[0])
     except ConfigurationError as error:
         said, _, valid = str(error).partition("; valid: ")
-        raise WayError(Wrong.NAME, said, f"say {valid}, in /etc/hosts for example") from error
+        raise WayError("name", said, f"say {valid}, in /etc/hosts for example") from error
 
 
 def host_and_port(port: Endpoint) -> str:

@@ -15,8 +15,6 @@ from common.errors import NoDriverError
 from feelahead.commands.doctor import command as doctor_command
 from feelahead.commands.doctor import controllers, machine
 from feelahead.commands.doctor.controllers import (
-    ControllerSeen,
-    check_controllers,
     check_hidapi,
     check_permission,
     check_uhid,
@@ -46,13 +44,14 @@ OK, NOTE, MISSING = Verdict.OK, Verdict.NOTE, Verdict.MISSING
 ABSENT = {"some_module": "No module named 'some_module'"}
 BROKEN = {"numba": "No module named 'numba'", "mujoco": "libGL.so.1: cannot open"}
 BOTH = ["hid", "hidapi"]
-SEEN = ControllerSeen("DualSense", "/dev/hidraw3", "USB", ADDRESS, "0x0110002a", "about 95%, full")
-DENIED = ControllerSeen("DualSense", "/dev/hidraw3", trouble="no permission to open the controller at X: do this")
+SEEN = Finding("controller", OK, "DualSense at /dev/hidraw3 on USB: and more")
+DENIED = Finding("controller", MISSING, "DualSense at /dev/hidraw3: no permission to open the controller at X")
+NONE = Finding("controller", NOTE, "none is connected")
 NO_RIGHT = "--realtime: locking memory is not permitted; to permit it: sudo this; and that"
 
 
-def permission(*seen: ControllerSeen, is_root: bool = False, rules: str = "") -> Finding:
-    return check_permission(is_root=is_root, rules={"/etc/x.rules": rules}, controllers=seen)
+def permission(*seen: Finding, is_root: bool = False, rules: str = "") -> Finding:
+    return check_permission(is_root=is_root, rules={"/etc/x.rules": rules}, controllers=seen or [NONE])
 
 
 @pytest.mark.parametrize(
@@ -72,10 +71,6 @@ def permission(*seen: ControllerSeen, is_root: bool = False, rules: str = "") ->
         ([permission(SEEN)], OK, "can be opened", None),
         ([permission(rules="\n".join(RULES))], OK, "there", None),
         ([permission(is_root=True)], OK, "root", "udevadm"),
-        (check_controllers(None), NOTE, "without hidapi", None),
-        (check_controllers([]), NOTE, "none is connected", "by USB"),
-        (check_controllers([SEEN]), OK, f"on USB: {ADDRESS}, firmware 0x0110002a, battery about 95%, full", None),
-        (check_controllers([DENIED]), MISSING, "/dev/hidraw3: no permission", "^do this$"),
         (check_realtime([]), OK, "permitted", None),
         (check_realtime([NO_RIGHT]), NOTE, "locking memory is not permitted;", "^sudo this; and that$"),
         (check_ports(dict.fromkeys(PORTS)), OK, "5555, 5556, 8080 are free", None),
@@ -173,7 +168,7 @@ def test_what_cannot_be_bound_imported_or_rendered_is_named_with_the_reason(monk
         port = taken.getsockname()[1]
         assert machine.port_trouble(port) == "Address already in use"
     monkeypatch.setattr(machine, "EXTRAS", {"robot": ("a test", ("json", "no_such_module"))})
-    assert machine.failed_imports() == {"robot": {"no_such_module": "No module named 'no_such_module'"}}
+    assert machine.failed_imports("robot") == {"no_such_module": "No module named 'no_such_module'"}
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
     monkeypatch.setenv("EGL_PLATFORM", "none")
     assert str(machine.rendering_troubles()["egl"]).startswith("egl: ")
@@ -183,13 +178,15 @@ def test_controllers_are_looked_at_and_left_alone(monkeypatch: pytest.MonkeyPatc
     working, denied = FakeHandle(BLUETOOTH), FakeHandle(opens=False, reason="in use")
     backend: HidBackend = FakeBackend({0x0CE6: {b"/dev/a": working}, 0x0DF2: {b"/dev/b": denied}})
     monkeypatch.setattr(controllers, "load_backend", lambda: backend)
-    first, second = controllers.controllers_seen() or []
-    assert (first.model, first.transport, first.address, first.trouble) == ("DualSense", "Bluetooth", ADDRESS, None)
-    assert first.firmware == "0x0110002a (hardware 0x00000616)"
-    assert first.battery is not None
-    assert second.model == "DualSense Edge"
-    assert "in use" in (second.trouble or "")
+    first, second = controllers.controllers_seen()
+    about = f"on Bluetooth: {ADDRESS}, firmware 0x0110002a (hardware 0x00000616), battery about "
+    assert (first.verdict, second.verdict) == (OK, MISSING)
+    assert first.said.startswith(f"DualSense at /dev/a {about}")
+    assert second.said.startswith("DualSense Edge at /dev/b: ")
+    assert "in use" in second.said + (second.remedy or "")
     assert (working.closed, working.written) == (working.times_opened, [])
+    monkeypatch.setattr(controllers, "load_backend", lambda: FakeBackend({}))
+    assert [one.said for one in controllers.controllers_seen()] == ["none is connected (the demo simulates one)"]
 
 
 @pytest.mark.parametrize(("verdict", "code"), [(OK, 0), (MISSING, 1)])
@@ -200,8 +197,7 @@ def test_the_exit_code_says_whether_the_demo_can_run(
         Finding("extra robot", verdict, "numba [gone]", "pip install 'feelahead[robot]'"),
         Finding("udev rule", NOTE, "none", installing_command()),
     ]
-    monkeypatch.setattr(controllers, "controllers_seen", lambda: [SEEN])
-    monkeypatch.setattr(doctor_command, "examine", lambda _: findings)
+    monkeypatch.setattr(doctor_command, "examine", lambda: findings)
     assert command(["doctor"]) == code
     lines = capsys.readouterr().out.splitlines()
     # What is to be copied is not wrapped, and brackets are no markup.
@@ -211,7 +207,6 @@ def test_the_exit_code_says_whether_the_demo_can_run(
     told = json.loads(capsys.readouterr().out)
     assert told["demo"] is (code == 0)
     assert (told["findings"][0]["name"], told["findings"][0]["verdict"]) == ("extra robot", verdict.value)
-    assert told["controllers"][0]["address"] == ADDRESS
 
 
 @pytest.mark.processes
