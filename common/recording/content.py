@@ -1,6 +1,7 @@
 """Sort each message of a side: inputs stay as they are, and beside them stands what people and tools read."""
 
 import json
+import math
 from collections.abc import Iterable
 from typing import Any, Final
 
@@ -91,7 +92,8 @@ class Content:
         self._write(shown_view(message, now_s, self._objects))
 
     def _status(self, side: str, now_s: float, status: dict[str, Any]) -> None:
-        self._decoders[side].offset_s = status.get("offset_s")
+        offset_s = status.get("offset_s")
+        self._decoders[side].offset_s = math.nan if offset_s is None else offset_s
         self._file.write(f"/{side}/status", now_s, as_json({"time_s": now_s} | status))
         why = status.get("stopped_because")
         if side == "robot" and why != self._stopped_because:
