@@ -107,14 +107,11 @@ def examine() -> list[Finding]:
     return [
         Finding("Python", Verdict.OK, platform.python_version()),
         *(machine.check_extra(extra, machine.failed_imports(extra)) for extra in machine.EXTRAS),
-        controllers.check_hidapi(),
         controllers.check_permission(is_root=is_root, rules=rules, controllers=seen),
         *seen,
-        controllers.check_uhid(),
         *machine.check_kernels(machine.kernel_facts()),
         machine.check_rendering(machine.rendering_troubles()),
         *machine.check_realtime(machine.realtime_notes()),
-        *machine.check_ports({port: machine.port_trouble(port) for port in machine.PORTS}),
     ]
 
 

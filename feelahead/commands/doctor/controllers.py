@@ -1,7 +1,6 @@
-"""Checks of a real controller (hidapi, permission, connection) and of a virtual one."""
+"""Checks of a real controller: hidapi, permission, connection."""
 
 import contextlib
-import importlib.metadata
 import os
 import re
 import sys
@@ -17,28 +16,7 @@ from operator_side.dualsense.hid.udev import RULE_FILE, RULE_FOLDERS, installing
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.models import PRODUCT_IDS, SONY_VENDOR_ID
 
-UHID: Final = Path("/dev/uhid")
 _NAME: Final = "controller"
-
-
-def check_hidapi() -> Finding:
-    """Whether hidapi is there, and no other package in its place."""
-    name, again = "hidapi", "pip install --force-reinstall hidapi"
-    try:
-        version = importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError:
-        return Finding(name, Verdict.NOTE, "not installed (for a real controller)", "pip install 'feelahead[operator]'")
-    trouble = None
-    try:
-        load_backend()
-    except NoDriverError as error:
-        trouble = str(error)
-    if strangers := sorted({*importlib.metadata.packages_distributions().get("hid", [])} - {name}):
-        # On Linux ours is the module hidraw, which nobody else brings.
-        verdict = Verdict.NOTE if sys.platform == "linux" and trouble is None else Verdict.MISSING
-        said = f"{version}, but the package {' and '.join(strangers)} installs a module called hid, too"
-        return Finding(name, verdict, said, f"pip uninstall {' '.join(strangers)} && {again}")
-    return Finding(name, Verdict.MISSING, trouble, again) if trouble else Finding(name, Verdict.OK, version)
 
 
 def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Sequence[Finding]) -> Finding:
@@ -74,25 +52,13 @@ def missing_grants(rules: Mapping[str, str]) -> list[str]:
     return [what for what, pattern in wanted.items() if not re.search(pattern, granting, re.IGNORECASE)]
 
 
-def check_uhid() -> Finding:
-    """Whether `feelahead virtual-dualsense` can show a controller to the system."""
-    name, purpose = str(UHID), "for feelahead virtual-dualsense"
-    if sys.platform != "linux":
-        return Finding(name, Verdict.NOTE, f"Linux alone has it ({purpose})")
-    if not UHID.exists():
-        return Finding(name, Verdict.NOTE, f"not there ({purpose})", "sudo modprobe uhid")
-    if not os.access(UHID, os.R_OK | os.W_OK):
-        command = f"sudo setfacl -m u:{os.environ.get('USER', 'YOU')}:rw {UHID}"
-        return Finding(name, Verdict.NOTE, f"no permission ({purpose})", command)
-    return Finding(name, Verdict.OK, f"can be used ({purpose})")
-
-
 def controllers_seen() -> list[Finding]:
     """Every controller that is connected, opened for a moment, or why there is none."""
     try:
         backend = load_backend()
-    except NoDriverError:
-        return [Finding(_NAME, Verdict.NOTE, "cannot be looked for without hidapi")]
+    except NoDriverError as error:
+        said, _, remedy = str(error).partition(": ")
+        return [Finding(_NAME, Verdict.NOTE, f"cannot be looked for: {said}", remedy)]
     how = "connect one by USB, or pair one by Bluetooth: hold Create and PS until its light flashes"
     none = Finding(_NAME, Verdict.NOTE, "none is connected (the demo simulates one)", how)
     return [_look_at(backend, seen.path, seen.model) for seen in sightings(backend)] or [none]

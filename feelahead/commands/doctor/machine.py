@@ -1,14 +1,12 @@
-"""Checks of this machine: packages, compiled kernels, rendering, priority, ports."""
+"""Checks of this machine: packages, compiled kernels, rendering, priority."""
 
 import importlib
 import json
-import os
-import socket
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
 from rich.progress import Progress
@@ -16,6 +14,9 @@ from rich.progress import Progress
 from common.errors import ConfigurationError
 from feelahead.commands.doctor.finding import Finding, Verdict
 from robot_side.viewing.off_screen import BACKENDS, REMEDY
+
+if TYPE_CHECKING:
+    from robot_side.compiled.kernel import Compiled
 
 EXTRAS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
     "robot": ("the simulated arm: the demo and feelahead-robot", ("mujoco", "numba", "simplejpeg")),
@@ -29,24 +30,11 @@ EXTRAS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
 }
 """Each extra with its purpose, and the modules that it brings."""
 COMPILE: Final = "feelahead doctor --compile"
-PORTS: Final = {
-    5555: "the control port of feelahead-robot; another one: --bind tcp://127.0.0.1:5557",
-    5556: "the view port of feelahead-robot; another one: --view-bind tcp://127.0.0.1:5558",
-    8080: "the console",
-}
-"""Each with what it is for, and how to use another."""
 _LIMIT_S: Final = 60.0
 _RENDER: Final = """
 import json, sys
 from robot_side.viewing.off_screen import trouble_with
 print(json.dumps(trouble_with(sys.argv[1])))
-"""
-_KERNELS: Final = """
-import json
-from robot_side.compiled.machine_code import can_keep, machine_code_folder
-from robot_side.compiled.warm_up import import_kernels
-kept = [kernel.is_kept for kernel in import_kernels()]
-print(json.dumps([len(kept), kept.count(False), str(machine_code_folder()), can_keep()]))
 """
 _REALTIME: Final = "import json; from common.realtime.priority import make_realtime; print(json.dumps(make_realtime()))"
 
@@ -110,21 +98,6 @@ def check_realtime(notes: Sequence[str]) -> list[Finding]:
     return findings or [Finding("--realtime", Verdict.OK, "permitted")]
 
 
-def check_ports(troubles: Mapping[int, str | None]) -> list[Finding]:
-    """Whether the default ports can be bound on loopback; `troubles`: port -> why not, None if it can."""
-    free = [str(port) for port, trouble in troubles.items() if trouble is None]
-    findings = [Finding("ports", Verdict.OK, f"{', '.join(free)} are free")] if free else []
-    for port, trouble in troubles.items():
-        if trouble is not None:
-            purpose, _, other = PORTS[port].partition("; another one: ")
-            remedy = f"end whatever has it: ss -ltnp 'sport = :{port}'{other and f'; or use another: {other}'}"
-            findings.append(Finding("ports", Verdict.NOTE, f"{port}, {purpose}: {trouble}", remedy))
-    return findings
-
-
-# Looking
-
-
 def failed_imports(extra: str) -> dict[str, str]:
     """The modules of an extra that cannot be imported, and why."""
     failures = {}
@@ -139,8 +112,18 @@ def failed_imports(extra: str) -> dict[str, str]:
 
 def kernel_facts() -> KernelFacts | None:
     """Which kernels are compiled; None where none can be."""
-    said = _output_of(_KERNELS)
-    return None if said is None else KernelFacts(*json.loads(said))
+    try:
+        from robot_side.compiled.warm_up import import_kernels  # noqa: PLC0415
+    except ImportError:
+        return None
+    return _facts(import_kernels())
+
+
+def _facts(kernels: Sequence["Compiled"]) -> KernelFacts:
+    from robot_side.compiled.machine_code import can_keep, machine_code_folder  # noqa: PLC0415
+
+    missing = sum(not kernel.is_kept for kernel in kernels)
+    return KernelFacts(len(kernels), missing, str(machine_code_folder()), can_keep())
 
 
 def rendering_troubles() -> dict[str, str | None]:
@@ -168,26 +151,9 @@ def _output_of(program: str, *arguments: str) -> str | None:
     return done.stdout.strip().splitlines()[-1]
 
 
-def port_trouble(port: int) -> str | None:
-    """Try a port on loopback: the reason why it cannot be bound, or None."""
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        # As the sides bind: what still lingers of an ended connection is no obstacle.
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("127.0.0.1", port))
-            probe.listen(1)
-        except OSError as error:
-            return os.strerror(error.errno or 0)
-    return None
-
-
-# Compiling
-
-
 def compile_kernels(*, as_json: bool) -> int:
     """Compile those that are not, and say what there is then; 1 where they are not kept for the next start."""
     try:
-        from robot_side.compiled.machine_code import can_keep, machine_code_folder  # noqa: PLC0415
         from robot_side.compiled.warm_up import import_kernels, warm_up  # noqa: PLC0415
 
         kernels = import_kernels()
@@ -197,13 +163,13 @@ def compile_kernels(*, as_json: bool) -> int:
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("compiling", total=max(len(missing), 1))
         took_s = warm_up(kernels=kernels, done=lambda name: progress.advance(task, name in missing))
-    left = sum(not kernel.is_kept for kernel in kernels)
-    facts = KernelFacts(len(kernels), left, str(machine_code_folder()), can_keep())
+    facts = _facts(kernels)
+    left, folder = facts.missing, facts.folder
     if as_json:
         said = json.dumps({"compiled": len(missing), "took_s": took_s, **asdict(facts)}, indent=2)
     elif left:
-        said = f"{left} of {len(kernels)} kernels were compiled, but not kept: no room, or no right, in {facts.folder}"
+        said = f"{left} of {len(kernels)} kernels were compiled, but not kept: no room, or no right, in {folder}"
     else:
-        said = f"{len(missing)} kernels compiled in {took_s:.0f} s, {len(kernels)} in all, kept in {facts.folder}"
+        said = f"{len(missing)} kernels compiled in {took_s:.0f} s, {len(kernels)} in all, kept in {folder}"
     sys.stdout.write(said + "\n")
     return 1 if left else 0

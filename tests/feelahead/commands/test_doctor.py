@@ -1,11 +1,7 @@
 """Each check of `feelahead doctor` on facts that a test makes up, and the command on this machine."""
 
-import importlib.metadata
 import json
-import os
 import re
-import socket
-import sys
 import tomllib
 from pathlib import Path
 
@@ -15,20 +11,16 @@ from common.errors import NoDriverError
 from feelahead.commands.doctor import command as doctor_command
 from feelahead.commands.doctor import controllers, machine
 from feelahead.commands.doctor.controllers import (
-    check_hidapi,
     check_permission,
-    check_uhid,
     missing_grants,
 )
 from feelahead.commands.doctor.finding import Finding, Verdict, fit_for_demo
 from feelahead.commands.doctor.machine import (
     COMPILE,
     EXTRAS,
-    PORTS,
     KernelFacts,
     check_extra,
     check_kernels,
-    check_ports,
     check_realtime,
     check_rendering,
 )
@@ -43,7 +35,6 @@ from tests.robot_side.compiled.fresh_kernels import fresh_kernels
 OK, NOTE, MISSING = Verdict.OK, Verdict.NOTE, Verdict.MISSING
 ABSENT = {"some_module": "No module named 'some_module'"}
 BROKEN = {"numba": "No module named 'numba'", "mujoco": "libGL.so.1: cannot open"}
-BOTH = ["hid", "hidapi"]
 SEEN = Finding("controller", OK, "DualSense at /dev/hidraw3 on USB: and more")
 DENIED = Finding("controller", MISSING, "DualSense at /dev/hidraw3: no permission to open the controller at X")
 NONE = Finding("controller", NOTE, "none is connected")
@@ -73,8 +64,6 @@ def permission(*seen: Finding, is_root: bool = False, rules: str = "") -> Findin
         ([permission(is_root=True)], OK, "root", "udevadm"),
         (check_realtime([]), OK, "permitted", None),
         (check_realtime([NO_RIGHT]), NOTE, "locking memory is not permitted;", "^sudo this; and that$"),
-        (check_ports(dict.fromkeys(PORTS)), OK, "5555, 5556, 8080 are free", None),
-        (check_ports({5555: "in use"}), NOTE, "5555, the control port", "--bind tcp://127.0.0.1:5557"),
         ([check_rendering({"egl": "egl: gone", "osmesa": None})], OK, "OSMESA", None),
         ([check_rendering({"egl": "egl: gone", "osmesa": "nor it"})], NOTE, "egl: gone; nor it", "libegl1"),
         (check_kernels(KernelFacts(30, 0, "/there", writable=False)), OK, "30 compiled for this processor", None),
@@ -98,55 +87,6 @@ def test_what_is_checked_is_what_the_package_brings() -> None:
         assert len(project["optional-dependencies"][extra]) == len(modules)
 
 
-@pytest.mark.parametrize(
-    ("platform", "version", "packages", "trouble", "verdict", "said", "remedy"),
-    [
-        ("linux", "0.15.0", ["hidapi"], None, OK, "0.15.0", None),
-        ("linux", None, [], "not importable", NOTE, "not installed", "operator"),
-        ("linux", "0.15.0", BOTH, None, NOTE, "called hid, too", "pip uninstall hid && "),
-        ("linux", "0.15.0", BOTH, "no", MISSING, "called hid, too", "pip uninstall hid && "),
-        ("darwin", "0.15.0", BOTH, None, MISSING, "called hid, too", "pip uninstall hid && "),
-        ("win32", "0.15.0", ["hidapi"], "broken", MISSING, "broken", "--force-reinstall"),
-    ],
-)
-def test_hidapi_and_what_stands_in_its_place(
-    monkeypatch: pytest.MonkeyPatch,
-    platform: str,
-    version: str | None,
-    packages: list[str],
-    trouble: str | None,
-    verdict: Verdict,
-    said: str,
-    remedy: str | None,
-) -> None:
-    def load() -> None:
-        if trouble is not None:
-            raise NoDriverError(trouble)
-
-    def installed(name: str) -> str:
-        if version is None:
-            raise importlib.metadata.PackageNotFoundError(name)
-        return version
-
-    monkeypatch.setattr(sys, "platform", platform)
-    monkeypatch.setattr(controllers, "load_backend", load)
-    monkeypatch.setattr(importlib.metadata, "version", installed)
-    monkeypatch.setattr(importlib.metadata, "packages_distributions", lambda: {"hid": packages})
-    finding = check_hidapi()
-    assert finding.verdict is verdict
-    assert said in finding.said
-    assert (remedy or "") in (finding.remedy or "")
-
-
-def test_a_device_for_virtual_controllers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(controllers, "UHID", tmp_path / "uhid")
-    assert check_uhid().remedy == "sudo modprobe uhid"
-    (tmp_path / "uhid").touch()
-    assert check_uhid().verdict is OK
-    monkeypatch.setattr(os, "access", lambda *_: False)
-    assert re.match(r"sudo setfacl -m u:\w+:rw .*uhid", check_uhid().remedy or "")
-
-
 def test_rules_that_others_wrote_count() -> None:
     steam = (
         'KERNEL=="hidraw*", ATTRS{idVendor}=="054c", ATTRS{idProduct}=="0ce6", MODE="0660", TAG+="uaccess"\n'
@@ -163,10 +103,7 @@ def test_rules_that_others_wrote_count() -> None:
 
 
 @pytest.mark.processes
-def test_what_cannot_be_bound_imported_or_rendered_is_named_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        assert machine.port_trouble(port) == "Address already in use"
+def test_what_cannot_be_imported_or_rendered_is_named_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(machine, "EXTRAS", {"robot": ("a test", ("json", "no_such_module"))})
     assert machine.failed_imports("robot") == {"no_such_module": "No module named 'no_such_module'"}
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
@@ -187,6 +124,13 @@ def test_controllers_are_looked_at_and_left_alone(monkeypatch: pytest.MonkeyPatc
     assert (working.closed, working.written) == (working.times_opened, [])
     monkeypatch.setattr(controllers, "load_backend", lambda: FakeBackend({}))
     assert [one.said for one in controllers.controllers_seen()] == ["none is connected (the demo simulates one)"]
+
+    def missing() -> None:
+        raise NoDriverError("hidapi cannot be imported (no): pip install it")
+
+    monkeypatch.setattr(controllers, "load_backend", missing)
+    [finding] = controllers.controllers_seen()
+    assert (finding.verdict, finding.remedy) == (NOTE, "pip install it")
 
 
 @pytest.mark.parametrize(("verdict", "code"), [(OK, 0), (MISSING, 1)])
@@ -214,8 +158,8 @@ def test_here_it_tells_of_everything(capsys: pytest.CaptureFixture[str]) -> None
     code = command(["doctor", "--json"])
     told = json.loads(capsys.readouterr().out)
     names = [finding["name"] for finding in told["findings"]]
-    assert {"kernels", "--realtime", "ports"} <= set(names)
-    expected = ("Python", *(f"extra {extra}" for extra in EXTRAS), "hidapi", "udev rule", "controller", "/dev/uhid")
+    assert {"kernels", "--realtime", "cameras"} <= set(names)
+    expected = ("Python", *(f"extra {extra}" for extra in EXTRAS), "udev rule", "controller")
     assert names[: len(expected)] == list(expected)
     assert code == (0 if told["demo"] else 1)
 
