@@ -12,8 +12,7 @@ from common.recording.decoding import Decoder, Shown, shown_view, view_message
 from common.recording.drawing import Drawing
 from common.recording.entries import unpack_block
 from common.recording.mcap_file import RecordingFile
-from common.recording.topics import FORMAT
-from common.recording.wire import BLOCK, FACTS, HEADER, NOTE, STATUS, VIEW, as_json, unstamped
+from common.recording.wire import BLOCK, FACTS, FORMAT, HEADER, NOTE, STATUS, VIEW, as_json, unstamped
 
 _OTHER: Final = {"robot": "operator", "operator": "robot"}
 

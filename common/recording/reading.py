@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from common.errors import ConfigurationError
 from common.recording.packages import require_packages
-from common.recording.topics import FORMAT, PROFILE
+from common.recording.wire import FORMAT, PROFILE
 
 _SIDES: Final = {f"{PROFILE}.{side}": side for side in ("robot", "operator")}
 

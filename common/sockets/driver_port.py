@@ -6,8 +6,8 @@ import zmq
 
 from common.sockets.authentication import Authenticator, RobotKeys
 from common.sockets.endpoints import parse_bind, refuse_open
-from common.sockets.frames import user_of
 from common.sockets.inbox import Inbox
+from common.sockets.readable import user_of
 from common.sockets.shell import SocketShell, bind_socket
 from common.sockets.turns import Offered
 

@@ -9,11 +9,10 @@ from common.errors import ConfigurationError
 from common.sockets.authentication import Authenticator, RobotKeys
 from common.sockets.descriptors import shut_down
 from common.sockets.endpoints import Endpoint, following, parse_bind, refuse_open
-from common.sockets.frames import descriptor_of, user_of
 from common.sockets.gate import Gate
 from common.sockets.inbox import Inbox
 from common.sockets.peers import Connection, Peers
-from common.sockets.readable import EVENTS
+from common.sockets.readable import EVENTS, descriptor_of, user_of
 from common.sockets.shell import (
     CONTROL_LIMIT_BYTES,
     CONTROL_UNSENT_BYTES,
