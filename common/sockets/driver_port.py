@@ -84,11 +84,7 @@ class DriverPort(SocketShell):
         if self._keys is None or self._authenticator is None:
             return []
         self._keys.allowed.refresh()
-        folder = self._keys.allowed.folder
-        return [
-            f"refused an unknown key; to let it in: {folder.command(f'allow NAME {key}')}"
-            for key in self._authenticator.unknown_keys()
-        ]
+        return self._authenticator.news()
 
     def wait(self, timeout_s: float) -> float:
         """Wait for a message, at most `timeout_s`; the time by our monotonic clock then."""
