@@ -31,8 +31,7 @@ from robot_side.outcome.placing import scaled
 from robot_side.reporting.outgoing_messages import SHOWN_NAME, Outgoing
 from robot_side.reporting.reports import Reports
 from robot_side.surroundings.perceived import ObjectSource
-from robot_side.surroundings.sight import Sight
-from robot_side.surroundings.surroundings import Surroundings
+from robot_side.surroundings.surroundings import Sight, Surroundings
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -54,9 +54,6 @@ class Outage:
         since_s = elapsed_s - self.at_s
         if since_s < 0.0:
             return None
-        begun_s = self.at_s
-        if self.every_s is not None:
-            times = math.floor(since_s / self.every_s)
-            begun_s += times * self.every_s
+        begun_s = self.at_s + (0.0 if self.every_s is None else math.floor(since_s / self.every_s) * self.every_s)
         end_s = begun_s + self.duration_s
         return end_s if elapsed_s < end_s else None

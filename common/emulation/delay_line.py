@@ -174,7 +174,8 @@ class DelayLine(Generic[Item]):
     ) -> None:
         if self._corruptions is not None and next(self._corruptions):
             self.figures.corrupted += 1
-            item = self._corrupted(item)
+            flip = self._flip_one_bit
+            item = self._corrupt(item, flip) if self._corrupt else cast(Item, flip(cast(bytes, item)))
         if len(self._queue) >= self.profile.limit:
             self.figures.dropped += 1
             return
@@ -219,11 +220,6 @@ class DelayLine(Generic[Item]):
     def _enqueue(self, now_s: float, due_s: float, item: Item, number: int, size_bytes: int, *, copy: bool) -> None:
         heapq.heappush(self._queue, (due_s, self._entered, item, now_s, number, size_bytes, copy))
         self._entered += 1
-
-    def _corrupted(self, item: Item) -> Item:
-        if self._corrupt is not None:
-            return self._corrupt(item, self._flip_one_bit)
-        return cast(Item, self._flip_one_bit(cast(bytes, item)))
 
     def _flip_one_bit(self, payload: bytes) -> bytes:
         if not payload:

@@ -1,8 +1,10 @@
 """The figures of an emulated link, as measured, to stand beside the words that asked for it."""
 
-from typing import Any
+from typing import Any, Final
 
 from common.statistics import RunningStatistics
+
+_COUNTED: Final = ("sent", "delivered", "lost", "outage", "held", "dropped", "duplicated", "corrupted", "retransmitted")
 
 
 class LinkFigures:
@@ -70,30 +72,16 @@ class LinkFigures:
         bits = 8.0 * (self._delivered_bytes - self._last_bytes)
         gone = self.lost + self.dropped + self.outage
         entered = self.sent + self.duplicated
-        errors_us = {
-            name: None if value is None else 1e6 * value
-            for name, value in (
-                ("p50", self._release_error.quantile(0.50)),
-                ("p99", self._release_error.quantile(0.99)),
-                ("max", self._release_error.maximum),
-            )
-        }
+        late = self._release_error
+        errors_s = {"p50": late.quantile(0.50), "p99": late.quantile(0.99), "max": late.maximum}
         return {
-            "sent": self.sent,
-            "delivered": self.delivered,
-            "lost": self.lost,
-            "outage": self.outage,
-            "held": self.held,
-            "dropped": self.dropped,
-            "duplicated": self.duplicated,
-            "corrupted": self.corrupted,
-            "retransmitted": self.retransmitted,
+            **{name: count for name, count in vars(self).items() if name in _COUNTED},
             "delay_ms": self._delay.summary_ms(),
             "loss_share": gone / entered if entered else None,
             "duplicate_share": (self.delivered - self._originals) / self.delivered if self.delivered else None,
             "late_share": self.late / self._originals if self._originals else None,
             "rate_bit_s": bits / span_s if span_s > 0.0 else None,
-            "release_error_us": errors_us,
+            "release_error_us": {name: value and 1e6 * value for name, value in errors_s.items()},
         }
 
 

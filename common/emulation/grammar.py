@@ -148,7 +148,7 @@ def _read_chance(name: str) -> Callable[[_Words, dict[str, Any]], None]:
 
 
 def _read_reorder(words: _Words, settings: dict[str, Any]) -> None:
-    settings["reorder"] = Chance(*words.shares("reorder", ["probability", "correlation"]))
+    _read_chance("reorder")(words, settings)
     if words.take_if("gap"):
         settings["gap"] = words.value(_positive, "reorder", "gap")
 
@@ -157,14 +157,6 @@ def _read_rate(words: _Words, settings: dict[str, Any]) -> None:
     bits_per_second = words.value(parse_rate, "rate", "rate")
     overhead = words.value(_small_integer, "rate", "packet overhead") if words.number_follows(percent=False) else 0
     settings["rate"] = Rate(bits_per_second, overhead)
-
-
-def _read_limit(words: _Words, settings: dict[str, Any]) -> None:
-    settings["limit"] = words.value(_positive, "limit", "limit")
-
-
-def _read_trace(words: _Words, settings: dict[str, Any]) -> None:
-    settings["trace"] = words.value(lambda path, field: Trace.read(Path(path), field), "trace", "trace")
 
 
 def _read_outage(words: _Words, settings: dict[str, Any]) -> None:
@@ -176,8 +168,16 @@ def _read_outage(words: _Words, settings: dict[str, Any]) -> None:
     settings["outages"] = (*settings.get("outages", ()), Outage(duration_s, at_s, every_s))
 
 
-def _read_retransmit(words: _Words, settings: dict[str, Any]) -> None:
-    settings["retransmit_s"] = words.value(parse_duration, "retransmit", "time")
+def _read_value(
+    clause: str, setting: str, name: str, read: Callable[[str, str], Any]
+) -> Callable[[_Words, dict[str, Any]], None]:
+    return lambda words, settings: settings.update({setting: words.value(read, clause, name)})
+
+
+def _positive(text: str, field: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) < 10 and int(text) > 0):
+        raise ConfigurationError(f"{field}: {text!r}; valid: a whole number from 1 to 999999999")
+    return int(text)
 
 
 _READERS: dict[str, Callable[[_Words, dict[str, Any]], None]] = {
@@ -187,17 +187,11 @@ _READERS: dict[str, Callable[[_Words, dict[str, Any]], None]] = {
     "corrupt": _read_chance("corrupt"),
     "reorder": _read_reorder,
     "rate": _read_rate,
-    "limit": _read_limit,
-    "trace": _read_trace,
+    "limit": _read_value("limit", "limit", "limit", _positive),
+    "trace": _read_value("trace", "trace", "trace", lambda path, field: Trace.read(Path(path), field)),
     "outage": _read_outage,
-    "retransmit": _read_retransmit,
+    "retransmit": _read_value("retransmit", "retransmit_s", "time", parse_duration),
 }
-
-
-def _positive(text: str, field: str) -> int:
-    if not (text.isascii() and text.isdigit() and len(text) < 10 and int(text) > 0):
-        raise ConfigurationError(f"{field}: {text!r}; valid: a whole number from 1 to 999999999")
-    return int(text)
 
 
 def _small_integer(text: str, field: str) -> int:

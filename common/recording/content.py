@@ -1,6 +1,7 @@
 """Sort each message of a side: inputs stay as they are, and beside them stands what people and tools read."""
 
 import json
+import math
 from collections.abc import Iterable
 from typing import Any, Final
 
@@ -11,8 +12,7 @@ from common.recording.decoding import Decoder, Shown, shown_view, view_message
 from common.recording.drawing import Drawing
 from common.recording.entries import unpack_block
 from common.recording.mcap_file import RecordingFile
-from common.recording.topics import FORMAT
-from common.recording.wire import BLOCK, FACTS, HEADER, NOTE, STATUS, VIEW, as_json, unstamped
+from common.recording.wire import BLOCK, FACTS, FORMAT, HEADER, NOTE, STATUS, VIEW, as_json, unstamped
 
 _OTHER: Final = {"robot": "operator", "operator": "robot"}
 
@@ -91,7 +91,8 @@ class Content:
         self._write(shown_view(message, now_s, self._objects))
 
     def _status(self, side: str, now_s: float, status: dict[str, Any]) -> None:
-        self._decoders[side].offset_s = status.get("offset_s")
+        offset_s = status.get("offset_s")
+        self._decoders[side].offset_s = math.nan if offset_s is None else offset_s
         self._file.write(f"/{side}/status", now_s, as_json({"time_s": now_s} | status))
         why = status.get("stopped_because")
         if side == "robot" and why != self._stopped_because:

@@ -35,13 +35,12 @@ class Decoder:
     def __init__(self, side: str) -> None:
         self.alone = True
         """Whether the other side is not in this file."""
-        self.offset_s: float | None = None
-        """What the other side's clock is ahead of this one's, by its status."""
+        self.offset_s = math.nan
+        """What the other side's clock is ahead of this one's, by its status; NaN while unknown, as all here."""
         self._side = side
         self._ages_s = -math.inf
-        self._field_sent_s: float | None = None
+        self._field_sent_s = self._frame_s = math.nan
         self._field_number = 0
-        self._frame_s: float | None = None
 
     def shown(self, block: Block) -> Iterator[Shown]:
         """What the entries of a block tell; what cannot be decoded is left to the inputs."""
@@ -57,18 +56,15 @@ class Decoder:
             yield from self._message(entry, split_text(rest)[1] if entry.kind == Kind.SENT else rest)
         elif entry.kind == Kind.FRAME:
             self._frame_s = struct.unpack_from("<d", entry.content)[0]
-        elif entry.kind == Kind.TICK and entry.now_s >= self._ages_s + AGES_PERIOD_S - 1e-6:
+        elif entry.kind in (Kind.TICK, Kind.MOTION) and entry.now_s >= self._ages_s + AGES_PERIOD_S - 1e-6:
             self._ages_s = entry.now_s
-            (applied_s,) = struct.unpack_from("<d", entry.content)
-            yield self._ages(
-                entry.now_s,
-                command_ms=None if math.isnan(applied_s) else self._since_ms(entry.now_s, applied_s),
-                frame_ms=None if self._frame_s is None else 1e3 * (entry.now_s - self._frame_s),
-            )
-        elif entry.kind == Kind.MOTION and entry.now_s >= self._ages_s + AGES_PERIOD_S - 1e-6:
-            self._ages_s = entry.now_s
-            sent_s = self._field_sent_s
-            yield self._ages(entry.now_s, field_ms=None if sent_s is None else self._since_ms(entry.now_s, sent_s))
+            applied_s = struct.unpack_from("<d", entry.content)[0] if entry.kind == Kind.TICK else math.nan
+            ages_ms = {
+                "command_ms": self._since_ms(entry.now_s, applied_s),
+                "field_ms": self._since_ms(entry.now_s, self._field_sent_s),
+                "frame_ms": 1e3 * (entry.now_s - self._frame_s),
+            }
+            yield _shown("/ages", entry.now_s, {"time_s": entry.now_s, "side": self._side}, ages_ms)
 
     def _message(self, entry: Entry, payload: bytes) -> Iterator[Shown]:
         message = decode(payload)
@@ -92,13 +88,9 @@ class Decoder:
         elif isinstance(message, MotionCommand) and (sent or self.alone):
             yield _shown("/command", entry.now_s, stamps, msgspec.structs.asdict(message))
 
-    def _since_ms(self, now_s: float, sent_s: float) -> float | None:
-        """How long ago the other side's clock showed `sent_s`; None while its offset is unknown."""
-        return None if self.offset_s is None else 1e3 * (now_s - (sent_s - self.offset_s))
-
-    def _ages(self, now_s: float, **ages_ms: float | None) -> Shown:
-        values = {"command_ms": None, "field_ms": None, "frame_ms": None} | ages_ms
-        return Shown("/ages", now_s, as_json({"time_s": now_s, "side": self._side} | values))
+    def _since_ms(self, now_s: float, sent_s: float) -> float:
+        """How long ago the other side's clock showed `sent_s`."""
+        return 1e3 * (now_s - (sent_s - self.offset_s))
 
 
 def view_message(payload: bytes) -> AnyViewMessage | Telemetry | None:

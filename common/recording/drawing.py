@@ -1,6 +1,6 @@
 """Foxglove's own messages: pictures, the scene with its transforms, and the log."""
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from foxglove import messages
@@ -67,7 +67,7 @@ class Drawing:
                 timestamp=stamp,
                 parent_frame_id=_WORLD,
                 child_frame_id=name,
-                translation=messages.Vector3(x=pose[0], y=pose[1], z=pose[2]),
+                translation=_vector(*pose[:3]),
                 rotation=messages.Quaternion(w=pose[3], x=pose[4], y=pose[5], z=pose[6]),
             )
             for name, pose in frames
@@ -82,24 +82,23 @@ class Drawing:
     def _entity(self, frame: str, shapes: list[Shape], now_s: float) -> messages.SceneEntity:
         cubes, spheres, cylinders, triangles = [], [], [], []
         for shape in shapes:
-            pose, color = _pose(shape), _color(shape)
+            looks: Any = {"pose": _pose(shape), "color": _color(shape)}
             a, b, c = shape.size_m
-            if shape.kind == "mesh":
-                triangles.append(_mesh(shape, pose, color))
-            elif shape.kind in ("box", "plane"):
-                size = (2 * a, 2 * b, 2 * c) if shape.kind == "box" else (2 * (a or 5.0), 2 * (b or 5.0), 1e-3)
-                cubes.append(messages.CubePrimitive(pose=pose, size=_vector(size), color=color))
-            elif shape.kind in ("cylinder", "capsule"):
-                # A capsule's round ends are left out: Foxglove has no such shape.
-                size = (2 * a, 2 * a, 2 * b)
-                cylinders.append(
-                    messages.CylinderPrimitive(
-                        pose=pose, size=_vector(size), bottom_scale=1.0, top_scale=1.0, color=color
-                    )
-                )
-            else:
-                size = (2 * a, 2 * a, 2 * a) if shape.kind == "sphere" else (2 * a, 2 * b, 2 * c)
-                spheres.append(messages.SpherePrimitive(pose=pose, size=_vector(size), color=color))
+            match shape.kind:
+                case "mesh":
+                    triangles.append(_mesh(shape, looks))
+                case "box":
+                    cubes.append(messages.CubePrimitive(size=_vector(2 * a, 2 * b, 2 * c), **looks))
+                case "plane":
+                    cubes.append(messages.CubePrimitive(size=_vector(2 * (a or 5.0), 2 * (b or 5.0), 1e-3), **looks))
+                case "cylinder" | "capsule":
+                    # A capsule's round ends are left out: Foxglove has no such shape.
+                    size = _vector(2 * a, 2 * a, 2 * b)
+                    cylinders.append(messages.CylinderPrimitive(size=size, bottom_scale=1.0, top_scale=1.0, **looks))
+                case "sphere":
+                    spheres.append(messages.SpherePrimitive(size=_vector(2 * a, 2 * a, 2 * a), **looks))
+                case "ellipsoid":
+                    spheres.append(messages.SpherePrimitive(size=_vector(2 * a, 2 * b, 2 * c), **looks))
         return messages.SceneEntity(
             timestamp=self._stamp(now_s),
             frame_id=frame,
@@ -116,14 +115,14 @@ class Drawing:
         return messages.Timestamp(seconds, nanoseconds)
 
 
-def _vector(values: tuple[float, float, float]) -> messages.Vector3:
-    return messages.Vector3(x=values[0], y=values[1], z=values[2])
+def _vector(x: float, y: float, z: float) -> messages.Vector3:
+    return messages.Vector3(x=x, y=y, z=z)
 
 
 def _pose(shape: Shape) -> messages.Pose:
     x, y, z, *turn = shape.pose
     orientation = messages.Quaternion(w=turn[0], x=turn[1], y=turn[2], z=turn[3])
-    return messages.Pose(position=messages.Vector3(x=x, y=y, z=z), orientation=orientation)
+    return messages.Pose(position=_vector(x, y, z), orientation=orientation)
 
 
 def _color(shape: Shape) -> messages.Color:
@@ -131,11 +130,10 @@ def _color(shape: Shape) -> messages.Color:
     return messages.Color(r=r, g=g, b=b, a=a)
 
 
-def _mesh(shape: Shape, pose: messages.Pose, color: messages.Color) -> messages.TriangleListPrimitive:
+def _mesh(shape: Shape, looks: Any) -> messages.TriangleListPrimitive:
     points = np.frombuffer(shape.vertices_m, "<f4").reshape(-1, 3).tolist()
     return messages.TriangleListPrimitive(
-        pose=pose,
         points=[messages.Point3(x=x, y=y, z=z) for x, y, z in points],
-        color=color,
         indices=np.frombuffer(shape.triangles, "<u4").tolist(),
+        **looks,
     )

@@ -11,7 +11,7 @@ import foxglove
 from foxglove import channels
 from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 
-from common.recording.topics import BINARY, ENCODING, PROFILE, schema_of
+from common.recording.wire import BINARY, ENCODING, PROFILE, schema_of
 
 _NANOSECONDS: Final = 1e9
 

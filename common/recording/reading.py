@@ -3,10 +3,7 @@
 The file is gone through record by record, as an index stands at the end, where a cut file has none.
 """
 
-import io
 import json
-import os
-import struct
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,16 +11,9 @@ from typing import Any, Final, NamedTuple
 
 from common.errors import ConfigurationError
 from common.recording.packages import require_packages
-from common.recording.topics import FORMAT, PROFILE
+from common.recording.wire import FORMAT, PROFILE
 
-_MAGIC: Final = b"\x89MCAP0\r\n"
-_RECORD: Final = struct.Struct("<BQ")
-_SPAN: Final = struct.Struct("<QQ")
-"""The beginning of a chunk: its first and last stamp"""
-_METADATA: Final = 0x0C
-_CHUNK: Final = 0x06
-_DATA_END: Final = 0x0F
-_SIDES: Final = ("robot", "operator")
+_SIDES: Final = {f"{PROFILE}.{side}": side for side in ("robot", "operator")}
 
 
 class Message(NamedTuple):
@@ -63,65 +53,39 @@ class Recording:
         from mcap.records import Message as Logged  # noqa: PLC0415
 
         names: dict[int, str] = {}
-        for _, chunk in _records(self.path, (_CHUNK,)):
-            records = _broken_up(chunk)
-            if records is None:
+        for record, inside in _records(self.path):
+            if record is None:
                 return
-            for record in records:
-                if isinstance(record, Channel):
-                    names[record.id] = record.topic
-                elif isinstance(record, Logged):
-                    topic = names.get(record.channel_id, "")
+            for one in inside:
+                if isinstance(one, Channel):
+                    names[one.id] = one.topic
+                elif isinstance(one, Logged):
+                    topic = names.get(one.channel_id, "")
                     if not topics or topic in topics:
-                        yield Message(topic, record.log_time, record.data)
+                        yield Message(topic, one.log_time, one.data)
 
 
 def open_recording(path: Path) -> Recording:
     """Look through the file at `path`; ConfigurationError, in one line, for what is no recording of ours."""
     require_packages("a recording", "foxglove", "mcap")
+    from mcap.records import Chunk, DataEnd, Metadata  # noqa: PLC0415
+
     headers: dict[str, Mapping[str, Any]] = {}
     whole, damaged, end_ns = False, False, 0
-    for opcode, content in _records(path, (_METADATA, _CHUNK, _DATA_END)):
-        if opcode == _METADATA:
-            name, values = _described(path, content)
-            side = name.removeprefix(f"{PROFILE}.")
-            if side in _SIDES and side != name:
-                headers[side] = _header(path, values)
-        elif opcode == _CHUNK and not damaged:
-            damaged = _broken_up(content) is None
-            end_ns = end_ns if damaged else max(end_ns, _SPAN.unpack_from(content)[1])
-        whole |= opcode == _DATA_END
+    for record, _ in _records(path):
+        damaged |= record is None
+        if isinstance(record, Metadata) and record.name in _SIDES:
+            headers[_SIDES[record.name]] = _header(path, record.metadata)
+        elif isinstance(record, Chunk):
+            end_ns = max(end_ns, record.message_end_time)
+        whole |= isinstance(record, DataEnd)
+    if not headers and damaged:
+        raise ConfigurationError(f"{path}: what it says of itself is damaged; valid: a file as --record made it")
     if not headers:
         raise ConfigurationError(
             f"{path}: holds nothing that feelahead recorded; valid: a file that --record made, of a second or more"
         )
     return Recording(path, headers, whole, damaged, end_ns)
-
-
-def _described(path: Path, content: bytes) -> tuple[str, Mapping[str, str]]:
-    """Read a name with texts that hold for the whole file."""
-    from mcap.records import Metadata  # noqa: PLC0415
-
-    try:
-        metadata = Metadata.read(_stream(content))
-    # As with chunks: the library says in many ways that bytes are not what they were.
-    except Exception as error:
-        raise ConfigurationError(
-            f"{path}: what it says of itself is damaged; valid: a file as --record made it"
-        ) from error
-    return metadata.name, metadata.metadata
-
-
-def _broken_up(chunk: bytes) -> list[Any] | None:
-    """The records of a chunk; None for one that is not as it was written."""
-    from mcap.records import Chunk  # noqa: PLC0415
-    from mcap.stream_reader import breakup_chunk  # noqa: PLC0415
-
-    try:
-        return breakup_chunk(Chunk.read(_stream(chunk)), validate_crc=True)
-    # What a flipped bit does is the decompressor's to say, in classes of its own.
-    except Exception:
-        return None
 
 
 def _header(path: Path, values: Mapping[str, str]) -> dict[str, Any]:
@@ -137,35 +101,28 @@ def _value(text: str) -> Any:
         return text
 
 
-def _records(path: Path, wanted: Collection[int]) -> Iterator[tuple[int, bytes]]:
-    """Each whole record of a wanted kind, as (opcode, content)."""
+def _records(path: Path) -> Iterator[tuple[Any, list[Any]]]:
+    """Each whole record with what a chunk has inside; last a None where one is not as it was written."""
+    from mcap.exceptions import EndOfFile, InvalidMagic, RecordLengthLimitExceeded  # noqa: PLC0415
+    from mcap.records import Chunk, DataEnd  # noqa: PLC0415
+    from mcap.stream_reader import StreamReader, breakup_chunk  # noqa: PLC0415
+
     try:
         if path.is_fifo():
             raise ConfigurationError(f"{path}: cannot be read: it is a pipe; valid: a recording's file")
-        file = path.open("rb")
+        with path.open("rb") as file:
+            for record in StreamReader(file, emit_chunks=True, record_size_limit=path.stat().st_size).records:
+                yield record, breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else []
+                if isinstance(record, DataEnd):
+                    return  # what follows repeats
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read: {error.strerror}; valid: a recording") from error
-    with file:
-        size = os.fstat(file.fileno()).st_size
-        try:
-            magic = file.read(len(_MAGIC))
-        except OSError as error:
-            raise ConfigurationError(f"{path}: cannot be read: {error.strerror}; valid: a recording") from error
-        if magic != _MAGIC:
-            raise ConfigurationError(f"{path}: is no MCAP file; valid: a file that --record made")
-        while len(head := file.read(_RECORD.size)) == _RECORD.size:
-            opcode, length = _RECORD.unpack(head)
-            if file.tell() + length > size:
-                return  # it was being written
-            if opcode in wanted:
-                yield opcode, file.read(length)
-            else:
-                file.seek(length, os.SEEK_CUR)
-            if opcode == _DATA_END:
-                return
-
-
-def _stream(content: bytes) -> Any:
-    from mcap.data_stream import ReadDataStream  # noqa: PLC0415
-
-    return ReadDataStream(io.BytesIO(content))
+    except InvalidMagic as error:
+        raise ConfigurationError(f"{path}: is no MCAP file; valid: a file that --record made") from error
+    except (EndOfFile, RecordLengthLimitExceeded):
+        return  # it was being written
+    except ConfigurationError:
+        raise
+    # What a flipped bit does is said by readers and decompressors in classes of their own.
+    except Exception:
+        yield None, []

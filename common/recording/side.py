@@ -29,6 +29,7 @@ STATUS_PERIOD_S: Final = 0.1
 _READY_LIMIT_S: Final = 20.0
 _LEAVE_LIMIT_S: Final = 0.5
 _FINISH_LIMIT_S: Final = 20.0
+_NOTHING: Final[Mapping[str, Any]] = {"kept_s": 0.0, "bytes": 0, "error": None}
 KILLED: Final = "the recorder was killed"
 
 
@@ -78,7 +79,7 @@ class SideRecording:
         self._number = 0
         self._first_s = self._last_s = 0.0
         self._status_s = -1.0
-        self._said: dict[str, Any] = {"kept_s": 0.0, "bytes": 0, "error": None}
+        self._said = dict(_NOTHING)
         self._notes: list[str] = []
         self._gone = self._closed = False
 
@@ -193,8 +194,7 @@ class Recorder:
 
     def finish(self) -> dict[str, Any]:
         """Let the file be finished once every side is through; what is in it."""
-        said: dict[str, Any] = {"kept_s": 0.0, "bytes": 0, "error": None}
-        ended = False
+        said, ended = dict(_NOTHING), False
         # What it said up to now comes first: to send something to one that is gone would lose it.
         for message in self.channel.receive():
             said |= json.loads(message)

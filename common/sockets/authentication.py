@@ -119,11 +119,12 @@ class Authenticator:
             self._questions.send_multipart(self._answer(question))
         return True
 
-    def unknown_keys(self) -> list[str]:
-        """The keys refused for the first time since the last call, for somebody who may want to allow them."""
+    def news(self) -> list[str]:
+        """A line for each key refused for the first time since the last call: somebody may want to allow it."""
         new = [key for key, is_new in self._refused_keys.items() if is_new]
         self._refused_keys.update(dict.fromkeys(new, False))
-        return new
+        command = self._allowed.folder.command
+        return [f"refused an unknown key; to let it in: {command(f'allow NAME {key}')}" for key in new]
 
     def _answer(self, question: list[bytes]) -> list[bytes]:
         # version, request, domain, address, identity, mechanism, and for CURVE the client's public key

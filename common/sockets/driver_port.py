@@ -6,8 +6,8 @@ import zmq
 
 from common.sockets.authentication import Authenticator, RobotKeys
 from common.sockets.endpoints import parse_bind, refuse_open
-from common.sockets.frames import user_of
 from common.sockets.inbox import Inbox
+from common.sockets.readable import user_of
 from common.sockets.shell import SocketShell, bind_socket
 from common.sockets.turns import Offered
 
@@ -84,11 +84,7 @@ class DriverPort(SocketShell):
         if self._keys is None or self._authenticator is None:
             return []
         self._keys.allowed.refresh()
-        folder = self._keys.allowed.folder
-        return [
-            f"refused an unknown key; to let it in: {folder.command(f'allow NAME {key}')}"
-            for key in self._authenticator.unknown_keys()
-        ]
+        return self._authenticator.news()
 
     def wait(self, timeout_s: float) -> float:
         """Wait for a message, at most `timeout_s`; the time by our monotonic clock then."""

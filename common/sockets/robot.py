@@ -9,11 +9,10 @@ from common.errors import ConfigurationError
 from common.sockets.authentication import Authenticator, RobotKeys
 from common.sockets.descriptors import shut_down
 from common.sockets.endpoints import Endpoint, following, parse_bind, refuse_open
-from common.sockets.frames import descriptor_of, user_of
 from common.sockets.gate import Gate
 from common.sockets.inbox import Inbox
 from common.sockets.peers import Connection, Peers
-from common.sockets.readable import EVENTS
+from common.sockets.readable import EVENTS, descriptor_of, user_of
 from common.sockets.shell import (
     CONTROL_LIMIT_BYTES,
     CONTROL_UNSENT_BYTES,
@@ -104,16 +103,14 @@ class RobotSockets(SocketShell):
 
     def news(self) -> list[str]:
         """News of strangers and keys since the last call, a line each."""
-        news, wrong = [], []
+        news: list[str] = []
+        wrong = []
         if self.crowded:
             limit = self._gates[0].crowd.limit
             wrong.append(f"more than {limit} connections at once: strangers are hung up on; who is in stays in")
         if self._keys is not None and self._authenticator is not None:
             allowed = self._keys.allowed
-            news = [
-                f"refused an unknown key; to let it in: {allowed.folder.command(f'allow NAME {key}')}"
-                for key in self._authenticator.unknown_keys()
-            ]
+            news = self._authenticator.news()
             wrong += [f"passed over, so that it lets nobody in: {fault}" for fault in allowed.faults]
             if allowed.unreadable is not None:
                 who = "whoever was let in stays so" if allowed.names else "nobody is let in any more"

@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -60,6 +61,12 @@ class Comparison:
             eighths, metres = _difference(first, second, told)
         self.worst_eighths = max(self.worst_eighths, eighths)
         self.worst_m = max(self.worst_m, metres)
+
+    def missed(self, made: deque[Any], told: int | None = None) -> None:
+        """Take, and empty, what had not been recorded: messages, or values for the controller."""
+        while made:
+            one = made.popleft()
+            self.take(None, one if isinstance(one, bytes) else b"", told)
 
     def lines(self) -> list[str]:
         """Lines for people."""

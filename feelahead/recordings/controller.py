@@ -1,6 +1,6 @@
 """What a recording holds of the controller: values, and in earlier recordings a DualSense's reports."""
 
-from typing import Final
+from typing import Final, TypeVar
 
 import msgspec
 
@@ -11,6 +11,7 @@ from operator_side.controller.state import ControllerState
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.output_report import build_output_report, parse_output_report
 
+_Value = TypeVar("_Value")
 STATES: Final = (Kind.HANDS, Kind.REPORT)
 """Kinds of entries that hold a state,"""
 FEELS: Final = (Kind.TOLD, Kind.WRITTEN)
@@ -19,22 +20,19 @@ FEELS: Final = (Kind.TOLD, Kind.WRITTEN)
 
 def recorded_state(kind: int, content: bytes) -> ControllerState:
     """Read an entry of STATES; RemoteProtocolError for what is none."""
-    if kind == Kind.REPORT:
-        return parse_input_report(content)
-    try:
-        return msgspec.msgpack.decode(content, type=ControllerState)
-    except msgspec.MsgspecError as error:
-        raise RemoteProtocolError(f"a recorded state of the controller: {error}") from error
+    return parse_input_report(content) if kind == Kind.REPORT else _read(content, ControllerState)
 
 
 def recorded_feel(kind: int, content: bytes) -> Feel:
     """Read an entry of FEELS; RemoteProtocolError for what is none."""
-    if kind == Kind.WRITTEN:
-        return parse_output_report(content)
+    return parse_output_report(content) if kind == Kind.WRITTEN else _read(content, Feel)
+
+
+def _read(content: bytes, kind: type[_Value]) -> _Value:
     try:
-        return msgspec.msgpack.decode(content, type=Feel)
+        return msgspec.msgpack.decode(content, type=kind)
     except msgspec.MsgspecError as error:
-        raise RemoteProtocolError(f"what a controller was told: {error}") from error
+        raise RemoteProtocolError(f"a recorded {kind.__name__}: {error}") from error
 
 
 def as_recorded(kind: int, feel: Feel) -> bytes:

@@ -181,13 +181,7 @@ def _newest(found: list[Picture], times_s: FloatArray) -> list[Picture]:
 
 def _statistics(values: FloatArray) -> dict[str, Any]:
     shares = {f"q{round(100 * share):02d}": np.quantile(values, share, axis=0) for share in (0.01, 0.1, 0.5, 0.9, 0.99)}
-    figures = {
-        "min": values.min(axis=0),
-        "max": values.max(axis=0),
-        "mean": values.mean(axis=0),
-        "std": values.std(axis=0),
-        **shares,
-    }
+    figures = {name: getattr(values, name)(axis=0) for name in ("min", "max", "mean", "std")} | shares
     return {name: figure.tolist() for name, figure in figures.items()} | {"count": [len(values)]}
 
 
@@ -229,17 +223,9 @@ def _tasks(pyarrow: Any) -> Any:
 
 
 def _episode(count: int, stats: Mapping[str, Any]) -> dict[str, list[Any]]:
-    row: dict[str, Any] = {
-        "episode_index": 0,
-        "tasks": [_TASK],
-        "length": count,
-        "data/chunk_index": 0,
-        "data/file_index": 0,
-        "dataset_from_index": 0,
-        "dataset_to_index": count,
-        "meta/episodes/chunk_index": 0,
-        "meta/episodes/file_index": 0,
-    }
+    row: dict[str, Any] = {"episode_index": 0, "tasks": [_TASK], "length": count}
+    row |= {"data/chunk_index": 0, "data/file_index": 0, "dataset_from_index": 0, "dataset_to_index": count}
+    row |= {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
     row |= {f"stats/{name}/{figure}": value for name, found in stats.items() for figure, value in found.items()}
     return {name: [value] for name, value in row.items()}
 

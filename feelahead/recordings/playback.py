@@ -66,10 +66,8 @@ def seen(recording: Recording) -> Iterator[Seen]:
     pictures: dict[tuple[str, int], bytes] = {}
     for message in recording.messages(_TOPICS):
         time_s = _NANOSECONDS * (message.log_ns - began_ns)
-        if message.topic == _FACTS:
-            yield Seen(time_s, FACTS, message.topic, message.content)
-        elif message.topic == _ROBOT:
-            yield Seen(time_s, ROBOT, message.topic, message.content)
+        if message.topic in (_FACTS, _ROBOT):
+            yield Seen(time_s, FACTS if message.topic == _FACTS else ROBOT, message.topic, message.content)
         elif message.topic == "/view":
             yield Seen(time_s, VIEW, *_view(message, pictures))
         else:

@@ -100,17 +100,9 @@ def _felt(side: str, name: str) -> Callable[[Any, Any, Table, FloatArray], None]
     def draw(figure: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
         zones = np.stack([joined.numbers(f"felt.{side}.{zone}") for zone in range(10)])
         end_s = times_s[-1] if len(times_s) else 1.0
-        shown = axis.imshow(
-            np.where(zones > 0, zones, np.nan),
-            aspect="auto",
-            origin="lower",
-            extent=(0.0, end_s, 0.0, 1.0),
-            cmap="viridis_r",
-            vmin=0.0,
-            vmax=_FULL,
-            interpolation="nearest",
-            zorder=1,
-        )
+        look: Any = {"cmap": "viridis_r", "vmin": 0.0, "vmax": _FULL, "interpolation": "nearest", "zorder": 1}
+        extent = 0.0, end_s, 0.0, 1.0
+        shown = axis.imshow(np.where(zones > 0, zones, np.nan), aspect="auto", origin="lower", extent=extent, **look)
         travel = joined.numbers(f"controller.{side}_raw")
         # Seen on light and on dark.
         axis.plot(times_s, travel, color="white", lw=2.4)

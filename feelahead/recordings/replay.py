@@ -95,12 +95,12 @@ def replay_robot(recording: Recording) -> Comparison:
             given.newest_frame = frames.unpack(entry.content)
             core.sight.see(entry.now_s)
         elif entry.kind == Kind.TICK:
-            _compare_rest(compared, made)
+            compared.missed(made)
             made.extend(one.payload for one in core.tick(entry.now_s) if one.stream == "haptics")
         elif entry.kind == Kind.SENT:
             payload = split_text(split_text(entry.content)[1])[1]
             compared.take(payload, made.popleft() if made else None)
-    _compare_rest(compared, made)
+    compared.missed(made)
     return compared
 
 
@@ -144,26 +144,15 @@ def replay_operator(recording: Recording) -> Comparison:
             compared.take(content, as_recorded(entry.kind, told.popleft()) if told else None, entry.kind)
         match entry.kind:
             case Kind.MOTION:
-                _compare_rest(compared, sent)
+                compared.missed(sent)
                 sent.extend(message.payload for message in core.motion(now_s))
             case Kind.OUTPUT:
-                _compare_untold(compared, told)
+                compared.missed(told, Kind.TOLD)
                 if (feel := core.feel_now(now_s)) is not None:
                     told.append(feel)
             case Kind.SENT:
                 payload = split_text(split_text(content)[1])[1]
                 compared.take(payload, sent.popleft() if sent else None)
-    _compare_rest(compared, sent)
-    _compare_untold(compared, told)
+    compared.missed(sent)
+    compared.missed(told, Kind.TOLD)
     return compared
-
-
-def _compare_rest(compared: Comparison, made: deque[bytes]) -> None:
-    """Compare the messages that had not been recorded."""
-    while made:
-        compared.take(None, made.popleft())
-
-
-def _compare_untold(compared: Comparison, made: deque[Feel]) -> None:
-    while made:
-        compared.take(None, as_recorded(Kind.TOLD, made.popleft()), Kind.TOLD)

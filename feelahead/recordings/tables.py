@@ -26,27 +26,12 @@ _NO_ZONES: Final = (0.0,) * 10
 _STAMPS: Final = ("time_s", "now_s", "sent_s", "sequence", "side")
 """Columns that a joined table leaves out."""
 _TOPICS: Final = (
-    "/stiffness",
-    "/command",
-    "/ages",
-    "/telemetry",
-    "/enlargement",
-    "/overlap",
-    "/robot/status",
-    "/operator/status",
-    "/operator/facts",
+    *("/stiffness", "/command", "/ages", "/telemetry", "/enlargement", "/overlap"),
+    *("/robot/status", "/operator/status", "/operator/facts"),
 )
 _JOINED: Final = (
-    "stiffness",
-    "command",
-    "felt",
-    "controller",
-    "arm",
-    "telemetry",
-    "ages",
-    "enlargement",
-    "overlap",
-    "robot_status",
+    *("stiffness", "command", "felt", "controller", "arm"),
+    *("telemetry", "ages", "enlargement", "overlap", "robot_status"),
 )
 
 

@@ -11,8 +11,7 @@ from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Header, LeaseNotice
 from common.protocol.session import SessionState
-from robot_side.operators.lease import Lease
-from robot_side.operators.participant import Participant
+from robot_side.operators.lease import Lease, Participant
 from robot_side.operators.tuning import Tuning
 
 _NOTICE_PERIOD_S = 0.1

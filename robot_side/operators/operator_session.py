@@ -13,8 +13,7 @@ from common.protocol.session import SessionEvent, SessionState
 from common.silence import counted_s
 from common.statistics import RunningStatistics
 from robot_side.operators.announcements import Announcements, Answer
-from robot_side.operators.lease import MOST_OBSERVERS, Lease
-from robot_side.operators.participant import Participant
+from robot_side.operators.lease import MOST_OBSERVERS, Lease, Participant
 from robot_side.operators.safety import Permission, Safety
 from robot_side.operators.tuning import Tuning
 from robot_side.operators.watchers import Watchers

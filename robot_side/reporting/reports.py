@@ -15,7 +15,7 @@ from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Permission
 from robot_side.reporting.outgoing_messages import MapSchedule, Outgoing, stiffness_message, telemetry
 from robot_side.reporting.perceptual_deadband import StiffnessDeadband, TelemetryDeadband
-from robot_side.surroundings.sight import Sight
+from robot_side.surroundings.surroundings import Sight
 
 OBSERVER_PERIOD_S: Final = 0.02
 """Period of stiffness for those who only observe"""

@@ -68,11 +68,6 @@ class Movers:
             parts[name] = Part(np.arange(count, count + len(self.things)), self.things, slice(begin, end), shape)
         return parts
 
-    def place_of(self, thing: int) -> int | None:
-        """Which of the movers an object is; None for one that stands still."""
-        place = int(np.searchsorted(self.things, thing))
-        return place if place < len(self.things) and self.things[place] == thing else None
-
     def numbers_in(self, objects: PerceivedObjects) -> FloatArray:
         """The movers' numbers where a frame of the same objects has them; NaN for what it does not know."""
         of_objects = [getattr(objects, name) for name in OF_OBJECTS]

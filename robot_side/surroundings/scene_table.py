@@ -88,11 +88,6 @@ class SceneTable:
         """(n,) into `objects.names`"""
         return np.repeat(np.arange(len(self.first_rows) - 1), np.diff(self.first_rows))
 
-    @property
-    def has_meshes(self) -> bool:
-        """Whether any primitive is a mesh."""
-        return len(self.objects.mesh_object) > 0
-
     @cached_property
     def placed(self) -> "PlacedMeshes | None":
         """The meshes; None where there are none."""

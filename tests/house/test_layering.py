@@ -125,8 +125,8 @@ ARROWS = """
     feelahead/recordings: common/* robot_side/* operator_side/*
     feelahead/containers: common/* feelahead/both_sides
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers
-    feelahead/commands: common/* robot_side/compiled robot_side/laws/named.py operator_side/* feelahead/lab
-        feelahead/both_sides feelahead/recordings
+    feelahead/commands: common/* robot_side/compiled robot_side/laws/named.py robot_side/viewing operator_side/*
+        feelahead/lab feelahead/both_sides feelahead/recordings
     feelahead: common/* feelahead/commands/*
 """
 """Each room with the rooms that it may import: `X` is the files directly in folder X, or file X where that has a row of

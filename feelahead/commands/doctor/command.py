@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import os
+import platform
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,12 +17,10 @@ from rich.text import Text
 
 from common.command.command_line import parse_settings
 from common.sockets.authentication import OperatorKeys
-from feelahead.commands.doctor import controllers, machine
-from feelahead.commands.doctor.controllers import ControllerSeen
+from feelahead.commands.doctor import controllers, link, machine
 from feelahead.commands.doctor.finding import Finding, Verdict, fit_for_demo
-from feelahead.commands.doctor.link_facts import Way, look_along
-from feelahead.commands.doctor.link_judgement import LinkFacts, judge, reached, told
-from feelahead.commands.doctor.path import PathFacts, measure_path_along, path_line, path_told
+from feelahead.commands.doctor.path import measure_path_along, path_line
+from feelahead.commands.doctor.port import Way
 
 _COLOURS: Final = {Verdict.OK: "green", Verdict.NOTE: "yellow", Verdict.MISSING: "red"}
 _WIDTH_WITHOUT_TERMINAL: Final = 120
@@ -73,55 +72,46 @@ def doctor(arguments: Sequence[str]) -> int:
     """Look, judge and tell."""
     settings = parse_settings(DoctorSettings, "feelahead doctor", arguments)
     if settings.connect is not None:
-        keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
-        way = Way(settings.connect, settings.view_connect, keys)
-        link = look_along(way)
-        path = measure_path_along(way) if settings.path and judge(link) is None else None
-        return _tell_of_link(link, path, as_json=settings.json)
+        return _look_along(settings, settings.connect)
     if settings.compile:
         return machine.compile_kernels(as_json=settings.json)
-    seen = controllers.controllers_seen()
-    findings = examine(seen)
+    findings = examine()
     fit = fit_for_demo(findings)
     if settings.json:
-        found = {
-            "demo": fit,
-            "findings": [dataclasses.asdict(finding) for finding in findings],
-            "controllers": None if seen is None else [dataclasses.asdict(one) for one in seen],
-        }
+        found = {"demo": fit, "findings": [dataclasses.asdict(finding) for finding in findings]}
         sys.stdout.write(json.dumps(found, indent=2) + "\n")
     else:
         show(findings, Console(width=None if sys.stdout.isatty() else _WIDTH_WITHOUT_TERMINAL))
     return 0 if fit else 1
 
 
-def _tell_of_link(link: LinkFacts, path: PathFacts | None, *, as_json: bool) -> int:
-    fault = judge(link)
-    if as_json:
-        said = json.dumps(told(link) | ({} if path is None else {"path": path_told(path)}), indent=2)
-    elif fault is not None:
-        said = f"{fault.wrong}: {fault.said}; to mend it: {fault.remedy}"
+def _look_along(settings: DoctorSettings, connect: str) -> int:
+    keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
+    way = Way.to(connect, settings.view_connect, keys)
+    talk, error = link.look_along(way)
+    path = measure_path_along(way) if settings.path and error is None else None
+    if settings.json:
+        said = json.dumps(link.told(way, talk, error) | ({} if path is None else {"path": path}), indent=2)
+    elif error is not None:
+        said = str(error)
     else:
-        said = "\n".join([reached(link), *([] if path is None else [path_line(path)])])
+        said = link.reached(talk) + ("" if path is None else f"\n{path_line(path)}")
     sys.stdout.write(said + "\n")
-    return 0 if fault is None else 1
+    return 0 if error is None else 1
 
 
-def examine(seen: list[ControllerSeen] | None) -> list[Finding]:
+def examine() -> list[Finding]:
     """Every check of this machine, in the order of the table."""
-    platform, version = sys.platform, sys.version_info
+    seen = controllers.controllers_seen()
     rules, is_root = controllers.udev_rules(), hasattr(os, "geteuid") and os.geteuid() == 0
     return [
-        machine.check_python((version.major, version.minor, version.micro)),
-        *(machine.check_extra(extra, failures) for extra, failures in machine.failed_imports().items()),
-        controllers.hidapi_finding(platform),
-        controllers.check_permission(platform, is_root=is_root, rules=rules, controllers=seen or []),
-        *controllers.check_controllers(seen),
-        controllers.uhid_finding(platform),
+        Finding("Python", Verdict.OK, platform.python_version()),
+        *(machine.check_extra(extra, machine.failed_imports(extra)) for extra in machine.EXTRAS),
+        controllers.check_permission(is_root=is_root, rules=rules, controllers=seen),
+        *seen,
         *machine.check_kernels(machine.kernel_facts()),
         machine.check_rendering(machine.rendering_troubles()),
-        *machine.check_realtime(platform, machine.realtime_notes()),
-        *machine.check_ports(machine.port_troubles()),
+        *machine.check_realtime(machine.realtime_notes()),
     ]
 
 

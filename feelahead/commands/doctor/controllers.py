@@ -1,11 +1,10 @@
-"""Checks of a real controller (hidapi, permission, connection) and of a virtual one."""
+"""Checks of a real controller: hidapi, permission, connection."""
 
 import contextlib
-import importlib.metadata
 import os
 import re
+import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -17,58 +16,22 @@ from operator_side.dualsense.hid.udev import RULE_FILE, RULE_FOLDERS, installing
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.models import PRODUCT_IDS, SONY_VENDOR_ID
 
-_UHID: Final = "/dev/uhid"
+_NAME: Final = "controller"
 
 
-@dataclass(frozen=True)
-class ControllerSeen:
-    """A controller that the system has, and what it says of itself; None for what it does not say."""
-
-    model: str
-    path: str
-    transport: str | None = None
-    address: str | None = None
-    firmware: str | None = None
-    battery: str | None = None
-    trouble: str | None = None
-    """Why it cannot be used, and what to do; None if it can."""
-
-
-def check_hidapi(platform: str, version: str | None, packages: Sequence[str], trouble: str | None) -> Finding:
-    """Whether hidapi is there, and no other package in its place.
-
-    `version`: None where it is not installed; `packages`: all that install a module called `hid`; `trouble`: why it
-    cannot be used.
-    """
-    name = "hidapi"
-    if version is None:
-        return Finding(name, Verdict.NOTE, "not installed (for a real controller)", "pip install 'feelahead[operator]'")
-    again = "pip install --force-reinstall hidapi"
-    if strangers := [package for package in packages if package.lower() != "hidapi"]:
-        # On Linux ours is the module hidraw, which nobody else brings.
-        verdict = Verdict.NOTE if platform == "linux" and trouble is None else Verdict.MISSING
-        said = f"{version}, but the package {' and '.join(strangers)} installs a module called hid, too"
-        return Finding(name, verdict, said, f"pip uninstall {' '.join(strangers)} && {again}")
-    if trouble is not None:
-        return Finding(name, Verdict.MISSING, trouble, again)
-    return Finding(name, Verdict.OK, version)
-
-
-def check_permission(
-    platform: str, *, is_root: bool, rules: Mapping[str, str], controllers: Sequence[ControllerSeen]
-) -> Finding:
-    """Whether a controller may be opened: seen to be so, or by udev's rules (`rules`: file -> text)."""
+def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Sequence[Finding]) -> Finding:
+    """Whether a controller may be opened: found to be so, or by udev's rules (`rules`: file -> text)."""
     name = "udev rule"
-    if platform != "linux":
-        return Finding(name, Verdict.OK, f"not needed on {platform}")
-    if controllers and all(seen.trouble is None for seen in controllers):
+    if sys.platform != "linux":
+        return Finding(name, Verdict.OK, f"not needed on {sys.platform}")
+    if all(seen.verdict is Verdict.OK for seen in controllers):
         return Finding(name, Verdict.OK, "the controller can be opened")
     if not (missing := missing_grants(rules)):
         return Finding(name, Verdict.OK, "there, for USB and Bluetooth")
     remedy = installing_command()
     if is_root:
         return Finding(name, Verdict.OK, "not needed by root, who you are; what is below is for everybody else", remedy)
-    denied = any("permission" in (seen.trouble or "") for seen in controllers)
+    denied = any("no permission" in seen.said for seen in controllers)
     opened = f"lets you open {', '.join(missing)}; plug the controller in again after it"
     verdict = Verdict.MISSING if denied else Verdict.NOTE
     return Finding(name, verdict, f"none in {RULE_FILE} or elsewhere {opened}", remedy)
@@ -77,74 +40,28 @@ def check_permission(
 def missing_grants(rules: Mapping[str, str]) -> list[str]:
     """The models and transports that no rule in these files opens to the person at the machine."""
     lines = [line for text in rules.values() for line in text.splitlines() if not line.lstrip().startswith("#")]
-    granting = [line for line in lines if "hidraw" in line and re.search(r'uaccess|MODE\s*:?=\s*"066', line)]
-    missing = []
-    for product, model in PRODUCT_IDS.items():
+    granting = "\n".join(line for line in lines if "hidraw" in line and re.search(r'uaccess|MODE\s*:?=\s*"066', line))
+    wanted = {
+        f"a {model} on {transport}": pattern
+        for product, model in PRODUCT_IDS.items()
         for transport, pattern in (
             ("USB", rf'idProduct\}}\s*==\s*"{product:04x}"'),
             ("Bluetooth", rf'KERNELS\s*==\s*"[^"]*{SONY_VENDOR_ID:04X}:{product:04X}'),
-        ):
-            if not any(re.search(pattern, line, re.IGNORECASE) for line in granting):
-                missing.append(f"a {model} on {transport}")
-    return missing
+        )
+    }
+    return [what for what, pattern in wanted.items() if not re.search(pattern, granting, re.IGNORECASE)]
 
 
-def check_controllers(controllers: Sequence[ControllerSeen] | None) -> list[Finding]:
-    """Each controller that is connected; None: without hidapi nobody can know."""
-    name = "controller"
-    if controllers is None:
-        return [Finding(name, Verdict.NOTE, "cannot be looked for without hidapi")]
-    if not controllers:
-        how = "connect one by USB, or pair one by Bluetooth: hold Create and PS until its light flashes"
-        return [Finding(name, Verdict.NOTE, "none is connected (the demo simulates one)", how)]
-    return [_described(seen) for seen in controllers]
-
-
-def check_uhid(platform: str, *, exists: bool, writable: bool) -> Finding:
-    """Whether `feelahead virtual-dualsense` can show a controller to the system."""
-    purpose = "for feelahead virtual-dualsense"
-    if platform != "linux":
-        return Finding(_UHID, Verdict.NOTE, f"Linux alone has it ({purpose})")
-    if not exists:
-        return Finding(_UHID, Verdict.NOTE, f"not there ({purpose})", "sudo modprobe uhid")
-    if not writable:
-        command = f"sudo setfacl -m u:{os.environ.get('USER', 'YOU')}:rw {_UHID}"
-        return Finding(_UHID, Verdict.NOTE, f"no permission ({purpose})", command)
-    return Finding(_UHID, Verdict.OK, f"can be used ({purpose})")
-
-
-def _described(seen: ControllerSeen) -> Finding:
-    place = f"{seen.model} at {seen.path}"
-    if seen.trouble is not None:
-        said, _, remedy = seen.trouble.partition(": ")
-        return Finding("controller", Verdict.MISSING, f"{place}: {said}", remedy or None)
-    parts = (seen.address, f"firmware {seen.firmware or 'unknown'}", f"battery {seen.battery or 'unknown'}")
-    return Finding("controller", Verdict.OK, f"{place} on {seen.transport}: {', '.join(filter(None, parts))}")
-
-
-# Looking
-
-
-def hidapi_finding(platform: str) -> Finding:
-    """Look at what is installed under hidapi's names."""
-    version = trouble = None
-    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-        version = importlib.metadata.version("hidapi")
-    try:
-        load_backend()
-    except NoDriverError as error:
-        trouble = str(error)
-    packages = importlib.metadata.packages_distributions().get("hid", [])
-    return check_hidapi(platform, version, sorted(set(packages)), trouble)
-
-
-def controllers_seen() -> list[ControllerSeen] | None:
-    """Every controller that is connected, opened for a moment; None without hidapi."""
+def controllers_seen() -> list[Finding]:
+    """Every controller that is connected, opened for a moment, or why there is none."""
     try:
         backend = load_backend()
-    except NoDriverError:
-        return None
-    return [_look_at(backend, seen.path, seen.model) for seen in sightings(backend)]
+    except NoDriverError as error:
+        said, _, remedy = str(error).partition(": ")
+        return [Finding(_NAME, Verdict.NOTE, f"cannot be looked for: {said}", remedy)]
+    how = "connect one by USB, or pair one by Bluetooth: hold Create and PS until its light flashes"
+    none = Finding(_NAME, Verdict.NOTE, "none is connected (the demo simulates one)", how)
+    return [_look_at(backend, seen.path, seen.model) for seen in sightings(backend)] or [none]
 
 
 def udev_rules() -> dict[str, str]:
@@ -153,22 +70,20 @@ def udev_rules() -> dict[str, str]:
     return {str(path): path.read_text(encoding="utf-8", errors="replace") for path in paths if os.access(path, os.R_OK)}
 
 
-def uhid_finding(platform: str) -> Finding:
-    """Look at /dev/uhid."""
-    return check_uhid(platform, exists=Path(_UHID).exists(), writable=os.access(_UHID, os.R_OK | os.W_OK))
-
-
-def _look_at(backend: HidBackend, path: bytes, model: str) -> ControllerSeen:
-    name = os.fsdecode(path)
+def _look_at(backend: HidBackend, path: bytes, model: str) -> Finding:
+    place = f"{model} at {os.fsdecode(path)}"
     try:
         device = HidDualSense(backend, path)
     except DeviceError as error:
-        return ControllerSeen(model, name, trouble=str(error))
-    identity, firmware, battery = device.identity, None, None
+        said, _, remedy = str(error).partition(": ")
+        return Finding(_NAME, Verdict.MISSING, f"{place}: {said}", remedy or None)
+    identity, firmware, battery = device.identity, "unknown", "unknown"
     device.close()
     if (told := identity.firmware) is not None:
         firmware = f"0x{told.firmware_version:08x} (hardware 0x{told.hardware_version:08x})"
     with contextlib.suppress(RemoteProtocolError):
         state = parse_input_report(identity.first_report).battery
         battery = f"{'' if state.fraction is None else f'about {state.fraction:.0%}, '}{state.state.value}"
-    return ControllerSeen(model, name, identity.transport.value, identity.address, firmware, battery)
+    parts = (identity.address, f"firmware {firmware}", f"battery {battery}")
+    said = f"{place} on {identity.transport.value}: {', '.join(filter(None, parts))}"
+    return Finding(_NAME, Verdict.OK, said)

@@ -1,68 +1,40 @@
-"""Checks of this machine: Python, packages, compiled kernels, rendering, priority, ports."""
+"""Checks of this machine: packages, compiled kernels, rendering, priority."""
 
+import importlib
 import json
-import os
-import socket
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from rich.console import Console
 from rich.progress import Progress
 
 from common.errors import ConfigurationError
 from feelahead.commands.doctor.finding import Finding, Verdict
+from robot_side.viewing.off_screen import BACKENDS, REMEDY
 
-OLDEST_PYTHON: Final = (3, 11)
-EXTRAS: Final[Mapping[str, tuple[str, ...]]] = {
-    "robot": ("mujoco", "numba", "simplejpeg"),
-    "operator": ("hidapi", "viser", "trimesh"),
-    "video": ("av",),
-    "record": ("foxglove", "mcap"),
-    "experiments": ("matplotlib", "pyarrow", "distributed"),
+if TYPE_CHECKING:
+    from robot_side.compiled.kernel import Compiled
+
+EXTRAS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
+    "robot": ("the simulated arm: the demo and feelahead-robot", ("mujoco", "numba", "simplejpeg")),
+    "operator": (
+        "a real controller and the browser console",
+        ("hidraw" if sys.platform == "linux" else "hid", "viser", "trimesh"),
+    ),
+    "video": ("pictures in H.264, a tenth of JPEG's bytes", ("av",)),
+    "record": ("recording runs", ("foxglove", "mcap")),
+    "experiments": ("sweeps over many runs", ("matplotlib", "pyarrow", "distributed")),
 }
-"""Each extra with what it brings; hidapi's module is `hidraw` on Linux and `hid` elsewhere."""
-_PACKAGES: Final = {"mujoco": "mujoco-core", "hidraw": "hidapi", "hid": "hidapi", "foxglove": "foxglove-sdk"}
-"""The package that brings a module, where its name is another."""
-_PURPOSES: Final = {
-    "robot": "the simulated arm: the demo and feelahead-robot",
-    "operator": "a real controller and the browser console",
-    "video": "pictures in H.264, a tenth of JPEG's bytes",
-    "record": "recording runs",
-    "experiments": "sweeps over many runs",
-}
+"""Each extra with its purpose, and the modules that it brings."""
 COMPILE: Final = "feelahead doctor --compile"
-RENDERING: Final = ("egl", "osmesa") if sys.platform == "linux" else ("",)
-"""The order of robot_side/viewing."""
-RENDERING_PACKAGES: Final = "sudo apt-get install libegl1 libgl1-mesa-dri (or: libosmesa6)"
-PORTS: Final = {
-    5555: "the control port of feelahead-robot; another one: --bind tcp://127.0.0.1:5557",
-    5556: "the view port of feelahead-robot; another one: --view-bind tcp://127.0.0.1:5558",
-    8080: "the console",
-}
-"""Each with what it is for, and how to use another."""
 _LIMIT_S: Final = 60.0
-_IMPORT: Final = """
-import json, sys
-try:
-    print(json.dumps(__import__(sys.argv[1]) and None))
-except Exception as error:
-    print(json.dumps(str(error).splitlines()[0] if str(error) else type(error).__name__))
-"""
 _RENDER: Final = """
 import json, sys
 from robot_side.viewing.off_screen import trouble_with
 print(json.dumps(trouble_with(sys.argv[1])))
-"""
-_KERNELS: Final = """
-import json
-from robot_side.compiled.machine_code import can_keep, machine_code_folder
-from robot_side.compiled.warm_up import import_kernels
-kept = [kernel.is_kept for kernel in import_kernels()]
-print(json.dumps([len(kept), kept.count(False), str(machine_code_folder()), can_keep()]))
 """
 _REALTIME: Final = "import json; from common.realtime.priority import make_realtime; print(json.dumps(make_realtime()))"
 
@@ -78,32 +50,17 @@ class KernelFacts:
     writable: bool
 
 
-def check_python(version: tuple[int, int, int]) -> Finding:
-    """Whether this Python is new enough."""
-    said, oldest = ".".join(map(str, version)), ".".join(map(str, OLDEST_PYTHON))
-    if version[:2] >= OLDEST_PYTHON:
-        return Finding("Python", Verdict.OK, said, for_demo=True)
-    remedy = f"install Python {oldest} or later"
-    return Finding("Python", Verdict.MISSING, f"{said}, older than {oldest}", remedy, for_demo=True)
-
-
 def check_extra(extra: str, failures: Mapping[str, str]) -> Finding:
     """Whether every module of an extra could be imported; `failures`: what Python said of those that could not."""
-    name, for_demo = f"extra {extra}", extra == "robot"
+    (purpose, modules), name = EXTRAS[extra], f"extra {extra}"
     if not failures:
-        return Finding(name, Verdict.OK, f"{', '.join(EXTRAS[extra])}: {_PURPOSES[extra]}", for_demo=for_demo)
+        return Finding(name, Verdict.OK, f"{', '.join(modules)}: {purpose}")
     absent = [module for module, reason in failures.items() if "No module named" in reason]
     broken = [f"{module} ({reason})" for module, reason in failures.items() if module not in absent]
     told = {"not installed": absent, "cannot be imported": broken}
-    said = "; ".join(f"{how}: {', '.join(modules)}" for how, modules in told.items() if modules)
-    again = " ".join(_PACKAGES.get(module, module) for module in failures)
-    return Finding(
-        name,
-        Verdict.MISSING if for_demo else Verdict.NOTE,
-        f"{said} (for {_PURPOSES[extra]})",
-        f"pip install --force-reinstall {again}" if broken else f"pip install 'feelahead[{extra}]'",
-        for_demo=for_demo,
-    )
+    said = "; ".join(f"{how}: {', '.join(found)}" for how, found in told.items() if found)
+    remedy = f"pip install {'--force-reinstall ' if broken else ''}'feelahead[{extra}]'"
+    return Finding(name, Verdict.MISSING if extra == "robot" else Verdict.NOTE, f"{said} (for {purpose})", remedy)
 
 
 def check_kernels(facts: KernelFacts | None) -> list[Finding]:
@@ -126,13 +83,13 @@ def check_rendering(troubles: Mapping[str, str | None]) -> Finding:
     if working:
         return Finding("cameras", Verdict.OK, f"rendered without a screen by way of {working[0].upper() or 'OpenGL'}")
     said = "; ".join(trouble for trouble in troubles.values() if trouble is not None)
-    remedy = RENDERING_PACKAGES if "egl" in troubles else None
+    remedy = REMEDY if "egl" in troubles else None
     return Finding("cameras", Verdict.NOTE, f"no pictures, the arm is driven without: {said}", remedy)
 
 
-def check_realtime(platform: str, notes: Sequence[str]) -> list[Finding]:
+def check_realtime(notes: Sequence[str]) -> list[Finding]:
     """Whether `--realtime` would be granted; `notes` are its own, one for each thing that is not."""
-    if platform != "linux":
+    if sys.platform != "linux":
         return [Finding("--realtime", Verdict.NOTE, "Linux alone has it; the sides run without")]
     findings = []
     for note in notes:
@@ -141,48 +98,37 @@ def check_realtime(platform: str, notes: Sequence[str]) -> list[Finding]:
     return findings or [Finding("--realtime", Verdict.OK, "permitted")]
 
 
-def check_ports(troubles: Mapping[int, str | None]) -> list[Finding]:
-    """Whether the default ports can be bound on loopback; `troubles`: port -> why not, None if it can."""
-    free = [str(port) for port, trouble in troubles.items() if trouble is None]
-    findings = [Finding("ports", Verdict.OK, f"{', '.join(free)} are free")] if free else []
-    for port, trouble in troubles.items():
-        if trouble is not None:
-            purpose, _, other = PORTS[port].partition("; another one: ")
-            remedy = f"end whatever has it: ss -ltnp 'sport = :{port}'{other and f'; or use another: {other}'}"
-            findings.append(Finding("ports", Verdict.NOTE, f"{port}, {purpose}: {trouble}", remedy))
-    return findings
-
-
-# Looking
-
-
-def modules_of(extra: str, platform: str) -> tuple[str, ...]:
-    """The modules to import to see whether an extra is there; `platform` as in sys.platform."""
-    hidapi = "hidraw" if platform == "linux" else "hid"
-    return tuple(hidapi if module == "hidapi" else module for module in EXTRAS[extra])
-
-
-def failed_imports() -> dict[str, dict[str, str]]:
-    """For each extra the modules that cannot be imported, and why; each in a process of its own, which may crash."""
-    pairs = [(extra, module) for extra in EXTRAS for module in modules_of(extra, sys.platform)]
-    with ThreadPoolExecutor(max_workers=2) as pool:
-        said = list(pool.map(lambda pair: _output_of(_IMPORT, pair[1]), pairs))
-    failures: dict[str, dict[str, str]] = {extra: {} for extra in EXTRAS}
-    for (extra, module), outcome in zip(pairs, said, strict=True):
-        trouble = "importing it ends Python" if outcome is None else json.loads(outcome)
-        failures[extra] |= {} if trouble is None else {module: trouble}
+def failed_imports(extra: str) -> dict[str, str]:
+    """The modules of an extra that cannot be imported, and why."""
+    failures = {}
+    for module in EXTRAS[extra][1]:
+        try:
+            importlib.import_module(module)
+        # A library may fail in any way.
+        except Exception as error:
+            failures[module] = (str(error).splitlines() or [type(error).__name__])[0]
     return failures
 
 
 def kernel_facts() -> KernelFacts | None:
     """Which kernels are compiled; None where none can be."""
-    said = _output_of(_KERNELS)
-    return None if said is None else KernelFacts(*json.loads(said))
+    try:
+        from robot_side.compiled.warm_up import import_kernels  # noqa: PLC0415
+    except ImportError:
+        return None
+    return _facts(import_kernels())
 
 
-def rendering_troubles(backends: Sequence[str] = RENDERING) -> dict[str, str | None]:
+def _facts(kernels: Sequence["Compiled"]) -> KernelFacts:
+    from robot_side.compiled.machine_code import can_keep, machine_code_folder  # noqa: PLC0415
+
+    missing = sum(not kernel.is_kept for kernel in kernels)
+    return KernelFacts(len(kernels), missing, str(machine_code_folder()), can_keep())
+
+
+def rendering_troubles() -> dict[str, str | None]:
     """For each way to render without a screen why it does not work, None if it does; each in a process of its own."""
-    outputs = {backend: _output_of(_RENDER, backend) for backend in backends}
+    outputs = {backend: _output_of(_RENDER, backend) for backend in BACKENDS}
     ended = "trying it ends Python, or takes too long"
     return {backend: ended if said is None else json.loads(said) for backend, said in outputs.items()}
 
@@ -191,11 +137,6 @@ def realtime_notes() -> list[str]:
     """The notes of `--realtime`, tried in a process of its own."""
     notes: list[str] = json.loads((sys.platform == "linux" and _output_of(_REALTIME)) or "[]")
     return notes
-
-
-def port_troubles() -> dict[int, str | None]:
-    """Try each default port on loopback: the reason why it cannot be bound, or None."""
-    return {port: _trouble_at(port) for port in PORTS}
 
 
 def _output_of(program: str, *arguments: str) -> str | None:
@@ -210,25 +151,9 @@ def _output_of(program: str, *arguments: str) -> str | None:
     return done.stdout.strip().splitlines()[-1]
 
 
-def _trouble_at(port: int) -> str | None:
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        # As the sides bind: what still lingers of an ended connection is no obstacle.
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("127.0.0.1", port))
-            probe.listen(1)
-        except OSError as error:
-            return os.strerror(error.errno or 0)
-    return None
-
-
-# Compiling
-
-
 def compile_kernels(*, as_json: bool) -> int:
     """Compile those that are not, and say what there is then; 1 where they are not kept for the next start."""
     try:
-        from robot_side.compiled.machine_code import can_keep, machine_code_folder  # noqa: PLC0415
         from robot_side.compiled.warm_up import import_kernels, warm_up  # noqa: PLC0415
 
         kernels = import_kernels()
@@ -238,13 +163,13 @@ def compile_kernels(*, as_json: bool) -> int:
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("compiling", total=max(len(missing), 1))
         took_s = warm_up(kernels=kernels, done=lambda name: progress.advance(task, name in missing))
-    left = sum(not kernel.is_kept for kernel in kernels)
-    facts = KernelFacts(len(kernels), left, str(machine_code_folder()), can_keep())
+    facts = _facts(kernels)
+    left, folder = facts.missing, facts.folder
     if as_json:
         said = json.dumps({"compiled": len(missing), "took_s": took_s, **asdict(facts)}, indent=2)
     elif left:
-        said = f"{left} of {len(kernels)} kernels were compiled, but not kept: no room, or no right, in {facts.folder}"
+        said = f"{left} of {len(kernels)} kernels were compiled, but not kept: no room, or no right, in {folder}"
     else:
-        said = f"{len(missing)} kernels compiled in {took_s:.0f} s, {len(kernels)} in all, kept in {facts.folder}"
+        said = f"{len(missing)} kernels compiled in {took_s:.0f} s, {len(kernels)} in all, kept in {folder}"
     sys.stdout.write(said + "\n")
     return 1 if left else 0

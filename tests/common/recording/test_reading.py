@@ -18,8 +18,7 @@ from common.recording.content import Content
 from common.recording.entries import Entry, Kind, entry, pack_block, split_text, text, unpack_block
 from common.recording.mcap_file import RecordingFile
 from common.recording.reading import open_recording
-from common.recording.topics import FORMAT, schema_of
-from common.recording.wire import BLOCK, HEADER, NOTE, STATUS, VIEW, as_json, stamped
+from common.recording.wire import BLOCK, FORMAT, HEADER, NOTE, STATUS, VIEW, as_json, schema_of, stamped
 from tests.helpers.felt import scene_state
 from tests.helpers.refusal import refusal
 

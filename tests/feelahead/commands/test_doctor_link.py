@@ -8,7 +8,6 @@ import socket
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import Any
@@ -18,11 +17,12 @@ import pytest
 from common.protocol.codec import PROTOCOL_VERSION, encode
 from common.protocol.link_end import LinkEnd
 from common.sockets.allow_list import AllowList
-from common.sockets.authentication import RobotKeys, make_key_pair
+from common.sockets.authentication import OperatorKeys, RobotKeys, make_key_pair
 from common.sockets.greeting import KNOCK
 from common.sockets.keys import KeyFolder
-from feelahead.commands.doctor import link_facts
-from feelahead.commands.doctor.link_judgement import LinkFacts, Opening, Talk, Wrong, judge
+from common.sockets.operator import OperatorSockets
+from feelahead.commands.doctor import link, port
+from feelahead.commands.doctor.port import Opening, Way, WayError, judge_port, judge_view
 from feelahead.main import command
 from tests.helpers.serving_robot import ServingRobot
 
@@ -34,89 +34,42 @@ def greeting(mechanism: bytes) -> Opening:
 
 
 PLAIN, CURVE = greeting(b"NULL"), greeting(b"CURVE")
-FINE = LinkFacts(
-    "robot:5555",
-    "robot:5556",
-    control_opening=PLAIN,
-    talk=Talk(answered=True, round_trips_s=(2e-3, 1.26e-3, 3e-3)),
-    view_opening=PLAIN,
-    telemetry=True,
-    large_arrive=True,
-)
-WITH_KEYS = replace(FINE, keys="ab" * 32, control_opening=CURVE, view_opening=CURVE)
-
-
-def failed(error: int) -> LinkFacts:
-    return LinkFacts("robot:5555", "robot:5556", control_opening=Opening(error))
+WAY = Way.to("tcp://robot:5555")
+WITH_KEYS = Way(WAY.control, WAY.view, OperatorKeys("ab" * 32, "cd" * 32))
 
 
 @pytest.mark.parametrize(
-    ("facts", "wrong", "said", "remedy"),
+    ("way", "opening", "wrong", "said", "remedy"),
     [
-        (
-            LinkFacts("robot:5555", "", unresolved="--connect: 'robot' cannot be resolved; valid: an IP address"),
-            Wrong.NAME,
-            "'robot' cannot be resolved",
-            "an IP address",
-        ),
-        (failed(errno.ENETUNREACH), Wrong.ROUTE, "this machine is in no network", "ip route get robot"),
-        (failed(errno.EHOSTUNREACH), Wrong.ROUTE, "no machine on its network has that address", "ip route get robot"),
-        (failed(errno.ECONNREFUSED), Wrong.CLOSED, "nothing listens there", "--bind tcp://0.0.0.0:5555"),
-        (
-            replace(failed(errno.ECONNREFUSED), loopback=True),
-            Wrong.CLOSED,
-            "nothing listens there",
-            "--connect tcp://ROBOT:5555",
-        ),
-        (failed(errno.ETIMEDOUT), Wrong.FIREWALL, "robot:5555 gave no answer", "any to any port 5555,5556"),
-        (replace(FINE, control_opening=Opening(said=b"SSH-2.0-x")), Wrong.OTHER, "an SSH server", "ss -ltnp"),
-        (replace(FINE, control_opening=Opening(said=b"220 mail")), Wrong.OTHER, "b'220 mail'", "ss -ltnp"),
-        (replace(FINE, control_opening=Opening()), Wrong.OTHER, "says nothing", "kill -CONT"),
-        (replace(FINE, control_opening=Opening(hung_up=True)), Wrong.OTHER, "hangs up at once", "behind it"),
-        (replace(FINE, control_opening=greeting(b"PLAIN")), Wrong.OTHER, "'PLAIN'", "ss -ltnp"),
-        (replace(FINE, control_opening=CURVE), Wrong.KEYS, "asks for keys", "--robot-key KEY"),
-        (replace(WITH_KEYS, control_opening=PLAIN), Wrong.KEYS, "runs without keys", "leave --keys out"),
-        (
-            replace(WITH_KEYS, talk=Talk("failed")),
-            Wrong.ROBOT_KEY,
-            "another key than --robot-key",
-            "feelahead keys show robot",
-        ),
-        (replace(FINE, talk=Talk("failed")), Wrong.OTHER, "no control port", "ss -ltnp"),
-        (replace(FINE, talk=Talk()), Wrong.SILENT, "does not answer", "wait until it says that it listens"),
-        (replace(FINE, view_opening=Opening(errno.ECONNREFUSED)), Wrong.VIEW, "robot:5556 refuses", "--view-connect"),
-        (replace(FINE, view_opening=Opening(errno.ETIMEDOUT)), Wrong.VIEW, "robot:5556 gave no answer", "5555,5556"),
-        (replace(FINE, view_opening=CURVE), Wrong.VIEW, "robot:5556 asks for keys", "--view-connect"),
-        (replace(FINE, large_arrive=False), Wrong.LARGE, "large ones do not", "mtu 1280"),
+        (WAY, Opening(errno.ENETUNREACH), "route", "this machine is in no network", "ip route get robot"),
+        (WAY, Opening(errno.EHOSTUNREACH), "route", "no machine has that address", "ip route get robot"),
+        (WAY, Opening(errno.ECONNREFUSED), "closed port", "nothing listens there", "--bind tcp://0.0.0.0:5555"),
+        (WAY, Opening(errno.ETIMEDOUT), "firewall", "robot:5555 gave no answer", "any to any port 5555,5556"),
+        (WAY, Opening(said=b"SSH-2.0-x"), "something else", "b'SSH-2.0-x'", "ss -ltnp"),
+        (WAY, Opening(), "something else", "says nothing", "kill -CONT"),
+        (WAY, Opening(hung_up=True), "something else", "hangs up at once", "behind it"),
+        (WAY, greeting(b"PLAIN"), "something else", "PLAIN", "ss -ltnp"),
+        (WAY, CURVE, "keys", "asks for keys", "--robot-key KEY"),
+        (WITH_KEYS, PLAIN, "keys", "runs without keys", "leave --keys out"),
     ],
 )
-def test_the_first_thing_that_is_wrong(facts: LinkFacts, wrong: Wrong, said: str, remedy: str) -> None:
-    fault = judge(facts)
-    assert fault is not None
-    assert (fault.wrong, "\n" in fault.said + fault.remedy) == (wrong, False)
-    assert said in fault.said
-    assert remedy in fault.remedy
+def test_what_is_wrong_with_a_port(way: Way, opening: Opening, wrong: str, said: str, remedy: str) -> None:
+    with pytest.raises(WayError, match=re.escape(said)) as raised:
+        judge_port(way, way.control, opening)
+    assert (raised.value.wrong, "\n" in str(raised.value)) == (wrong, False)
+    assert remedy in raised.value.remedy
+    with pytest.raises(WayError, match=re.escape(said.replace("5555", "5556"))) as raised:
+        judge_view(way, opening)
+    assert raised.value.wrong == "view port"
+    assert "--view-connect" in raised.value.remedy
+    assert ("5555,5556" in raised.value.remedy) is (wrong == "firewall")
 
 
-def test_what_comes_first_is_said_first() -> None:
-    everything = replace(
-        WITH_KEYS,
-        control_opening=Opening(errno.ETIMEDOUT),
-        talk=Talk("key refused"),
-        view_opening=Opening(errno.ECONNREFUSED),
-        telemetry=False,
-        large_arrive=False,
-    )
-    expected = [Wrong.FIREWALL, Wrong.OUR_KEY, Wrong.VIEW, Wrong.VIEW, Wrong.LARGE]
-    for field, wrong in zip(
-        ("control_opening", "talk", "view_opening", "telemetry", "large_arrive"), expected, strict=True
-    ):
-        fault = judge(everything)
-        assert fault is not None
-        assert fault.wrong is wrong
-        everything = replace(everything, **{field: getattr(WITH_KEYS, field)})
-    for fine in (everything, FINE, LinkFacts("robot:5555", "robot:5556"), replace(FINE, telemetry=None)):
-        assert judge(fine) is None
+def test_a_robot_side_is_as_it_should_be_and_a_closed_port_of_this_machine_has_another_remedy() -> None:
+    judge_port(WAY, WAY.control, PLAIN)
+    judge_view(WITH_KEYS, CURVE)
+    with pytest.raises(WayError, match="--connect tcp://ROBOT:5555"):
+        judge_port(WAY, WAY.control, Opening(errno.ECONNREFUSED), loopback=True)
 
 
 # By sockets on loopback
@@ -124,17 +77,17 @@ def test_what_comes_first_is_said_first() -> None:
 
 LONG_S, SHORT_S = 60.0, 0.3
 """For what comes in the end, and for what never does."""
-LINE_END = b"\r\n\r\n"
 
 
 @pytest.fixture(autouse=True)
 def patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """However busy the machine is."""
     limits = ("_ANSWER_LIMIT_S", "_HANDSHAKE_LIMIT_S", "_LARGE_LIMIT_S", "_TELEMETRY_LIMIT_S", "_MEASURE_S")
-    for name in (*limits, "CONNECT_LIMIT_S"):
-        monkeypatch.setattr(link_facts, name, LONG_S)
-    monkeypatch.setattr(link_facts, "_KNOCKS", ((KNOCK, LONG_S), (LINE_END, LONG_S)))
-    monkeypatch.setattr(link_facts, "_ROUND_TRIPS", 3)
+    for name in limits:
+        monkeypatch.setattr(link, name, LONG_S)
+    for name in ("_CONNECT_LIMIT_S", "_GREETING_LIMIT_S"):
+        monkeypatch.setattr(port, name, LONG_S)
+    monkeypatch.setattr(link, "_ROUND_TRIPS", 3)
 
 
 class Doctor:
@@ -196,25 +149,36 @@ def http_server() -> Iterator[str]:
 
 
 @pytest.mark.parametrize(
-    ("stranger", "patient", "said"),
+    ("stranger", "limit_s", "said"),
     [
-        (closed, "", "closed port: 127.0.0.1:"),
-        (listening, "", "takes connections and says nothing"),
-        (lambda: listening(accept=True), "hangs up", "hangs up at once"),
-        (http_server, "answers a line", "is an HTTP server, and no robot side"),
+        (closed, LONG_S, "closed port: 127.0.0.1:"),
+        (listening, SHORT_S, "takes connections and says nothing"),
+        (lambda: listening(accept=True), LONG_S, "hangs up at once"),
+        (http_server, LONG_S, "something that begins with b'<!DOCTYPE HTML"),
     ],
 )
 def test_a_stranger_at_the_port(
     doctor: Doctor,
     monkeypatch: pytest.MonkeyPatch,
     stranger: Callable[[], AbstractContextManager[str]],
-    patient: str,
+    limit_s: float,
     said: str,
 ) -> None:
-    limits_s = [LONG_S if patient == "hangs up" else SHORT_S, LONG_S if patient else SHORT_S]
-    monkeypatch.setattr(link_facts, "_KNOCKS", tuple(zip((KNOCK, LINE_END), limits_s, strict=True)))
+    monkeypatch.setattr(port, "_GREETING_LIMIT_S", limit_s)
     with stranger() as address:
         assert said in doctor.line("--connect", address)
+
+
+def test_packets_that_are_too_long_for_the_way(doctor: Doctor, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Narrow(OperatorSockets):
+        def send(self, payload: bytes, *, everywhere: bool = False) -> bool:
+            self.stuck = getattr(self, "stuck", False) or len(payload) > 1280
+            return self.stuck or super().send(payload, everywhere=everywhere)
+
+    monkeypatch.setattr(link, "OperatorSockets", Narrow)
+    monkeypatch.setattr(link, "_LARGE_LIMIT_S", SHORT_S)
+    with ServingRobot() as robot:
+        assert doctor.of(robot).startswith("large packets: small packets reach ")
 
 
 def test_a_name_that_nobody_knows(doctor: Doctor) -> None:
@@ -274,7 +238,7 @@ def test_a_robot_side_that_is_silent_or_another(
     doctor: Doctor, monkeypatch: pytest.MonkeyPatch, robot: dict[str, Any], never: Sequence[str], said: str
 ) -> None:
     for name in never:
-        monkeypatch.setattr(link_facts, name, SHORT_S)
+        monkeypatch.setattr(link, name, SHORT_S)
     with ServingRobot(**robot) as serving:
         assert doctor.of(serving).startswith(said)
 

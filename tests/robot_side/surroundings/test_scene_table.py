@@ -48,7 +48,6 @@ def test_the_rows_of_an_object_are_together_and_say_where_they_come_from() -> No
     assert kinds == [[SPHERE, BOX, MESH], [], [HALF_SPACE], [SPHERE, BOX, TETRAHEDRON]]
     assert [int(table.rows_of_kind[row]) for row in rows_of(table, 3)] == [1, 1, 0]
     assert table.object_index.tolist() == [0, 0, 0, 2, 3, 3, 3]
-    assert table.has_meshes
     assert table.flat == 0
     volumes = [4 / 3 * np.pi * 0.1**3 + 8 * 0.1 * 0.2 * 0.3 + 0.2**3, 0.0, np.inf]
     np.testing.assert_allclose(table.object_volumes, [*volumes, 0.2**3 + 4 / 3 * np.pi * 0.2**3 + 0.003 / 6])

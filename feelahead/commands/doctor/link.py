@@ -1,0 +1,212 @@
+"""Look at the way to a robot side, no farther than to the first thing that is wrong with it.
+
+Harmless to the person who drives: two connections to each port, one after the other, and questions that the robot side
+answers without letting anybody in. A Hello would ask for the arm, so none is sent.
+"""
+
+import secrets
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from common.clock import MonotonicClock
+from common.errors import OtherVersionError, RemoteProtocolError
+from common.protocol.codec import PROTOCOL_VERSION, decode, encode
+from common.protocol.messages import Header, LeaseNotice, MotionCommand, Telemetry
+from common.sockets.authentication import public_part
+from common.sockets.operator import OperatorSockets
+from feelahead.commands.doctor.port import (
+    VIEW_CONNECT,
+    Way,
+    WayError,
+    host_and_port,
+    judge_port,
+    judge_view,
+    knock,
+    resolved,
+)
+
+_ROUND_TRIPS: Final = 20
+_MEASURE_S: Final = 5.0
+"""A long way allows fewer round trips."""
+_PAUSE_S: Final = 0.11
+"""The robot side answers strangers ten times a second."""
+_TELEMETRY_LIMIT_S: Final = 2.0
+_ANSWER_LIMIT_S: Final = 2.5
+_HANDSHAKE_LIMIT_S: Final = 4.0
+"""Less than the 5 s after which a robot side hangs up: what ends earlier was refused."""
+_STEP_S: Final = 0.05
+_LARGE: Final = bytes(4000)
+"""No message; three packets of full size."""
+_LARGE_LIMIT_S: Final = 2.5
+_MOST_LOST: Final = 2
+"""Answers, where links are emulated, or where other strangers ask."""
+
+
+@dataclass(frozen=True)
+class Talk:
+    """The answers to questions that ask for nothing; no round trips without an answer."""
+
+    round_trips_s: tuple[float, ...] = ()
+    place: int = 0
+    """The place that we would get: 0 owns the arm."""
+    waiting: int = 0
+    """The number of observers."""
+
+
+def look_along(way: Way) -> tuple[Talk, WayError | None]:
+    """Look at everything up to the first thing that is wrong."""
+    clock, talk = MonotonicClock(), Talk()
+    try:
+        to_control, to_view = resolved(way.control, "--connect"), resolved(way.view, "--view-connect")
+        opening = knock(to_control, clock)
+        judge_port(way, way.control, opening, loopback=to_control.is_loopback())
+        topics = (b"telemetry",)
+        with OperatorSockets(way.control.address, way.view.address, topics=topics, keys=way.keys) as sockets:
+            questions = _Questions(sockets, way, clock, opening.took_s)
+            talk = questions.talk()
+            judge_view(way, knock(to_view, clock), loopback=to_view.is_loopback())
+            questions.expect_telemetry()
+            questions.expect_large()
+    except WayError as error:
+        return talk, error
+    return talk, None
+
+
+def told(way: Way, talk: Talk, error: WayError | None) -> dict[str, object]:
+    """Tell programs what was found."""
+    trips_s = talk.round_trips_s
+    return {
+        "connect": host_and_port(way.control),
+        "view_connect": host_and_port(way.view),
+        "reached": error is None,
+        "wrong": error and error.wrong,
+        "said": error and error.said,
+        "remedy": error and error.remedy,
+        "protocol": PROTOCOL_VERSION,
+        "round_trip_ms": 1e3 * min(trips_s) if trips_s else None,
+        "round_trips": len(trips_s),
+        "arm": ("taken" if talk.place else "free") if trips_s else None,
+        "waiting": talk.waiting if trips_s else None,
+    }
+
+
+def reached(talk: Talk) -> str:
+    """The line for a way on which nothing is wrong."""
+    trips_s = talk.round_trips_s
+    arm = "the arm is free (you would own it)"
+    if talk.place:
+        arm = f"somebody has the arm (you would observe, as number {talk.place} of those who wait)"
+    best_ms = 1e3 * min(trips_s)
+    return f"reached: protocol {PROTOCOL_VERSION}, round trip {best_ms:.1f} ms (best of {len(trips_s)}), {arm}"
+
+
+class _Questions:
+    """Asks the robot side what it answers to anybody, and watches whether it sends telemetry."""
+
+    def __init__(self, sockets: OperatorSockets, way: Way, clock: MonotonicClock, round_trip_s: float) -> None:
+        self._sockets = sockets
+        self._way, self._place = way, host_and_port(way.control)
+        self._clock = clock
+        self._round_trip_s = round_trip_s
+        self._epoch = secrets.randbits(53)
+        """One that no Hello opens."""
+        self._sequence = 0
+        self._notices: list[LeaseNotice] = []
+        self._telemetry = False
+
+    def talk(self) -> Talk:
+        """Ask until the best round trip is known."""
+        end_s = self._clock.now() + _HANDSHAKE_LIMIT_S + self._round_trip_s
+        while not self._ask():
+            self._until(_STEP_S)
+            if self._sockets.trouble is not None:
+                raise self._no_handshake()
+            if self._clock.now() >= end_s:
+                raise self._no_answer()
+        trips_s: list[float] = []
+        lost, enough_s = 0, self._clock.now() + _MEASURE_S
+        while True:
+            asked_s = self._clock.now()
+            if self._answered(_ANSWER_LIMIT_S):
+                trips_s.append(self._clock.now() - asked_s)
+            else:
+                lost += 1
+            if len(trips_s) >= _ROUND_TRIPS or lost >= _MOST_LOST or (trips_s and self._clock.now() >= enough_s):
+                break
+            self._until(_PAUSE_S)
+            self._ask()
+        if not trips_s:
+            raise self._no_answer()
+        return Talk(tuple(trips_s), self._notices[-1].place, self._notices[-1].waiting)
+
+    def expect_telemetry(self) -> None:
+        """WayError unless some comes."""
+        if not self._until(_TELEMETRY_LIMIT_S + 2.0 * self._round_trip_s, lambda: self._telemetry):
+            place = host_and_port(self._way.view)
+            said = f"{place} is no view port of a robot side, or not of this one: it sends no telemetry"
+            raise WayError("view port", f"the control port works, but {said}", VIEW_CONNECT)
+
+    def expect_large(self) -> None:
+        """WayError unless a question gets through behind packets of full size."""
+        self._until(_PAUSE_S)
+        if not self._sockets.send(_LARGE):
+            return
+        # The robot side would hang up after 3 s without a heartbeat, and the next connection would be a free one.
+        if not any(self._ask() and self._answered(_LARGE_LIMIT_S / 2) for _ in range(2)):
+            said = f"small packets reach {self._place}, large ones do not: the way swallows what is too long for it"
+            remedy = "a smaller MTU here, such as: sudo ip link set DEVICE mtu 1280 (VPNs and tunnels need that)"
+            raise WayError("large packets", said, remedy)
+
+    def _no_handshake(self) -> WayError:
+        place = self._place
+        if self._way.keys is None:
+            return self._no_answer()
+        if self._sockets.key_refused:
+            said = f"the robot side at {place} does not let this key in: it was never allowed there, or was revoked"
+            return WayError(
+                "our key", said, f"run there: feelahead keys allow NAME {public_part(self._way.keys.secret)}"
+            )
+        said = f"the program at {place} has another key than --robot-key says, or is no such port of a robot side"
+        remedy = "--robot-key with what is shown on the robot's machine by: feelahead keys show robot"
+        return WayError("robot key", said, remedy)
+
+    def _no_answer(self) -> WayError:
+        said = (
+            f"{self._place} speaks ZeroMQ and does not answer: a robot side that still starts or stands still, its view"
+        )
+        remedy = "wait until it says that it listens (its first start compiles for a minute), and say its control port"
+        return WayError("no answer", f"{said} port, or another program", remedy)
+
+    def _ask(self) -> bool:
+        """A command under no lease of an epoch that has not begun: it is answered, and moves nothing."""
+        self._sequence += 1
+        header = Header(epoch=self._epoch, sequence=self._sequence, sent_s=self._clock.now())
+        return self._sockets.send(encode(MotionCommand(header, l2=0.0, r2=0.0)))
+
+    def _answered(self, limit_s: float) -> bool:
+        before = len(self._notices)
+        return self._until(limit_s, lambda: len(self._notices) > before)
+
+    def _until(self, limit_s: float, done: Callable[[], bool] = lambda: False) -> bool:
+        """Read whatever comes until `done`; False where that is not so in time."""
+        end_s = self._clock.now() + limit_s
+        while not done():
+            if (left_s := end_s - self._clock.now()) <= 0.0:
+                return False
+            self._sockets.wait(min(left_s, _STEP_S))
+            for payload in [*self._sockets.receive(), *(payload for _, payload in self._sockets.receive_view())]:
+                self._take(payload)
+        return True
+
+    def _take(self, payload: bytes) -> None:
+        try:
+            message = decode(payload)
+        except OtherVersionError as error:
+            said = f"the robot side speaks {str(error).partition(';')[0]}, this machine {PROTOCOL_VERSION}"
+            raise WayError("version", said, "install the same release of feelahead on both") from error
+        except RemoteProtocolError:
+            return
+        self._telemetry |= isinstance(message, Telemetry)
+        if isinstance(message, LeaseNotice):
+            self._notices.append(message)

@@ -1,0 +1,157 @@
+"""Knock at a port where a robot side should listen, and judge how it answers."""
+
+import errno
+import os
+import socket
+from dataclasses import dataclass, replace
+from typing import Final
+
+from common.clock import MonotonicClock
+from common.errors import ConfigurationError
+from common.sockets.authentication import OperatorKeys
+from common.sockets.endpoints import Endpoint, following, resolve, split_connect
+from common.sockets.greeting import GREETING_BYTES, KNOCK, mechanism_of
+
+_CONNECT_LIMIT_S: Final = 4.0
+"""A second more than it takes Linux to find out that nobody on the network has an address."""
+_GREETING_LIMIT_S: Final = 3.0
+_STEPS: Final = "feelahead keys --help has the steps on both machines"
+VIEW_CONNECT: Final = "say --view-connect tcp://HOST:PORT with the port that the robot side names at its start"
+
+
+class WayError(Exception):
+    """The first thing that is wrong with the way; `wrong` is its kind in a word or two."""
+
+    def __init__(self, wrong: str, said: str, remedy: str) -> None:
+        super().__init__(f"{wrong}: {said}; to mend it: {remedy}")
+        self.wrong, self.said, self.remedy = wrong, said, remedy
+
+
+@dataclass(frozen=True)
+class Way:
+    """The address of a robot side, and the keys to it."""
+
+    control: Endpoint
+    view: Endpoint
+    keys: OperatorKeys | None = None
+
+    @classmethod
+    def to(cls, connect: str, view_connect: str | None = None, keys: OperatorKeys | None = None) -> "Way":
+        """Read the addresses by their spelling; ConfigurationError for what is none."""
+        control = Endpoint(*split_connect(connect, "--connect"), ipv6=False)
+        if view_connect is None:
+            return cls(control, following(control, connect, "--view-connect"), keys)
+        return cls(control, Endpoint(*split_connect(view_connect, "--view-connect"), ipv6=False), keys)
+
+
+@dataclass(frozen=True)
+class Opening:
+    """A port's answer to a TCP connection, and its first bytes."""
+
+    error: int | None = None
+    """The errno of a connection that failed, ETIMEDOUT for one that nobody answered; None for one that stands."""
+    said: bytes = b""
+    hung_up: bool = False
+    """Whether it ended the connection by itself."""
+    took_s: float = 0.0
+    """The time until the connection stood."""
+
+
+def judge_port(way: Way, port: Endpoint, opening: Opening, *, loopback: bool = False) -> None:
+    """WayError where it is no robot side's port. loopback: of this machine."""
+    place = host_and_port(port)
+    if opening.error is not None:
+        raise _no_connection(way, port, opening.error, loopback=loopback)
+    see_who = f"say the robot side's own port; who has this one is shown there by: ss -ltnp 'sport = :{port.port}'"
+    match mechanism_of(opening.said), way.keys is not None:
+        case ("NULL", False) | ("CURVE", True):
+            return
+        case "CURVE", _:
+            said = f"the robot side at {place} asks for keys, and none were given"
+            raise WayError("keys", said, f"--keys FOLDER --robot-key KEY ({_STEPS})")
+        case "NULL", _:
+            remedy = f"start it with --keys FOLDER ({_STEPS}), or leave --keys out if anyone may move the arm"
+            raise WayError("keys", f"the robot side at {place} runs without keys, and --keys was given", remedy)
+    if opening.said:
+        said = f"at {place} is something that begins with {opening.said[:24]!r}, and no robot side"
+    elif opening.hung_up:
+        said = (
+            f"{place} takes connections and hangs up at once: a forwarded port with nothing behind it, or a robot side"
+        )
+        said += " with too many connections"
+        see_who = "start the robot side behind it, or end the program that keeps connecting"
+    else:
+        said = f"{place} takes connections and says nothing: no robot side, or one that stands still"
+        see_who += "; a stopped process goes on after: kill -CONT PID"
+    raise WayError("something else", said, see_who)
+
+
+def judge_view(way: Way, opening: Opening, *, loopback: bool = False) -> None:
+    """WayError as `judge_port`, where the control port works."""
+    try:
+        judge_port(way, way.view, opening, loopback=loopback)
+    except WayError as error:
+        remedy = f"{error.remedy}; or {VIEW_CONNECT}" if error.wrong == "firewall" else VIEW_CONNECT
+        raise WayError("view port", f"the control port works, but not the view port: {error.said}", remedy) from error
+
+
+def _no_connection(way: Way, port: Endpoint, error: int, *, loopback: bool) -> WayError:
+    place = host_and_port(port)
+    if error == errno.ECONNREFUSED:
+        remedy = f"start feelahead-robot, or say where it is: --connect tcp://ROBOT:{port.port}"
+        if not loopback:
+            remedy = f"start feelahead-robot there with --bind tcp://0.0.0.0:{port.port} and --keys FOLDER: without"
+            remedy += " --bind it listens on its own loopback alone"
+        return WayError("closed port", f"{place} refuses connections: nothing listens there", remedy)
+    if error == errno.ETIMEDOUT:
+        ports = list(dict.fromkeys(str(each.port) for each in (way.control, way.view)))
+        said = f"{place} gave no answer in {_CONNECT_LIMIT_S:g} s: a firewall drops what is sent there, or nothing has"
+        remedy = (
+            f"let TCP ports {' and '.join(ports)} in on the robot's machine, such as: sudo ufw allow proto tcp from"
+        )
+        remedy += f" any to any port {','.join(ports)}; whether it is on: ping {port.host}"
+        return WayError("firewall", f"{said} that address", remedy)
+    reason = {
+        errno.EHOSTUNREACH: "no machine has that address, no router knows a way, or a firewall rejects it",
+        errno.ENETUNREACH: "this machine is in no network from which it can be reached",
+    }.get(error, "this machine does not send there")
+    remedy = f"see that the robot's machine is on, and both are in one network: ip route get {port.host}"
+    return WayError("route", f"no way to {place} ({os.strerror(error)}): {reason}", remedy)
+
+
+def resolved(port: Endpoint, flag: str) -> Endpoint:
+    """Replace the host by its first address; WayError where nobody knows it."""
+    try:
+        return replace(port, host=resolve(port.host, port.address, flag)[0])
+    except ConfigurationError as error:
+        said, _, valid = str(error).partition("; valid: ")
+        raise WayError("name", said, f"say {valid}, in /etc/hosts for example") from error
+
+
+def host_and_port(port: Endpoint) -> str:
+    """Name a port in a line for people."""
+    return port.address.removeprefix("tcp://")
+
+
+def knock(port: Endpoint, clock: MonotonicClock) -> Opening:
+    """Connect, and listen to what it says first."""
+    began_s = clock.now()
+    try:
+        connection = socket.create_connection((port.host, port.port), _CONNECT_LIMIT_S)
+    except TimeoutError:
+        return Opening(errno.ETIMEDOUT)
+    except OSError as error:
+        return Opening(error.errno or errno.EIO)
+    took_s, said = clock.now() - began_s, b""
+    with connection:
+        connection.settimeout(_GREETING_LIMIT_S + 2.0 * took_s)
+        try:
+            # Some servers wait for a line's end.
+            connection.sendall(KNOCK + b"\r\n\r\n")
+            while len(said) < GREETING_BYTES and said[:1] in (b"", KNOCK[:1]):
+                if not (piece := connection.recv(GREETING_BYTES - len(said))):
+                    return Opening(None, said, hung_up=True, took_s=took_s)
+                said += piece
+        except OSError as error:
+            return Opening(None, said, hung_up=not isinstance(error, TimeoutError), took_s=took_s)
+    return Opening(None, said, took_s=took_s)
