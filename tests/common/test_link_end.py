@@ -153,15 +153,6 @@ def test_reordering_does_not_pull_the_mean() -> None:
     assert traffic.operator.offset_summary_ms()["estimator"] == "mean"
 
 
-def test_an_asymmetry_that_both_ends_are_told_costs_nothing() -> None:
-    nearer = Way("exponential", 0.030, 0.010)
-    for told_s, expected_s in ((0.0, 0.010), (0.020, 0.0)):
-        traffic = Traffic(Scenario("", QUEUES, nearer, 20e-6, told_s), seed=2, duration_s=3.0)
-        for estimate in last_estimates(traffic).values():
-            assert estimate.offset_error_s is not None
-            assert abs(estimate.offset_error_s) == pytest.approx(expected_s, abs=0.3e-3)
-
-
 ways = st.builds(
     Way,
     st.sampled_from(["normal", "exponential"]),

@@ -60,16 +60,6 @@ def test_a_gripper_command_runs_out_with_the_gap(bench: Bench, monkeypatch: pyte
     assert said[-1] == (0.0, 0.0)
 
 
-def test_an_emergency_stop_stops_the_gripper(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    operator = bench.join(2)
-    bench.arm_it(operator)
-    bench.drive(0.05, operator, gripper=1.0)
-    bench.send(operator, gripper=1.0, emergency_stop=True)
-    said = grips(bench, monkeypatch)
-    bench.drive(0.05, operator, gripper=1.0)
-    assert set(said) == {(0.0, 0.0)}
-
-
 def test_an_unarmed_robot_lets_no_load_sink_however_unevenly_it_ticks() -> None:
     scene = load_scene()
     robot = RobotSide(build_parts(RobotSettings(), epoch=1, clock_domain="test", scene=scene))

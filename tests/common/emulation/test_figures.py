@@ -5,9 +5,6 @@ from typing import Any
 
 import pytest
 
-from common.emulation.delay_line import DelayLine
-from common.emulation.figures import report_lines
-from common.emulation.profile import LinkProfile
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
@@ -52,14 +49,3 @@ def test_the_other_side_sees_what_the_line_let_through(summary: dict[str, Any]) 
     # A flipped bit makes most messages invalid; the others differ in a digit.
     assert messages["rejected"] > line["corrupted"] / 4
     assert messages["stiffness_received"] < messages["stiffness_sent"] - line["lost"]
-
-
-def test_a_line_of_text_for_each_link(summary: dict[str, Any]) -> None:
-    lines = report_lines(summary["link"])
-    assert len(lines) == 3
-    assert lines[0].startswith("link to_robot: asked delay 20ms duplicate 10%; achieved 20.00 ± 0.00 ms")
-    assert "% doubled" in lines[0]
-    idle: DelayLine[bytes] = DelayLine(LinkProfile.parse("rate 1mbit"))
-    assert report_lines({"to_robot": idle.summary()}) == ["link to_robot: asked rate 1mbit; nothing of 0 delivered"]
-    plain: DelayLine[bytes] = DelayLine(LinkProfile())
-    assert report_lines({"to_robot": plain.summary()})[0].startswith("link to_robot: asked no delay; nothing of 0")

@@ -60,15 +60,6 @@ def test_a_floor_under_queues_gives_offset_and_skew(skew: float) -> None:
     assert offset.skew == pytest.approx(skew, abs=25e-6)
 
 
-def test_a_minute_of_queues_gives_the_skew_to_a_few_parts_in_a_million() -> None:
-    generator, clock = np.random.default_rng(9), ahead(-99.0, 37e-6)
-    offset = ClockOffset(shared_clock=False)
-    queues_s = generator.exponential(0.010, (2, 15_000))
-    end_s = talk(offset, clock, 0.050 + queues_s[0], 0.050 + queues_s[1])
-    assert offset.skew == pytest.approx(37e-6, abs=2e-6)
-    assert abs(error_s(offset, clock, end_s)) < 0.05e-3
-
-
 @pytest.mark.parametrize("skew", [0.0, 20e-6, -100e-6])
 def test_a_minute_of_symmetric_jitter_averages_out(skew: float) -> None:
     generator, clock = np.random.default_rng(11), ahead(1e5, skew)
@@ -99,28 +90,6 @@ def test_a_stall_does_not_drive_the_mean_out() -> None:
     end_s = talk(offset, clock, there_s, back_s)
     assert offset.estimator == "mean"
     assert abs(error_s(offset, clock, end_s)) < 1.0e-3
-
-
-def test_the_choice_is_not_made_on_a_handful() -> None:
-    generator, clock = np.random.default_rng(15), ahead(0.0)
-    offset = ClockOffset(shared_clock=False)
-    talk(offset, clock, generator.normal(0.050, 0.010, 100), generator.normal(0.050, 0.010, 100))
-    assert offset.estimator == "lower envelope"
-    assert not offset.settled
-
-
-def test_a_link_that_turns_from_jitter_to_queues_turns_to_the_envelope() -> None:
-    generator, clock = np.random.default_rng(16), ahead(7.0)
-    offset = ClockOffset(shared_clock=False)
-    estimators = []
-    end_s = 0.0
-    for there_s, back_s in (
-        generator.normal(0.050, 0.005, (2, 2500)),
-        0.05 + generator.exponential(0.005, (2, 10_000)),
-    ):
-        end_s = talk(offset, clock, there_s, back_s, start_s=end_s)
-        estimators.append(offset.estimator)
-    assert estimators == ["mean", "lower envelope"]
 
 
 def test_the_same_echo_many_times_and_in_any_order_is_one_sample() -> None:

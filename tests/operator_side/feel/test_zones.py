@@ -10,7 +10,7 @@ from common.protocol.messages import Header, StiffnessUpdate, TriggerField, Ways
 from common.reaction import HORIZON_S
 from common.touch_speed import touch_speed_m_s
 from operator_side.feel.commands_under_way import Displacement
-from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_travels
+from operator_side.feel.zones import moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TriggerTravel
 from tests.helpers.felt import field, ways
 
@@ -83,12 +83,6 @@ def test_each_zone_is_what_the_equation_gives(
     assert list(found.strengths) == one_by_one(farther, USUAL, other, moving)
 
 
-def test_a_way_that_nothing_gets_to_is_free() -> None:
-    far = field(ways(HORIZON_M), full_speed_m_s=0.1, acceleration_m_s2=3.0)
-    assert zone_strengths(far, HORIZON_M, USUAL, 0.0, STILL) is FREE
-    assert zone_strengths(far, HORIZON_M, USUAL, 0.0, Displacement(HORIZON_M, 0.0)) is not FREE
-
-
 def test_what_is_beyond_the_horizon_is_full_and_counted_and_no_sooner() -> None:
     free = field(ways(0.05))
     # u = 0.25 m/s from zone 7 on: 0.3 * 0.25 + 0.25²/6 = 85.4 mm.
@@ -97,14 +91,6 @@ def test_what_is_beyond_the_horizon_is_full_and_counted_and_no_sooner() -> None:
     assert zone_strengths(beyond, 0.0855, USUAL, 0.0, STILL) == ((0,) * 10, 0)
     assert zone_strengths(beyond, 0.0853, USUAL, 0.0, STILL) == ((0,) * 7 + (8,) * 3, 3)
     assert zone_strengths(beyond, 0.0853, USUAL, 1.0, Displacement(1.0, 0.0)) == ((0,) * 10, 0)
-
-
-@pytest.mark.parametrize(("full_speed_m_s", "slow_zones"), [(0.25, 2), (0.1, 2), (0.5, 1), (2.0, 1)])
-def test_slow_zones_take_the_slow_ways(full_speed_m_s: float, slow_zones: int) -> None:
-    # Below 45 mm/s, or below 18 % of a slower arm's full speed.
-    touching = field(ways(-1.0), ways(1.0), full_speed_m_s=full_speed_m_s)
-    strengths = zone_strengths(touching, 10.0, USUAL, 0.0, STILL).strengths
-    assert strengths == (0,) * slow_zones + (8,) * (10 - slow_zones)
 
 
 def update(**changes: Any) -> StiffnessUpdate:

@@ -269,20 +269,10 @@ def test_frames_do_not_pile_up() -> None:
 
 
 @pytest.mark.parametrize(
-    ("field", "factor"),
-    [
-        ("sphere_centers_m", np.nan),
-        ("sphere_radii_m", -1.0),
-        ("box_half_sizes_m", -1.0),
-        ("box_rotations", 1.1),
-        ("half_space_normals", 2.0),
-        ("tetrahedron_vertices_m", np.inf),
-        ("half_space_offsets_m", np.nan),
-        ("mesh_positions_m", np.nan),
-        ("mesh_rotations", 1.1),
-    ],
+    ("field", "factor"), [("sphere_centers_m", np.nan), ("mesh_positions_m", np.nan), ("mesh_rotations", 1.1)]
 )
 def test_bad_objects_are_named_and_never_silently_far_away(field: str, factor: float) -> None:
+    """The rest of what is bad: test_validity.py."""
     objects = random_scene(np.random.default_rng(0), 2, meshes=1)
     broken = dataclasses.replace(objects, **{field: getattr(objects, field) * factor})
     for _ in range(2):

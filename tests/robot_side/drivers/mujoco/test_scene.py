@@ -11,11 +11,9 @@ from robot_side.drivers.mujoco import model_enums
 from robot_side.drivers.mujoco.camera import MujocoCamera
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 from tests.helpers.arm_models import MOTORS, POSITION_SERVOS, SHAPES, STONE, TENDON_GRIPPER, planar_arm
-from tests.helpers.repository import DATA
 
 
 def test_the_numbers_of_the_kinds_are_mujocos() -> None:
@@ -280,11 +278,6 @@ def test_what_a_keyframe_sets_in_motion_moves_and_the_robot_rests(tmp_path: Path
 
 
 # What tells an arm: its joints, links and limits, and nothing of where it stands or what stands around it.
-
-
-def test_the_built_in_table_of_prediction_errors_is_for_the_built_in_arm_in_every_scene() -> None:
-    expected = load_prediction_errors(BUILT_IN).arm
-    assert load_scene().robot.fingerprint == load_scene(DATA / "u_mesh.xml", "tool").robot.fingerprint == expected
 
 
 @pytest.mark.parametrize(
