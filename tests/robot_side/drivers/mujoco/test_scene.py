@@ -260,13 +260,6 @@ def test_what_cannot_be_used_is_told_in_one_line(
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_is_none_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match=r"none\.xml.*there is no such file"):
-        load_scene(tmp_path / "none.xml", "tcp")
-    with pytest.raises(ConfigurationError, match=r"--model .*: is a directory; valid: an MJCF file"):
-        load_scene(tmp_path, "tcp")
-
-
 def test_what_a_keyframe_sets_in_motion_moves_and_the_robot_rests(tmp_path: Path) -> None:
     mover = '<body pos="0.9 0 0.2"><joint name="mover" type="slide"/><geom size="0.02"/></body>'
     key = '<keyframe><key name="home" qpos="0.05 0 0 0 0" qvel="-0.5 0.3 0.1 0 0"/></keyframe>'
