@@ -291,16 +291,6 @@ def test_an_overtaken_message_is_echoed_beside_the_newest() -> None:
     assert operator.stamp(1.26).last_sent_s is None
 
 
-def test_a_contradictory_echo_is_counted_and_measures_nothing() -> None:
-    robot, operator = ends(robot_clock="another clock")
-    robot.arrived(operator.hello(0.0), 500.02)
-    header = Header(epoch=2, sequence=9, sent_s=1.0, echo_sent_s=500.5, echo_held_s=10.0)
-    arrival = robot.arrived(motion(header), 501.02)
-    assert (arrival.loop_age_s, arrival.one_way_s) == (None, None)
-    assert robot.offset_summary_ms()["rejected"] == 1
-    assert robot.round_trip.count == 0
-
-
 def test_gaps_are_silences_of_more_than_100_ms_that_something_newer_ended() -> None:
     robot, operator = ends()
     robot.arrived(operator.hello(0.0), 0.0)

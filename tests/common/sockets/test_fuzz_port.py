@@ -114,15 +114,6 @@ def test_a_connection_that_never_introduces_itself_is_ended(monkeypatch: pytest.
         assert all(connection.ended() for connection in slow)
 
 
-def test_five_hundred_connections_at_once_keep_nobody_out(robot: RobotSockets, operator: OperatorSockets) -> None:
-    before = descriptors()
-    crowd = [RawConnection(port_of(robot.control_endpoint)) for _ in range(500)]
-    assert is_heard(robot, operator)
-    for connection in crowd:
-        connection.close()
-    assert until_descriptors_are(before, robot)
-
-
 def test_a_crowd_is_hung_up_on_and_who_is_in_stays_in(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
     with (

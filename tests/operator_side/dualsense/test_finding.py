@@ -152,6 +152,17 @@ def test_a_look_waits_for_nobody_and_is_one_at_a_time() -> None:
     assert search.take() is None
 
 
+def test_what_is_found_is_handed_over_once() -> None:
+    handle, find = usable()
+    looks = Looks(find(None))
+    search = BackgroundSearch(looks.find)
+    search.begin(None)
+    assert finished(search, looks) is looks.result
+    assert search.take() is None
+    search.close()
+    assert handle.closed == 0
+
+
 def test_what_else_goes_wrong_is_not_lost() -> None:
     looks = Looks(RuntimeError("in the thread"))
     search = BackgroundSearch(looks.find)
@@ -170,3 +181,12 @@ def test_what_is_found_too_late_is_let_go() -> None:
     assert handle.closed == handle.times_opened > 0
     search.begin(None)
     assert looks.asked == [None]
+
+
+def test_what_was_found_and_not_taken_is_let_go() -> None:
+    handle, find = usable()
+    search = BackgroundSearch(find)
+    search.begin(None)
+    search.close()
+    assert handle.closed == handle.times_opened > 0
+    assert handle.written == []

@@ -266,17 +266,3 @@ def used(what: str, *arguments: Any, **named: Any) -> Any:
 def test_refusals(what: str, arguments: tuple[Any, ...], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         used(what, *arguments)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        *(((1.0, strengths), "zone_strengths") for strengths in ((1,) * 9, (9,) * 10)),
-        *(((1.0, (1,) * 10, step_n), "strength_step_n = ") for step_n in (-0.1, NAN, INF)),
-    ],
-)
-def test_refused_forces(arguments: Any, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        equilibrium_travel(*arguments)
-    with pytest.raises(ValueError, match="address = 'nobody'"):
-        SimulatedDualSense(address="nobody")

@@ -11,7 +11,6 @@ from feelahead.lab.reference.meshes import (
     grid_tetrahedra,
     round_mesh,
     surface_of,
-    torus,
 )
 from feelahead.lab.reference.oracle import true_mesh_overlap
 from robot_side.overlap import Mesh
@@ -49,11 +48,6 @@ def positions(rng: Rng, vertices: FloatArray, triangles: IntArray, count: int) -
     return centers, radii
 
 
-def test_a_torus_in_all_positions() -> None:
-    vertices, triangles = torus(6, 4)
-    assert_exact(vertices, triangles, *positions(np.random.default_rng(1), vertices, triangles, 27))
-
-
 @pytest.mark.parametrize("jitter", [0.0, 0.1])
 def test_random_solids_with_parts_that_touch_at_edges_and_corners(jitter: float) -> None:
     rng = np.random.default_rng(3)
@@ -65,17 +59,6 @@ def test_random_solids_with_parts_that_touch_at_edges_and_corners(jitter: float)
         if jitter == 0.0:
             centers[::2] = rng.integers(0, 5, size=centers[::2].shape) / 2.0
         assert_exact(vertices, triangles, centers, radii)
-
-
-def test_a_cavity_is_not_part_of_the_solid() -> None:
-    rng = np.random.default_rng(4)
-    vertices, tetrahedra = grid_tetrahedra(3)
-    triangles = surface_of(tetrahedra[np.abs(vertices[tetrahedra].mean(axis=1) - 1.5).max(axis=1) > 0.5])
-    mesh = Mesh(vertices, triangles)
-    assert mesh.volume_m3 == pytest.approx(26.0)
-    assert mesh.overlap([1.5, 1.5, 1.5], 0.4) == 0.0
-    assert mesh.overlap([0.5, 0.5, 0.5], 0.4) == pytest.approx(4.0 / 3.0 * np.pi * 0.4**3, rel=1e-15)
-    assert_exact(vertices, triangles, rng.uniform(0.5, 2.5, (30, 3)), rng.uniform(0.1, 2.0, 30))
 
 
 def test_a_narrow_slit_and_a_thin_plate_through_the_centre() -> None:

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.arrays import FloatArray
 from common.roles import Role
 from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.overlap import Mesh
@@ -64,30 +63,6 @@ def test_what_has_no_volume_is_left_out_and_counted() -> None:
     beside = scene_table(scene.sphere([0.0, 0.0, 0.1], 0.01).objects())
     assert beside.flat == 3
     assert beside.rows_of_kind.tolist() == [1]
-
-
-def surface_points(objects: PerceivedObjects, kind: int, row: int, rng: np.random.Generator) -> FloatArray:
-    """Points (n, 3) of a primitive that reach as far as it does."""
-    units = rng.normal(size=(200, 3))
-    units /= np.linalg.norm(units, axis=1)[:, None]
-    if kind == SPHERE:
-        return np.asarray(objects.sphere_centers_m[row] + objects.sphere_radii_m[row] * units)
-    if kind == BOX:
-        corners = CUBE_CORNERS * objects.box_half_sizes_m[row]
-        return np.asarray(objects.box_centers_m[row] + corners @ objects.box_rotations[row].T)
-    return np.asarray(objects.tetrahedron_vertices_m[row])
-
-
-@settings(derandomize=True, deadline=None, max_examples=20)
-@given(seed=st.integers(0, 2**32 - 1))
-def test_bounds_contain_their_primitives_and_those_of_objects_their_own(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    objects = random_scene(rng, 3)
-    table = scene_table(objects)
-    for row in np.flatnonzero(table.kinds != HALF_SPACE):
-        points = surface_points(objects, int(table.kinds[row]), int(table.rows_of_kind[row]), rng)
-        for bounds in (table.bounds[row], table.object_bounds[table.object_index[row]]):
-            assert np.linalg.norm(points - bounds[:3], axis=1).max() <= bounds[3] * (1.0 + 1e-12)
 
 
 def test_a_table_is_made_once_for_each_frame(monkeypatch: pytest.MonkeyPatch) -> None:
