@@ -81,16 +81,6 @@ def test_who_stops_commanding_has_said_stop() -> None:
     assert bench.without_history == 0
 
 
-def test_with_the_robot_sides_reckoning_only_that_counts() -> None:
-    bench = Driving("robot")
-    bench.drive(0.2)
-    bench.feel_field(bench.report())
-    assert bench.r2 == FREE
-    bench.feel_field(bench.report(displacement_m=0.04, speed_m_s=0.25))
-    assert bench.r2 == (0,) * 5 + (8,) * 5
-    assert bench.without_history == 0
-
-
 @pytest.mark.parametrize(
     ("echo_s", "held_s"), [(None, None), (0.5, 0.0), (1e6, 0.0), (2.0, 100.0)], ids=["none", "old", "to come", "held"]
 )

@@ -129,14 +129,6 @@ def test_what_is_held_is_felt_no_more_and_the_table_is(delay_ms: int) -> None:
 
 
 @episodes
-def test_a_person_whose_left_hand_advances_gets_there_as_well() -> None:
-    operator = OperatorSettings(swap_sides=True)
-    run = Loopback(LoopbackSettings(RobotSettings(), operator))
-    run.run_until(6.5)
-    assert run.summary()["task"]["time_to_grasp_s"] == episode(0).summary["task"]["time_to_grasp_s"]
-
-
-@episodes
 @pytest.mark.parametrize("delay_ms", [0, 200])
 def test_each_direction_measures_the_delay_that_was_asked_for(delay_ms: int) -> None:
     summary = episode(delay_ms).summary

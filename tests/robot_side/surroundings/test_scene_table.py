@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from common.roles import Role
 from feelahead.lab.reference.meshes import CUBE_CORNERS, CUBE_TRIANGLES
 from robot_side.overlap import Mesh
-from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
 from robot_side.surroundings import surroundings as module
 from robot_side.surroundings.blocks import TOGETHER
 from robot_side.surroundings.kinds.layout import BOX, HALF_SPACE, MESH, SPHERE, TETRAHEDRON
@@ -253,15 +252,3 @@ def test_bad_objects_are_named_and_never_silently_far_away(field: str, factor: f
     for _ in range(2):
         with pytest.raises(ValueError, match=field):
             scene_table(broken)
-
-
-def test_a_mesh_is_bounded_where_it_lies() -> None:
-    rotation, position = random_rotation(np.random.default_rng(3)), np.array([1.0, 2.0, 3.0])
-    vertices, triangles = ellipsoid_mesh(np.array([0.05, 0.1, 0.2]), 8)[:2]
-    # Off its own origin.
-    vertices = vertices + np.array([0.3, 0.0, 0.0])
-    table = scene_table(Scene().add().mesh(Mesh(vertices, triangles), position, rotation).objects())
-    placed = position + vertices @ rotation.T
-    for bounds in (table.bounds[0], table.object_bounds[0]):
-        assert np.linalg.norm(placed - bounds[:3], axis=1).max() <= bounds[3] * (1.0 + 1e-12)
-        assert 0.2 <= bounds[3] < 0.25
