@@ -93,6 +93,14 @@ def test_what_is_beyond_the_horizon_is_full_and_counted_and_no_sooner() -> None:
     assert zone_strengths(beyond, 0.0853, USUAL, 1.0, Displacement(1.0, 0.0)) == ((0,) * 10, 0)
 
 
+@pytest.mark.parametrize(("full_speed_m_s", "slow_zones"), [(0.25, 2), (0.1, 2), (0.5, 1), (2.0, 1)])
+def test_slow_zones_take_the_slow_ways(full_speed_m_s: float, slow_zones: int) -> None:
+    # Below 45 mm/s, or below 18 % of a slower arm's full speed.
+    touching = field(ways(-1.0), ways(1.0), full_speed_m_s=full_speed_m_s)
+    strengths = zone_strengths(touching, 10.0, USUAL, 0.0, STILL).strengths
+    assert strengths == (0,) * slow_zones + (8,) * (10 - slow_zones)
+
+
 def update(**changes: Any) -> StiffnessUpdate:
     l2, r2 = field(ways(1.0), displacement_m=-0.02), field(ways(1.0), displacement_m=0.03)
     return StiffnessUpdate(Header(1, 1, 0.0), l2, r2, horizon_m=1.0, rumble=0.0, state="armed", **changes)
