@@ -55,10 +55,6 @@ def test_what_is_out_of_range_is_named_with_its_value_and_its_limit(field: str, 
         _Record(**{field: value})
 
 
-def test_what_has_no_range_and_what_is_absent_pass() -> None:
-    assert _Record(free=math.nan, late_s=None).late_s is None
-
-
 @given(st.floats() | st.integers(-100, 100))
 def test_the_same_numbers_are_refused_here_and_by_the_decoder(value: float) -> None:
     for hint in (Annotated[float, Meta(gt=0.0, le=60.0)], Finite, Share):
