@@ -12,12 +12,6 @@ def pressing(*buttons: Button) -> OperatorIntent:
     return operator_intent(ControllerState(pressed=frozenset(buttons)))
 
 
-def test_nobody_touches_it() -> None:
-    intent = operator_intent(ControllerState())
-    assert intent == OperatorIntent(0.0, 0.0, (0.0, 0.0), (0.0, 0.0), False, False, False, False, False, 0)
-    assert intent.triggers_released
-
-
 @pytest.mark.parametrize(("l2", "r2", "released"), [(0.04, 0.05, True), (0.06, 0.0, False), (0.0, 1.0, False)])
 def test_released_means_within_the_dead_zone(l2: float, r2: float, released: bool) -> None:
     assert operator_intent(ControllerState(l2=l2, r2=r2)).triggers_released is released
