@@ -12,22 +12,17 @@ CHANGES_S = np.full((6, AXES), 0.05)
 ways = st.floats(-0.1, 1.0) | st.just(float("inf"))
 
 
-@pytest.mark.parametrize("full_s", [0.0, -1.0, float("nan"), float("inf"), 101.0])
-def test_a_time_that_cannot_be_is_named(full_s: float) -> None:
-    with pytest.raises(ValueError, match="full_s"):
-        Around(full_s, bytes(COUNT), bytes(2 * AXES))
-
-
-@pytest.mark.parametrize("count", [0, COUNT - 1, COUNT + 1])
-def test_another_number_of_ways_is_named(count: int) -> None:
-    with pytest.raises(ValueError, match=f"steps has {count} bytes; valid: {COUNT}"):
-        Around(0.8, bytes(count), bytes(2 * AXES))
-
-
-@pytest.mark.parametrize("count", [0, AXES, 33 * 2 * AXES])
-def test_changes_of_no_joints_or_too_many_are_named(count: int) -> None:
-    with pytest.raises(ValueError, match=f"changes has {count} bytes; valid: 10 for each of 1 to 32 joints"):
-        Around(0.8, bytes(COUNT), bytes(count))
+@pytest.mark.parametrize(
+    ("full_s", "count", "changes", "said"),
+    [
+        *((full_s, COUNT, 2 * AXES, "full_s") for full_s in (0.0, -1.0, float("nan"), float("inf"), 101.0)),
+        *((0.8, count, 2 * AXES, f"steps has {count} bytes; valid: {COUNT}") for count in (0, COUNT - 1, COUNT + 1)),
+        *((0.8, COUNT, n, f"changes has {n} bytes; valid: 10 for each of 1 to 32") for n in (0, AXES, 66 * AXES)),
+    ],
+)
+def test_what_cannot_be_is_named(full_s: float, count: int, changes: int, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        Around(full_s, bytes(count), bytes(changes))
 
 
 def test_changes_are_told_to_a_quarter_of_a_millisecond_up_to_8_s() -> None:

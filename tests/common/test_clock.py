@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from common.clock import VirtualClock, clock_domain
-from common.protocol.link_end import LinkEnd
 
 
 @pytest.fixture
@@ -15,16 +14,6 @@ def fresh_domain() -> Iterator[None]:
     clock_domain.cache_clear()
     yield
     clock_domain.cache_clear()
-
-
-def test_a_virtual_clock_stands_still_until_it_is_told() -> None:
-    clock = VirtualClock()
-    assert [clock.now(), clock.now()] == [0.0, 0.0]
-    clock.advance_to(0.25)
-    assert [clock.now(), clock.now()] == [0.25, 0.25]
-    clock.advance_to(0.25)
-    assert clock.now() == 0.25
-    assert VirtualClock(17.5).now() == 17.5
 
 
 @pytest.mark.parametrize("past_s", [0.999, -1.0, -math.inf, math.nan])
@@ -69,7 +58,3 @@ def test_another_boot_or_time_namespace_is_another_domain(monkeypatch: pytest.Mo
     names = [domain(boot, space) for boot in ("boot1", "boot2") for space in ("time:[1]", "time:[2]")]
     assert len(set(names)) == 4
     assert all("\n" not in name for name in names)
-
-
-def test_a_domain_fits_into_a_hello() -> None:
-    LinkEnd("robot", 1, clock_domain()).hello(0.0)

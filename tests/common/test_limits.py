@@ -1,8 +1,13 @@
 """Ranges that are declared once, in a field's type hint."""
 
+import dataclasses
+import importlib
+import inspect
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any
+from types import ModuleType
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import msgspec
 import pytest
@@ -10,7 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import Meta
 
-from common.limits import Finite, Share, check_limits, check_value, range_in_words
+from common.emulation.clauses import Chance, Outage, Rate
+from common.emulation.loss import GilbertElliott, RandomLoss
+from common.limits import Finite, Share, check_limits, check_value
+from operator_side.dualsense.reports.feature_report import Firmware
 
 
 @dataclass(frozen=True)
@@ -47,10 +55,6 @@ def test_what_is_out_of_range_is_named_with_its_value_and_its_limit(field: str, 
         _Record(**{field: value})
 
 
-def test_what_has_no_range_and_what_is_absent_pass() -> None:
-    assert _Record(free=math.nan, late_s=None).late_s is None
-
-
 @given(st.floats() | st.integers(-100, 100))
 def test_the_same_numbers_are_refused_here_and_by_the_decoder(value: float) -> None:
     for hint in (Annotated[float, Meta(gt=0.0, le=60.0)], Finite, Share):
@@ -67,5 +71,52 @@ def test_the_same_numbers_are_refused_here_and_by_the_decoder(value: float) -> N
         assert checked == decoded
 
 
-def test_large_whole_limits_are_written_out() -> None:
-    assert range_in_words(Meta(ge=0, le=2**53)) == f"0 to {2**53}"
+# Each value just outside of a range that a record of ours declares is refused by that record, and named
+
+MODULES = (
+    *("common.emulation.clauses", "common.emulation.loss", "common.emulation.profile"),
+    *("robot_side.arm.tool_motion", "robot_side.drivers.mujoco.joint_reference", "robot_side.operators.safety"),
+    *("robot_side.settings", "robot_side.viewing.settings", "operator_side.settings", "operator_side.people.settings"),
+    *("operator_side.feel.rendering", "operator_side.controller.feel", "operator_side.controller.state"),
+    *("operator_side.dualsense.reports.feature_report", "operator_side.dualsense.uhid.controller"),
+    *("feelahead.commands.recordings", "feelahead.commands.virtual_dualsense"),
+)
+NEEDS: dict[type, tuple[float, ...]] = {
+    **{Chance: (0.5,), Rate: (1.0,), Outage: (1.0, 1.0), RandomLoss: (0.5,), GilbertElliott: (0.5, 0.5)},
+    Firmware: (0, 0, 0),
+}
+"""What has no default."""
+
+
+def ranges(hint: Any) -> Iterator[tuple[type, Meta]]:
+    """Yield the type and the range of a field, and of what a tuple holds."""
+    kind, *rest = get_args(hint) if get_args(hint) else (hint,)
+    if get_origin(hint) is Annotated and (metas := [one for one in rest if isinstance(one, Meta)]):
+        yield kind, metas[0]
+    elif get_origin(hint) is not Annotated:
+        for one in get_args(hint):
+            yield from ranges(one)
+
+
+def outside(kind: type, meta: Meta) -> Iterator[Any]:
+    if kind is str:
+        yield "x" * ((meta.max_length or 0) + 1)
+        return
+    step = 1 if kind is int else 1e-9
+    yield from (bound for bound in (meta.gt, meta.lt) if bound is not None)
+    yield from ([] if meta.ge is None else [meta.ge - step])
+    yield from ([] if meta.le is None else [meta.le + (step if kind is int else max(step, 1e-9 * abs(meta.le)))])
+    yield from ([0.5] if kind is int else [math.nan, math.inf, -math.inf])
+
+
+@pytest.mark.parametrize("module", [importlib.import_module(name) for name in MODULES], ids=MODULES)
+def test_what_lies_just_outside_of_a_declared_range_is_refused(module: ModuleType) -> None:
+    for kind in vars(module).values():
+        if not inspect.isclass(kind) or kind.__module__ != module.__name__ or not dataclasses.is_dataclass(kind):
+            continue
+        needed = dict(zip((one.name for one in dataclasses.fields(kind)), NEEDS.get(kind, ()), strict=False))
+        for name, hint in get_type_hints(kind, include_extras=True).items():
+            of_elements = any(get_origin(one) is tuple for one in (hint, *get_args(hint)))
+            for value in [value for of, meta in ranges(hint) for value in outside(of, meta)]:
+                with pytest.raises(ValueError, match=rf"^{name}\b.* = .*; valid: "):
+                    kind(**(needed | {name: (value,) if of_elements else value}))

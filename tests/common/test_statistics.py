@@ -1,4 +1,6 @@
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -80,30 +82,18 @@ def test_quantiles_of_a_long_run_cover_all_of_it() -> None:
         assert running.quantile(probability) == pytest.approx(probability * count, abs=4.0 * sd)
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_refuses_what_is_not_finite(value: float) -> None:
+def test_what_is_no_number_no_probability_or_no_window_is_refused() -> None:
     running, sliding = RunningStatistics(0), SlidingQuantile()
-    with pytest.raises(ValueError, match="value = "):
-        running.add(value)
-    with pytest.raises(ValueError, match="values"):
-        running.extend([1.0, value])
-    with pytest.raises(ValueError, match="value = "):
-        sliding.update(value)
-    assert running.count == 0
-    assert sliding.value is None
-
-
-@pytest.mark.parametrize("probability", [-0.01, 1.01, math.nan])
-def test_refuses_probabilities_that_are_none(probability: float) -> None:
-    with pytest.raises(ValueError, match="probability = "):
-        RunningStatistics(0).quantile(probability)
-    with pytest.raises(ValueError, match="probability = "):
-        SlidingQuantile(probability=probability)
-
-
-def test_refuses_an_empty_window() -> None:
-    with pytest.raises(ValueError, match="window = 0"):
-        SlidingQuantile(window=0)
+    refused: list[tuple[str, Callable[[], object]]] = [("window = 0", lambda: SlidingQuantile(window=0))]
+    for value in (math.nan, math.inf, -math.inf):
+        refused += [("value = ", partial(running.add, value)), ("value = ", partial(sliding.update, value))]
+        refused += [("values", partial(running.extend, [1.0, value]))]
+    for p in (-0.01, 1.01, math.nan):
+        refused += [("probability = ", partial(one, probability=p)) for one in (running.quantile, SlidingQuantile)]
+    for said, call in refused:
+        with pytest.raises(ValueError, match=said):
+            call()
+    assert (running.count, sliding.value) == (0, None)
 
 
 @given(samples, st.integers(1, 50), st.sampled_from([0.05, 0.25, 0.5, 0.75, 0.95, 1.0]))

@@ -122,12 +122,6 @@ class World:
         """Whether a release of everything is what was written last, if perhaps with the usual light."""
         return bool(self.written) and replace(self.written[-1], light=None) == RELEASED
 
-    def commands_that_came(self) -> int:
-        """All that it has sent so far: the Hellos of now come after them."""
-        hellos = self.source.hellos
-        self.until(lambda: self.source.hellos >= hellos + 2)
-        return self.source.commands
-
     def _look(self) -> None:
         while not self._lines.empty():
             self.events.append(json.loads(self._lines.get_nowait()))
@@ -214,14 +208,6 @@ def test_without_a_controller_it_says_so_and_commands_nothing_until_one_appears(
         assert world.written[0] == RELEASED
         # On a machine that stalls a field may expire, which the light tells and nothing else.
         assert {(report.l2, report.r2) for report in world.written[1:]} <= {(None, None)}
-
-
-def test_killed_while_its_controller_is_away_it_leaves_nobody_behind(world: World) -> None:
-    world.stiffen()
-    world.plug(False)
-    world.until(lambda: world.controller() == "lost")
-    world.process.send_signal(signal.SIGTERM)
-    assert world.end() == (0, "")
 
 
 def test_hung_its_triggers_are_released_and_told_anew_when_it_runs_on(world: World) -> None:

@@ -11,7 +11,7 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import AnyMessage, Hello, LeaseNotice, MotionCommand, Tune
 from common.protocol.session import SessionState
 from common.status.codes import LinkState, Sight
-from operator_side.controller.feel import FREE_TRIGGER, USUAL_LIGHT, WARNING_LIGHT, Rumble
+from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT, Rumble
 from operator_side.controller.state import Button
 from operator_side.core import OperatorSide
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
@@ -31,15 +31,6 @@ def sent(bench: Bench, kind: type[AnyMessage], for_s: float = 0.0) -> list[Any]:
         found += [message for message in map(decode, bench.payloads()) if isinstance(message, kind)]
         bench.now_s += 0.004
     return found
-
-
-def test_stiffness_reaches_the_trigger_it_is_meant_for_and_only_changes_are_written(bench: Bench) -> None:
-    bench.feel(6, rumble=1.0)
-    l2, r2 = bench.device.strengths
-    assert (l2, r2, bench.device.rumble.left) == (FREE_TRIGGER, (6,) * 10, 1.0)
-    bench.now_s += 0.001
-    bench.feel(6, rumble=1.0)
-    assert bench.device.write_count == 1
 
 
 def test_another_calibration_changes_what_is_read_and_what_is_felt(bench: Bench) -> None:

@@ -68,33 +68,6 @@ def test_commands_under_way_bring_it_nearer() -> None:
     assert bench.without_history == 0
 
 
-@pytest.mark.parametrize(("speed_m_s", "free"), [(0.0, 4), (0.25, 3), (-0.25, 7)])
-def test_it_begins_with_the_speed_of_the_report(speed_m_s: float, free: int) -> None:
-    bench = Driving()
-    bench.drive(0.26)
-    bench.feel_field(bench.report(speed_m_s=speed_m_s))
-    assert bench.r2 == (0,) * free + (8,) * (10 - free)
-
-
-@pytest.mark.parametrize(("told_m_s", "stiff"), [(None, True), (0.25, True), (0.0, False)])
-def test_a_command_does_what_the_robot_says_that_it_does(told_m_s: float | None, stiff: bool) -> None:
-    bench = Driving()
-    bench.drive(0.1)
-    bench.echo_s = bench.now_s
-    bench.now_s += 0.15  # The newest command that the robot had is the last one.
-    bench.feel_field(bench.report(told_m_s=told_m_s))
-    assert (bench.r2 != FREE) == stiff
-    assert bench.without_history == 0
-
-
-@pytest.mark.parametrize("button", [Button.SQUARE, Button.CIRCLE])
-def test_without_the_run_button_nothing_is_under_way(button: Button) -> None:
-    bench = Driving()
-    bench.drive(0.2, button)
-    bench.feel_field(bench.report())
-    assert bench.r2 == FREE
-
-
 def test_who_stops_commanding_has_said_stop() -> None:
     bench = Driving()
     bench.drive(0.1)
@@ -105,16 +78,6 @@ def test_who_stops_commanding_has_said_stop() -> None:
     bench.feel_field(bench.report())
     # Its last command counted until it was seen to stop, 0.2 s later: δ = 0.25 * 0.296 = 74 mm, w = 0.
     assert bench.r2 == (0,) * 3 + (8,) * 7
-    assert bench.without_history == 0
-
-
-def test_with_the_robot_sides_reckoning_only_that_counts() -> None:
-    bench = Driving("robot")
-    bench.drive(0.2)
-    bench.feel_field(bench.report())
-    assert bench.r2 == FREE
-    bench.feel_field(bench.report(displacement_m=0.04, speed_m_s=0.25))
-    assert bench.r2 == (0,) * 5 + (8,) * 5
     assert bench.without_history == 0
 
 

@@ -17,7 +17,7 @@ from robot_side.gripper.held_object import grip
 from robot_side.laws.law import Situation
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
-from tests.robot_side.session_bench import QUICK, TICK_S, Bench, Operator
+from tests.robot_side.session_bench import Bench, Operator
 
 
 def test_an_armed_robot_moves_as_asked_and_stops_when_commands_stop(bench: Bench) -> None:
@@ -35,39 +35,6 @@ def test_an_armed_robot_moves_as_asked_and_stops_when_commands_stop(bench: Bench
     assert np.linalg.norm(bench.tool_m - rest) < 2e-3
     [stop] = bench.robot.summary()["stops"]
     assert "no command for" in stop["reason"]
-
-
-def grips(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
-    """Record what the gripper is told from now on: how fast to close, and for how much longer."""
-    said: list[tuple[float, float]] = []
-    monkeypatch.setattr(
-        bench.arm, "command_gripper", lambda closing, until_s: said.append((closing, until_s - bench.now_s))
-    )
-    return said
-
-
-def test_a_gripper_command_runs_out_with_the_gap(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    operator = bench.join(2)
-    bench.arm_it(operator)
-    said = grips(bench, monkeypatch)
-    bench.drive(0.05, operator, gripper=1.0)
-    bench.silence(0.3)
-    closing = [left_s for share, left_s in said if share == 1.0]
-    gap_s = QUICK.safety.gap_s
-    assert len(closing) > gap_s / TICK_S
-    assert max(closing) <= gap_s
-    assert min(closing) >= -1e-9
-    assert said[-1] == (0.0, 0.0)
-
-
-def test_an_emergency_stop_stops_the_gripper(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    operator = bench.join(2)
-    bench.arm_it(operator)
-    bench.drive(0.05, operator, gripper=1.0)
-    bench.send(operator, gripper=1.0, emergency_stop=True)
-    said = grips(bench, monkeypatch)
-    bench.drive(0.05, operator, gripper=1.0)
-    assert set(said) == {(0.0, 0.0)}
 
 
 def test_an_unarmed_robot_lets_no_load_sink_however_unevenly_it_ticks() -> None:

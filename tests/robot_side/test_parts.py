@@ -152,6 +152,7 @@ def test_a_scene_needs_no_kernels_for_primitives_that_it_lacks(
     needed = {kernel.name.rpartition(".")[2] for kernel in parts.kernels}
     assert needed >= {"look", "sense", "drive"}
     assert ("overlap_one_box" in needed, "overlap_one_tetrahedron" in needed) == (boxes, tetrahedra)
+    assert not [name for name in needed if "mesh" in name]
     # Those of the library of overlaps are not for ticks.
     assert not needed & {"overlap_boxes", "precise_boxes", "overlap_tetrahedra", "precise_tetrahedra"}
 

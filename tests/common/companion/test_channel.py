@@ -1,6 +1,5 @@
 import socket
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -81,11 +80,3 @@ def test_a_length_beyond_reason_ends_it() -> None:
     assert channel.ended
     one.close()
     channel.close()
-
-
-def test_more_than_anybody_would_take_is_an_error() -> None:
-    one, other = pair()
-    with pytest.raises(ValueError, match="valid: up to"):
-        one.send(bytes(MESSAGE_LIMIT_BYTES + 1))
-    one.close()
-    other.close()

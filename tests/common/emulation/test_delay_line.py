@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.emulation.clauses import LinkModel
-from common.emulation.delay_line import DelayLine
+from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.profile import LinkProfile
 from common.emulation.spec import Direction, LinkSpec, Stream, unused_clauses
 from tests.helpers.refusal import refusal
@@ -97,6 +97,7 @@ def test_reports_what_was_asked_and_achieved() -> None:
     assert achieved["rate_bit_s"] == pytest.approx(1000.0 * len(delays_s) / 900, rel=0.01)
     assert achieved["late_share"] == achieved["duplicate_share"] == 0.0
     assert achieved["release_error_us"]["max"] == 0.0
+    assert list(link_summary("to_robot", {"haptics": line, "video": line})) == ["to_robot", "to_robot.video"]
 
 
 @pytest.mark.parametrize("now_s", [math.nan, math.inf])

@@ -112,13 +112,6 @@ def test_refuses_unknown_models_and_negative_seeds() -> None:
             parse("", seed=-1)
 
 
-def test_a_stream_that_never_gets_through_is_refused() -> None:
-    assert LinkProfile.parse("loss 100%").loss == RandomLoss(1.0)
-    for spec in ("loss 100%", "corrupt 100%", "loss gemodel 10% 0%"):
-        with pytest.raises(ConfigurationError, match="below 99%"):
-            LinkProfile.parse(spec, model="stream")
-
-
 def test_a_files_name_may_hold_a_colon(tmp_path: Path) -> None:
     path = tmp_path / "a:b.csv"
     path.write_text("delay_ns\n1000000\n")

@@ -94,12 +94,6 @@ def test_a_trace_is_replayed_by_position_and_begins_anew_at_its_end(tmp_path: Pa
     assert deliveries(profile, 7) == pytest.approx({0: 1.0, 2: 3.0, 3: 1.0, 5: 3.0, 6: 1.0})
 
 
-def test_an_outage_does_not_shift_the_trace(tmp_path: Path) -> None:
-    path = written(tmp_path, "delay_ns\n1000000\n2000000\n")
-    profile = LinkProfile.parse(f"trace {path} outage 1.5s at 0s")
-    assert deliveries(profile, 4) == pytest.approx({2: 1.0, 3: 2.0})
-
-
 @pytest.mark.parametrize(("model", "delay_ms"), [("datagram", None), ("stream", 50.0 + 20.0)])
 def test_what_a_trace_loses_a_stream_sends_again(tmp_path: Path, model: LinkModel, delay_ms: float | None) -> None:
     path = written(tmp_path, "delay_ns,x\n10000000,\n,\n20000000,\n")

@@ -100,17 +100,6 @@ def test_a_file_that_may_not_be_written_is_refused_before_and_after(
     assert path.stat().st_ino == before
 
 
-def test_links_in_a_circle_are_refused_before_and_after(tmp_path: Path) -> None:
-    path, other = tmp_path / "out.csv", tmp_path / "other.csv"
-    path.symlink_to(other)
-    other.symlink_to(path)
-    with pytest.raises(ValueError, match=r"--csv .*out.csv: cannot be written to; valid: "):
-        require_output_file("--csv", path)
-    with pytest.raises(ConfigurationError, match=os.strerror(errno.ELOOP)):
-        write_json("--csv", path, 1)
-    assert path.is_symlink()
-
-
 PRINTS = """
 import sys
 from pathlib import Path

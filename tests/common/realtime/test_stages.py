@@ -3,8 +3,8 @@
 import pytest
 
 from common.clock import VirtualClock
-from common.realtime.stages import EVERY, Stages, microseconds
-from common.statistics import BLOCK, RunningStatistics
+from common.realtime.stages import EVERY, Stages
+from common.statistics import BLOCK
 
 
 class Both:
@@ -36,14 +36,6 @@ def test_a_stage_adds_up_within_a_turn_and_starts_anew_in_the_next() -> None:
     assert stages.spent_s == pytest.approx([10e-6, 7e-6, 10e-6, 8e-6])
 
 
-def test_what_is_timed_returns_what_it_would_and_an_unknown_stage_is_refused() -> None:
-    clocks = Both()
-    stages = Stages(("law",), clocks.wall, clocks.processor, every=1)
-    assert stages.timed("law", lambda one, *, other: (one, other))(1, other=2) == (1, 2)
-    with pytest.raises(ValueError, match="not in"):
-        stages.timed("physics", clocks.pass_)
-
-
 def test_turns_are_reckoned_with_in_blocks_and_none_is_lost() -> None:
     clocks = Both()
     stages = Stages(("law",), clocks.wall, clocks.processor, every=1)
@@ -65,11 +57,3 @@ def test_one_turn_in_so_many_is_looked_at_and_stands_for_them_all() -> None:
         stages.end_turn()
     assert stages.summary()["law"]["wall_us"]["max"] == pytest.approx(3.0 * EVERY)
     assert stages.spent_s == pytest.approx([EVERY * EVERY * 6e-6, 4 * EVERY * 2e-6])
-
-
-def test_nothing_yet_is_unknown_and_times_are_in_microseconds() -> None:
-    times = RunningStatistics()
-    assert microseconds(times) == {"p50": None, "p99": None, "max": None}
-    for milliseconds in range(1, 102):
-        times.add(1e-3 * milliseconds)
-    assert microseconds(times) == pytest.approx({"p50": 51_000.0, "p99": 100_000.0, "max": 101_000.0})

@@ -114,15 +114,6 @@ def test_a_connection_that_never_introduces_itself_is_ended(monkeypatch: pytest.
         assert all(connection.ended() for connection in slow)
 
 
-def test_five_hundred_connections_at_once_keep_nobody_out(robot: RobotSockets, operator: OperatorSockets) -> None:
-    before = descriptors()
-    crowd = [RawConnection(port_of(robot.control_endpoint)) for _ in range(500)]
-    assert is_heard(robot, operator)
-    for connection in crowd:
-        connection.close()
-    assert until_descriptors_are(before, robot)
-
-
 def test_a_crowd_is_hung_up_on_and_who_is_in_stays_in(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
     with (
@@ -273,32 +264,6 @@ def test_who_sends_more_than_twenty_operators_floods(robot: RobotSockets, monkey
             received += [payload for _, payload in robot.receive()]
         assert received == [b"x"] * most
         assert connection.ended()
-
-
-def test_a_flood_by_the_descriptor_of_a_peer_that_has_left_is_cut_off(
-    robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    before = descriptors()
-    with contextlib.closing(stranger(robot)) as connection:
-        connection.send(message(b"good"))
-        assert drain(robot, PATIENT_S) == [b"good"]
-    assert until_descriptors_are(before, robot)
-    test_a_peer_that_floods_is_cut_off_and_the_operator_is_not(robot, operator, monkeypatch)
-
-
-def test_a_flood_whose_sender_has_left_is_only_counted(
-    robot: RobotSockets, operator: OperatorSockets, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 200)
-    within_one_second(robot, monkeypatch)
-    before = descriptors()
-    with contextlib.closing(stranger(robot)) as connection:
-        connection.send(message(b"flood") * 1000)
-    assert any(descriptors() <= before for _ in range(ROUNDS) if not operator.wait(0.01))
-    received = [payload for _ in range(100) for _, payload in robot.receive()]
-    assert received == [b"flood"] * 200
-    assert robot.flooding == 800
-    assert is_heard(robot, operator)
 
 
 def test_the_view_port_takes_nothing_large_and_survives_garbage(robot: RobotSockets, operator: OperatorSockets) -> None:

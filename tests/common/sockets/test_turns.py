@@ -128,12 +128,6 @@ def test_peers_and_their_connections_are_bounded() -> None:
     assert peers.get(newest.name) is None, "all that are gone are forgotten"
 
 
-@pytest.mark.parametrize("connections", [0, 17])
-def test_refuses_a_number_of_connections_that_cannot_be(connections: int) -> None:
-    with pytest.raises(ValueError, match=f"connections = {connections}; valid: 1 to 16"):
-        OperatorSockets("tcp://127.0.0.1:9", connections=connections)
-
-
 @pytest.mark.parametrize("connections", [1, 4, 16])
 def test_a_message_goes_over_one_connection_or_over_all(robot: RobotSockets, connections: int) -> None:
     with OperatorSockets(robot.control_endpoint, heartbeat_timeout_s=PATIENT_S, connections=connections) as operator:

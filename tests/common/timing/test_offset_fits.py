@@ -47,27 +47,6 @@ def test_the_envelope_lies_under_everything_and_touches_it(
     assert envelope.line.value(0.0) == pytest.approx(half_s, abs=1e-12)
 
 
-def log_likelihood(envelope_skew: float, to_peer: list[Block], from_peer: list[Block]) -> float:
-    """Of exponential excesses over floors of that slope each way, with the prior on the slope; from its definition."""
-    total = -((envelope_skew / TYPICAL_SKEW) ** 2) / 2.0
-    for blocks, sign in ((to_peer, 1.0), (from_peer, -1.0)):
-        flat_s = np.array([block.least_s for block in blocks])
-        scale_s = flat_s.mean() - flat_s.min()
-        values_s = flat_s - sign * envelope_skew * np.array([block.least_at_s for block in blocks])
-        total -= float((values_s - values_s.min()).sum() / scale_s)
-    return total
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_envelope_is_the_likeliest_of_all_slopes(seed: int) -> None:
-    generator = np.random.default_rng(seed)
-    there_s, back_s = generator.exponential([[0.010], [0.003]], (2, 1250))
-    to_peer, from_peer = both_ways(0.05 + there_s, 0.03 + back_s, 0.0, 50e-6)
-    found = fit_envelope(to_peer, from_peer, MAX_SKEW, 0.0).line.skew
-    best = max(np.linspace(-MAX_SKEW, MAX_SKEW, 4801), key=lambda skew: log_likelihood(skew, to_peer, from_peer))
-    assert found == pytest.approx(best, abs=0.3e-6)
-
-
 def test_a_moment_of_noise_says_nothing_about_the_skew() -> None:
     generator = np.random.default_rng(6)
     there_s, back_s = generator.normal(0.05, 0.01, (2, 50))

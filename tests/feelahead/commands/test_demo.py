@@ -92,12 +92,6 @@ def test_the_summary_and_the_errors_do_not_depend_on_the_reader(
     assert capsys.readouterr().err == "feelahead demo: the robot side ended early\n"
 
 
-@pytest.mark.processes
-def test_a_side_that_refuses_its_settings_is_bad_input() -> None:
-    with pytest.raises(ConfigurationError, match="probability"):
-        demo(["--probability", "2", "--status", "none"])
-
-
 def test_a_link_over_which_the_sides_cannot_meet_is_the_reason() -> None:
     with pytest.raises(ConfigurationError, match=r"--link 'delay 1e9ms'.* take 2e\+06 s; valid: below 30 s"):
         demo(["--link", "delay 1e9ms", "--status", "none"])

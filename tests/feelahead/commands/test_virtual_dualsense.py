@@ -5,16 +5,13 @@ from collections import deque
 import pytest
 
 from common.clock import VirtualClock
-from common.errors import ConfigurationError
 from feelahead.commands.virtual_dualsense import DRIVER_PATIENCE_S, PULL_PERIOD_S, VirtualDualSenseSettings, live
-from feelahead.main import command
 from operator_side.controller.feel import FREE_TRIGGER, Feel, Rumble
 from operator_side.controller.state import ControllerState
 from operator_side.dualsense.reports.feature_report import parse_address
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport
-from operator_side.dualsense.uhid.file import UHID_PATH
 from tests.helpers.fake_kernel import START, STOP, FakeKernel, get_report, output, said
 from tests.helpers.felt import feedback
 
@@ -88,9 +85,3 @@ def test_pulling_hands_are_seen_to_move() -> None:
     middle = len(states) // 2
     assert all(state.l2 == 0.0 for state in states[:middle])
     assert all(state.r2 == 0.0 for state in states[middle + 50 :])
-
-
-@pytest.mark.skipif(UHID_PATH.exists(), reason="this machine has /dev/uhid")
-def test_without_uhid_it_says_in_one_line_what_to_do() -> None:
-    with pytest.raises(ConfigurationError, match=r"no /dev/uhid.*sudo modprobe uhid"):
-        command(["virtual-dualsense"])

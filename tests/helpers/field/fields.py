@@ -65,18 +65,11 @@ def ways_of(pose: GripperPose, objects: PerceivedObjects, ahead: Along) -> Float
     return look(pose, objects, ahead).fast_m
 
 
-def judged(
-    pose: GripperPose,
-    objects: PerceivedObjects,
-    ahead: Along,
-    *,
-    classes: list[int] | None = None,
-    widest_m: float = np.inf,
-    by: Ahead | None = None,
-) -> Judged:
-    """How far off the ways of such a look are from their definition."""
-    looking = by or Ahead(np.zeros(pose.tool_jacobian.shape[1]))
-    found = look(pose, objects, ahead, classes=classes, widest_m=widest_m, by=looking)
-    defined = defined_ways(pose, objects, _classes(objects, classes), ahead, widest_m, looking.encoder_sigma_rad)
+def judged(pose: GripperPose, objects: PerceivedObjects, ahead: Along, **how: Any) -> Judged:
+    """How far off the ways of such a look are from their definition; `how` as `look` takes it."""
+    looking: Ahead = how.setdefault("by", Ahead(np.zeros(pose.tool_jacobian.shape[1])))
+    found = look(pose, objects, ahead, **how)
+    classes, widest_m = _classes(objects, how.get("classes")), how.get("widest_m", np.inf)
+    defined = defined_ways(pose, objects, classes, ahead, widest_m, looking.encoder_sigma_rad)
     assert found.sigma_m == pytest.approx(defined.sigma_m, abs=1e-12)
     return defined.judge(found.ways_m, ahead.reach_m)

@@ -10,7 +10,6 @@ from common.errors import DeviceError, NoDriverError
 from operator_side.controller.feel import FREE_TRIGGER, RELEASED, USUAL_LIGHT, WARNING_LIGHT, Feel, Rumble
 from operator_side.controller.state import ControllerState
 from operator_side.dualsense.hid.device import HidDualSense, load_backend
-from operator_side.dualsense.reports import output_report
 from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.reports.output_report import parse_output_report
 from operator_side.dualsense.reports.transport import Transport
@@ -152,18 +151,6 @@ def test_each_report_goes_out_in_its_framing_with_the_next_number_and_a_checksum
         assert [report[1] >> 4 for report in handle.written] == [number % 16 for number in range(20)]
         assert all(valid_checksum(report) for report in handle.written)
     assert {(report[0], len(report)) for report in handle.written} == {(0x02, 48) if transport is USB else (0x31, 78)}
-
-
-@TRANSPORTS
-def test_no_debug_code_leaves(transport: Transport, monkeypatch: pytest.MonkeyPatch) -> None:
-    handle = FakeHandle(transport)
-    device = open_fake(handle)
-    for code in (0xFC, 0xFD, 0xFE):
-        monkeypatch.setattr(output_report, "encode_effect", lambda _, code=code: bytes([code]).ljust(11, b"\0"))
-        with pytest.raises(ValueError, match=f"0x{code:02x}"):
-            device.write(STIFF, 0.0)
-    assert handle.written == []
-    assert device.released
 
 
 def test_it_is_released_when_everything_that_was_written_is_off() -> None:

@@ -218,25 +218,16 @@ def test_refused_bytes_are_named(report: bytes, message: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "arguments", "message"),
+    ("strengths", "named"),
     [
-        *(
-            (Feel, {name: strengths}, f"{name} = {named}.*; valid: a tuple of 10")
-            for name in ("l2", "r2")
-            for strengths, named in (
-                *(((1,) * 9, ""), ([1] * 10, r"\[1, "), ((1,) * 9 + (9,), ".*9"), ((-1,) + (0,) * 9, ".*-1")),
-                *(((1.0,) + (0,) * 9, ".*1.0"), (5, "5"), (b"\xfc" * 10, "b")),
-            )
-        ),
-        (Feel, {"light": (0, 0, 256)}, r"light\[2\] = 256"),
-        (Feel, {"light": (0, 0.5, 0)}, r"light\[1\] = 0.5"),
-        (Rumble, {"left": 1.5}, "left = 1.5; valid: 0 to 1"),
-        (Rumble, {"right": float("nan")}, "right = nan"),
+        *(((1,) * 9, ""), ([1] * 10, r"\[1, "), ((1,) * 9 + (9,), ".*9"), ((-1,) + (0,) * 9, ".*-1")),
+        *(((1.0,) + (0,) * 9, ".*1.0"), (5, "5"), (b"\xfc" * 10, "b")),
     ],
 )
-def test_refused_values_are_named(kind: Any, arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        kind(**arguments)
+def test_refused_strengths_are_named(strengths: Any, named: str) -> None:
+    for name in ("l2", "r2"):
+        with pytest.raises(ValueError, match=f"{name} = {named}.*; valid: a tuple of 10"):
+            Feel(**{name: strengths})
 
 
 @given(OUTPUTS, OUTPUTS)

@@ -34,7 +34,6 @@ from tests.helpers.felt import feedback
 
 TRANSPORTS = pytest.mark.parametrize("transport", Transport)
 FORCES = st.floats(0.0, 10.0)
-STEPS = st.floats(0.0, 1.0)
 STRENGTHS = st.tuples(*[st.integers(0, 8)] * 10)
 STIFF = Feel(l2=feedback(3, 6), r2=feedback(0, 8))
 NAN, INF = float("nan"), float("inf")
@@ -60,19 +59,6 @@ def test_forces_balance_at_the_equilibrium(force_n: float, strengths: tuple[int,
         # At a boundary, to rounding, either zone may be the one that holds.
         beside = {min(max(int(travel * 10 + one), 0), 9) for one in (-1e-9, 1e-9)}
         assert max(resistance_n(travel, strengths[zone]) for zone in beside) >= force_n - 1e-9
-
-
-@given(FORCES, FORCES, STRENGTHS, STRENGTHS, STEPS, STEPS)
-def test_more_force_goes_farther_and_more_resistance_less_far(
-    one_n: float, other_n: float, some: tuple[int, ...], others: tuple[int, ...], one: float, other: float
-) -> None:
-    (weak_n, strong_n), (light, heavy) = sorted((one_n, other_n)), sorted((one, other))
-    less, more = tuple(map(min, some, others)), tuple(map(max, some, others))
-    assert equilibrium_travel(weak_n, more, heavy) <= equilibrium_travel(strong_n, less, light)
-    # Half the strengths are half the step.
-    halved = tuple(strength / 2 for strength in some)
-    expected = equilibrium_travel(one_n, halved, one)
-    assert equilibrium_travel(one_n, some, one / 2) == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_normal_pull_is_full_when_free_overcomes_the_strongest_and_rests_at_an_edge() -> None:
@@ -280,17 +266,3 @@ def used(what: str, *arguments: Any, **named: Any) -> Any:
 def test_refusals(what: str, arguments: tuple[Any, ...], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         used(what, *arguments)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        *(((1.0, strengths), "zone_strengths") for strengths in ((1,) * 9, (9,) * 10)),
-        *(((1.0, (1,) * 10, step_n), "strength_step_n = ") for step_n in (-0.1, NAN, INF)),
-    ],
-)
-def test_refused_forces(arguments: Any, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        equilibrium_travel(*arguments)
-    with pytest.raises(ValueError, match="address = 'nobody'"):
-        SimulatedDualSense(address="nobody")

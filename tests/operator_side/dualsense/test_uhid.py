@@ -1,14 +1,11 @@
 """/dev/uhid: its protocol down to the byte, the controller that the kernel is offered, the file and the loop on it."""
 
-import contextlib
 import os
 import struct
 from collections import deque
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from common.clock import VirtualClock
 from common.errors import ConfigurationError, DeviceError
@@ -69,14 +66,6 @@ def test_the_kernel_is_answered_as_the_controller_answers(
     said_back = offered.handle(content.ljust(EVENT_LENGTH, b"\0") if filled_up else content, 0.0)
     assert (said_back, offered.counts) == (None if answer is None else bytes.fromhex(answer), counts)
     assert b"".join(plain.written) == written
-
-
-@given(kind=st.integers(0, 20), payload=st.binary(max_size=EVENT_LENGTH - 4))
-def test_any_event_is_read_or_refused(kind: int, payload: bytes) -> None:
-    plain = PlainController()
-    with contextlib.suppress(ValueError, IndexError):  # the plain controller's own, of a report without bytes
-        UhidController(plain, UhidIdentity()).handle(struct.pack("=I", kind) + payload, 0.0)
-    assert all(len(report) <= 4096 for report in plain.written)
 
 
 def test_refusals() -> None:

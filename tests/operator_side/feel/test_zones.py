@@ -10,7 +10,7 @@ from common.protocol.messages import Header, StiffnessUpdate, TriggerField, Ways
 from common.reaction import HORIZON_S
 from common.touch_speed import touch_speed_m_s
 from operator_side.feel.commands_under_way import Displacement
-from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_travels
+from operator_side.feel.zones import moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TriggerTravel
 from tests.helpers.felt import field, ways
 
@@ -81,12 +81,6 @@ def test_each_zone_is_what_the_equation_gives(
     )
     found = zone_strengths(farther, HORIZON_M, USUAL, other, moving)
     assert list(found.strengths) == one_by_one(farther, USUAL, other, moving)
-
-
-def test_a_way_that_nothing_gets_to_is_free() -> None:
-    far = field(ways(HORIZON_M), full_speed_m_s=0.1, acceleration_m_s2=3.0)
-    assert zone_strengths(far, HORIZON_M, USUAL, 0.0, STILL) is FREE
-    assert zone_strengths(far, HORIZON_M, USUAL, 0.0, Displacement(HORIZON_M, 0.0)) is not FREE
 
 
 def test_what_is_beyond_the_horizon_is_full_and_counted_and_no_sooner() -> None:

@@ -12,21 +12,6 @@ def pressing(*buttons: Button) -> OperatorIntent:
     return operator_intent(ControllerState(pressed=frozenset(buttons)))
 
 
-def test_nobody_touches_it() -> None:
-    intent = operator_intent(ControllerState())
-    assert intent == OperatorIntent(0.0, 0.0, (0.0, 0.0), (0.0, 0.0), False, False, False, False, False, 0)
-    assert intent.triggers_released
-
-
-def test_travel_runs_from_the_dead_zone_to_saturation() -> None:
-    calibration = TravelCalibration(l2=TriggerTravel(0.1, 0.9), r2=TriggerTravel(0.1, 0.9))
-    raw_to_travel = {0.0: 0.0, 0.1: 0.0, 0.3: 0.25, 0.5: 0.5, 0.9: 1.0, 1.0: 1.0}
-    for raw, travel in raw_to_travel.items():
-        intent = operator_intent(ControllerState(l2=raw, r2=1.0 - raw), calibration)
-        assert intent.l2 == pytest.approx(travel, abs=1e-12)
-        assert intent.r2 == pytest.approx(1.0 - travel, abs=1e-12)
-
-
 @pytest.mark.parametrize(("l2", "r2", "released"), [(0.04, 0.05, True), (0.06, 0.0, False), (0.0, 1.0, False)])
 def test_released_means_within_the_dead_zone(l2: float, r2: float, released: bool) -> None:
     assert operator_intent(ControllerState(l2=l2, r2=r2)).triggers_released is released

@@ -179,15 +179,6 @@ def test_the_stick_goes_to_where_the_target_is_seen(
     assert hands.r2_n == 0.0
 
 
-def test_they_close_only_when_the_target_is_in_line_and_in_reach() -> None:
-    for place, closes in (((0.0, 0.0, 0.0), True), ((0.0, 0.0, 0.05), False), ((0.02, 0.0, 0.0), False)):
-        desk = Desk()
-        desk.arm()
-        x, y, z = place
-        desk.watch(armed((x, y, z - GRASP_M)), 1.0)
-        assert (desk.person.phase == "close") is closes
-
-
 @pytest.mark.parametrize("up", [(0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.6, 0.0, -0.8)])
 def test_lifting_goes_up_whichever_way_the_tool_points(up: Vector3) -> None:
     desk = Desk()
@@ -225,11 +216,7 @@ def test_between_attempts_they_open_and_draw_back_and_in_the_end_they_give_up() 
 # Feeling
 
 
-UNMOVED = dataclasses.replace(CLEAR_SIGHTED, trust=0.0)
-"""Feels mechanics alone: believes no cue."""
-STIFF = feedback(0, 8)
 TOWARDS = armed((0.0, 0.0, 0.06))
-MEANT = crossover(0.25) * (0.06 + GRASP_M) / FULL_TRIGGER_M_S
 
 
 @pytest.mark.parametrize(
@@ -266,13 +253,6 @@ def test_who_feels_the_pulse_of_what_stands_lets_go_a_reaction_later(trust: floa
     if let_go:
         assert 0.15 < let_go[0] < 0.5
         assert seen[-1].left == (0.0, 0.0)
-
-
-def test_a_target_that_comes_no_nearer_is_taken_for_as_near_as_it_gets() -> None:
-    desk = Desk(UNMOVED)
-    desk.arm()
-    desk.resist(STIFF)
-    assert 2.5 < desk.until("close", armed((0.0, 0.0, 0.03)), 4.0) < 3.5
 
 
 def test_at_the_warning_light_they_rest_their_hands_and_go_on_a_moment_after_it() -> None:

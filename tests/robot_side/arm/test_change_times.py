@@ -1,7 +1,6 @@
 """How long the arm takes to follow trigger and sticks together, against the references of its joints."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -52,10 +51,3 @@ def test_trigger_and_sticks_are_followed_as_the_joints_references_follow_them(
     gained, followed = follow_together(np.array(began), np.array(then), changes_s, 60 * STEP_S)
     np.testing.assert_allclose(rates(followed.tolist()), velocity, atol=1e-6)
     np.testing.assert_allclose(rates(gained.tolist()), passed, atol=1e-5)
-
-
-def test_each_axis_alone_takes_what_its_slowest_joint_takes() -> None:
-    changes_s = change_times_s(POSE, LIMITS.of_joints(POSE.tool_jacobian.shape[1]), full_twists(MOTION))
-    assert changes_s.shape == (POSE.tool_jacobian.shape[1], 5)
-    _, followed = follow_together(np.zeros(5), np.eye(5)[0], changes_s, 0.5 * float(np.abs(changes_s[:, 0]).max()))
-    assert followed[0] == pytest.approx(0.5)

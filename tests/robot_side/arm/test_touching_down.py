@@ -101,15 +101,6 @@ def test_a_thing_that_is_gripped_where_it_stands_is_lifted_freely_and_noticed_wh
     assert pressing.go(-0.025, 0.1) is not None
 
 
-@pytest.mark.parametrize("speed_m_s", [0.01, 0.025, 0.1])
-def test_where_no_load_is_measured_a_tool_that_does_not_sink_as_told_stands(speed_m_s: float) -> None:
-    arm = Arm(measures=False)
-    assert arm.go(0.2, 0.1) is None
-    assert arm.go(-speed_m_s, 0.06 / speed_m_s) is None
-    assert arm.go(-speed_m_s, 0.045 / speed_m_s) is not None
-    assert -1e-3 - 0.25 * speed_m_s < arm.meant_m < -0.1 * speed_m_s
-
-
 def test_a_state_that_was_seen_already_says_nothing_new() -> None:
     touching_down = TouchingDown()
     for carried in (2.0, -100.0):

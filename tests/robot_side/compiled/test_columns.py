@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from common.arrays import BoolArray, FloatArray, IntArray
-from robot_side.compiled.columns import BUNDLE, BUNDLED, FLAGS, INDICES, NUMBERS, Declared, matrices, records, rows
-from robot_side.compiled.kernel import NUMBER, compiled
+from robot_side.compiled.columns import BUNDLED, FLAGS, INDICES, NUMBERS, Declared, matrices, records, rows
 
 RECORD = np.dtype([("place", np.int64), ("way", np.float64)])
 
@@ -43,24 +42,6 @@ class Owner:
 
     def __post_init__(self) -> None:
         self.inner = INNER.bundle(self)
-
-
-@compiled(BUNDLE, returns=NUMBER)
-def _write_what_is_seen(bundle: IntArray) -> float:
-    columns = _at(bundle)
-    sizes = columns.numbers.size + columns.indices.size + columns.flags.size + columns.points.size + columns.turns.size
-    columns.found[1].place = columns.indices[2]
-    columns.found[1].way = columns.points[3, 1] + columns.turns[2, 1, 0]
-    if columns.flags[1] and not columns.flags[0]:
-        columns.numbers[0] += _inner_at(columns.inner).numbers[1]
-    return float(sizes)
-
-
-def test_a_kernel_sees_the_arrays_of_the_owner_in_the_forms_that_were_declared() -> None:
-    owner = Owner()
-    assert _write_what_is_seen(DECLARED.bundle(owner)) == 2 + 3 + 2 + 12 + 18
-    assert owner.found.tolist() == [(0, 0.0), (9, 10.0 + 15.0)]
-    assert owner.numbers.tolist() == [4.0, 2.5]
 
 
 def test_another_number_of_views_than_of_columns_is_refused() -> None:

@@ -11,13 +11,11 @@ import pytest
 from common.arrays import FloatArray
 from robot_side.compiled import kernel as compile_module
 from robot_side.compiled.kernel import (
-    COUNT,
     Compiled,
     compiled,
     imported_kernels,
     input_array,
     output_array,
-    record_array,
 )
 from robot_side.compiled.machine_code import can_keep, keep, kept
 from robot_side.compiled.numba_inside import machine
@@ -131,15 +129,6 @@ def test_an_array_of_another_kind_is_refused_rather_than_compiled_for() -> None:
         kernel(np.ones((2, 2)), np.empty(2))
 
 
-_PAIR = np.dtype([("row", np.int64), ("way", np.float64, (2,))])
-
-
-def _halve(pairs: np.ndarray, halved: int) -> None:
-    for k in range(halved):
-        pairs[k].row += 1
-        pairs[k].way[1] = 0.5 * pairs[k].way[0]
-
-
 def test_a_kernel_that_allocates_is_not_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compile_module, "_kernels", [])
 
@@ -148,15 +137,3 @@ def test_a_kernel_that_allocates_is_not_compiled(monkeypatch: pytest.MonkeyPatch
 
     with pytest.raises(numba.TypingError):
         compiled(input_array(1), output_array(1))(allocates).prepare()
-
-
-def test_records_with_named_fields_are_read_and_filled() -> None:
-    kernel = compiled(record_array(_PAIR), COUNT)(_halve)
-    pairs = np.zeros(3, dtype=_PAIR)
-    pairs["row"], pairs["way"][:, 0] = [5, 6, 7], [1.0, 2.0, 3.0]
-    kernel(pairs, 2)
-    assert pairs["row"].tolist() == [6, 7, 7]
-    assert pairs["way"][:, 1].tolist() == [0.5, 1.0, 0.0]
-    other = np.dtype([("row", np.int64), ("way", np.float64)])
-    with pytest.raises(TypeError):
-        kernel(np.zeros(3, dtype=other), 2)

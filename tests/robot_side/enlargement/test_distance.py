@@ -24,30 +24,6 @@ def test_distance_is_the_quantile_of_the_standard_library(p: float, mean: float,
     assert Uncertainty(p).quantile == pytest.approx(NormalDist().inv_cdf(p), rel=1e-9, abs=1e-12)
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
-@given(p=probabilities, higher=probabilities, mean=lengths, variance=lengths, delay=lengths)
-def test_distance_grows_with_probability_and_never_falls_below_the_delay_part(
-    p: float, higher: float, mean: float, variance: float, delay: float
-) -> None:
-    small = enlargement_distance(min(p, higher), mean, variance, delay)
-    large = enlargement_distance(max(p, higher), mean, variance, delay)
-    assert delay <= small <= large
-
-
-def test_known_values_and_types() -> None:
-    assert enlargement_distance(0.5, 0.003, 1e-4, 0.001) == pytest.approx(0.004, rel=1e-12)
-    # Φ⁻¹(0.99) = 2.3263478740408408 (tables of the standard normal distribution).
-    assert enlargement_distance(0.99, 0.0, 1e-6, 0.0) == pytest.approx(2.3263478740408408e-3, rel=1e-12)
-    # A quantile below 0 does not shrink the gripper.
-    assert enlargement_distance(0.01, 0.0, 1e-6, 0.002) == 0.002
-    assert enlargement_distance(0.01, 0.003, 0.0, 0.002) == 0.005
-    assert isinstance(enlargement_distance(0.9, 0.0, 0.0, 0.0), float)
-    table = enlargement_distance(0.9, np.zeros((2, 1)), np.array([0.0, 1e-6, 4e-6]), 0.1)
-    assert isinstance(table, np.ndarray)
-    assert table.shape == (2, 3)
-    assert table[1, 2] == enlargement_distance(0.9, 0.0, 4e-6, 0.1)
-
-
 @pytest.mark.parametrize("p", [0.0, 1.0, -0.1, 1.1, math.nan, math.inf])
 def test_probability_outside_the_open_interval_is_an_error_that_says_so(p: float) -> None:
     with pytest.raises(ValueError, match=r"probability = .* outside \(0, 1\)"):

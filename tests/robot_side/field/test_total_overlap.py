@@ -9,12 +9,11 @@ from common.arrays import FloatArray
 from feelahead.lab.reference.solids import Solids
 from robot_side.field.object_class import PASSED_OVER
 from robot_side.field.total_overlap import total_overlap_m3
-from robot_side.overlap import Mesh, sphere_sphere
+from robot_side.overlap import sphere_sphere
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import scene_table
 from tests.helpers.field.fields import REACH_M, along, ball_pose, ways_of
-from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES
-from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
+from tests.helpers.perceived_scenes import Scene, random_scene
 
 
 def total(spheres: FloatArray, objects: PerceivedObjects, passed_over: frozenset[int] = frozenset()) -> float:
@@ -37,19 +36,6 @@ def test_it_is_the_sum_over_all_pairs_but_those_passed_over(seed: int, of_each_k
     things, every = np.tile(counted, count).astype(np.int64), np.repeat(spheres, len(counted), axis=0)
     expected = float(Solids(objects).overlap(every[:, :3], every[:, 3], things)[0].sum())
     assert total(spheres, objects, passed_over) == pytest.approx(expected, rel=1e-9, abs=1e-18)
-
-
-def test_a_box_made_of_tetrahedra_or_of_a_mesh_is_the_box() -> None:
-    rng = np.random.default_rng(3)
-    for _ in range(20):
-        center, half, rotation = rng.normal(size=3) * 0.1, rng.uniform(0.05, 0.2, 3), random_rotation(rng)
-        spheres = any_spheres(rng, 10)
-        whole = total(spheres, Scene().add().box(center, half, rotation).objects())
-        parts = total(spheres, Scene().add().box_of_tetrahedra(center, half, rotation).objects())
-        mesh = Mesh(CUBE_CORNERS * half, CUBE_TRIANGLES)
-        of_faces = total(spheres, Scene().add().mesh(mesh, center, rotation).objects())
-        assert parts == pytest.approx(whole, rel=1e-9, abs=1e-15)
-        assert of_faces == pytest.approx(whole, rel=1e-9, abs=1e-15)
 
 
 def test_more_spheres_than_are_worked_out_at_a_time_are_all_counted() -> None:

@@ -101,20 +101,6 @@ def test_the_built_in_gripper_needs_few_spheres() -> None:
     assert len(cover.radii_m) <= 246
 
 
-def test_a_plate_a_line_and_a_point_have_one_layer_one_row_and_one_sphere() -> None:
-    plate = cover_one((0.02, 0.0, 0.03), 0.003)
-    np.testing.assert_array_equal(plate.centers_m[:, 1], 0.0)
-    np.testing.assert_array_equal(plate.radii_m, np.full(len(plate.radii_m), 0.003))
-    line = cover_one((0.0, 0.02, 0.0), 0.003)
-    np.testing.assert_array_equal(line.centers_m[:, [0, 2]], 0.0)
-    # Each covers 6 mm of the 40.
-    assert len(line.radii_m) == 7
-    np.testing.assert_allclose(np.diff(line.centers_m[:, 1]), 2 * line.centers_m[-1, 1] / 6)
-    point = cover_one((0.0, 0.0, 0.0), 0.003)
-    np.testing.assert_array_equal(point.centers_m, [[0.0, 0.0, 0.0]])
-    np.testing.assert_array_equal(point.radii_m, [0.003])
-
-
 def test_a_very_large_box_gets_the_stand_out_that_2000_spheres_take_and_the_others_what_was_asked_for() -> None:
     half_sizes = np.array([(0.05, 5.0, 5.0), PALM_M])
     cover = cover_boxes(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), half_sizes)

@@ -183,13 +183,6 @@ def test_what_is_held_or_ignored_shortens_no_way_by_moving(law: SweptLaw) -> Non
     np.testing.assert_array_equal(before.r2_m, after.r2_m)
 
 
-def test_after_a_change_of_role_a_new_map_comes_within_a_tenth_of_a_second(law: SweptLaw) -> None:
-    looks(law, 300, np.zeros(6), 0.0)
-    law.expect(0.5)
-    looks(law, 100, np.zeros(6), 0.3)
-    assert told_by(law, ball_pose()) is not None
-
-
 def test_what_comes_nearer_shortens_every_way_by_what_it_covers_until_it_is_told(law: SweptLaw) -> None:
     looks(law, 300, np.zeros(6), 0.0)
     comes_m_s, until_s, told = 0.12, 0.0, []
@@ -243,10 +236,6 @@ def test_a_map_of_before_is_withheld_and_the_robot_side_follows_the_path_itself(
     assert law.memory.state["moments"][0] == 0
     looks(law, 20, drifting, 0.62, compensation="robot")
     assert law.around(ball_pose()) is None
-
-
-def test_the_robot_sides_own_prediction_asks_for_none(law: SweptLaw) -> None:
-    assert around(law, walls(0.1), compensation="robot") is None
 
 
 def test_errors_of_the_prediction_shorten_these_ways_too() -> None:

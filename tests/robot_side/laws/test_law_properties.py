@@ -68,32 +68,12 @@ def test_strength_is_0_until_the_margin_before_the_free_way_and_full_from_there_
     assert FREE_M - 0.0102 < ways[3] < FREE_M - 0.004
 
 
-@pytest.mark.parametrize("free_m", [0.0, 0.002, 0.02, 0.1])
-def test_it_does_so_at_every_distance(free_m: float) -> None:
-    ways = ways_of(ball_pose(), thing("wall", RADIUS_M + INFLATED_M + free_m), along(AHEAD, INFLATED_M))
-    far = ways_of(ball_pose(), thing("wall", RADIUS_M + INFLATED_M + FREE_M), along(AHEAD, INFLATED_M))
-    if free_m > 0.0:
-        np.testing.assert_allclose(ways, far - FREE_M + free_m, atol=EQUAL_M)
-    # At the very touch the sphere counts uninflated, too, which is felt a little earlier.
-    assert (ways <= far - FREE_M + free_m + EQUAL_M).all()
-
-
 def test_a_wall_that_is_touched_exactly_without_any_doubt_is_felt() -> None:
     for kind in ("wall", "half-space", "ball"):
         for gap_m in (0.0, 1e-12, 5e-8):
             ways = ways_of(ball_pose(), thing(kind, RADIUS_M + gap_m), along())
             assert -MARGIN_M < ways[0] < -0.009
             assert -0.0027 < ways[7] <= gap_m
-
-
-@pytest.mark.parametrize("degrees", [0, 15, 30, 45, 60, 70, 80])
-def test_tilted_walls_are_felt_like_straight_ones(degrees: int) -> None:
-    angle = np.radians(degrees)
-    normal = np.array([np.sin(angle), 0.0, -np.cos(angle)])
-    wall = Scene().add().half_space(normal, FREE_M * normal[2] - RADIUS_M - INFLATED_M).objects()
-    ways = ways_of(ball_pose(), wall, along(AHEAD, INFLATED_M))
-    assert FREE_M - MARGIN_M < ways[0] < FREE_M - 0.009
-    assert FREE_M - 0.0027 < ways[7] <= FREE_M
 
 
 @pytest.mark.parametrize("degrees", [2, 5, 10, 15, 20, 30, 45, 60, 89])

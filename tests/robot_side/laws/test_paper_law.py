@@ -132,8 +132,3 @@ def test_a_pose_that_is_not_finite_is_an_error_and_no_stiffness(name: str) -> No
     values.reshape(-1)[-1] = math.nan
     with pytest.raises(ValueError, match=r"NaN|finite|valid"):
         senses().sense(dataclasses.replace(pose, **{name: values}), walls(0.1))
-
-
-def test_a_scene_without_anything_near_has_no_overlap() -> None:
-    sensed = senses().sense(ball_pose(RADIUS_M), walls(1.0, 1.0))
-    assert (sensed.overlap_m3, sensed.r2.stiffness) == (0.0, 0.0)

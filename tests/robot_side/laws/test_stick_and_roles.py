@@ -108,13 +108,6 @@ def one(role: Role, **changes: object) -> Sensed:
     return Senses().sense(ball_pose(), scene.add(Role.OBSTACLE).sphere([0.0, 0.0, 9.0], 0.1).objects(), **changes)
 
 
-def test_a_target_is_less_in_the_slow_list_alone() -> None:
-    obstacle, target = one(Role.OBSTACLE), one(Role.TARGET)
-    assert obstacle.r2.slow_m == obstacle.r2.fast_m == target.r2.fast_m
-    np.testing.assert_allclose(np.array(target.r2.slow_m[:4]) - obstacle.r2.fast_m[:4], SIGMA_M)
-    assert target.r2.slow_m[4:] == (target.horizon_m,) * 4
-
-
 def test_a_support_is_to_be_touched_only_while_something_is_held() -> None:
     obstacle, support, placing = one(Role.OBSTACLE), one(Role.SUPPORT), one(Role.SUPPORT, held=1)
     assert support.r2 == obstacle.r2

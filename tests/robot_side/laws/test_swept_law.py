@@ -181,17 +181,6 @@ def test_the_enlargement_and_the_overlap_by_hand() -> None:
     assert still.overlap_m3 == 0.0
 
 
-def test_the_summary_counts_the_work() -> None:
-    senses = Senses()
-    senses.sense(GRIPPER, walls(0.05, front_m=FRONT_M))
-    senses.sense(GRIPPER, walls(None))
-    summary = senses.law.summary()
-    assert (summary["fields"], summary["with_nothing_near"]) == (4, 3)
-    assert summary["pairs"] > 0
-    assert summary["overlaps"] > 0
-    assert summary["limited"] == 0
-
-
 # What cannot be
 
 

@@ -87,16 +87,6 @@ def test_a_stick_that_is_deflected_is_looked_along_within_a_tick_or_two(watched:
     assert len([1 for _, side in watched.looks if side == "stick"]) == before
 
 
-def test_a_pose_that_is_refused_changes_nothing_that_was_seen() -> None:
-    law, before = swept(), at(0.0)
-    seen = law.sense(situation(before, walls(0.03, 0.03)), 7.0)
-    broken = replace(before, sphere_centers_m=np.full_like(before.sphere_centers_m, np.nan))
-    with pytest.raises(ValueError, match="sphere_centers_m"):
-        law.sense(situation(broken, walls(0.03, 0.03)), 7.02)
-    again = law.sense(situation(before, walls(0.03, 0.03)), 7.021)
-    np.testing.assert_allclose(again.r2.fast_m, seen.r2.fast_m, rtol=0.0, atol=1e-12)
-
-
 def test_what_an_object_is_is_worked_out_when_roles_or_the_held_object_change() -> None:
     law, ticked = swept(), situation(ball_pose(), walls(0.1, 0.1))
     law.sense(ticked, 0.0)

@@ -40,11 +40,6 @@ def test_it_is_in_the_fast_list_like_an_obstacle_and_in_the_slow_one_at_most_hal
     assert np.isinf(touched.slow_m[TOUCH_STRENGTH:]).all()
 
 
-def test_where_things_are_known_exactly_it_is_expected_where_it_is() -> None:
-    known = along(AHEAD, MEAN_M)
-    np.testing.assert_allclose(one(TARGET, looked=known).slow_m[:4], one(OBSTACLE, looked=known).slow_m[:4])
-
-
 def test_a_mean_below_0_is_no_place_behind_the_surface() -> None:
     nearer = along(AHEAD, -0.004, variance_m2=SD_M**2, quantile=QUANTILE)
     shift = one(TARGET, looked=nearer).slow_m[:4] - one(OBSTACLE, looked=nearer).slow_m[:4]

@@ -87,18 +87,6 @@ def test_there_is_room_for_so_many_observers_and_the_next_is_told_so(bench: Benc
     assert bench.robot.summary()["lease"]["refused"] == 1
 
 
-def test_the_old_epoch_of_a_restarted_operator_is_over(bench: Bench) -> None:
-    bench.cruise(bench.join(2))
-    restarted = bench.join(3)
-    assert bench.state == "disarmed"
-    assert restarted.state is SessionState.DISARMED
-    late = bench.operator(2)
-    bench.say_hello(late)
-    bench.tick()
-    assert late.state is SessionState.ENDED
-    assert bench.robot.session.refused == 1
-
-
 def test_hellos_are_answered_at_a_bounded_rate(bench: Bench) -> None:
     operator = bench.join(2)
     operator.inbox.clear()

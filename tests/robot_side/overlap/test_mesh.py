@@ -5,7 +5,6 @@ import pytest
 from mpmath import mpf
 
 from common.arrays import FloatArray, IntArray
-from feelahead.lab.reference.meshes import torus
 from feelahead.lab.reference.oracle import true_mesh_overlap
 from robot_side.overlap import Mesh
 from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, round_mesh, surface_of
@@ -43,11 +42,6 @@ def positions(rng: Rng, vertices: FloatArray, triangles: IntArray, count: int) -
     return centers, radii
 
 
-def test_a_torus_in_all_positions() -> None:
-    vertices, triangles = torus(6, 4)
-    assert_exact(vertices, triangles, *positions(np.random.default_rng(1), vertices, triangles, 27))
-
-
 @pytest.mark.parametrize("jitter", [0.0, 0.1])
 def test_random_solids_with_parts_that_touch_at_edges_and_corners(jitter: float) -> None:
     rng = np.random.default_rng(3)
@@ -59,17 +53,6 @@ def test_random_solids_with_parts_that_touch_at_edges_and_corners(jitter: float)
         if jitter == 0.0:
             centers[::2] = rng.integers(0, 5, size=centers[::2].shape) / 2.0
         assert_exact(vertices, triangles, centers, radii)
-
-
-def test_a_cavity_is_not_part_of_the_solid() -> None:
-    rng = np.random.default_rng(4)
-    vertices, tetrahedra = grid_tetrahedra(3)
-    triangles = surface_of(tetrahedra[np.abs(vertices[tetrahedra].mean(axis=1) - 1.5).max(axis=1) > 0.5])
-    mesh = Mesh(vertices, triangles)
-    assert mesh.volume_m3 == pytest.approx(26.0)
-    assert mesh.overlap([1.5, 1.5, 1.5], 0.4) == 0.0
-    assert mesh.overlap([0.5, 0.5, 0.5], 0.4) == pytest.approx(4.0 / 3.0 * np.pi * 0.4**3, rel=1e-15)
-    assert_exact(vertices, triangles, rng.uniform(0.5, 2.5, (30, 3)), rng.uniform(0.1, 2.0, 30))
 
 
 def test_a_narrow_slit_and_a_thin_plate_through_the_centre() -> None:

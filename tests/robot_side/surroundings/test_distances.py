@@ -120,20 +120,6 @@ def test_direction_is_the_negative_gradient_of_the_signed_distance(kind: str) ->
         assert agree[inside].mean() > 0.9
 
 
-def test_spheres_and_half_spaces_by_hand() -> None:
-    distance, direction = nearest_on_sphere(
-        np.array([[0.0, 0.0, 3.0], [0.0, 0.0, 0.5], [0.0, 0.0, 0.0]]), np.zeros((3, 3)), np.ones(3)
-    )
-    np.testing.assert_allclose(distance, [2.0, -0.5, -1.0])
-    np.testing.assert_allclose(direction[:2], [[0.0, 0.0, -1.0], [0.0, 0.0, -1.0]])
-    assert np.linalg.norm(direction[2]) == 1.0
-    distance, direction = nearest_on_half_space(
-        np.array([[1.0, 2.0, 3.0], [0.0, 0.0, -1.0]]), np.array([[0.0, 0.0, 1.0]] * 2), np.array([1.0, 1.0])
-    )
-    np.testing.assert_allclose(distance, [2.0, -2.0])
-    np.testing.assert_allclose(direction, [[0.0, 0.0, -1.0]] * 2)
-
-
 def test_points_on_the_surface_look_into_the_solid() -> None:
     on_box = nearest_on_box(np.array([[1.0, 0.2, 0.0]]), np.zeros((1, 3)), np.eye(3)[None], np.array([[1.0, 2.0, 3.0]]))
     on_tetrahedron = nearest_on_tetrahedron(
@@ -201,37 +187,6 @@ def test_an_object_without_primitives_is_infinitely_far() -> None:
     objects = Scene().add(Role.IGNORED).add().sphere([0.0, 0.0, 0.1], 0.05).objects()
     assert distance_to_object(objects, 0, ORIGIN) == math.inf
     assert distance_to_object(objects, 1, ORIGIN) == pytest.approx(0.05)
-
-
-@settings(derandomize=True, deadline=None, max_examples=30)
-@given(seed=seeds)
-def test_a_way_of_that_length_leads_to_the_surface_and_none_shorter(seed: int) -> None:
-    """The signed distance changes by no more than the way, and by all of it along some direction."""
-    random = np.random.default_rng(seed)
-    objects = random_scene(random, 2, 0.5, meshes=1)
-    point = random.uniform(-0.5, 0.5, 3)
-    directions = random.normal(size=(200, 3))
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    for index in range(len(objects.names)):
-        distance_m = distance_to_object(objects, index, point)
-        step_m = 0.5 * abs(distance_m)
-        moved = [distance_to_object(objects, index, point + step_m * direction) for direction in directions]
-        changes = np.array(moved) - distance_m
-        assert (np.abs(changes) <= step_m + 1e-12).all()
-        assert np.abs(changes).max() > 0.8 * step_m
-
-
-def test_a_box_of_tetrahedra_is_as_far_as_the_box() -> None:
-    random = np.random.default_rng(5)
-    center, half_sizes, rotation = random.normal(size=3) * 0.1, np.array([0.05, 0.1, 0.2]), random_rotation(random)
-    scene = Scene().add().box(center, half_sizes, rotation).add()
-    objects = scene.box_of_tetrahedra(center, half_sizes, rotation).objects()
-    for point in random.uniform(-0.5, 0.5, (50, 3)):
-        of_box, of_parts = (distance_to_object(objects, index, point) for index in (0, 1))
-        if of_box > 0.0:
-            assert of_parts == pytest.approx(of_box, abs=1e-12)
-        else:
-            assert of_parts < 0.0
 
 
 # The distances from spheres to all objects

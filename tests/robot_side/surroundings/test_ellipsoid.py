@@ -9,8 +9,7 @@ import pytest
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import NUMBER, compiled, input_array, output_array
 from robot_side.compiled.vectors import load
-from robot_side.overlap import sphere_mesh, sphere_sphere
-from robot_side.overlap.meshes.mesh_shapes import ellipsoid_mesh
+from robot_side.overlap import sphere_sphere
 from robot_side.surroundings.kinds import ellipsoid
 from robot_side.surroundings.kinds.ellipsoid_sections import sum_slices
 from robot_side.surroundings.kinds.layout import rows
@@ -125,21 +124,6 @@ def test_sections_across_each_axis_make_up_the_same_to_a_billionth_of_the_ball()
             ends = np.linspace(max(at[0, 2] - 1.0, -size[0, 2]), min(at[0, 2] + 1.0, size[0, 2]), 6)
             found.append(sum(summed(at, size, low, high) for low, high in pairwise(ends)))
         assert np.ptp(found) <= 1e-9 * 4.0 / 3.0 * math.pi
-
-
-def test_a_fine_mesh_around_it_has_hardly_more() -> None:
-    rng = np.random.default_rng(5)
-    half_axes = np.array([0.02, 0.03, 0.05])
-    around = ellipsoid_mesh(half_axes, 24)
-    allowance = around.excess * 4.0 / 3.0 * math.pi * half_axes.prod()
-    for _ in range(20):
-        center, _ = beside(rng, half_axes, float(rng.uniform(-0.005, 0.02)))
-        volume, _ = overlap(shape(np.zeros(3), np.eye(3), half_axes), center, 0.01)
-        assert (
-            volume * (1.0 - 1e-9)
-            <= float(sphere_mesh(center, 0.01, around.vertices, around.triangles))
-            <= volume + allowance
-        )
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -44,18 +44,3 @@ def test_what_pictures_take_is_measured_whatever_step_they_were_made_in() -> Non
     step = giving_way.update(4e6, 2, 1.0)
     assert step.quality == 75
     assert 8.0 * 2 * 40_000 * step.rate_hz <= 4e6
-
-
-def test_a_narrow_link_shows_two_views_in_h264_where_jpeg_gives_way_to_the_least() -> None:
-    giving_way = GivingWay(30.0, 75)
-    assert giving_way.update(200e3, 2, 0.0) == (5.0, 30, True)
-    # At once, as the codec is another one, and before the first picture.
-    assert giving_way.update(200e3, 2, 0.01, h264=True).rate_hz > 7.0
-    for _ in range(200):
-        giving_way.made(1_000, giving_way.step, h264=True)
-    for number in range(20):
-        giving_way.update(200e3, 2, 1.0 + number, h264=True)
-    step = giving_way.step
-    assert step.rate_hz >= 9.0
-    assert (step.quality, step.halved) == (75, False)
-    assert giving_way.update(200e3, 2, 30.0) == (5.0, 30, True)

@@ -29,14 +29,6 @@ def desk(scene: Scene) -> Iterator[Desk]:
     made.close()
 
 
-def test_nothing_is_started_before_somebody_looks(desk: Desk) -> None:
-    for turn in range(200):
-        assert desk.cameras.update(0.01 * turn, 0.0, ()) == []
-    assert desk.companions == []
-    desk.started(2.0)
-    assert len(desk.companions) == 1
-
-
 def test_one_order_of_each_view_is_under_way_and_its_answer_carries_its_stamp(desk: Desk) -> None:
     companion = desk.started()
     desk.cameras.update(0.001, 0.5, BOTH)
@@ -182,13 +174,6 @@ def test_nothing_is_ordered_before_the_companion_is_ready_so_that_no_picture_is_
     companion.answer(Ready(h264=True))
     desk.cameras.update(10.0, 10.0, BOTH)
     assert [order.captured_s for order in desk.orders()] == [10.0, 10.0]
-    hangs = Desk(desk.scene)
-    silent = hangs.started()
-    silent.channel.receive()
-    for turn in range(1, 4000):
-        hangs.cameras.update(0.01 * turn, 0.0, BOTH)
-    assert silent.closed == [0.0]
-    hangs.close()
 
 
 @pytest.mark.parametrize("trouble", ["", "UnknownCodecError: libx264"])

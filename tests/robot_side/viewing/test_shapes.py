@@ -135,19 +135,6 @@ def test_what_there_is_no_room_for_is_counted_and_the_nearest_is_kept(monkeypatc
     assert max(distances[list(kept)]) <= min(distances[list(left_out)])
 
 
-def test_in_a_scene_of_many_only_what_may_move_is_said_each_time(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setattr(scene_view, "_FEW", 3)
-    path = planar_arm(tmp_path, world=SHAPES, extra_top=STONE)
-    robot, view = looked_at(RobotSettings(model=path, site="tcp"))
-    said = shapes_of(robot, view)
-    sensed, situation = robot.newest or pytest.fail("no tick")
-    state = state_of(view, sensed, situation)
-    moving = {said.objects[index] for index in np.frombuffer(state.object_index, "<u4")}
-    assert moving == {"post", "Target_egg"}
-
-
 def test_a_robots_mesh_without_room_becomes_a_box_around_it() -> None:
     generator = np.random.default_rng(1)
     vertices_m = generator.uniform(-1.0, 1.0, (50, 3)) * [0.1, 0.2, 0.3] + [0.5, 0.0, 0.0]

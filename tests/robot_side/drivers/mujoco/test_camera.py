@@ -1,5 +1,3 @@
-from dataclasses import fields
-
 import numpy as np
 import pytest
 
@@ -10,13 +8,6 @@ from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.surroundings.perceived import KINDS
 from tests.helpers.repository import DATA
-
-
-def test_every_array_is_contiguous(shapes: Scene) -> None:
-    seen = MujocoCamera(shapes).perceive(0.0)
-    arrays = [getattr(seen, field.name) for field in fields(seen) if isinstance(getattr(seen, field.name), np.ndarray)]
-    assert len(arrays) == 23
-    assert all(array.flags.c_contiguous for array in arrays)
 
 
 def test_exact_shapes_are_exact(shapes: Scene) -> None:

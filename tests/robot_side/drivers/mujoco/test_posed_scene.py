@@ -17,7 +17,6 @@ from tests.helpers.repository import DATA
 # By hand: the tool is at (0.55, 0, 0.2) with the fingertips 15 mm ahead, the wall's face at x = 0.885; the fingers'
 # outer sides are 56.5 mm beside the tool when open, those of the palm 50 mm, and the wall beside begins at 81.5 mm.
 WALL_M = 0.32
-ALMOST_M = 2e-5
 NOWHERE = np.zeros(3)
 
 
@@ -56,22 +55,6 @@ def path(ahead_m: float, across_m: float = 0.0, turned_rad: float = 0.0) -> Tool
     turns = Rotation.from_rotvec(share * [0.0, 0.0, turned_rad]).as_matrix()
     home = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
     return ToolPath(np.array([0.55, 0.0, 0.2]) + moved_m + share * [0.0, across_m, 0.0], turns @ home)
-
-
-def test_before_a_wall_gap_and_way_are_the_distance(wall: Posed) -> None:
-    for shift_m in (0.0, -0.1, 0.02):
-        put = wall.at(shift_m, 0.05, -0.03)  # along the wall nothing changes
-        assert put.gap_m() == pytest.approx(WALL_M + shift_m, abs=ALMOST_M)
-        assert put.way_m(1.0) == pytest.approx(WALL_M + shift_m, abs=ALMOST_M)
-
-
-def test_an_inclined_wall_is_nearer_than_the_way_to_it() -> None:
-    put = Posed("wall_45").at()
-    assert put.way_m(1.0) == pytest.approx(WALL_M, abs=1e-4)
-    assert put.gap_m() == pytest.approx(WALL_M * math.cos(math.pi / 4.0), abs=1e-3)
-    # Moved along the normal by 10 mm it is that much farther off, and 14 mm along the approach.
-    away = Posed("wall_45").at(0.01 * math.cos(math.pi / 4.0), 0.01 * math.sin(math.pi / 4.0), 0.0)
-    assert away.way_m(1.0) == pytest.approx(WALL_M + 0.01 * math.sqrt(2.0), abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -118,7 +101,7 @@ def test_a_turned_arm_is_where_kinematics_put_it(wall: Posed) -> None:
     np.testing.assert_allclose(wall.at().approach_axis(), [1.0, 0.0, 0.0], atol=1e-4)
 
 
-@pytest.mark.parametrize("name", ["wall", "ball", "slot", "u_mesh", "mug", "cluttered"])
+@pytest.mark.parametrize("name", ["wall", "wall_45", "ball", "slot", "u_mesh", "mug", "cluttered"])
 def test_at_home_it_is_what_the_live_scene_says(name: str) -> None:
     scene = Posed(name)
     truth, put = TrueContact(scene.scene), scene.at()

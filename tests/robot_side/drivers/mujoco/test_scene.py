@@ -11,11 +11,9 @@ from robot_side.drivers.mujoco import model_enums
 from robot_side.drivers.mujoco.camera import MujocoCamera
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from robot_side.enlargement.prediction_errors import BUILT_IN, load_prediction_errors
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 from tests.helpers.arm_models import MOTORS, POSITION_SERVOS, SHAPES, STONE, TENDON_GRIPPER, planar_arm
-from tests.helpers.repository import DATA
 
 
 def test_the_numbers_of_the_kinds_are_mujocos() -> None:
@@ -262,13 +260,6 @@ def test_what_cannot_be_used_is_told_in_one_line(
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_is_none_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError, match=r"none\.xml.*there is no such file"):
-        load_scene(tmp_path / "none.xml", "tcp")
-    with pytest.raises(ConfigurationError, match=r"--model .*: is a directory; valid: an MJCF file"):
-        load_scene(tmp_path, "tcp")
-
-
 def test_what_a_keyframe_sets_in_motion_moves_and_the_robot_rests(tmp_path: Path) -> None:
     mover = '<body pos="0.9 0 0.2"><joint name="mover" type="slide"/><geom size="0.02"/></body>'
     key = '<keyframe><key name="home" qpos="0.05 0 0 0 0" qvel="-0.5 0.3 0.1 0 0"/></keyframe>'
@@ -280,11 +271,6 @@ def test_what_a_keyframe_sets_in_motion_moves_and_the_robot_rests(tmp_path: Path
 
 
 # What tells an arm: its joints, links and limits, and nothing of where it stands or what stands around it.
-
-
-def test_the_built_in_table_of_prediction_errors_is_for_the_built_in_arm_in_every_scene() -> None:
-    expected = load_prediction_errors(BUILT_IN).arm
-    assert load_scene().robot.fingerprint == load_scene(DATA / "u_mesh.xml", "tool").robot.fingerprint == expected
 
 
 @pytest.mark.parametrize(

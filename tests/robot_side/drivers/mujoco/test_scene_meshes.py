@@ -1,8 +1,6 @@
 """Curved and non-convex objects through the whole robot side: never smaller than they are, and hardly larger."""
 
 import math
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -25,7 +23,6 @@ from robot_side.surroundings.scene_table import scene_table
 from tests.helpers.arm_models import planar_arm
 from tests.helpers.field.nearest_point import distance_to_object
 from tests.helpers.meshes import CELL_M, cup
-from tests.helpers.repository import ROOT
 
 TURNED = 'pos="0.9 0.3 0.2" euler="20 30 40"'
 ROUND = {
@@ -229,26 +226,6 @@ def test_a_height_field_is_the_solid_that_rays_hit(shape: tuple[int, int], tmp_p
 
 
 # What is said and skipped
-
-
-@pytest.mark.processes
-def test_a_scene_without_meshes_loads_no_kernel_for_them() -> None:
-    program = (
-        "import feelahead.both_sides.loopback, robot_side.main\n"
-        "from robot_side.core import RobotSide\n"
-        "from robot_side.parts import build_parts\n"
-        "from robot_side.compiled.kernel import imported_kernels\n"
-        "from robot_side.settings import RobotSettings\n"
-        "parts = build_parts(RobotSettings(), 1, 'clock')\n"
-        "RobotSide(parts).tick(0.0)\n"
-        "assert not [note for note in parts.notes if 'perceived larger' in note]\n"
-        "print(*(kernel.name for kernel in imported_kernels()))"
-    )
-    root = ROOT
-    done = subprocess.run([sys.executable, "-c", program], cwd=root, capture_output=True, text=True, check=True)
-    names = done.stdout.split()
-    assert any("overlap.kernels" in name for name in names)
-    assert [name for name in names if "mesh" in name] == []
 
 
 def test_nothing_is_compiled_within_a_tick_at_meshes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
