@@ -18,7 +18,6 @@ from operator_side.settings import OperatorSettings
 from operator_side.stored_travel import StoredTravel
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts_of_core import Surroundings
-from operator_side.viewing.following_pages import follow_pages, hands_facts
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.pages.shared_hands import MovedHands
 from operator_side.viewing.viewing import Viewing
@@ -67,12 +66,7 @@ class OperatorTurns:
         self._sending = Sending(settings.link_spec(), sockets)
         self._viewing = Viewing(
             core,
-            lambda now_s: Surroundings(
-                Hands.CONTROLLER if self._person is None else self._person.hands,
-                self._sending.asked,
-                settings.swap_sides,
-                hands_facts(self._pages, self._person, core, now_s),
-            ),
+            self._surroundings,
             *(process.status, self._pages, console, process.recording),
         )
         self._travel = StoredTravel(self._connection, core, self._viewing.note) if stored_travel else None
@@ -150,7 +144,7 @@ class OperatorTurns:
 
     def _move(self, now_s: float) -> None:
         core, connection = self._core, self._connection
-        follow_pages(self._pages, core, now_s)
+        self._pages.follow(core, now_s)
         # Before anything else is sent: the wish arrives after all that took the old way.
         if (words := core.tuner.take_link()) is not None:
             self._sending.tune(words)
@@ -168,6 +162,13 @@ class OperatorTurns:
     def _say_what_is_new(self) -> None:
         for text in self._connection.take_notes():
             self.note(text)
+
+    def _surroundings(self, now_s: float) -> Surroundings:
+        hands, doing, has_person = Hands.CONTROLLER, None, False
+        if self._person is not None:
+            hands, doing, has_person = self._person.hands, self._person.doing, self._person.has_person
+        page = self._pages.facts(doing, self._core, now_s, person=has_person)
+        return Surroundings(hands, self._sending.asked, page)
 
     def _status(self, now_s: float) -> OperatorStatus:
         """The core's status with what the process knows."""

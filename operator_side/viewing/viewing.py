@@ -18,7 +18,6 @@ from operator_side.settings import OperatorSettings
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts import FACTS_PERIOD_S, SceneFacts
 from operator_side.viewing.facts_of_core import Surroundings, operator_facts
-from operator_side.viewing.following_pages import hear_pages
 from operator_side.viewing.pages.driving_page import DrivingPage
 
 _WATCH_PERIOD_S: Final = 0.25
@@ -111,7 +110,7 @@ class Viewing:
     def requests(self, now_s: float) -> list[bytes]:
         """What to send to the robot side now: what is looked at, while anything is."""
         if self.console is not None:
-            hear_pages(self.console, self._pages, now_s)
+            self._hear(self.console, now_s)
         pages = self.console is not None and self.console.pages > 0
         lacks = None if self.console is None else self.console.lacks
         stands_still = lacks is not None and any(lacks) and not self._asked
@@ -122,6 +121,15 @@ class Viewing:
         if self._recording is not None:
             self._recording.noted.append((Kind.WATCHED, now_s, b""))
         return [encode(watch)]
+
+    def _hear(self, console: Console, now_s: float) -> None:
+        console.receive()
+        while console.words:
+            page, said = console.words.popleft()
+            if said is None:
+                self._pages.close(page, now_s)
+            else:
+                self._pages.receive(page, said, now_s)
 
     def facts_due(self, now_s: float) -> bool:
         """Whether to call `show`."""

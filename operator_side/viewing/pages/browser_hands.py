@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from common.protocol.messages import Telemetry
-from common.status.codes import Doing, Hands, Readiness
+from common.status.codes import Doing, Hands
 from operator_side.controller.feel import RELEASED, Feel
 from operator_side.controller.state import ControllerState
 from operator_side.hands.button_map import Action, button_of
@@ -39,8 +39,8 @@ class BrowserHands:
     @property
     def doing(self) -> Doing:
         """What they do."""
-        if self._pages.readiness is not Readiness.RUNNING or self._moves:
-            return Doing(self._pages.readiness)
+        if self._pages.doing is not Doing.RUNNING or self._moves:
+            return self._pages.doing
         return Doing.AT_REST_FIRST if self._was_armed else Doing.ARMING
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:

@@ -89,7 +89,7 @@ def test_what_is_needed_is_d_at_the_present_travel_by_the_controllers_own_names(
     facts = facts_of(felt_bench(r2=1.0))
     assert facts.r2.needed_m == pytest.approx(DISPLACED_M + FULL_M_S * HORIZON_S + FULL_M_S**2 / (2 * A_M_S2))
     assert facts.l2.needed_m == pytest.approx(-DISPLACED_M)
-    swapped = facts_of(felt_bench(l2=1.0, swap_sides=True), Surroundings(Hands.CONTROLLER, swap_sides=True))
+    swapped = facts_of(felt_bench(l2=1.0, swap_sides=True))
     assert (swapped.advancing, swapped.l2, swapped.r2) == ("L2", facts.r2, facts.l2)
 
 

@@ -1,9 +1,8 @@
 // The page: what the console sends, shown as it comes.
 import { Chart } from "./charts.js";
 import { Hands as PageHands } from "./hands.js";
-import { Hands, LinkState, Look, ShownKind, VIEWS } from "./names.js";
+import { LinkState, ShownKind, VIEWS } from "./names.js";
 import { Player } from "./player.js";
-import { holdingWords, linkWords, phaseWords, reasonWords, WORDS, words } from "./words.js";
 import { Clock, View } from "./views.js";
 import { Trigger } from "./triggers.js";
 
@@ -94,8 +93,8 @@ function receive(message) {
 function goWithoutFacts(atS) {
   everHeard = true;
   clock.set(atS, null);
-  text("state", WORDS.recorded);
-  text("why", WORDS.robotAlone);
+  text("state", "RECORDED");
+  text("why", "the robot side alone · replay");
 }
 
 function text(id, value, bad = false) {
@@ -113,19 +112,17 @@ function showFacts(message) {
   facts = message.facts;
   clock.set(facts.now_s, facts.offset_s);
   const { status } = facts;
-  const { look, alarm } = message.phase;
-  document.body.dataset.state = look;
-  const said = phaseWords(message.phase, status), reason = reasonWords(message.phase);
-  const word = alarm || look === Look.STARTING ? said : words(look);
-  text("state", word.toUpperCase());
-  text("why", [alarm || said === word ? null : said, reason, run.live ? null : WORDS.replay].filter(Boolean).join(" · "));
-  text("link", linkWords(status), status.link !== LinkState.UP);
-  text("lease", words(status.owner));
-  text("whose", facts.hands === Hands.PERSON ? WORDS.person : words(facts.hands));
+  const { said } = message;
+  document.body.dataset.state = message.look;
+  text("state", said.state);
+  text("why", [...said.why, run.live ? null : "replay"].filter(Boolean).join(" · "));
+  text("link", said.link, status.link !== LinkState.UP);
+  text("lease", said.lease);
+  text("whose", said.whose);
   text("delay", `${ms(facts.to_robot.mean_ms)} / ${ms(facts.to_operator.mean_ms)} ms`, facts.field_age_ms > 200);
   showLink(status);
-  text("target", status.target ?? WORDS.none);
-  text("holding", holdingWords(status));
+  text("target", status.target ?? "none");
+  text("holding", said.holding);
   const fingers = { l2: message.fingers[0], r2: message.fingers[1] };
   for (const side of ["l2", "r2"]) triggers[side].show(facts[side], fingers[side], facts.advancing === side.toUpperCase());
   charts.delay.add(clock.nowMs, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);

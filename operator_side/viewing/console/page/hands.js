@@ -6,7 +6,7 @@
 //
 // The operator side judges the same by itself (operator_side/viewing/pages/driving_page.py); this is to show it.
 import { atRest, both, Grips, Keys, readGamepads, REST } from "./inputs.js";
-import { Doing, MotionState, Readiness } from "./names.js";
+import { Doing, MotionState } from "./names.js";
 import { Panel } from "./panel.js";
 import { Tuning } from "./tuning.js";
 
@@ -208,7 +208,7 @@ export class Hands {
   #follow(hands, allUp, nowMs) {
     if (this.#state === "resting") {
       this.#upSinceMs = allUp ? this.#upSinceMs ?? nowMs : null;
-      const agreed = this.#hands?.driver === this.#page && this.#hands.readiness === Readiness.READY;
+      const agreed = this.#hands?.driver === this.#page && this.#hands.doing === Doing.READY;
       if (allUp && agreed && nowMs - this.#upSinceMs >= REST_MS) this.#enter("ready", "");
     } else if (this.#state === "ready" && !allUp) {
       if (hands.run && !this.#stops) this.#enter("running", "");
@@ -226,7 +226,7 @@ export class Hands {
     if (!known.may_drive) this.#end("A real controller drives.");
     else if (known.driver !== null && known.driver !== this.#page && nowMs - this.#drivingSinceMs > AGREES_MS)
       this.#end("Another page drives.");
-    else if (known.readiness === Readiness.RESTING && this.#state !== "resting" && nowMs - this.#sinceMs > AGREES_MS) {
+    else if (known.doing === Doing.ALL_KEYS_UP_FIRST && this.#state !== "resting" && nowMs - this.#sinceMs > AGREES_MS) {
       this.#enter("resting", this.#armed ? "" : "The arm was disarmed or stopped.");
     }
   }

@@ -167,7 +167,9 @@ def test_pages_get_facts_pictures_and_the_scene_as_they_are_fed(console: Console
                 facts, scene = newest["facts"], newest["scene"]
                 assert isinstance(facts, dict)
                 assert isinstance(scene, dict)
-                assert (facts["phase"]["doing"], facts["facts"]["advancing"]) == ("advancing", "R2")
+                assert (facts["said"]["state"], facts["said"]["why"]) == ("ARMED", ["advancing", None])
+                assert (facts["said"]["whose"], facts["said"]["holding"]) == ("scripted person", "nothing")
+                assert facts["facts"]["advancing"] == "R2"
                 assert {row["name"] for row in scene["objects"]} <= set(OBJECTS)
             assert console.pages == 2
             await first.send('{"hands": {"Space": true}}')

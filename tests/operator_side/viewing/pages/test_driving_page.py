@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from common.status.codes import Readiness
+from common.status.codes import Doing
 from operator_side.viewing.pages.driving_page import REST_S, SILENCE_S, DrivingPage
 from operator_side.viewing.pages.page_messages import PageHands, TuneWish, read_page_message
 from tests.operator_side.viewing.pages.talking_page import PERIOD_S, TalkingPage
@@ -53,9 +53,9 @@ def test_what_is_no_message_is_refused_whole_and_counted(pages: DrivingPage, con
 def test_hold_to_run_counts_after_a_full_second_of_rest_and_until_it_is_let_go(pages: DrivingPage) -> None:
     page = TalkingPage(pages)
     now_s = page.go_on(0.0, REST_S)
-    assert pages.readiness is Readiness.RESTING
+    assert pages.doing is Doing.ALL_KEYS_UP_FIRST
     page.say(now_s)
-    assert (pages.readiness, pages.driver) == (Readiness.READY, "page1")
+    assert (pages.doing, pages.driver) == (Doing.READY, "page1")
     page.say(now_s + 0.02, run=True, r2=0.5)
     hands = pages.hands(now_s + 0.02)
     assert hands is not None
@@ -64,13 +64,13 @@ def test_hold_to_run_counts_after_a_full_second_of_rest_and_until_it_is_let_go(p
     assert pages.hands(now_s + 0.04) is None
     page.say(now_s + 0.06, run=True, r2=0.5)
     assert pages.hands(now_s + 0.06) is None
-    assert pages.rest_s(now_s + 0.06) == REST_S
+    assert pages.doing is Doing.ALL_KEYS_UP_FIRST
 
 
 def running(pages: DrivingPage, page: TalkingPage, start_s: float = 0.0) -> float:
     now_s = page.go_on(start_s, 1.1)
     page.say(now_s, run=True)
-    assert pages.readiness is Readiness.RUNNING
+    assert pages.doing is Doing.RUNNING
     return now_s
 
 
