@@ -28,9 +28,8 @@ from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.intent import OperatorIntent
 from operator_side.hands.newest import Hands
 from operator_side.hands.travel_calibration import TravelCalibration
-from operator_side.robot_link.commanding import STOPPING, ToRobot
-from operator_side.robot_link.commands import HEARTBEAT_PERIOD_S, Commands
-from operator_side.robot_link.newest import STIFFNESS_EXPIRES_S, NewestStiffness, NewestView
+from operator_side.robot_link.commanding import HEARTBEAT_PERIOD_S, STOPPING, Commands, ToRobot
+from operator_side.robot_link.newest import STIFFNESS_EXPIRES_S, NewestStiffness, overtakes
 from operator_side.robot_link.standing import Standing
 from operator_side.robot_link.tuner import Tuner
 
@@ -66,7 +65,9 @@ class OperatorSide:
         """listeners: hear what happens."""
         self.settings = settings = settings or CoreSettings()
         self.link = LinkEnd("operator", epoch, clock_domain, settings.seed, settings.asymmetry_s)
-        self.felt, self.view = NewestStiffness(settings.seed), NewestView()
+        self.felt = NewestStiffness(settings.seed)
+        self.screen: Telemetry | None = None
+        """The newest view of the robot; None before the first."""
         self.hands = Hands(settings.calibration, swap_sides=settings.swap_sides)
         self.haptics = Haptics(
             settings.rendering,
@@ -97,11 +98,6 @@ class OperatorSide:
     def stiffness(self) -> StiffnessUpdate | None:
         """The newest stiffness; None before the first and once it has expired."""
         return self.felt.update
-
-    @property
-    def screen(self) -> Telemetry | None:
-        """The newest view of the robot; None before the first."""
-        return self.view.telemetry
 
     def receive(self, payload: bytes, now_s: float) -> None:
         """Take one control payload from the robot side."""
@@ -159,8 +155,9 @@ class OperatorSide:
         if not isinstance(message, Telemetry):
             self.rejected += 1
             return
-        if message.header.epoch == self.link.peer_epoch:
-            self.view.take(message)
+        known = None if self.screen is None else self.screen.header
+        if message.header.epoch == self.link.peer_epoch and overtakes(message.header, known):
+            self.screen = message
 
     def read_state(self, state: ControllerState, now_s: float) -> None:
         """Take one state of the controller."""
@@ -206,7 +203,7 @@ class OperatorSide:
         messages: list[ToRobot] = []
         lease, intent = self.lease, self._meant(now_s)
         if intent is None or lease is None:
-            self.commands.forget()
+            self.commands.held.forget()
             self.haptics.silent(now_s, owns=self._standing.owns)
         elif (due := self.commands.due(intent, lease.token, now_s)) is not None:
             message, command = due

@@ -94,7 +94,7 @@ class OperatorTurns:
     def send(self) -> None:
         """Let go of what is due."""
         if not self._sending.send(self._process.loop.clock.now()):
-            self._core.commands.forget()
+            self._core.commands.held.forget()
 
     def rest(self, now_s: float, turned_s: float) -> None:
         """Record, look after the watchdog, and show."""

@@ -36,14 +36,6 @@ def link_words(side: RobotStatus | OperatorStatus | None) -> str:
     return words(side.link)
 
 
-def holding_words(side: RobotStatus | OperatorStatus | None) -> str | None:
-    """What is between the fingers, and whether it stands on something; None for nothing, or where it is not known."""
-    if side is None or not side.holding:
-        return None
-    holding = printable(side.holding) if isinstance(side, RobotStatus) else "something"
-    return f"{holding}, it stands" if side.stands else holding
-
-
 def printable(text: str) -> str:
     """Put a question mark for each sign that cannot be printed, such as a terminal's control characters."""
     return text if text.isprintable() else "".join(sign if sign.isprintable() else "?" for sign in text)

@@ -24,12 +24,14 @@ from operator_side.controller.feel import (
 )
 from operator_side.feel.commands_under_way import Displacement
 from operator_side.feel.path_ahead import Aside, traced_zones
-from operator_side.feel.stand_pulse import StandPulse
 from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 
 FALL_S: Final = 0.1
 """From full strength to none, unless the trigger is released."""
+PULSE_S: Final = 0.08
+_PULSE: Final = 0.7
+"""Drive of the right motor alone: the left one says danger, and both say that the field is lost."""
 _ROUNDING: Final = 1e-9
 _TOUCHED: Final = MAX_STRENGTH // 2
 """The most that is felt, in slow zones, of what is to be touched"""
@@ -128,7 +130,8 @@ class TriggerRendering:
         self.l2 = RenderedTrigger(settings, calibration.l2)
         self.r2 = RenderedTrigger(settings, calibration.r2)
         self._swap_sides = swap_sides
-        self._stand = StandPulse()
+        self._stands = False
+        self._pulse_ends_s = -math.inf
 
     def render(
         self,
@@ -155,7 +158,10 @@ class TriggerRendering:
             advancing.render(felt.r2, felt.horizon_m, pulled[0], forth, now_s, aside),
         )
         l2, r2 = reversed(strengths) if self._swap_sides else strengths
-        return Feel(l2=l2, r2=r2, rumble=Rumble(felt.rumble, self._stand.right(felt.stands, now_s)))
+        if felt.stands and not self._stands:
+            self._pulse_ends_s = now_s + PULSE_S
+        self._stands = felt.stands
+        return Feel(l2=l2, r2=r2, rumble=Rumble(felt.rumble, _PULSE if now_s < self._pulse_ends_s else 0.0))
 
     def zones(self) -> dict[str, Any]:
         """The run's figures of the controller's own triggers."""

@@ -19,7 +19,8 @@ from typing import Any, Final
 
 import msgspec
 
-from common.command.words import holding_words, link_words, phase_words, words
+from common.command.live_view import LiveView
+from common.command.words import link_words, words
 from common.companion.channel import Channel
 from common.companion.process import companion_channel
 from common.errors import RemoteProtocolError
@@ -34,7 +35,6 @@ from common.protocol.view_messages import (
 )
 from common.roles import ROLES, Role
 from common.status.codes import Hands, Look
-from common.status.phase import PhaseFacts, phase_of
 from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts, ShownKind
 
@@ -136,9 +136,8 @@ class _Process:
         if kind == b"f":
             self._facts = facts = msgspec.msgpack.decode(content, type=OperatorFacts)
             at = [None if trigger.raw is None else SENSED_TRAVEL * trigger.raw for trigger in (facts.l2, facts.r2)]
-            phase = phase_of(None, facts.status)
-            shown = {"kind": ShownKind.FACTS, "facts": facts, "look": phase.look, "said": said(facts, phase)}
-            self._pages.show(ShownKind.FACTS, msgspec.json.encode(shown | {"fingers": at}).decode())
+            shown = {"kind": ShownKind.FACTS, "facts": facts, "said": said(facts), "fingers": at}
+            self._pages.show(ShownKind.FACTS, msgspec.json.encode(shown).decode())
         elif kind == b"n":
             note = {"kind": ShownKind.NOTE, "text": content.decode("utf-8", "replace")}
             self._pages.note(msgspec.json.encode(note).decode())
@@ -199,17 +198,18 @@ class _Process:
         self._pages.show(ShownKind.SCENE, msgspec.json.encode(scene).decode())
 
 
-def said(facts: OperatorFacts, phase: PhaseFacts) -> dict[str, Any]:
-    """The sentences of a page; None for what is not known."""
-    status, (words_of_phase, reason) = facts.status, phase_words(phase, facts.status)
-    state = words_of_phase if phase.alarm or phase.look is Look.STARTING else words(phase.look)
+def said(facts: OperatorFacts) -> dict[str, Any]:
+    """The sentences of a page, and how it looks; None for what is not known."""
+    status, view = facts.status, LiveView(None, facts.status)
+    state = view.phase if view.alarm or view.look is Look.STARTING else words(view.look)
     return {
+        "look": view.look,
         "state": state.upper(),
-        "why": (None if state == words_of_phase else words_of_phase, reason),
+        "why": (None if state == view.phase else view.phase, view.reason),
         "link": link_words(status),
         "lease": words(status.owner) or None,
         "whose": "scripted person" if facts.hands is Hands.PERSON else words(facts.hands),
-        "holding": None if status.holding is None else holding_words(status) or "nothing",
+        "holding": None if status.holding is None else f"{view.holding or 'nothing'}{view.stands}",
     }
 
 

@@ -113,7 +113,7 @@ function showFacts(message) {
   clock.set(facts.now_s, facts.offset_s);
   const { status } = facts;
   const { said } = message;
-  document.body.dataset.state = message.look;
+  document.body.dataset.state = said.look;
   text("state", said.state);
   text("why", [...said.why, run.live ? null : "replay"].filter(Boolean).join(" · "));
   text("link", said.link, status.link !== LinkState.UP);
