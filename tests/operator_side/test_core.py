@@ -39,7 +39,7 @@ def test_stiffness_reaches_the_trigger_it_is_meant_for_and_only_changes_are_writ
     assert (l2, r2, bench.device.rumble.left) == (FREE_TRIGGER, (6,) * 10, 1.0)
     bench.now_s += 0.001
     bench.feel(6, rumble=1.0)
-    assert bench.device.write_count == 1
+    assert bench.side.haptics.writes == 1
 
 
 def test_another_calibration_changes_what_is_read_and_what_is_felt(bench: Bench) -> None:
@@ -93,7 +93,7 @@ def test_without_haptics_nothing_is_ever_written_and_the_hands_rest_all_the_same
     bench.hands(Button.L1, r2=1.0)
     assert [command.r2 for command in bench.commands()] == [0.0]
     bench.write()
-    assert bench.device.write_count == 0
+    assert bench.side.haptics.writes == 0
 
 
 def test_a_controller_that_comes_while_blind_is_released_then_told(bench: Bench) -> None:

@@ -9,8 +9,7 @@ from functools import lru_cache
 from typing import Final
 
 from common.errors import RemoteProtocolError
-from operator_side.controller.state import Button, ControllerState
-from operator_side.dualsense.reports.battery import BATTERIES, battery_byte
+from operator_side.controller.state import Battery, BatteryState, Button, ControllerState
 from operator_side.dualsense.reports.transport import (
     CHECKSUM_LENGTH,
     INPUT_FRAMING,
@@ -106,6 +105,37 @@ def code_of(pressed: frozenset[Button]) -> int:
     return code
 
 
+_BATTERY_STATES: Final = {
+    0x0: BatteryState.DISCHARGING,
+    0x1: BatteryState.CHARGING,
+    0x2: BatteryState.FULL,
+    0xA: BatteryState.OUT_OF_RANGE,
+    0xB: BatteryState.TEMPERATURE,
+    0xF: BatteryState.FAULT,
+}
+_BATTERY_CODES: Final = {state: code for code, state in _BATTERY_STATES.items()} | {BatteryState.UNKNOWN: 0x3}
+
+
+def _battery(byte: int) -> Battery:
+    """A step of the fraction stands for ten per cent, and the middle of them is meant (hid-playstation)."""
+    state = _BATTERY_STATES.get(byte >> 4, BatteryState.UNKNOWN)
+    if state is BatteryState.FULL:
+        return Battery(1.0, state)
+    if state not in (BatteryState.DISCHARGING, BatteryState.CHARGING):
+        return Battery(None, state)
+    return Battery(min((2 * (byte & 0x0F) + 1) / 20, 1.0), state)
+
+
+_BATTERIES: Final = tuple(_battery(byte) for byte in range(256))
+"""The battery by its byte."""
+
+
+def _battery_byte(battery: Battery) -> int:
+    """The byte that says `battery`."""
+    tenths = 0 if battery.fraction is None else min(int(battery.fraction * 10 + 1e-9), 10)
+    return _BATTERY_CODES[battery.state] << 4 | tenths
+
+
 def parse_input_report(report: bytes) -> ControllerState:
     """Read an input report of either transport; every one of a valid id, length and checksum can be read.
 
@@ -119,7 +149,7 @@ def parse_input_report(report: bytes) -> ControllerState:
         l2=TRAVEL[l2],
         r2=TRAVEL[r2],
         pressed=pressed_of(int.from_bytes(buttons, "little")),
-        battery=BATTERIES[battery],
+        battery=_BATTERIES[battery],
     )
 
 
@@ -159,7 +189,7 @@ def build_input_report(
         round(sensor_time_s * _SENSOR_TICKS_PER_S) % 2**32,
         _NOT_TOUCHED,
         _NOT_TOUCHED,
-        battery_byte(state.battery),
+        _battery_byte(state.battery),
         _USB_DATA_AND_POWER if transport is Transport.USB else 0,
     )
     return bytes(report) if transport is Transport.USB else sealed(Seed.INPUT, bytes(report[:-CHECKSUM_LENGTH]))

@@ -6,7 +6,7 @@ nobody ─▶ resting ─▶ ready ─▶ running         of the page that drive
 silence for 150 ms, a page that lets go or closes: nobody, and whoever drives next rests first
 """
 
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from typing import Final
 
 from common.errors import RemoteProtocolError
@@ -20,6 +20,8 @@ SILENCE_S: Final = 0.15
 REST_S: Final = 1.0
 """All keys are up for so long before hold-to-run counts."""
 _MOST_PAGES: Final = 64
+_MOST_WISHES: Final = 16
+"""From one turn to the next."""
 
 
 class DrivingPage:
@@ -45,7 +47,7 @@ class DrivingPage:
         self._stop_s: float | None = None
         self._giving_back: set[int] = set()
         self._give_back = False
-        self._wish: TuneWish | None = None
+        self.wishes: deque[TuneWish] = deque(maxlen=_MOST_WISHES)
 
     @property
     def driver(self) -> str | None:
@@ -61,7 +63,7 @@ class DrivingPage:
             self.rejected += 1
             return
         if message.tune is not None:
-            self._wish = message.tune.over(self._wish)
+            self.wishes.append(message.tune)
         if message.hands is not None:
             self._take(page, message.hands, now_s)
 
@@ -97,16 +99,12 @@ class DrivingPage:
         given, self._give_back = self._give_back, False
         return given
 
-    def take_wish(self) -> TuneWish | None:
-        """What was wished for since the last call, the newest of each kind."""
-        wish, self._wish = self._wish, None
-        return wish
-
     def follow(self, core: OperatorSide, now_s: float) -> None:
         """In every turn: a stop on a page counts like the controller's, and what a page wants tuned is asked for."""
         if self.stopping(now_s):
             core.press_stop(now_s)
-        if (wish := self.take_wish()) is not None:
+        while self.wishes:
+            wish = self.wishes.popleft()
             core.tune(wish.probability, wish.link, now_s)
 
     def facts(self, doing: Doing | None, core: OperatorSide, now_s: float, *, person: bool) -> HandsFacts:

@@ -59,13 +59,6 @@ class TuneWish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     link: Annotated[str, Meta(max_length=200)] | None = None
     """Netem's words"""
 
-    def over(self, earlier: "TuneWish | None") -> "TuneWish":
-        """This wish, and of an earlier one what this one leaves."""
-        if earlier is None:
-            return self
-        probability = earlier.probability if self.probability is None else self.probability
-        return TuneWish(probability, earlier.link if self.link is None else self.link)
-
 
 class PageMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One message of a page."""

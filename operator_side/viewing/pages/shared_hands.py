@@ -1,7 +1,7 @@
 """A controller that a person in a browser may take out of the scripted person's hands, and give back."""
 
 from collections.abc import Callable
-from typing import Final, Protocol
+from typing import Final
 
 from common.protocol.messages import Telemetry
 from common.status.codes import Doing, Hands
@@ -11,25 +11,6 @@ from operator_side.controller.state import ControllerState
 from operator_side.people.whoever import Whoever
 from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
-
-
-class MovedHands(Protocol):
-    """Hands that are moved in every turn."""
-
-    @property
-    def has_person(self) -> bool:
-        """Whether there is a scripted person who could go on."""
-
-    @property
-    def hands(self) -> Hands:
-        """Whose hands they are: the person's or a browser's."""
-
-    @property
-    def doing(self) -> Doing:
-        """What they do."""
-
-    def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Move the hands; `delay_s` is the round trip that the person has got used to."""
 
 
 class SharedHands:
@@ -97,3 +78,7 @@ class SharedHands:
         """Release both."""
         self._device.close()
         self._page.close()
+
+
+MovedHands = BrowserHands | SharedHands
+"""Hands that are moved in every turn."""

@@ -41,7 +41,6 @@ export class Hands {
   #stopHeld = new Set();
   #giveBack = false;
   #why = "";
-  #timer;
 
   constructor(document, send) {
     this.#document = document;
@@ -64,7 +63,7 @@ export class Hands {
     document.addEventListener("focusin", ({ target }) => {
       if (target.matches?.(EDITS)) this.#release("A field has the keys.");
     });
-    this.#timer = setInterval(() => this.#step(), PERIOD_MS);
+    setInterval(() => this.#step(), PERIOD_MS);
   }
 
   show(facts) {
@@ -253,10 +252,5 @@ export class Hands {
       mine: this.#hands?.driver === this.#page, level: this.#keys.level,
       stop: this.#stopMs === null ? null : { sinceMs: performance.now() - this.#stopMs, goesOn: this.#stops },
     });
-  }
-
-  close() {
-    clearInterval(this.#timer);
-    this.#end("The page was left.");
   }
 }

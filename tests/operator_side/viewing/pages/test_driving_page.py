@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from common.status.codes import Doing
 from operator_side.viewing.pages.driving_page import REST_S, SILENCE_S, DrivingPage
-from operator_side.viewing.pages.page_messages import PageHands, TuneWish, read_page_message
+from operator_side.viewing.pages.page_messages import PageHands, read_page_message
 from tests.operator_side.viewing.pages.talking_page import PERIOD_S, TalkingPage
 
 NO_HANDS: list[object] = [
@@ -46,7 +46,7 @@ def pages() -> DrivingPage:
 @pytest.mark.parametrize("content", NO_HANDS, ids=str)
 def test_what_is_no_message_is_refused_whole_and_counted(pages: DrivingPage, content: object) -> None:
     pages.receive(1, content, 0.0)
-    assert (pages.rejected, pages.driver, pages.take_wish()) == (1, None, None)
+    assert (pages.rejected, pages.driver, len(pages.wishes)) == (1, None, 0)
     assert not pages.stopping(0.0)
 
 
@@ -136,13 +136,6 @@ def test_the_person_goes_on_only_by_the_page_that_drives_or_any_when_none_does(p
     two.say(0.06, driving=False)
     two.say(0.08, driving=False, give_back=True)
     assert pages.take_give_back()
-
-
-def test_wishes_that_come_at_once_are_kept_together_the_newest_of_each_kind(pages: DrivingPage) -> None:
-    for tune in ({"probability": 0.8}, {"link": "delay 5ms"}, {"probability": 0.9}):
-        pages.receive(1, {"tune": tune}, 0.0)
-    assert pages.take_wish() == TuneWish(0.9, "delay 5ms")
-    assert pages.take_wish() is None
 
 
 @dataclass(frozen=True)
