@@ -73,7 +73,7 @@ class OperatorTurns:
         timed = process.loop.stages.timed
         self._take, self._feel = timed("messages", self._take_in), timed("feeling", self._tell_controller)
         self.turn = timed("hands", self._move)
-        self.wait, self.next_due, self.note = sockets.wait, self._sending.next_due, self._viewing.note
+        self.wait, self.next_due, self.note = sockets.wait, self._sending.line.next_due, self._viewing.note
         self._guard_s = 0.0
 
     @property
@@ -168,7 +168,7 @@ class OperatorTurns:
         if self._person is not None:
             hands, doing, has_person = self._person.hands, self._person.doing, self._person.has_person
         page = self._pages.facts(doing, self._core, now_s, person=has_person)
-        return Surroundings(hands, self._sending.asked, page)
+        return Surroundings(hands, self._sending.line.profile.words, page)
 
     def _status(self, now_s: float) -> OperatorStatus:
         """The core's status with what the process knows."""

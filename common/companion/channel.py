@@ -23,8 +23,6 @@ class Channel:
         part.setblocking(False)
         for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
             part.setsockopt(socket.SOL_SOCKET, option, _AT_ONCE)
-        self.refused = 0
-        """Messages that found no room."""
         self.ended = False
         """Whether the other end is gone: nothing is sent any more, and what has arrived is the last."""
         self._part = part
@@ -39,13 +37,12 @@ class Channel:
         return self._part.fileno()
 
     def send(self, *parts: bytes) -> bool:
-        """Send `parts` as one message, now or in a later call; False, and counted, when there is no room for it."""
+        """Send `parts` as one message, now or in a later call; False when there is no room for it."""
         self.flush()
         length = sum(map(len, parts))
         if length > MESSAGE_LIMIT_BYTES:
             raise ValueError(f"a message of {length} bytes; valid: up to {MESSAGE_LIMIT_BYTES}")
         if self.ended or (self._waiting and self.waiting + length > self._room_bytes):
-            self.refused += 1
             return False
         for part in (_LENGTH.pack(length), *parts):
             if part:

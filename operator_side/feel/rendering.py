@@ -115,10 +115,6 @@ class RenderedTrigger:
         """How far it is pulled, in calibrated travel, 0 to 1, by what the controller reports, before it stiffens."""
         return self._travel.travel(min(self._strengths.count(0) / ZONE_COUNT / SENSED_TRAVEL, 1.0))
 
-    def zones(self) -> dict[str, int | None]:
-        """The run's figures of its zones."""
-        return {"first_stiff": self.first_stiff, "max": self.max_strength}
-
 
 class TriggerRendering:
     """Both triggers, and the motors for danger where the stick leads, and for what has come to stand."""
@@ -165,7 +161,8 @@ class TriggerRendering:
 
     def zones(self) -> dict[str, Any]:
         """The run's figures of the controller's own triggers."""
-        return {"l2": self.l2.zones(), "r2": self.r2.zones()}
+        both = {"l2": self.l2, "r2": self.r2}
+        return {name: {"first_stiff": one.first_stiff, "max": one.max_strength} for name, one in both.items()}
 
     def summary(self) -> dict[str, Any]:
         """What else is to be known of the run."""

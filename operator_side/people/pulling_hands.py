@@ -1,6 +1,5 @@
 """A person who arms the robot and then pulls as told: no eyes for the scene, no will of their own."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -51,17 +50,8 @@ def constant_force(force_n: float, across: Vector2 = (0.0, 0.0), turning: Vector
     They rest after 1.5 s: a tool that turns on and on ends where its arm cannot follow.
     """
     straight = Hands(r2_n=force_n)
-    aside = Hands(r2_n=force_n, left_stick=_beyond_dead_zone(across), right_stick=_beyond_dead_zone(turning))
+    aside = Hands(r2_n=force_n, left_stick=_STICK.raw(across), right_stick=_STICK.raw(turning))
     return lambda since_s: aside if since_s < _ASIDE_S else straight
-
-
-def _beyond_dead_zone(deflection: Vector2) -> Vector2:
-    """Where the stick has to be for this to count."""
-    length = math.hypot(*deflection)
-    if length == 0.0:
-        return deflection
-    part = (_STICK.dead_zone + (1.0 - _STICK.dead_zone) * length) / length
-    return deflection[0] * part, deflection[1] * part
 
 
 class PullingHands:

@@ -71,16 +71,8 @@ _BUTTON_BITS: Final = {
 
 
 def _axis(byte: int) -> float:
-    """-1 at 0, 0 at 128, 1 at 255: the halves differ by one step."""
+    """A stick's byte to -1 at 0, 0 at 128, 1 at 255: the halves differ by one step."""
     return (byte - 128) / (127 if byte > 128 else 128)
-
-
-AXIS: Final = tuple(_axis(byte) for byte in range(256))
-"""A stick's byte to -1 to 1."""
-AXIS_DOWN: Final = tuple(0.0 - _axis(byte) for byte in range(256))
-"""A stick's byte of a vertical axis to -1 to 1: down is positive on the wire."""
-TRAVEL: Final = tuple(byte / 255 for byte in range(256))
-"""A trigger's byte to 0 to 1."""
 
 
 def byte_of_axis(axis: float) -> int:
@@ -116,6 +108,7 @@ _BATTERY_STATES: Final = {
 _BATTERY_CODES: Final = {state: code for code, state in _BATTERY_STATES.items()} | {BatteryState.UNKNOWN: 0x3}
 
 
+@lru_cache
 def _battery(byte: int) -> Battery:
     """A step of the fraction stands for ten per cent, and the middle of them is meant (hid-playstation)."""
     state = _BATTERY_STATES.get(byte >> 4, BatteryState.UNKNOWN)
@@ -124,10 +117,6 @@ def _battery(byte: int) -> Battery:
     if state not in (BatteryState.DISCHARGING, BatteryState.CHARGING):
         return Battery(None, state)
     return Battery(min((2 * (byte & 0x0F) + 1) / 20, 1.0), state)
-
-
-_BATTERIES: Final = tuple(_battery(byte) for byte in range(256))
-"""The battery by its byte."""
 
 
 def _battery_byte(battery: Battery) -> int:
@@ -144,12 +133,12 @@ def parse_input_report(report: bytes) -> ControllerState:
     start = INPUT_FRAMING[_checked_transport(report)].start
     left_x, left_y, right_x, right_y, l2, r2, _, *buttons, _, _, _, _, battery, _ = _COMMON.unpack_from(report, start)
     return ControllerState(
-        left_stick=(AXIS[left_x], AXIS_DOWN[left_y]),
-        right_stick=(AXIS[right_x], AXIS_DOWN[right_y]),
-        l2=TRAVEL[l2],
-        r2=TRAVEL[r2],
+        left_stick=(_axis(left_x), 0.0 - _axis(left_y)),  # down is positive on the wire
+        right_stick=(_axis(right_x), 0.0 - _axis(right_y)),
+        l2=l2 / 255,
+        r2=r2 / 255,
         pressed=pressed_of(int.from_bytes(buttons, "little")),
-        battery=_BATTERIES[battery],
+        battery=_battery(battery),
     )
 
 

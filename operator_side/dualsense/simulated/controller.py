@@ -74,7 +74,8 @@ class SimulatedDualSense:
         self._woke_s: float | None = None
         self._newest_report = -1
         self._unread: bytes | None = None
-        self._told = RELEASED
+        self.told = RELEASED
+        """All that it has been told and still does; None where nothing was."""
         self._apply(RELEASED)
 
     # The hands
@@ -115,11 +116,6 @@ class SimulatedDualSense:
         return self._l2.travel, self._r2.travel
 
     @property
-    def told(self) -> Feel:
-        """All that it has been told and still does; None where nothing was."""
-        return self._told
-
-    @property
     def strengths(self) -> tuple[Strengths, Strengths]:
         """The strengths in force, L2 and R2."""
         return self._l2.strengths, self._r2.strengths
@@ -132,7 +128,7 @@ class SimulatedDualSense:
     @property
     def rumble(self) -> Rumble:
         """The motors' present drive."""
-        return self._told.rumble or Rumble()
+        return self.told.rumble or Rumble()
 
     # The port
 
@@ -149,7 +145,7 @@ class SimulatedDualSense:
 
     def close(self) -> None:
         """Take effects, rumble and a warning light off; `read` and `write` raise DeviceError from then on."""
-        self._apply(self._told.farewell)
+        self._apply(self.told.farewell)
         self._closed = True
 
     # The wire, for a system that is offered this controller
@@ -191,9 +187,9 @@ class SimulatedDualSense:
             raise DeviceError("the simulated controller is closed; open a new one")
 
     def _apply(self, feel: Feel) -> None:
-        self._told = feel.following(self._told)
-        self._l2.set_strengths(self._told.l2 or FREE_TRIGGER)
-        self._r2.set_strengths(self._told.r2 or FREE_TRIGGER)
+        self.told = feel.following(self.told)
+        self._l2.set_strengths(self.told.l2 or FREE_TRIGGER)
+        self._r2.set_strengths(self.told.r2 or FREE_TRIGGER)
 
     def _advance(self, now_s: float) -> None:
         """Let time pass until `now_s`, and make the newest input report on the way that has come due."""

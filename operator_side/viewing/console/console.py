@@ -51,11 +51,6 @@ class Console:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    @property
-    def process_id(self) -> int:
-        """The operating system's number for it."""
-        return self._companion.process_id
-
     def fileno(self) -> int:
         """To wait for what it says."""
         return self._companion.channel.fileno()

@@ -47,6 +47,22 @@ def compose(outer: Floats, inner: Floats) -> Floats:
     return np.concatenate([outer[:, :3] + turn.apply(inner[:, :3]), turns], axis=1)
 
 
+def _add(scene: viser.SceneApi, name: str, solid: Solid, places: Any, **looks: Any) -> viser.BatchedMeshHandle:
+    """Draw a solid at many places (n, 3), not turned yet."""
+    return scene.add_batched_meshes_simple(
+        name,
+        solid.vertices,
+        solid.triangles,
+        batched_wxyzs=np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (len(places), 1)),
+        batched_positions=places,
+        flat_shading=solid.flat,
+        lod="off",
+        cast_shadow=False,
+        receive_shadow=False,
+        **looks,
+    )
+
+
 class _Batch:
     """Shapes that share a mesh."""
 
@@ -56,19 +72,8 @@ class _Batch:
         self.owner = np.array([shape.owner for shape in shapes])
         self._inner = np.array([shape.pose for shape in shapes], np.float64)
         self._colors = (255.0 * np.array([shape.color[:3] for shape in shapes])).astype(np.uint8)
-        self._handle = scene.add_batched_meshes_simple(
-            name,
-            solid.vertices,
-            solid.triangles,
-            batched_wxyzs=np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (len(members), 1)),
-            batched_positions=np.zeros((len(members), 3)),
-            batched_scales=np.array([scale for _, scale in members]),
-            batched_colors=self._colors,
-            flat_shading=solid.flat,
-            lod="off",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        places, scales = np.zeros((len(members), 3)), np.array([scale for _, scale in members])
+        self._handle = _add(scene, name, solid, places, batched_scales=scales, batched_colors=self._colors)
         self._poses = np.full((len(members), 7), np.nan, np.float32)
 
     def place(self, links: Floats, objects: Floats, object_colors: NDArray[np.uint8]) -> None:
@@ -108,20 +113,9 @@ class _Ghost:
         if self._handle is None or self._count != len(spheres):
             if self._handle is not None:
                 self._handle.remove()
-            ball, self._count = sphere(1), len(spheres)
-            self._handle = self._scene.add_batched_meshes_simple(
-                self._name,
-                ball.vertices,
-                ball.triangles,
-                batched_wxyzs=np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (len(spheres), 1)),
-                batched_positions=moved,
-                batched_scales=radii,
-                batched_colors=self._color,
-                opacity=_GHOST_OPACITY,
-                lod="off",
-                cast_shadow=False,
-                receive_shadow=False,
-            )
+            self._count = len(spheres)
+            looks = {"batched_scales": radii, "batched_colors": self._color, "opacity": _GHOST_OPACITY}
+            self._handle = _add(self._scene, self._name, sphere(1), moved, **looks)
         else:
             self._handle.batched_positions = moved
             if not np.array_equal(radii, self._radii):

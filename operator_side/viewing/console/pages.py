@@ -1,6 +1,7 @@
 """The open pages: each gets the newest of everything as fast as it takes it, and says what its hands do."""
 
 import asyncio
+import contextlib
 from collections import deque
 from collections.abc import Callable
 from typing import Any, Final
@@ -23,8 +24,7 @@ ROUND_ENDS: Final = f'{{"kind":"{ShownKind.END}"}}'
 """A page answers it with `taken`."""
 
 Heard = Callable[[str, bytes], None]
-"""Called with `h`, `t` or `p` and MessagePack of `{"page": number, "hands", "tune" or "play": what the page said}`. A
-page that is gone says `hands` of nil."""
+"""Called with `s` and MessagePack of PageWords."""
 
 
 class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -54,16 +54,17 @@ class _Page:
         self.looks = True
 
     async def send(self, connection: ServerConnection) -> None:
-        while True:
-            await self.something.wait()
-            self.something.clear()
-            self.taken.clear()
-            this_round = [*self.notes, *self.newest.values()]
-            self.notes.clear()
-            self.newest.clear()
-            for message in (*this_round, ROUND_ENDS):
-                await connection.send(message)
-            await self.taken.wait()
+        with contextlib.suppress(ConnectionClosed):  # whoever listens to it notices, too
+            while True:
+                await self.something.wait()
+                self.something.clear()
+                self.taken.clear()
+                this_round = [*self.notes, *self.newest.values()]
+                self.notes.clear()
+                self.newest.clear()
+                for message in (*this_round, ROUND_ENDS):
+                    await connection.send(message)
+                await self.taken.wait()
 
 
 class Pages:
@@ -112,11 +113,10 @@ class Pages:
             page.something.set()
         self._pages[number] = page
         self._count()
-        sending = asyncio.create_task(self._send(page, connection))
+        sending = asyncio.create_task(page.send(connection))
         try:
-            await self._listen(number, page, connection)
-        except ConnectionClosed:
-            pass
+            with contextlib.suppress(ConnectionClosed):
+                await self._listen(number, page, connection)
         finally:
             sending.cancel()
             del self._pages[number]
@@ -125,12 +125,6 @@ class Pages:
 
     def _count(self) -> None:
         self._changed(sum(page.looks for page in self._pages.values()))
-
-    async def _send(self, page: _Page, connection: ServerConnection) -> None:
-        try:
-            await page.send(connection)
-        except ConnectionClosed:
-            return  # whoever listens to it notices, too
 
     async def _listen(self, number: int, page: _Page, connection: ServerConnection) -> None:
         loop = asyncio.get_running_loop()

@@ -9,11 +9,12 @@ silence for 150 ms, a page that lets go or closes: nobody, and whoever drives ne
 from collections import OrderedDict, deque
 from typing import Final
 
-from common.errors import RemoteProtocolError
+import msgspec
+
 from common.status.codes import Doing
 from operator_side.core import OperatorSide
 from operator_side.viewing.facts import HandsFacts
-from operator_side.viewing.pages.page_messages import PageHands, TuneWish, read_page_message
+from operator_side.viewing.pages.page_messages import PageHands, PageMessage, TuneWish
 
 SILENCE_S: Final = 0.15
 """Without a message for so long a page drives no more, and a stop of it is not pressed any more."""
@@ -58,8 +59,8 @@ class DrivingPage:
         """Take one message of the page of this number; what is invalid is refused whole, and counted."""
         self._expire(now_s)
         try:
-            message = read_page_message(content)
-        except RemoteProtocolError:
+            message = msgspec.convert(content, PageMessage)
+        except msgspec.ValidationError:
             self.rejected += 1
             return
         if message.tune is not None:

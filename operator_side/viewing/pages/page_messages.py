@@ -5,7 +5,6 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from common.errors import RemoteProtocolError
 from common.limits import Share
 
 Deflection = tuple[Annotated[float, Meta(ge=-1.0, le=1.0)], Annotated[float, Meta(ge=-1.0, le=1.0)]]
@@ -65,11 +64,3 @@ class PageMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     hands: PageHands | None = None
     tune: TuneWish | None = None
-
-
-def read_page_message(content: object) -> PageMessage:
-    """Validate what was JSON; RemoteProtocolError, in one line, for what is no message of a page."""
-    try:
-        return msgspec.convert(content, PageMessage)
-    except msgspec.ValidationError as error:
-        raise RemoteProtocolError(f"no valid message of a page: {error}") from error

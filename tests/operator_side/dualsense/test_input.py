@@ -186,8 +186,6 @@ def test_refused_features_are_named(report: bytes, transport: Transport, message
 @pytest.mark.parametrize(
     ("kind", "arguments", "message"),
     [
-        (Firmware, (0, 0, 65536), "update_version = 65536; valid: 0 to 65535"),
-        (Firmware, (0.5, 0, 0), r"hardware_version = 0\.5; valid: a whole number"),
         (Battery, (1.5,), "fraction = 1.5; valid: 0 to 1"),
         (ControllerState, ((1.5, 0.0),), r"left_stick\[0\] = 1.5; valid: -1 to 1"),
         (ControllerState, ((0.0, 0.0), (0.0, float("nan"))), r"right_stick\[1\] = nan"),

@@ -240,7 +240,7 @@ def test_what_pages_say_reaches_whoever_follows_them() -> None:
 
 def test_overlaps_of_the_trigger_with_more_and_ticks_are_read_from_the_newest_scene() -> None:
     figures = SceneFigures()
-    assert figures.figures() is None
+    assert figures.newest is None
     scene = decode_view(state(0.0))
     assert isinstance(scene, SceneState)
     scene = msgspec.structs.replace(scene, overlaps=((0, 1e-6, 2e-6), (3, 0.5e-6, 0.0)), overruns=3, tick_p50_us=60.0)
@@ -251,5 +251,5 @@ def test_overlaps_of_the_trigger_with_more_and_ticks_are_read_from_the_newest_sc
         for payload in (None, shapes(), encode(scene)[:-3], b"", b"scene"):
             if payload is not None:
                 figures.take(payload)
-            assert (found := figures.figures()) is not None
+            assert (found := figures.newest) is not None
             assert msgspec.structs.astuple(found) == pytest.approx(expected)

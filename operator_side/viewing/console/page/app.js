@@ -1,6 +1,7 @@
 // The page: what the console sends, shown as it comes.
 import { Chart } from "./charts.js";
 import { Hands as PageHands } from "./hands.js";
+import { make } from "./make.js";
 import { LinkState, ShownKind, VIEWS } from "./names.js";
 import { Player } from "./player.js";
 import { Clock, View } from "./views.js";
@@ -23,12 +24,7 @@ const FIGURES = {
 const byId = (id) => document.getElementById(id);
 
 for (const [id, title] of Object.entries(FIGURES)) {
-  const place = document.createElement("div");
-  place.append(
-    Object.assign(document.createElement("dt"), { textContent: title }),
-    Object.assign(document.createElement("dd"), { id, textContent: "–" }),
-  );
-  byId("figures").append(place);
+  byId("figures").append(make("div", {}, make("dt", {}, title), make("dd", { id }, "–")));
 }
 
 const clock = new Clock();
@@ -123,8 +119,8 @@ function showFacts(message) {
   showLink(status);
   text("target", status.target ?? "none");
   text("holding", said.holding);
-  const fingers = { l2: message.fingers[0], r2: message.fingers[1] };
-  for (const side of ["l2", "r2"]) triggers[side].show(facts[side], fingers[side], facts.advancing === side.toUpperCase());
+  triggers.l2.show(facts.l2, message.fingers[0], facts.advancing === "L2");
+  triggers.r2.show(facts.r2, message.fingers[1], facts.advancing === "R2");
   charts.delay.add(clock.nowMs, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
   const asked = [["robot", facts.to_robot.asked], ["operator", facts.to_operator.asked]].filter(([, words]) => words);
   charts.delay.said = asked.map(([side, words]) => `asked to the ${side}: ${words}`).join("; ");
@@ -176,7 +172,7 @@ function showScene(scene) {
       const cell = row.insertCell();
       cell.className = kind;
       cell.textContent = kind ? (content ? content.toFixed(0) : "–") : content;
-      if (small) cell.append(" ", Object.assign(document.createElement("small"), { textContent: small }));
+      if (small) cell.append(" ", make("small", {}, small));
     }
     return row;
   });
@@ -187,7 +183,7 @@ function showScene(scene) {
 }
 
 function showNote(note) {
-  const item = Object.assign(document.createElement("li"), { textContent: note });
+  const item = make("li", {}, note);
   byId("notes").append(item);
   while (byId("notes").childElementCount > MOST_NOTES) byId("notes").firstChild.remove();
   item.scrollIntoView({ block: "nearest" });

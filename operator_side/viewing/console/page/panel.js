@@ -1,5 +1,6 @@
 // What the hands' part of the page shows, and what of it can be held.
 import { KEYS, keyWords } from "./inputs.js";
+import { make } from "./make.js";
 import { Doing, Hands, MotionState, SessionState } from "./names.js";
 
 const FULL = "How far a key goes: 1 to 9";
@@ -10,11 +11,6 @@ export class Panel {
   #shown = new Map();
 
   constructor(document, { drive, stop, giveBack }) {
-    const make = (tag, properties = {}, ...content) => {
-      const element = Object.assign(document.createElement(tag), properties);
-      element.append(...content);
-      return element;
-    };
     const place = (name, element) => (this.#places[name] = element);
     const style = make("link", { rel: "stylesheet", href: new URL("hands.css", import.meta.url).href });
     document.head.append(style);

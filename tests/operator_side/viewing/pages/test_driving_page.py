@@ -5,13 +5,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from common.status.codes import Doing
 from operator_side.viewing.pages.driving_page import REST_S, SILENCE_S, DrivingPage
-from operator_side.viewing.pages.page_messages import PageHands, read_page_message
+from operator_side.viewing.pages.page_messages import PageHands, PageMessage
 from tests.operator_side.viewing.pages.talking_page import PERIOD_S, TalkingPage
 
 NO_HANDS: list[object] = [
@@ -194,7 +195,7 @@ def test_hands_count_only_while_fresh_and_after_a_second_of_rest(script: list[tu
                 content = talkers[number].content(**KINDS[kind])
                 said[number].append(content)
                 pages.receive(number, content, now_s)
-                hands = read_page_message(content).hands
+                hands = msgspec.convert(content, PageMessage).hands
                 assert hands is not None
                 heard.append(Heard(now_s, number, hands))
             judge(pages, heard, now_s)
