@@ -18,8 +18,8 @@ from operator_side.settings import OperatorSettings
 from operator_side.stored_travel import StoredTravel
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts_of_core import Surroundings
+from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
-from operator_side.viewing.pages.shared_hands import MovedHands
 from operator_side.viewing.viewing import Viewing
 
 HELPS: Final = {
@@ -41,7 +41,7 @@ class Desk(NamedTuple):
     connection: Connection
     guard: ReleaseGuard | None
     """The watchdog of a real controller"""
-    person: MovedHands | None
+    person: BrowserHands | None
     """The hands that have to be moved in every turn; None for a person's own"""
     pages: DrivingPage
     console: Console | None
@@ -164,10 +164,9 @@ class OperatorTurns:
             self.note(text)
 
     def _surroundings(self, now_s: float) -> Surroundings:
-        hands, doing, has_person = Hands.CONTROLLER, None, False
-        if self._person is not None:
-            hands, doing, has_person = self._person.hands, self._person.doing, self._person.has_person
-        page = self._pages.facts(doing, self._core, now_s, person=has_person)
+        person = self._person
+        page = self._pages.facts(self._core, now_s, person=person is not None and person.has_person)
+        hands = Hands.CONTROLLER if person is None else person.hands
         return Surroundings(hands, self._sending.line.profile.words, page)
 
     def _status(self, now_s: float) -> OperatorStatus:

@@ -14,7 +14,7 @@ from typing import Any, TypeVar, get_type_hints
 import msgspec
 import tyro
 
-from common.command.launch import value_of
+from common.command.flag_value import value_of
 from common.command.stop_signal import STOP_SIGNALS, ignore_broken_output, say_output_failed
 from common.errors import ConfigurationError, FeelaheadError
 from common.files.toml_complaint import explain

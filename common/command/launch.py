@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 from types import FrameType
 
+from common.command.flag_value import value_of
 from common.command.stop_signal import STOP_SIGNALS, LeavingAtOnce, say_output_failed
 
 Command = Callable[[Sequence[str]], int]
@@ -59,17 +60,6 @@ def _summary_path(arguments: Sequence[str]) -> str | None:
     """Find the value of --summary, the last one; nothing that could parse it, or a --config, is imported yet."""
     path = value_of("--summary", arguments)
     return None if path is None or path in ("", "None") or path.startswith("--") else path
-
-
-def value_of(flag: str, arguments: Sequence[str]) -> str | None:
-    """Find the last value of a flag; None without the flag, and "" where the arguments end behind it."""
-    value = None
-    for argument, following in zip(arguments, [*arguments, ""][1:], strict=True):
-        if argument == flag:
-            value = following
-        elif argument.startswith(f"{flag}="):
-            value = argument.removeprefix(f"{flag}=")
-    return value
 
 
 def single_threaded_algebra() -> None:

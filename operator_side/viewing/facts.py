@@ -9,7 +9,7 @@ from typing import Literal
 import msgspec
 
 from common.protocol.messages import Telemetry
-from common.status.codes import Doing, Hands
+from common.status.codes import Hands
 from common.status.statuses import OperatorStatus, RobotStatus
 
 Ten = tuple[int, int, int, int, int, int, int, int, int, int]
@@ -56,8 +56,6 @@ class HandsFacts(msgspec.Struct, frozen=True):
     """The word by which the page that drives calls itself; None while none does"""
     person: bool
     """Whether there is a scripted person who could go on"""
-    doing: Doing | None
-    """None for a real controller"""
     tuning_refused: str
     """Why the last wish to tune was refused; empty where it was not"""
     link_asked: str | None

@@ -107,7 +107,9 @@ class HandsAlone:
             self.state = "stopped"
         screen: Telemetry = msgspec.structs.replace(VIEW, state=self.state)
         self.shared.tick(now_s, screen, 0.0)
-        self.intent = operator_intent(self.shared.read(now_s), AS_GIVEN)
+        state = self.shared.read(now_s)
+        assert state is not None
+        self.intent = operator_intent(state, AS_GIVEN)
         if self.intent.arm:
             self.state = "armed"
         if self.hears:
@@ -117,7 +119,7 @@ class HandsAlone:
         self.pages.driven(now_s)  # first, as it looks whether the page is still there
         nothing_asked = {"asked": "", "mean_ms": None, "p99_ms": None, "newest_ms": None}
         return {
-            "status": _SILENT_STATUS | {"state": self.state},
+            "status": _SILENT_STATUS | {"state": self.state, "person": self.shared.doing},
             "hands": "person" if self.person and not self.pages.driver else "browser",
             "advancing": "R2",
             "may_tune": True,
@@ -128,7 +130,6 @@ class HandsAlone:
                 "may_drive": self.pages.may_drive,
                 "driver": self.pages.driver,
                 "person": self.person,
-                "doing": self.shared.doing,
                 "tuning_refused": "",
                 "link_asked": None,
             },

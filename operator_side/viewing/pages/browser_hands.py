@@ -20,8 +20,8 @@ _GRIPPER: Final = {1: Action.CLOSE_GRIPPER, -1: Action.OPEN_GRIPPER}
 class BrowserHands:
     """Hold-to-run arms, once per press; what moves the arm counts from when it was seen at rest while armed."""
 
-    has_person: Final = False
-    hands: Final = Hands.BROWSER
+    has_person = False
+    """Whether there is a scripted person who could go on."""
 
     def __init__(
         self, pages: DrivingPage, calibrate: Callable[[TravelCalibration], None], *, swap_sides: bool = False
@@ -35,6 +35,11 @@ class BrowserHands:
         self._moves = False
         self._state = ControllerState()
         self._told = RELEASED
+
+    @property
+    def hands(self) -> Hands:
+        """Whose hands they are."""
+        return Hands.BROWSER
 
     @property
     def doing(self) -> Doing:
@@ -73,7 +78,7 @@ class BrowserHands:
         """Nothing that was told holds or shakes; a page only shows it."""
         return self._told.releases
 
-    def read(self, now_s: float) -> ControllerState:
+    def read(self, now_s: float) -> ControllerState | None:
         """The state by the last tick."""
         del now_s
         return self._state

@@ -108,10 +108,10 @@ class DrivingPage:
             wish = self.wishes.popleft()
             core.tune(wish.probability, wish.link, now_s)
 
-    def facts(self, doing: Doing | None, core: OperatorSide, now_s: float, *, person: bool) -> HandsFacts:
-        """Facts for the pages. doing: of the hands at the controller, None for a person's own; person: as in these."""
+    def facts(self, core: OperatorSide, now_s: float, *, person: bool) -> HandsFacts:
+        """Facts for the pages; person: as in these."""
         self._expire(now_s)
-        return HandsFacts(self.may_drive, self.driver, person, doing, core.tuner.why, core.tuner.link)
+        return HandsFacts(self.may_drive, self.driver, person, core.tuner.why, core.tuner.link)
 
     def _take(self, page: int, hands: PageHands, now_s: float) -> None:
         if hands.stop:  # however late it comes

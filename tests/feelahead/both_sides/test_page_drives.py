@@ -121,7 +121,7 @@ def test_the_person_goes_on_from_the_start_once_they_are_told_to() -> None:
     run.run_until(4.9)
     assert state(run) == "armed"
     run.run_until(7.0)
-    assert run.pages.facts(None, run.operator, 7.0, person=False).driver is None
+    assert run.pages.facts(run.operator, 7.0, person=False).driver is None
     assert run.pages.doing is Doing.NOBODY_DRIVES
     assert speed_m_s(run) < 0.002
     run.run_until(17.0)

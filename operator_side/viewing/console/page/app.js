@@ -44,7 +44,7 @@ let facts = null;
 let drawn = true;
 const frame = document.querySelector("#scene iframe");
 const slow = drawsSlowly();
-let run = { title: "", live: true, tunable: [] };
+let run = { title: "", live: true };
 
 const send = (object) => {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(object));

@@ -84,7 +84,7 @@ export class Hands {
 
   // Armed by the operator side's own hands, which may know it later than the status line.
   get #moves() {
-    return this.#armed && this.#hands?.doing === Doing.RUNNING;
+    return this.#armed && this.#facts.status.person === Doing.RUNNING;
   }
 
   #keyDown(event) {
@@ -207,7 +207,7 @@ export class Hands {
   #follow(hands, allUp, nowMs) {
     if (this.#state === "resting") {
       this.#upSinceMs = allUp ? this.#upSinceMs ?? nowMs : null;
-      const agreed = this.#hands?.driver === this.#page && this.#hands.doing === Doing.READY;
+      const agreed = this.#hands?.driver === this.#page && this.#facts.status.person === Doing.READY;
       if (allUp && agreed && nowMs - this.#upSinceMs >= REST_MS) this.#enter("ready", "");
     } else if (this.#state === "ready" && !allUp) {
       if (hands.run && !this.#stops) this.#enter("running", "");
@@ -225,7 +225,7 @@ export class Hands {
     if (!known.may_drive) this.#end("A real controller drives.");
     else if (known.driver !== null && known.driver !== this.#page && nowMs - this.#drivingSinceMs > AGREES_MS)
       this.#end("Another page drives.");
-    else if (known.doing === Doing.ALL_KEYS_UP_FIRST && this.#state !== "resting" && nowMs - this.#sinceMs > AGREES_MS) {
+    else if (this.#facts.status.person === Doing.ALL_KEYS_UP_FIRST && this.#state !== "resting" && nowMs - this.#sinceMs > AGREES_MS) {
       this.#enter("resting", this.#armed ? "" : "The arm was disarmed or stopped.");
     }
   }

@@ -99,7 +99,7 @@ export class Panel {
       watching: [why, taken, cannot || (taken ? "" : "You are watching.")].filter(Boolean).join(" "),
       resting: [why, "All keys up for a second."].filter(Boolean).join(" "),
       ready: "Ready: hold Space to arm and run.",
-      running: moves ? "You drive." : hands?.doing === Doing.AT_REST_FIRST ? "Let go of all but hold-to-run." : "Arming: keep holding.",
+      running: moves ? "You drive." : facts?.status.person === Doing.AT_REST_FIRST ? "Let go of all but hold-to-run." : "Arming: keep holding.",
     }[state]);
     this.#text("rest", state === "resting" ? `still ${(restMs / 1000).toFixed(1)} s` : "");
     this.#text("level", state === "watching" ? "" : `${FULL}; now ${level}`);
