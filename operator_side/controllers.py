@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 from operator_side.controller.background_writes import BackgroundWrites
 from operator_side.controller.port import OpenController
-from operator_side.controller.search import BackgroundSearch, Ready, Search
+from operator_side.controller.search import BackgroundSearch, Ready
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.device import HidBackend, load_backend
 from operator_side.dualsense.hid.finding import Finder
@@ -34,7 +34,7 @@ class Given(NamedTuple):
 class Opening(NamedTuple):
     """How the controller is found, and what else it takes."""
 
-    search: Search
+    search: BackgroundSearch
     guard: ReleaseGuard | None = None
     """Releases it should we be killed; its context is still to be opened"""
     hands: BrowserHands | None = None

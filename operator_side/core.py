@@ -6,6 +6,7 @@ controller's states ─▶ read_state ─▶ newest intent ─▶ motion ─▶ 
 view payloads ─▶ receive_view ─▶ screen
 """
 
+import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -102,13 +103,12 @@ class OperatorSide:
     def receive(self, payload: bytes, now_s: float) -> None:
         """Take one control payload from the robot side."""
         self._hear("received", payload, now_s)
-        try:
-            message = decode(payload)
-        except RemoteProtocolError as error:
-            self.rejected += 1
-            if isinstance(error, OtherVersionError):
+        message = None
+        with contextlib.suppress(RemoteProtocolError):
+            try:
+                message = decode(payload)
+            except OtherVersionError as error:
                 self._standing.other_version = str(error)
-            return
         if not isinstance(message, Hello | LeaseNotice | LinkReport | StiffnessUpdate):
             self.rejected += 1
             return
@@ -147,11 +147,9 @@ class OperatorSide:
     def receive_view(self, payload: bytes, now_s: float) -> None:
         """Take one view payload; only the newest of the robot's present epoch is kept."""
         self._hear("seen", payload, now_s)
-        try:
+        message = None
+        with contextlib.suppress(RemoteProtocolError):
             message = decode(payload)
-        except RemoteProtocolError:
-            self.rejected += 1
-            return
         if not isinstance(message, Telemetry):
             self.rejected += 1
             return

@@ -9,7 +9,7 @@ from common.errors import DeviceError, NoDeviceError, NoDriverError
 from common.status.codes import ConnectionState
 from operator_side.controller.feel import Feel
 from operator_side.controller.port import OpenController
-from operator_side.controller.search import Search
+from operator_side.controller.search import BackgroundSearch
 from operator_side.controller.state import ControllerState
 
 BEAT_PERIOD_S: Final = 0.05
@@ -50,7 +50,7 @@ class Guard(Protocol):
 class Connection:
     """One controller at a time. None of its methods waits, and none raises DeviceError but `update` (NoDriverError)."""
 
-    def __init__(self, search: Search, listener: Listener, guard: Guard | None = None) -> None:
+    def __init__(self, search: BackgroundSearch, listener: Listener, guard: Guard | None = None) -> None:
         self.state = ConnectionState.ABSENT
         self.found = 0
         """Number of times that a controller was found."""

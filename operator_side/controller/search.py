@@ -3,33 +3,18 @@
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, wait
-from typing import Protocol
 
 from common.errors import DeviceError
 from operator_side.controller.port import OpenController
 
 _CLOSE_TIMEOUT_S = 0.3
 
-
-class Search(Protocol):
-    """One look at a time."""
-
-    def begin(self, preferred: str | None) -> None:
-        """Start to look, for the controller of this address first, unless a look goes on."""
-
-    def take(self) -> OpenController | DeviceError | None:
-        """The controller, or why there is none; None while a look goes on."""
-
-    def close(self) -> None:
-        """Give up; what is found from now on is let go."""
-
-
 Find = Callable[[str | None], OpenController]
 """Find and open a controller, that of the given address first; DeviceError says why there is none."""
 
 
 class BackgroundSearch:
-    """Each look in a thread of its own, because a controller on Bluetooth may take its time to answer."""
+    """One look at a time, in a thread of its own: a controller on Bluetooth may take its time to answer."""
 
     def __init__(self, find: Find) -> None:
         self._find = find
@@ -37,7 +22,7 @@ class BackgroundSearch:
         self._closed = False
 
     def begin(self, preferred: str | None) -> None:
-        """Start to look, unless a look goes on."""
+        """Start to look, for the controller of this address first, unless a look goes on."""
         if self._look is None and not self._closed:
             self._look = Future()
             # A daemon: a controller that never answers must not keep the process from ending.
@@ -72,20 +57,13 @@ def _let_go(look: "Future[OpenController]") -> None:
         look.result().device.close()
 
 
-class Ready:
+class Ready(BackgroundSearch):
     """A search that finds what is there already: a simulated controller."""
 
     def __init__(self, controller: OpenController) -> None:
-        self._controller: OpenController | None = controller
+        super().__init__(lambda _: controller)
+        self._look = Future()
+        self._look.set_result(controller)
 
     def begin(self, preferred: str | None) -> None:
         """There is nothing to look for."""
-        del preferred
-
-    def take(self) -> OpenController | None:
-        """The controller, once."""
-        controller, self._controller = self._controller, None
-        return controller
-
-    def close(self) -> None:
-        """There is nothing to give up."""

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-from collections import deque
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -47,7 +46,6 @@ class _Page:
 
     def __init__(self) -> None:
         self.newest: dict[str, bytes | str] = {}
-        self.notes: deque[str] = deque(maxlen=_MOST_NOTES)
         self.something = asyncio.Event()
         self.taken = asyncio.Event()
         self.slow = False
@@ -59,10 +57,8 @@ class _Page:
                 await self.something.wait()
                 self.something.clear()
                 self.taken.clear()
-                this_round = [*self.notes, *self.newest.values()]
-                self.notes.clear()
-                self.newest.clear()
-                for message in (*this_round, ROUND_ENDS):
+                this_round, self.newest = self.newest, {}
+                for message in (*this_round.values(), ROUND_ENDS):
                     await connection.send(message)
                 await self.taken.wait()
 
@@ -77,7 +73,7 @@ class Pages:
         self._pages: dict[int, _Page] = {}
         self._number = 0
         self._lasting: dict[str, bytes | str] = {}
-        self._notes: deque[str] = deque(maxlen=_MOST_NOTES)
+        self._noted = 0
 
     @property
     def slow(self) -> bool:
@@ -87,6 +83,7 @@ class Pages:
     def show(self, kind: str, message: bytes | str, *, lasting: bool = False) -> None:
         """Send this, text or bytes, instead of what of this kind has not left yet; `lasting`: to later pages, too."""
         if lasting:
+            self._lasting.pop(kind, None)  # the newest comes last
             self._lasting[kind] = message
         for page in self._pages.values():
             if page.looks or lasting:
@@ -95,10 +92,8 @@ class Pages:
 
     def note(self, message: str) -> None:
         """Send this to every page, and to later ones."""
-        self._notes.append(message)
-        for page in self._pages.values():
-            page.notes.append(message)
-            page.something.set()
+        self._noted += 1
+        self.show(f"{ShownKind.NOTE} {self._noted % _MOST_NOTES}", message, lasting=True)
 
     async def serve(self, connection: ServerConnection) -> None:
         """One page, until it goes."""
@@ -108,8 +103,7 @@ class Pages:
         self._number += 1
         number, page = self._number, _Page()
         page.newest.update(self._lasting)
-        page.notes.extend(self._notes)
-        if page.newest or page.notes:
+        if page.newest:
             page.something.set()
         self._pages[number] = page
         self._count()

@@ -6,7 +6,7 @@ nobody ─▶ resting ─▶ ready ─▶ running         of the page that drive
 silence for 150 ms, a page that lets go or closes: nobody, and whoever drives next rests first
 """
 
-from collections import OrderedDict, deque
+from collections import deque
 from typing import Final
 
 import msgspec
@@ -20,7 +20,6 @@ SILENCE_S: Final = 0.15
 """Without a message for so long a page drives no more, and a stop of it is not pressed any more."""
 REST_S: Final = 1.0
 """All keys are up for so long before hold-to-run counts."""
-_MOST_PAGES: Final = 64
 _MOST_WISHES: Final = 16
 """From one turn to the next."""
 
@@ -37,7 +36,8 @@ class DrivingPage:
         """Messages that others of the same page had overtaken; only a stop in them counts."""
         self.silences = 0
         """How often a page that drove was silent for too long"""
-        self._numbers: OrderedDict[int, int] = OrderedDict()
+        self._numbers: dict[int, int] = {}
+        """The newest message of each open page"""
         self._refused: set[int] = set()
         self._driver: int | None = None
         self._newest: PageHands | None = None
@@ -71,6 +71,7 @@ class DrivingPage:
     def close(self, page: int, now_s: float) -> None:
         """The page is gone."""
         self._expire(now_s)
+        self._numbers.pop(page, None)
         for gone in (self._refused, self._giving_back):
             gone.discard(page)
         if page == self._driver:
@@ -121,9 +122,6 @@ class DrivingPage:
             self.stale += 1
             return
         self._numbers[page] = hands.number
-        self._numbers.move_to_end(page)
-        while len(self._numbers) > _MOST_PAGES:
-            self._numbers.popitem(last=False)
         self._choose(page, hands)
         if page == self._driver:
             self._newest, self._heard_s = hands, now_s

@@ -33,7 +33,6 @@ from tests.helpers.felt import feedback
 
 TRANSPORTS = pytest.mark.parametrize("transport", Transport)
 FORCES = st.floats(0.0, 10.0)
-STEPS = st.floats(0.0, 1.0)
 STRENGTHS = st.tuples(*[st.integers(0, 8)] * 10)
 STIFF = Feel(l2=feedback(3, 6), r2=feedback(0, 8))
 NAN, INF = float("nan"), float("inf")
@@ -61,19 +60,6 @@ def test_forces_balance_at_the_equilibrium(force_n: float, strengths: tuple[int,
         assert max(resistance_n(travel, strengths[zone]) for zone in beside) >= force_n - 1e-9
 
 
-@given(FORCES, FORCES, STRENGTHS, STRENGTHS, STEPS, STEPS)
-def test_more_force_goes_farther_and_more_resistance_less_far(
-    one_n: float, other_n: float, some: tuple[int, ...], others: tuple[int, ...], one: float, other: float
-) -> None:
-    (weak_n, strong_n), (light, heavy) = sorted((one_n, other_n)), sorted((one, other))
-    less, more = tuple(map(min, some, others)), tuple(map(max, some, others))
-    assert equilibrium_travel(weak_n, more, heavy) <= equilibrium_travel(strong_n, less, light)
-    # Half the strengths are half the step.
-    halved = tuple(strength / 2 for strength in some)
-    expected = equilibrium_travel(one_n, halved, one)
-    assert equilibrium_travel(one_n, some, one / 2) == pytest.approx(expected, abs=1e-12)
-
-
 def test_a_normal_pull_is_full_when_free_overcomes_the_strongest_and_rests_at_an_edge() -> None:
     assert equilibrium_travel(NORMAL_FINGER_FORCE_N, (0,) * 10) >= SENSED_TRAVEL
     assert 0.25 <= equilibrium_travel(NORMAL_FINGER_FORCE_N, (8,) * 10) <= 0.6 * SENSED_TRAVEL
@@ -89,18 +75,6 @@ def test_relaxation_has_the_stated_time_constant() -> None:
     assert trigger.travel == pytest.approx(goal * (1.0 - math.exp(-1.0)), abs=1e-12)
     trigger.advance(1e6)
     assert trigger.travel == pytest.approx(goal)
-
-
-@pytest.mark.parametrize("strongest_n", [0.0, 1.5, 8 * STRENGTH_STEP_N, 3.0])
-def test_the_strongest_effect_is_eight_steps(strongest_n: float) -> None:
-    trigger = SimulatedTrigger(strongest_n / 8)
-    trigger.set_strengths(feedback(0, 8))
-    trigger.set_finger_force(4.0)
-    trigger.advance(2.0)
-    assert trigger.travel == pytest.approx((4.0 - SPRING_PRELOAD_N - strongest_n) / SPRING_RISE_N, abs=1e-9)
-    trigger.set_strengths(FREE_TRIGGER)
-    trigger.advance(2.0)
-    assert trigger.travel == pytest.approx((4.0 - SPRING_PRELOAD_N) / SPRING_RISE_N, abs=1e-9)
 
 
 # Reports in time

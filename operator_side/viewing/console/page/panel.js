@@ -12,8 +12,6 @@ export class Panel {
 
   constructor(document, { drive, stop, giveBack }) {
     const place = (name, element) => (this.#places[name] = element);
-    const style = make("link", { rel: "stylesheet", href: new URL("hands.css", import.meta.url).href });
-    document.head.append(style);
     this.#section = document.getElementById("hands");
     const stopButton = place("stop", make("button", { type: "button", id: "stop", title: "Esc" }, "Emergency stop (Esc)"));
     stopButton.addEventListener("pointerdown", () => stop(true));
