@@ -70,10 +70,8 @@ class Fingers:
         for free, pressed_n in zip(self._free, self._forces_n, strict=True):
             free.set_finger_force(pressed_n)
         # A hand learns where a stick begins to act.
-        if self._swap_sides:
-            self._device.set_sticks(right=self._calibration.right_stick.raw(stick))
-        else:
-            self._device.set_sticks(left=self._calibration.left_stick.raw(stick))
+        side = "right" if self._swap_sides else "left"
+        self._device.set_sticks(**{side: getattr(self._calibration, f"{side}_stick").raw(stick)})
         run = button_of(swap_sides=self._swap_sides)[Action.RUN]
         self._device.set_buttons(frozenset({run, *buttons}))
 

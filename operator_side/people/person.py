@@ -175,19 +175,14 @@ class SimulatedOperator:
         # Off the line a person slows down; far off, they centre first.
         eagerness = max(0.0, 1.0 - off_m / (3 * self._ALIGNED_M))
         if self._settings.aiming == "move-and-wait":
-            self._go(self._single_move(across, depth_m if eagerness > 0.0 else 0.0, look))
+            if self._moves.free(look.now_s, look.lag_s):
+                by_m = (across[0], across[1], depth_m if eagerness > 0.0 else 0.0)
+                across_m_s = GENTLY_M_S if self._gently_across else _PEAK_ACROSS_M_S
+                self._moves.begin(look.now_s, by_m, across_m_s, GENTLY_M_S if self._gently_along else _PEAK_M_S)
+            self._go(self._moves.velocity_m_s(look.now_s))
             return
         x, y = (look.gain * component for component in across)
         self._go((x, y, eagerness * look.gain * depth_m))
-
-    def _single_move(self, across_m: tuple[float, ...], depth_m: float, look: Glance) -> Vector3:
-        """The velocity of the present move; the next one is planned once the last one's outcome is seen."""
-        if self._moves.free(look.now_s, look.lag_s):
-            x, y = across_m
-            across_m_s = GENTLY_M_S if self._gently_across else _PEAK_ACROSS_M_S
-            along_m_s = GENTLY_M_S if self._gently_along else _PEAK_M_S
-            self._moves.begin(look.now_s, (x, y, depth_m), across_m_s, along_m_s)
-        return self._moves.velocity_m_s(look.now_s)
 
     def _grasping(self, look: Glance) -> None:
         self._fingers.do(0.0, _REST, {Button.CROSS})

@@ -83,17 +83,12 @@ class HeldCommand:
         """
         pressed = (*_PRESSED(intent), intent.gripper, token)
         moved = (intent.l2, intent.r2, *intent.lateral, *intent.turning)
-        changed = pressed != self._pressed
-        if not (self._full_rate or changed or self._differs(moved) or now_s - self._sent_s > _LATEST_S):
+        changed, rests = pressed != self._pressed, moved != self._moved and not any(moved)
+        at_once = self._full_rate or changed or rests or now_s - self._sent_s > _LATEST_S
+        if not at_once and all(abs(now - held) <= _NOTICED for now, held in zip(moved, self._moved, strict=True)):
             return None
-        rests = moved != self._moved and not any(moved)
         self._pressed, self._moved, self._sent_s = pressed, moved, now_s
         return ToRobot(b"", everywhere=changed or rests or intent.emergency_stop)
-
-    def _differs(self, moved: tuple[float, ...]) -> bool:
-        if moved != self._moved and not any(moved):
-            return True
-        return any(abs(now - held) > _NOTICED for now, held in zip(moved, self._moved, strict=True))
 
 
 class Commands:

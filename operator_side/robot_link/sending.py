@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from common.emulation.delay_line import BitFlip, DelayLine, link_summary
+from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import LinkSpec
 from common.emulation.tuned import tuned_link
 from common.rate.budget import Budget
@@ -12,17 +12,15 @@ from common.sockets.operator import OperatorSockets
 from operator_side.robot_link.commanding import ToRobot
 
 
-def _corrupted(message: ToRobot, flip: BitFlip) -> ToRobot:
-    return message._replace(payload=flip(message.payload))
-
-
 class Sending:
     """Everything leaves at once: commands are few, and nothing here can give way to them."""
 
     def __init__(self, link: LinkSpec, sockets: OperatorSockets) -> None:
         self._link = link
         self._sockets = sockets
-        self.line: DelayLine[ToRobot] = DelayLine(link.profile("to_robot"), corrupt=_corrupted)
+        self.line: DelayLine[ToRobot] = DelayLine(
+            link.profile("to_robot"), corrupt=lambda message, flip: message._replace(payload=flip(message.payload))
+        )
         self._budget: Budget[str] = Budget()
 
     def push(self, messages: Iterable[ToRobot], now_s: float) -> None:

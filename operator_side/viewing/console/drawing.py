@@ -199,17 +199,14 @@ class Drawing:
             if self._label is not None:
                 self._label.visible = False
             return
-        text, position = f"target: {shapes.objects[targets[0]]}", self._place_of(int(targets[0]))
+        index, text = int(targets[0]), f"target: {shapes.objects[targets[0]]}"
+        # The middle of its first shape: its own frame may be anywhere.
+        pose = next((shape.pose for shape in shapes.shapes if shape.owner == index and not shape.of_robot), _STILL)
+        position = compose(self._objects[index : index + 1], np.array([pose]))[0, :3]
         if self._label is None:
             self._label = self._server.scene.add_label("/target", text, position=position, anchor="bottom-center")
         elif self._label.text != text or not np.array_equal(self._label.position, position):
             self._label.text, self._label.position, self._label.visible = text, position, True
-
-    def _place_of(self, index: int) -> Floats:
-        """The middle (3,) of an object's first shape: its own frame may be anywhere."""
-        shapes = () if self._shapes is None else self._shapes.shapes
-        pose = next((shape.pose for shape in shapes if shape.owner == index and not shape.of_robot), _STILL)
-        return compose(self._objects[index : index + 1], np.array([pose]))[0, :3]
 
 
 def _colors(roles: NDArray[np.uint8], state: SceneState) -> NDArray[np.uint8]:
