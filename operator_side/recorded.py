@@ -20,8 +20,6 @@ from operator_side.settings import OperatorSettings
 
 _HAPTICS: Final = text(b"haptics")
 _NOBODY: Final = text(b"")
-
-
 _KINDS: Final[dict[Input, Kind]] = {
     "received": Kind.RECEIVED,
     "seen": Kind.SEEN,

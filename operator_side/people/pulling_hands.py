@@ -88,7 +88,9 @@ class PullingHands:
             case "grip":
                 self._act(Hands(), Action.CLOSE_GRIPPER)
             case "pull":
-                self._follow_pull(now_s)
+                self.pull_began_s = now_s if self.pull_began_s is None else self.pull_began_s
+                hands = self._pull(now_s - self.pull_began_s)
+                self._act(hands, Action.CLOSE_GRIPPER if self._grips else None)
 
     def _choose_phase(self, now_s: float, for_s: float, screen: Telemetry) -> None:
         if self.phase == "rest" and for_s > _REST_S:
@@ -104,12 +106,6 @@ class PullingHands:
 
     def _enter(self, phase: Phase, now_s: float) -> None:
         self.phase, self._since_s = phase, now_s
-
-    def _follow_pull(self, now_s: float) -> None:
-        if self.pull_began_s is None:
-            self.pull_began_s = now_s
-        hands = self._pull(now_s - self.pull_began_s)
-        self._act(hands, Action.CLOSE_GRIPPER if self._grips else None)
 
     def _act(self, hands: Hands, action: Action | None = None) -> None:
         self._device.set_finger_force(hands.l2_n, hands.r2_n)

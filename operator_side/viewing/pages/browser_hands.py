@@ -93,8 +93,8 @@ class BrowserHands:
         self._told = self._told.farewell
 
     def _held(self, hands: PageHands, pressed: set[Action]) -> ControllerState:
-        chosen = {Action.NEXT_TARGET: hands.next_target, Action.HAND_OVER: hands.hand_over}
-        pressed |= {action for action, is_pressed in chosen.items() if is_pressed}
+        pressed |= {Action.NEXT_TARGET} if hands.next_target else set()
+        pressed |= {Action.HAND_OVER} if hands.hand_over else set()
         if self._moves and hands.gripper in _GRIPPER:
             pressed.add(_GRIPPER[hands.gripper])
         button = button_of(swap_sides=self._swap_sides)
