@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 from operator_side.controller.background_writes import BackgroundWrites
 from operator_side.controller.port import OpenController
-from operator_side.controller.search import BackgroundSearch, Ready, Search
+from operator_side.controller.search import BackgroundSearch, Ready
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.device import HidBackend, load_backend
 from operator_side.dualsense.hid.finding import Finder
@@ -18,7 +18,7 @@ from operator_side.people.whoever import whoever
 from operator_side.settings import DeviceName, OperatorSettings
 from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
-from operator_side.viewing.pages.shared_hands import MovedHands, SharedHands
+from operator_side.viewing.pages.shared_hands import SharedHands
 
 
 class Given(NamedTuple):
@@ -34,10 +34,10 @@ class Given(NamedTuple):
 class Opening(NamedTuple):
     """How the controller is found, and what else it takes."""
 
-    search: Search
+    search: BackgroundSearch
     guard: ReleaseGuard | None = None
     """Releases it should we be killed; its context is still to be opened"""
-    hands: MovedHands | None = None
+    hands: BrowserHands | None = None
     """Those on it that have to be moved in every turn; None for a person's own"""
 
 
@@ -62,12 +62,10 @@ def _evdev(given: Given) -> Opening:
 
 
 def _simulated(given: Given) -> Opening:
-    settings, device = given.settings, SimulatedDualSense()
+    settings, device, core = given.settings, SimulatedDualSense(), given.core
     calibration, swap_sides = settings.calibration, settings.swap_sides
     person = functools.partial(whoever, device, settings.person, settings.seed, calibration, swap_sides=swap_sides)
-    page = BrowserHands(given.pages, given.core.calibrate, swap_sides=swap_sides)
-    calibrate = functools.partial(given.core.calibrate, calibration)
-    shared = SharedHands(given.pages, page, device, person, device.hands_off, calibrate)
+    shared = SharedHands(given.pages, core.calibrate, device, calibration, person, swap_sides=swap_sides)
     return Opening(Ready(OpenController(shared, "simulated DualSense")), hands=shared)
 
 

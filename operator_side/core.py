@@ -6,6 +6,7 @@ controller's states ─▶ read_state ─▶ newest intent ─▶ motion ─▶ 
 view payloads ─▶ receive_view ─▶ screen
 """
 
+import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -28,9 +29,8 @@ from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.intent import OperatorIntent
 from operator_side.hands.newest import Hands
 from operator_side.hands.travel_calibration import TravelCalibration
-from operator_side.robot_link.commanding import STOPPING, ToRobot
-from operator_side.robot_link.commands import HEARTBEAT_PERIOD_S, Commands
-from operator_side.robot_link.newest import STIFFNESS_EXPIRES_S, NewestStiffness, NewestView
+from operator_side.robot_link.commanding import HEARTBEAT_PERIOD_S, STOPPING, Commands, ToRobot
+from operator_side.robot_link.newest import STIFFNESS_EXPIRES_S, NewestStiffness, overtakes
 from operator_side.robot_link.standing import Standing
 from operator_side.robot_link.tuner import Tuner
 
@@ -66,7 +66,9 @@ class OperatorSide:
         """listeners: hear what happens."""
         self.settings = settings = settings or CoreSettings()
         self.link = LinkEnd("operator", epoch, clock_domain, settings.seed, settings.asymmetry_s)
-        self.felt, self.view = NewestStiffness(settings.seed), NewestView()
+        self.felt = NewestStiffness(settings.seed)
+        self.screen: Telemetry | None = None
+        """The newest view of the robot; None before the first."""
         self.hands = Hands(settings.calibration, swap_sides=settings.swap_sides)
         self.haptics = Haptics(
             settings.rendering,
@@ -98,21 +100,15 @@ class OperatorSide:
         """The newest stiffness; None before the first and once it has expired."""
         return self.felt.update
 
-    @property
-    def screen(self) -> Telemetry | None:
-        """The newest view of the robot; None before the first."""
-        return self.view.telemetry
-
     def receive(self, payload: bytes, now_s: float) -> None:
         """Take one control payload from the robot side."""
         self._hear("received", payload, now_s)
-        try:
-            message = decode(payload)
-        except RemoteProtocolError as error:
-            self.rejected += 1
-            if isinstance(error, OtherVersionError):
+        message = None
+        with contextlib.suppress(RemoteProtocolError):
+            try:
+                message = decode(payload)
+            except OtherVersionError as error:
                 self._standing.other_version = str(error)
-            return
         if not isinstance(message, Hello | LeaseNotice | LinkReport | StiffnessUpdate):
             self.rejected += 1
             return
@@ -151,16 +147,15 @@ class OperatorSide:
     def receive_view(self, payload: bytes, now_s: float) -> None:
         """Take one view payload; only the newest of the robot's present epoch is kept."""
         self._hear("seen", payload, now_s)
-        try:
+        message = None
+        with contextlib.suppress(RemoteProtocolError):
             message = decode(payload)
-        except RemoteProtocolError:
-            self.rejected += 1
-            return
         if not isinstance(message, Telemetry):
             self.rejected += 1
             return
-        if message.header.epoch == self.link.peer_epoch:
-            self.view.take(message)
+        known = None if self.screen is None else self.screen.header
+        if message.header.epoch == self.link.peer_epoch and overtakes(message.header, known):
+            self.screen = message
 
     def read_state(self, state: ControllerState, now_s: float) -> None:
         """Take one state of the controller."""
@@ -206,7 +201,7 @@ class OperatorSide:
         messages: list[ToRobot] = []
         lease, intent = self.lease, self._meant(now_s)
         if intent is None or lease is None:
-            self.commands.forget()
+            self.commands.held.forget()
             self.haptics.silent(now_s, owns=self._standing.owns)
         elif (due := self.commands.due(intent, lease.token, now_s)) is not None:
             message, command = due

@@ -20,8 +20,6 @@ from operator_side.settings import OperatorSettings
 
 _HAPTICS: Final = text(b"haptics")
 _NOBODY: Final = text(b"")
-
-
 _KINDS: Final[dict[Input, Kind]] = {
     "received": Kind.RECEIVED,
     "seen": Kind.SEEN,
@@ -72,15 +70,12 @@ class OperatorEncoder:
             asked = entry(kind, now_s)
             told = b"" if content is None else entry(Kind.TOLD, now_s, msgspec.msgpack.encode(content))
             return now_s, asked + told
-        if kind == Kind.HANDS:
-            return now_s, entry(kind, now_s, msgspec.msgpack.encode(content))
-        if kind == Kind.RECEIVED:
-            return now_s, entry(kind, now_s, _NOBODY, content)
         if kind == Kind.SEEN:
             views(now_s, content)
-            # A longer one is no message that the core heeds, but a picture.
-            return now_s, entry(kind, now_s, content) if len(content) <= MAXIMUM_BYTES else b""
-        return now_s, entry(kind, now_s, content)
+            if len(content) > MAXIMUM_BYTES:  # no message that the core heeds, but a picture
+                return now_s, b""
+        sender = [_NOBODY] if kind == Kind.RECEIVED else []
+        return now_s, entry(kind, now_s, *sender, msgspec.msgpack.encode(content) if kind == Kind.HANDS else content)
 
 
 def build_recorded(settings: OperatorSettings, epoch: int, recording: SideRecording | None) -> OperatorSide:

@@ -18,9 +18,8 @@ from operator_side.settings import OperatorSettings
 from operator_side.stored_travel import StoredTravel
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts_of_core import Surroundings
-from operator_side.viewing.following_pages import follow_pages, hands_facts
+from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
-from operator_side.viewing.pages.shared_hands import MovedHands
 from operator_side.viewing.viewing import Viewing
 
 HELPS: Final = {
@@ -42,7 +41,7 @@ class Desk(NamedTuple):
     connection: Connection
     guard: ReleaseGuard | None
     """The watchdog of a real controller"""
-    person: MovedHands | None
+    person: BrowserHands | None
     """The hands that have to be moved in every turn; None for a person's own"""
     pages: DrivingPage
     console: Console | None
@@ -67,19 +66,14 @@ class OperatorTurns:
         self._sending = Sending(settings.link_spec(), sockets)
         self._viewing = Viewing(
             core,
-            lambda now_s: Surroundings(
-                Hands.CONTROLLER if self._person is None else self._person.hands,
-                self._sending.asked,
-                settings.swap_sides,
-                hands_facts(self._pages, self._person, core, now_s),
-            ),
+            self._surroundings,
             *(process.status, self._pages, console, process.recording),
         )
         self._travel = StoredTravel(self._connection, core, self._viewing.note) if stored_travel else None
         timed = process.loop.stages.timed
         self._take, self._feel = timed("messages", self._take_in), timed("feeling", self._tell_controller)
         self.turn = timed("hands", self._move)
-        self.wait, self.next_due, self.note = sockets.wait, self._sending.next_due, self._viewing.note
+        self.wait, self.next_due, self.note = sockets.wait, self._sending.line.next_due, self._viewing.note
         self._guard_s = 0.0
 
     @property
@@ -100,7 +94,7 @@ class OperatorTurns:
     def send(self) -> None:
         """Let go of what is due."""
         if not self._sending.send(self._process.loop.clock.now()):
-            self._core.commands.forget()
+            self._core.commands.held.forget()
 
     def rest(self, now_s: float, turned_s: float) -> None:
         """Record, look after the watchdog, and show."""
@@ -150,7 +144,7 @@ class OperatorTurns:
 
     def _move(self, now_s: float) -> None:
         core, connection = self._core, self._connection
-        follow_pages(self._pages, core, now_s)
+        self._pages.follow(core, now_s)
         # Before anything else is sent: the wish arrives after all that took the old way.
         if (words := core.tuner.take_link()) is not None:
             self._sending.tune(words)
@@ -168,6 +162,12 @@ class OperatorTurns:
     def _say_what_is_new(self) -> None:
         for text in self._connection.take_notes():
             self.note(text)
+
+    def _surroundings(self, now_s: float) -> Surroundings:
+        person = self._person
+        page = self._pages.facts(self._core, now_s, person=person is not None and person.has_person)
+        hands = Hands.CONTROLLER if person is None else person.hands
+        return Surroundings(hands, self._sending.line.profile.words, page)
 
     def _status(self, now_s: float) -> OperatorStatus:
         """The core's status with what the process knows."""

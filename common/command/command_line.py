@@ -14,6 +14,7 @@ from typing import Any, TypeVar, get_type_hints
 import msgspec
 import tyro
 
+from common.command.flag_value import value_of
 from common.command.stop_signal import STOP_SIGNALS, ignore_broken_output, say_output_failed
 from common.errors import ConfigurationError, FeelaheadError
 from common.files.toml_complaint import explain
@@ -129,14 +130,8 @@ def _from_toml(kind: type, value: object) -> object:
 
 def _config_path(arguments: Sequence[str]) -> str | None:
     """The value of --config, read before the flags because it provides their defaults."""
-    path = None
-    for position, argument in enumerate(arguments):
-        if argument == "--config":
-            if position + 1 == len(arguments):
-                raise ConfigurationError("--config: no file given; valid: the path of a TOML file")
-            path = arguments[position + 1]
-        elif argument.startswith("--config="):
-            path = argument.removeprefix("--config=")
+    if (path := value_of("--config", arguments)) == "":
+        raise ConfigurationError("--config: no file given; valid: the path of a TOML file")
     return path
 
 

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 from types import FrameType
 
+from common.command.flag_value import value_of
 from common.command.stop_signal import STOP_SIGNALS, LeavingAtOnce, say_output_failed
 
 Command = Callable[[Sequence[str]], int]
@@ -57,12 +58,7 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
 
 def _summary_path(arguments: Sequence[str]) -> str | None:
     """Find the value of --summary, the last one; nothing that could parse it, or a --config, is imported yet."""
-    path = None
-    for argument, following in zip(arguments, [*arguments, ""][1:], strict=True):
-        if argument.startswith("--summary="):
-            path = argument.removeprefix("--summary=")
-        elif argument == "--summary":
-            path = following
+    path = value_of("--summary", arguments)
     return None if path is None or path in ("", "None") or path.startswith("--") else path
 
 

@@ -2,7 +2,8 @@
 
 from rich.cells import cell_len
 
-from common.command.live_view import SLOW, LiveView
+from common.command.live_view import SLOW, LiveView, number
+from common.status.codes import LinkState
 
 _BETWEEN = "  "
 UNKNOWN = "–"
@@ -32,14 +33,12 @@ def live_line(view: LiveView, width: int) -> str:
     return _BETWEEN.join(fact[1] for fact in facts if fact in kept)
 
 
-def millimetres(value_mm: float | None, space: str = " ", digits: int = 0) -> str:
+def millimetres(value_mm: float | None, space: str = " ") -> str:
     """A distance, in metres from one metre on; nothing is nearer than 0."""
-    if value_mm is None:
-        return f"{UNKNOWN:>{digits}}{space}mm"
-    value_mm = max(0.0, value_mm)
-    if round(value_mm) >= 1000:
-        return f"{value_mm / 1000.0:.1f}{space}m"
-    return f"{value_mm:{digits}.0f}{space}mm"
+    if (known_mm := number(value_mm)) is None:
+        return f"{UNKNOWN}{space}mm"
+    known_mm = max(0.0, known_mm)
+    return f"{known_mm / 1000.0:.1f}{space}m" if round(known_mm) >= 1000 else f"{known_mm:.0f}{space}mm"
 
 
 def percent(share: float | None, digits: int = 0) -> str:
@@ -51,30 +50,30 @@ def _facts(view: LiveView) -> list[_Fact]:
     facts = [(0, view.phase)]
     if view.reason is not None:
         facts.append((1, view.reason))
-    if view.real_time is not None and view.real_time < SLOW:
-        facts.append((1, f"{percent(view.real_time)} % of real time"))
-    pulled = f"{percent(view.l2.pulled)}/{percent(view.r2.pulled)}%"
-    resist = f"{percent(view.l2.resists)}/{percent(view.r2.resists)}%"
+    if (real_time := number(view.robot.real_time)) is not None and real_time < SLOW:
+        facts.append((1, f"{percent(real_time)} % of real time"))
+    pulled = "/".join(percent(trigger.pulled) for trigger in view.triggers)
+    resist = "/".join(percent(trigger.resists) for trigger in view.triggers)
     facts += [
-        (2, f"L2/R2 pull {pulled} {'resist' if view.haptics else 'danger'} {resist}"),
-        (4, f"near {millimetres(view.nearest_mm, '')}"),
+        (2, f"L2/R2 pull {pulled}% {'resist' if view.operator.haptics else 'danger'} {resist}%"),
+        (4, f"near {millimetres(view.robot.nearest_mm, '')}"),
         (3, _target(view)),
     ]
-    if view.linked:
-        facts.append((5, f"link {UNKNOWN if view.delay_ms is None else format(view.delay_ms, '.0f')}ms"))
-        if view.queue_ms is not None and view.queue_ms >= _QUEUE_MS:
-            facts.append((6, f"queue {view.queue_ms:.0f}ms"))
-        if view.lost_percent is not None and view.lost_percent >= _LOST_PERCENT:
-            facts.append((6, f"lost {view.lost_percent:.1f}%"))
+    if view.side.link is LinkState.UP:
+        delay_ms, queue_ms, lost = map(number, (view.side.delay_ms, view.scene.queue_ms, view.scene.lost_percent))
+        facts.append((5, f"link {UNKNOWN if delay_ms is None else format(delay_ms, '.0f')}ms"))
+        if queue_ms is not None and queue_ms >= _QUEUE_MS:
+            facts.append((6, f"queue {queue_ms:.0f}ms"))
+        if lost is not None and lost >= _LOST_PERCENT:
+            facts.append((6, f"lost {lost:.1f}%"))
     return facts
 
 
 def _target(view: LiveView) -> str:
     if view.holding is not None:
-        name = f" {view.holding}" if cell_len(view.holding) <= _LONGEST_NAME else ""
-        return f"holding{name}{', it stands' if view.stands else ''}"
-    if view.has_target is False:
+        return f"holding{f' {view.holding}' if cell_len(view.holding) <= _LONGEST_NAME else ''}{view.stands}"
+    if view.scene.target is None:
         return "no target"
-    if view.target_mm is None and view.target_centre_mm is not None:
-        return f"target centre {millimetres(view.target_centre_mm, '')}"
-    return f"target {millimetres(view.target_mm, '')}"
+    if number(view.robot.target_mm) is None and (centre_mm := number(view.operator.target_centre_mm)) is not None:
+        return f"target centre {millimetres(centre_mm, '')}"
+    return f"target {millimetres(view.robot.target_mm, '')}"

@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from enum import IntEnum
+from typing import NamedTuple
 
 from common.command.live_line import millimetres, percent
-from common.command.live_view import LiveView, TriggerView
+from common.command.live_view import LiveView, TriggerView, number
+from common.command.words import printable
+from common.status.codes import LinkState
 
 SHORTEST_GAP_S = 0.4
 """Between two lines, so that what goes to and fro is not told each time; an alarm does not wait."""
@@ -29,19 +31,18 @@ def next_resistance(before: Resistance, stiffness: float) -> Resistance:
     return Resistance.SOME if stiffness >= (0.05 if before is Resistance.NONE else 0.01) else Resistance.NONE
 
 
-@dataclass(frozen=True)
-class _State:
+class _State(NamedTuple):
     """What is worth a line when it changes."""
 
     phase: str = ""
     reason: str | None = None
     linked: bool = False
     armed: bool = False
-    l2: Resistance = Resistance.NONE
-    r2: Resistance = Resistance.NONE
+    felt: tuple[Resistance, ...] = (Resistance.NONE, Resistance.NONE)
+    """Of L2 and of R2"""
     touched: str | None = None
     holding: str | None = None
-    stands: bool = False
+    stands: str = ""
 
 
 class Story:
@@ -58,39 +59,30 @@ class Story:
         """A line with what is new at `now_s` and the time since the first call; None while there is nothing."""
         if self._start_s is None:
             self._start_s = now_s
-        for name, trigger in (("L2", view.l2), ("R2", view.r2)):
-            self._peaks[name] = max(self._peaks[name], trigger.resists or 0.0)
-        self._state = _next_state(self._state, view)
-        state, told = self._state, self._told
-        alarm = view.alarm and (state.phase, state.reason) != (told.phase, told.reason)
+        for trigger in view.triggers:
+            self._peaks[trigger.name] = max(self._peaks[trigger.name], trigger.resists or 0.0)
+        self._state = state = _next_state(self._state, view)
+        told = self._told
+        alarm = view.alarm and state[:2] != told[:2]
         if state == told or (now_s - self._told_s < SHORTEST_GAP_S and not alarm):
             return None
         self._told, self._told_s = state, now_s
         news = "; ".join(_news(told, state, view, self._peaks))
-        for name, resists in (("L2", state.l2), ("R2", state.r2)):
-            if resists is Resistance.NONE:
-                self._peaks[name] = 0.0
+        for trigger, felt in zip(view.triggers, state.felt, strict=True):
+            if felt is Resistance.NONE:
+                self._peaks[trigger.name] = 0.0
         return f"{now_s - self._start_s:6.1f} s  {news}{_figures(view)}"
 
 
 def _next_state(before: _State, view: LiveView) -> _State:
-    touched = before.touched
-    if view.nearest_mm is None or view.nearest_mm > _APART_AGAIN_MM:
+    touched, nearest_mm = before.touched, number(view.robot.nearest_mm)
+    if nearest_mm is None or nearest_mm > _APART_AGAIN_MM:
         touched = None
-    elif view.nearest_mm <= 0.0 and touched is None:
-        touched = view.nearest
-    return replace(
-        before,
-        phase=view.phase,
-        reason=view.reason,
-        linked=view.linked is True,
-        armed=view.armed,
-        l2=next_resistance(before.l2, view.l2.resists or 0.0),
-        r2=next_resistance(before.r2, view.r2.resists or 0.0),
-        touched=touched,
-        holding=view.holding,
-        stands=view.stands,
-    )
+    elif nearest_mm <= 0.0 and touched is None and view.robot.nearest is not None:
+        touched = printable(view.robot.nearest)
+    felt = (next_resistance(was, one.resists or 0.0) for was, one in zip(before.felt, view.triggers, strict=True))
+    linked = view.side.link is LinkState.UP
+    return _State(view.phase, view.reason, linked, view.armed, tuple(felt), touched, view.holding, view.stands)
 
 
 def _news(told: _State, state: _State, view: LiveView, peaks: Mapping[str, float]) -> list[str]:
@@ -99,11 +91,11 @@ def _news(told: _State, state: _State, view: LiveView, peaks: Mapping[str, float
         news.append("link up")
     if state.armed and not told.armed and state.phase != "armed":
         news.append("armed")
-    if (state.phase, state.reason) != (told.phase, told.reason):
+    if state[:2] != told[:2]:
         news.append(state.phase if state.reason is None else f"{state.phase}: {state.reason}")
-    for name, before, after, trigger in (("L2", told.l2, state.l2, view.l2), ("R2", told.r2, state.r2, view.r2)):
+    for trigger, before, after in zip(view.triggers, told.felt, state.felt, strict=True):
         if after is not before:
-            news.append(_resistance(name, before, after, trigger, peaks[name], view.haptics))
+            news.append(_resistance(trigger, before, after, peaks[trigger.name], view.operator.haptics))
     if state.touched != told.touched:
         news.append("touches nothing" if state.touched is None else f"touches {state.touched}, as perceived")
     if state.holding != told.holding:
@@ -113,28 +105,27 @@ def _news(told: _State, state: _State, view: LiveView, peaks: Mapping[str, float
     return news
 
 
-def _resistance(
-    name: str, before: Resistance, after: Resistance, trigger: TriggerView, peak: float, haptics: bool
-) -> str:
+def _resistance(trigger: TriggerView, before: Resistance, after: Resistance, peak: float, haptics: bool) -> str:
     """What a finger on the trigger notices; without haptics, what it would."""
-    would, share = ("" if haptics else "would "), f"{percent(trigger.resists)} %"
+    would, s = ("", "s") if haptics else ("would ", "")
     if after is Resistance.NONE:
-        return f"{name} {would}yield{'s' if haptics else ''} freely, after up to {percent(peak)} %"
+        return f"{trigger.name} {would}yield{s} freely, after up to {percent(peak)} %"
     if after is Resistance.FULL:
-        return f"{name} {would}resist{'s' if haptics else ''} fully"
-    return f"{name} {would}{'ease' if before is Resistance.FULL else 'stiffen'}{'s' if haptics else ''} to {share}"
+        return f"{trigger.name} {would}resist{s} fully"
+    does = "ease" if before is Resistance.FULL else "stiffen"
+    return f"{trigger.name} {would}{does}{s} to {percent(trigger.resists)} %"
 
 
 def _figures(view: LiveView) -> str:
     if not view.armed:
         return ""
     figures = [
-        f"{name} pulled {percent(trigger.pulled)} %"
-        for name, trigger in (("L2", view.l2), ("R2", view.r2))
-        if trigger.pulled is not None and round(100.0 * trigger.pulled) > 0
+        f"{name} pulled {percent(pulled)} %"
+        for name, pulled, _ in view.triggers
+        if pulled is not None and round(100.0 * pulled) > 0
     ]
-    if view.nearest_mm is not None:
-        figures.append(f"nearest {millimetres(view.nearest_mm)}")
-    if view.target_mm is not None and view.holding is None:
-        figures.append(f"target {millimetres(view.target_mm)}")
+    if number(view.robot.nearest_mm) is not None:
+        figures.append(f"nearest {millimetres(view.robot.nearest_mm)}")
+    if number(view.robot.target_mm) is not None and view.holding is None:
+        figures.append(f"target {millimetres(view.robot.target_mm)}")
     return f"  ({', '.join(figures)})" if figures else ""

@@ -1,15 +1,12 @@
-"""A run as people see it: figures that each may be unknown, and the state in words.
+"""A run as people see it: the statuses of one side or both, and the state in words.
 
-The statuses of one side or both become one frozen record here, which `live_line` writes for a terminal and
-`live_story` for a file. All distances are perceived ones, never the simulation's truth.
+`live_line` writes it for a terminal, `live_story` for a file. All distances are perceived ones, never the simulation's
+truth.
 """
 
-from dataclasses import dataclass
-
-from msgspec import UNSET
+from typing import NamedTuple
 
 from common.command.words import phase_words, printable
-from common.status.codes import LinkState
 from common.status.phase import phase_of
 from common.status.statuses import OperatorStatus, RobotStatus
 
@@ -18,86 +15,36 @@ SLOW = 0.9
 """A simulation below this share of real time is said to be slow."""
 
 
-@dataclass(frozen=True)
-class TriggerView:
+class TriggerView(NamedTuple):
     """One trigger of the controller; None is not known."""
 
-    pulled: float | None = None
+    name: str
+    pulled: float | None
     """Calibrated travel, 0 to 1."""
-    resists: float | None = None
+    resists: float | None
     """Stiffness, 0 to 1; 0 while the arm is not armed, as the trigger is free then."""
 
 
-@dataclass(frozen=True)
 class LiveView:
-    """Everything that is shown; None is not known."""
+    """One moment; a side that says nothing knows nothing."""
 
-    phase: str = "starting"
-    """The state, in a word or two."""
-    reason: str | None = None
-    """Why, after a stop or a lost link."""
-    alarm: bool = False
-    """Whether that has stopped the arm against somebody's will."""
-    state: str | None = None
-    """The arm's; None while the robot side has not said."""
-    armed: bool = False
-    linked: bool | None = None
-    real_time: float | None = None
-    """The simulation's share of it."""
-    delay_ms: float | None = None
-    queue_ms: float | None = None
-    """The queue that the robot side's own messages make in the link."""
-    lost_percent: float | None = None
-    """Packets that were lost on the way to the operator."""
-    l2: TriggerView = TriggerView()
-    r2: TriggerView = TriggerView()
-    haptics: bool = True
-    """Whether the triggers are stiffened at all; else `resists` only says how near danger is."""
-    nearest: str | None = None
-    """The nearest object's name, supports aside."""
-    nearest_mm: float | None = None
-    """From the gripper's surface to it, as perceived."""
-    has_target: bool | None = None
-    target_mm: float | None = None
-    """From the gripper's surface to the target's, as perceived."""
-    target_centre_mm: float | None = None
-    """From the point between the fingertips to the target's centre, as perceived."""
-    holding: str | None = None
-    """The object between the fingers."""
-    stands: bool = False
-    """Whether that stands on something."""
-
-
-def live_view(robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> LiveView:
-    """The record of what is known of either side: of controller and link what the operator side says first."""
-    facts, side, scene = phase_of(robot, operator), operator or robot, robot or operator
-    if side is None or scene is None:
-        return LiveView()
-    phase, reason = phase_words(facts, side)
-    free = 0.0 if side.state not in (None, "armed") else None
-    holding = scene.holding if isinstance(scene, RobotStatus) else "something" if scene.holding else None
-    return LiveView(
-        phase=phase,
-        reason=reason,
-        alarm=facts.alarm,
-        state=side.state,
-        armed=side.state == "armed",
-        linked=side.link is LinkState.UP,
-        real_time=None if robot is None else number(robot.real_time),
-        delay_ms=number(side.delay_ms),
-        queue_ms=number(scene.queue_ms),
-        lost_percent=number(scene.lost_percent),
-        l2=TriggerView(number(side.l2_pulled), number(side.l2) if free is None else free),
-        r2=TriggerView(number(side.r2_pulled), number(side.r2) if free is None else free),
-        haptics=operator is None or operator.haptics,
-        nearest=None if robot is None or robot.nearest is None else printable(robot.nearest),
-        nearest_mm=None if robot is None else number(robot.nearest_mm),
-        has_target=None if scene.target is UNSET else scene.target is not None,
-        target_mm=None if robot is None else number(robot.target_mm),
-        target_centre_mm=None if operator is None else number(operator.target_centre_mm),
-        holding=None if holding is None else printable(holding),
-        stands=scene.stands is True,
-    )
+    def __init__(self, robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> None:
+        facts, first = phase_of(robot, operator), operator or robot
+        self.look, self.alarm = facts.look, facts.alarm
+        self.phase, self.reason = phase_words(facts, first)
+        self.robot, self.operator = robot or RobotStatus(), operator or OperatorStatus()
+        self.side, self.scene = first or self.operator, robot or self.operator
+        """Who knows it better: of controller and link, and of what is ahead and in the hand."""
+        side, free = self.side, self.side.state not in (None, "armed")
+        self.armed = side.state == "armed"
+        self.triggers = (
+            TriggerView("L2", number(side.l2_pulled), 0.0 if free else number(side.l2)),
+            TriggerView("R2", number(side.r2_pulled), 0.0 if free else number(side.r2)),
+        )
+        held = self.scene.holding
+        self.holding = printable(held) if isinstance(held, str) else "something" if held else None
+        """What is between the fingers."""
+        self.stands = ", it stands" if self.scene.stands else ""
 
 
 def number(value: float | None) -> float | None:

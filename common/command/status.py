@@ -12,7 +12,7 @@ from rich.text import Text
 
 from common.command.live_line import live_line
 from common.command.live_story import Story
-from common.command.live_view import live_view
+from common.command.live_view import LiveView
 from common.command.patient_output import PatientOutput
 from common.status.statuses import OperatorStatus, RobotStatus, joined
 
@@ -84,7 +84,7 @@ class Status:
         if self._mode in _LINES_OF_JSON:
             self._write({"event": "status", **joined(robot, operator)})
             return
-        view = live_view(robot, operator)
+        view = LiveView(robot, operator)
         if self._live is not None:
             # The last column stays free: some terminals break the line as soon as it is written to.
             text = live_line(view, self._console.width - 1)

@@ -23,38 +23,31 @@ class Channel:
         part.setblocking(False)
         for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
             part.setsockopt(socket.SOL_SOCKET, option, _AT_ONCE)
-        self.refused = 0
-        """Messages that found no room."""
         self.ended = False
         """Whether the other end is gone: nothing is sent any more, and what has arrived is the last."""
         self._part = part
         self._room_bytes = room_bytes
         self._waiting: deque[memoryview] = deque()
-        self._waiting_bytes = 0
+        self.waiting = 0
+        """Bytes that have not left yet."""
         self._begun = bytearray()
 
     def fileno(self) -> int:
         """To wait for it."""
         return self._part.fileno()
 
-    @property
-    def waiting(self) -> int:
-        """Bytes that have not left yet."""
-        return self._waiting_bytes
-
     def send(self, *parts: bytes) -> bool:
-        """Send `parts` as one message, now or in a later call; False, and counted, when there is no room for it."""
+        """Send `parts` as one message, now or in a later call; False when there is no room for it."""
         self.flush()
         length = sum(map(len, parts))
         if length > MESSAGE_LIMIT_BYTES:
             raise ValueError(f"a message of {length} bytes; valid: up to {MESSAGE_LIMIT_BYTES}")
-        if self.ended or (self._waiting and self._waiting_bytes + length > self._room_bytes):
-            self.refused += 1
+        if self.ended or (self._waiting and self.waiting + length > self._room_bytes):
             return False
         for part in (_LENGTH.pack(length), *parts):
             if part:
                 self._waiting.append(memoryview(part))
-                self._waiting_bytes += len(part)
+                self.waiting += len(part)
         self.flush()
         return True
 
@@ -69,7 +62,7 @@ class Channel:
             except OSError:
                 self._end()
                 return
-            self._waiting_bytes -= sent
+            self.waiting -= sent
             while sent:
                 first = waiting.popleft()
                 if len(first) > sent:
@@ -107,7 +100,7 @@ class Channel:
     def _end(self) -> None:
         self.ended = True
         self._waiting.clear()
-        self._waiting_bytes = 0
+        self.waiting = 0
 
     def close(self) -> None:
         """End it; the other end notices."""

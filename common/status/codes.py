@@ -37,16 +37,6 @@ class Sight(StrEnum):
     """The field is back, and both triggers have to be released first."""
 
 
-class Readiness(StrEnum):
-    """Where the hands of the page that drives stand."""
-
-    NOBODY = "nobody_drives"
-    RESTING = "all_keys_up_first"
-    READY = "ready"
-    """Hold-to-run counts."""
-    RUNNING = "running"
-
-
 class Hands(StrEnum):
     """Whose hands move the arm."""
 
@@ -57,7 +47,7 @@ class Hands(StrEnum):
 
 
 class Doing(StrEnum):
-    """What the hands at the controller do."""
+    """What the hands at the controller, or at a page that drives, do."""
 
     RESTING = "resting"
     ARMING = "arming"
@@ -76,9 +66,10 @@ class Doing(StrEnum):
     AT_REST_FIRST = "at_rest_first"
     """A page's: all but hold-to-run has to be let go of before anything moves."""
     NOBODY_DRIVES = "nobody_drives"
-    """This and the next three are a page's, too: its Readiness."""
+    """This and the next three are a page's, too."""
     ALL_KEYS_UP_FIRST = "all_keys_up_first"
     READY = "ready"
+    """Hold-to-run counts."""
     RUNNING = "running"
 
 

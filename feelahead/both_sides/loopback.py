@@ -25,7 +25,6 @@ from operator_side.controller.search import Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.people.whoever import whoever
 from operator_side.settings import OperatorSettings
-from operator_side.viewing.following_pages import follow_pages
 from operator_side.viewing.pages.driving_page import DrivingPage
 from robot_side import events as robot_events
 from robot_side.compiled.warm_up import warm_up
@@ -157,7 +156,7 @@ class Loopback:
             self.operator.receive_view(payload, now_s)
 
     def _operator_tick(self, now_s: float) -> None:
-        follow_pages(self.pages, self.operator, now_s)
+        self.pages.follow(self.operator, now_s)
         if (words := self.operator.tuner.take_link()) is not None:
             self._there = tuned_link(self._there, words)
             self._to_robot.change(self._there.profile("to_robot"))

@@ -85,7 +85,7 @@ def play_in_terminal(recording: Recording, speed: float) -> int:
                 figures.take(one.content)
             else:
                 facts = decoder.decode(one.content)
-                status.show_facts(msgspec.structs.replace(facts, robot=robot, scene=figures.figures()))
+                status.show_facts(msgspec.structs.replace(facts, robot=robot, scene=figures.newest))
 
         playback = Playback(recording, speed)
         playback.paused = False

@@ -80,31 +80,20 @@ class RestMeasurement:
         """How much of the second has passed, 0 to 1."""
         self._since_s = 0.0
         self._reports: list[tuple[float, ...]] = []
-        self._low: tuple[float, ...] = ()
-        self._high: tuple[float, ...] = ()
 
     def feed(self, state: ControllerState, now_s: float) -> str | None:
         """Take one report; what is being moved, if anything is."""
         values = (state.l2, state.r2, *state.left_stick, *state.right_stick)
-        if self._reports:
-            self._low = tuple(map(min, self._low, values))
-            self._high = tuple(map(max, self._high, values))
-            for name, low, high in zip(_CHANNELS, self._low, self._high, strict=True):
-                if high - low > _STILL:
-                    self._begin(values, now_s)
-                    return f"{name} is being moved"
-            self._reports.append(values)
-        else:
-            self._begin(values, now_s)
+        self._since_s = self._since_s if self._reports else now_s
+        self._reports.append(values)
+        for name, column in zip(_CHANNELS, zip(*self._reports, strict=True), strict=True):
+            if max(column) - min(column) > _STILL:
+                self._since_s, self._reports, self.progress = now_s, [values], 0.0
+                return f"{name} is being moved"
         self.progress = min((now_s - self._since_s) / REST_S, 1.0)
         if self.progress >= 1.0 and len(self._reports) >= _LEAST_REPORTS:
             self.result = self._measured()
         return None
-
-    def _begin(self, values: tuple[float, ...], now_s: float) -> None:
-        self._since_s, self._reports = now_s, [values]
-        self._low = self._high = values
-        self.progress = 0.0
 
     def _measured(self) -> Rest:
         l2, r2, *axes = zip(*self._reports, strict=True)

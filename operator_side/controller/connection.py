@@ -9,7 +9,7 @@ from common.errors import DeviceError, NoDeviceError, NoDriverError
 from common.status.codes import ConnectionState
 from operator_side.controller.feel import Feel
 from operator_side.controller.port import OpenController
-from operator_side.controller.search import Search
+from operator_side.controller.search import BackgroundSearch
 from operator_side.controller.state import ControllerState
 
 BEAT_PERIOD_S: Final = 0.05
@@ -50,29 +50,25 @@ class Guard(Protocol):
 class Connection:
     """One controller at a time. None of its methods waits, and none raises DeviceError but `update` (NoDriverError)."""
 
-    def __init__(self, search: Search, listener: Listener, guard: Guard | None = None) -> None:
+    def __init__(self, search: BackgroundSearch, listener: Listener, guard: Guard | None = None) -> None:
         self.state = ConnectionState.ABSENT
         self.found = 0
         """Number of times that a controller was found."""
         self.released = True
         """Whether the last controller that was let go had its triggers released; False for one that was unplugged."""
+        self.controller: OpenController | None = None
+        """The one that is connected."""
         self._search = search
         self._listener = listener
         self._guard = guard
         self._held = False
         self._beat_s: float | None = None
-        self._controller: OpenController | None = None
         self._address: str | None = None
         self._next_look_s: float | None = None
         self._refused: str | None = None
         self._said: set[str] = set()
         self._notes: list[str] = []
         self._closed = False
-
-    @property
-    def controller(self) -> OpenController | None:
-        """The one that is connected."""
-        return self._controller
 
     def update(self, now_s: float) -> None:
         """Look for a controller if there is none and it is time. NoDriverError where looking is of no use."""
@@ -102,9 +98,9 @@ class Connection:
         After a long silence the watchdog may have released the triggers. Then the listener hears of a controller that
         has just been found. A write that does not return is a silence, too.
         """
-        if self._guard is None or self._controller is None or not self._held:
+        if self._guard is None or self.controller is None or not self._held:
             return
-        if self._controller.device.released:
+        if self.controller.device.released:
             if self._beat_s is not None:
                 self._beat_s = None
                 self._guard.rest()
@@ -113,7 +109,7 @@ class Connection:
         if self._beat_s is not None and silence_s < BEAT_PERIOD_S:
             return
         silent = silence_s > RETELL_AFTER_S
-        if self._controller.stalls(now_s):
+        if self.controller.stalls(now_s):
             if silent:
                 self._say_once("a write to the controller does not return; until it does, its triggers are released")
             return
@@ -124,23 +120,23 @@ class Connection:
 
     def read(self, now_s: float) -> ControllerState | None:
         """The newest state; None without a new one, or without a controller."""
-        if self._controller is None:
+        if self.controller is None:
             return None
         try:
-            return self._controller.device.read(now_s)
+            return self.controller.device.read(now_s)
         except DeviceError as error:
             self._lose(error, now_s)
             return None
 
     def write(self, feel: Feel, now_s: float) -> bool:
         """Tell the controller, if there is one; whether it went out."""
-        if self._controller is None:
+        if self.controller is None:
             return False
         if self._guard is not None and self._held and self._beat_s is None:
             self._beat_s = now_s  # before the effect is on: we may hang at once
             self._guard.beat()
         try:
-            self._controller.device.write(feel, now_s)
+            self.controller.device.write(feel, now_s)
         except DeviceError as error:
             self._lose(error, now_s)
             return False
@@ -168,7 +164,7 @@ class Connection:
             self._held = True
             self._guard.hold(controller.path, controller.release)
         known, self._address = self._address, controller.address
-        self._controller = controller
+        self.controller = controller
         self.state = ConnectionState.CONNECTED
         self.found += 1
         self._said.clear()
@@ -187,7 +183,7 @@ class Connection:
         self._let_go()
 
     def _let_go(self) -> None:
-        controller, self._controller = self._controller, None
+        controller, self.controller = self.controller, None
         if controller is None:
             return
         controller.device.close()

@@ -32,11 +32,6 @@ class Controller(Protocol):
         """
 
 
-def _never_stalls(now_s: float) -> bool:
-    del now_s
-    return False
-
-
 @dataclass(frozen=True)
 class OpenController:
     """A controller that a search has found and opened."""
@@ -50,7 +45,7 @@ class OpenController:
     """Device node, for the guard; None where nothing has to be released after our death."""
     release: bytes = b""
     """What the guard writes to that node to take everything off."""
-    stalls: Callable[[float], bool] = _never_stalls
+    stalls: Callable[[float], bool] = lambda _: False
     """Whether a write does not return, at `now_s`: then nothing can be said to the controller by `device`."""
 
 

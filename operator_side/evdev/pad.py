@@ -90,10 +90,6 @@ class Axis(NamedTuple):
         """Place in the range, 0 to 1."""
         return min(max((value - self.least) / max(self.most - self.least, 1), 0.0), 1.0)
 
-    def deflection(self, value: int) -> float:
-        """Place in the range, -1 to 1."""
-        return 2.0 * self.share(value) - 1.0
-
 
 class EvdevPad:
     """The port on an open node; one thread reads and writes. A state comes with each read, as the kernel keeps it."""
@@ -181,7 +177,7 @@ class EvdevPad:
         self._down = self._bits(GET_KEYS) & BUTTONS.keys()
 
     def _made(self) -> ControllerState:
-        across = {axis: self._ranges[axis].deflection(self._values[axis]) for axis in (_X, _Y, _RX, _RY)}
+        across = {axis: 2.0 * self._ranges[axis].share(self._values[axis]) - 1.0 for axis in (_X, _Y, _RX, _RY)}
         hats = {_HATS[axis, value] for axis in self._hats if (axis, value := self._values[axis]) in _HATS}
         return ControllerState(
             left_stick=(across[_X], -across[_Y]),

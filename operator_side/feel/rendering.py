@@ -24,12 +24,14 @@ from operator_side.controller.feel import (
 )
 from operator_side.feel.commands_under_way import Displacement
 from operator_side.feel.path_ahead import Aside, traced_zones
-from operator_side.feel.stand_pulse import StandPulse
 from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 
 FALL_S: Final = 0.1
 """From full strength to none, unless the trigger is released."""
+PULSE_S: Final = 0.08
+_PULSE: Final = 0.7
+"""Drive of the right motor alone: the left one says danger, and both say that the field is lost."""
 _ROUNDING: Final = 1e-9
 _TOUCHED: Final = MAX_STRENGTH // 2
 """The most that is felt, in slow zones, of what is to be touched"""
@@ -113,10 +115,6 @@ class RenderedTrigger:
         """How far it is pulled, in calibrated travel, 0 to 1, by what the controller reports, before it stiffens."""
         return self._travel.travel(min(self._strengths.count(0) / ZONE_COUNT / SENSED_TRAVEL, 1.0))
 
-    def zones(self) -> dict[str, int | None]:
-        """The run's figures of its zones."""
-        return {"first_stiff": self.first_stiff, "max": self.max_strength}
-
 
 class TriggerRendering:
     """Both triggers, and the motors for danger where the stick leads, and for what has come to stand."""
@@ -128,7 +126,8 @@ class TriggerRendering:
         self.l2 = RenderedTrigger(settings, calibration.l2)
         self.r2 = RenderedTrigger(settings, calibration.r2)
         self._swap_sides = swap_sides
-        self._stand = StandPulse()
+        self._stands = False
+        self._pulse_ends_s = -math.inf
 
     def render(
         self,
@@ -155,11 +154,15 @@ class TriggerRendering:
             advancing.render(felt.r2, felt.horizon_m, pulled[0], forth, now_s, aside),
         )
         l2, r2 = reversed(strengths) if self._swap_sides else strengths
-        return Feel(l2=l2, r2=r2, rumble=Rumble(felt.rumble, self._stand.right(felt.stands, now_s)))
+        if felt.stands and not self._stands:
+            self._pulse_ends_s = now_s + PULSE_S
+        self._stands = felt.stands
+        return Feel(l2=l2, r2=r2, rumble=Rumble(felt.rumble, _PULSE if now_s < self._pulse_ends_s else 0.0))
 
     def zones(self) -> dict[str, Any]:
         """The run's figures of the controller's own triggers."""
-        return {"l2": self.l2.zones(), "r2": self.r2.zones()}
+        both = {"l2": self.l2, "r2": self.r2}
+        return {name: {"first_stiff": one.first_stiff, "max": one.max_strength} for name, one in both.items()}
 
     def summary(self) -> dict[str, Any]:
         """What else is to be known of the run."""

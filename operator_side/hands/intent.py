@@ -58,10 +58,8 @@ def operator_intent(
     if (Action.CLOSE_GRIPPER in held) != (Action.OPEN_GRIPPER in held):
         gripper = 1 if Action.CLOSE_GRIPPER in held else -1
     l2, r2 = calibration.l2.travel(state.l2), calibration.r2.travel(state.r2)
-    left, right = (
-        calibration.left_stick.deflection(state.left_stick),
-        calibration.right_stick.deflection(state.right_stick),
-    )
+    left = calibration.left_stick.deflection(state.left_stick)
+    right = calibration.right_stick.deflection(state.right_stick)
     if swap_sides:
         l2, r2, left, right = r2, l2, right, left
     return OperatorIntent(

@@ -12,6 +12,8 @@ LARGEST_REST: Final = 0.3
 LEAST_SPAN: Final = 0.2
 """Of a trigger's raw travel between released and fully pulled: with less, a few counts would be full speed."""
 _ROUNDING: Final = 1e-9
+_LEAST_MEANT: Final = 1e-3
+"""A stick that is meant to be deflected by less is let go."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,14 @@ class StickRest:
         scale = min((radius - self.dead_zone) / span, 1.0) / radius
         # Rounding must not leave the range.
         return min(max(x * scale, -1.0), 1.0), min(max(y * scale, -1.0), 1.0)
+
+    def raw(self, deflection: Stick) -> Stick:
+        """Where a stick that rests at its centre has to be for this to count, within the unit circle."""
+        radius = math.hypot(*deflection)
+        if radius < _LEAST_MEANT:
+            return 0.0, 0.0
+        scale = min(self.dead_zone + (1.0 - self.dead_zone) * radius, 1.0) / radius
+        return deflection[0] * scale, deflection[1] * scale
 
 
 @dataclass(frozen=True)

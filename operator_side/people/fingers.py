@@ -69,22 +69,11 @@ class Fingers:
         self._device.set_finger_force(*self._forces_n)
         for free, pressed_n in zip(self._free, self._forces_n, strict=True):
             free.set_finger_force(pressed_n)
-        across = self._beyond_dead_zone(stick)
-        if self._swap_sides:
-            self._device.set_sticks(right=across)
-        else:
-            self._device.set_sticks(left=across)
+        # A hand learns where a stick begins to act.
+        side = "right" if self._swap_sides else "left"
+        self._device.set_sticks(**{side: getattr(self._calibration, f"{side}_stick").raw(stick)})
         run = button_of(swap_sides=self._swap_sides)[Action.RUN]
         self._device.set_buttons(frozenset({run, *buttons}))
-
-    def _beyond_dead_zone(self, stick: Vector2) -> Vector2:
-        """A hand learns where a stick begins to act."""
-        radius = math.hypot(*stick)
-        if radius < 1e-3:
-            return (0.0, 0.0)
-        dead = (self._calibration.right_stick if self._swap_sides else self._calibration.left_stick).dead_zone
-        scale = (dead + (1.0 - dead) * radius) / radius
-        return within_unit_circle(stick[0] * scale, stick[1] * scale)
 
 
 def within_unit_circle(x: float, y: float) -> Vector2:

@@ -7,14 +7,14 @@ less, and they never push harder for it. What they feel, a trigger that yields l
 also believe, and go on gently from a reaction later; or let go, where a pulse says that what they hold stands.
 Figures: the operator's table of facts (McRuer's crossover model; reaction times).
 
-    wait ─▶ arm ─▶ advance ─▶ close ─▶ lift ─▶ carry ─▶ lower ─▶ release ─▶ withdraw ─▶ done
+    rest ─▶ arm ─▶ advance ─▶ grasp ─▶ lift ─▶ carry ─▶ lower ─▶ let go ─▶ draw back ─▶ done
                      ▲          │ nothing held
                      └─ retreat ◀
 """
 
 import math
 from collections import deque
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
@@ -50,20 +50,6 @@ _CLEARS_S: Final = 3.0
 _BACK_M: Final = 0.1
 """So far they draw back from what they have set down."""
 
-Phase = Literal["wait", "arm", "advance", "close", "retreat", "lift", "carry", "lower", "release", "withdraw", "done"]
-_DOING: Final[dict[Phase, Doing]] = {
-    "wait": Doing.RESTING,
-    "arm": Doing.ARMING,
-    "advance": Doing.ADVANCING,
-    "close": Doing.GRASPING,
-    "retreat": Doing.RETREATING,
-    "lift": Doing.LIFTING,
-    "carry": Doing.CARRYING,
-    "lower": Doing.LOWERING,
-    "release": Doing.LETTING_GO,
-    "withdraw": Doing.DRAWING_BACK,
-    "done": Doing.DONE,
-}
 _REST: Final[Vector2] = (0.0, 0.0)
 
 
@@ -82,7 +68,7 @@ class SimulatedOperator:
         *,
         swap_sides: bool = False,
     ) -> None:
-        self.phase: Phase = "wait"
+        self.phase = Doing.RESTING
         self._device = device
         self._settings = settings
         self._generator = np.random.default_rng(np.random.SeedSequence([seed, 0x0B5E]))
@@ -105,8 +91,8 @@ class SimulatedOperator:
     @property
     def doing(self) -> Doing:
         """Their phase; without a target they do not seem to advance."""
-        aimless = self.phase == "advance" and self._view is not None and self._view.target_in_tool_m is None
-        return Doing.NO_TARGET if aimless else _DOING[self.phase]
+        aimless = self.phase is Doing.ADVANCING and self._view is not None and self._view.target_in_tool_m is None
+        return Doing.NO_TARGET if aimless else self.phase
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """Look at the screen and move the hands; `delay_s` is the round trip that the person has got used to."""
@@ -122,8 +108,8 @@ class SimulatedOperator:
         if self._view is None or now_s - self._warned_s < _CALM_S:
             self._fingers.do(0.0, _REST)
             return
-        if self._view.state != "armed" and self.phase not in ("wait", "arm", "done"):
-            self._enter("wait", now_s)
+        if self._view.state != "armed" and self.phase not in (Doing.RESTING, Doing.ARMING, Doing.DONE):
+            self._enter(Doing.RESTING, now_s)
         lag_s = self._settings.visual_reaction_s + (delay_s if self._settings.adapts_to_delay else 0.0)
         # Crossover frequency in 1/s: as fast as the delay in the loop allows, at most 4.5.
         gain = min(4.5, (math.pi / 2 - self._settings.phase_margin_rad) / lag_s) if lag_s > 0.0 else 4.5
@@ -141,7 +127,7 @@ class SimulatedOperator:
         seeing = self._device.told.light != WARNING_LIGHT
         self._stands |= self._pulse.acted_on(now_s, seeing and self._device.rumble.right > 0.0)
 
-    def _enter(self, phase: Phase, now_s: float) -> None:
+    def _enter(self, phase: Doing, now_s: float) -> None:
         self.phase = phase
         self._since_s = now_s
         self._gently_along = self._gently_across = self._stands = False
@@ -151,29 +137,29 @@ class SimulatedOperator:
     def _elapsed_s(self, look: Glance) -> float:
         return look.now_s - (look.now_s if self._since_s is None else self._since_s)
 
-    def _wait(self, look: Glance) -> None:
+    def _resting(self, look: Glance) -> None:
         """Rest the hands for the healthy second that arming asks for."""
         self._fingers.do(0.0, _REST)
         if self._elapsed_s(look) > 1.2 + self._settings.visual_reaction_s:
-            self._enter("arm", look.now_s)
+            self._enter(Doing.ARMING, look.now_s)
 
-    def _arm(self, look: Glance) -> None:
+    def _arming(self, look: Glance) -> None:
         pressing = self._elapsed_s(look) < 0.2
         self._fingers.do(0.0, _REST, {Button.OPTIONS} if pressing else set())
         if look.view.state == "armed":
             self._aim(look.now_s)
         elif self._elapsed_s(look) > 2.0:
-            self._enter("wait", look.now_s)
+            self._enter(Doing.RESTING, look.now_s)
 
     def _aim(self, now_s: float) -> None:
         self._judge_depth()
-        self._enter("advance", now_s)
+        self._enter(Doing.ADVANCING, now_s)
 
     def _judge_depth(self) -> None:
         settings = self._settings
         self._depth_error_m = float(self._generator.normal(settings.depth_error_mean_m, settings.depth_error_sd_m))
 
-    def _advance(self, look: Glance) -> None:
+    def _advancing(self, look: Glance) -> None:
         """Centre the target with the stick, then pull R2 until it seems to lie between the fingers."""
         if look.view.target_in_tool_m is None:
             self._fingers.do(0.0, _REST)
@@ -184,36 +170,31 @@ class SimulatedOperator:
         aligned = off_m < self._ALIGNED_M
         settled = self._settings.aiming == "servo" or self._moves.free(look.now_s, look.lag_s)
         if settled and aligned and (abs(depth_m) < self._REACHED_M or self._nearing.see(depth_m, look)):
-            self._enter("close", look.now_s)
+            self._enter(Doing.GRASPING, look.now_s)
             return
         # Off the line a person slows down; far off, they centre first.
         eagerness = max(0.0, 1.0 - off_m / (3 * self._ALIGNED_M))
         if self._settings.aiming == "move-and-wait":
-            self._go(self._single_move(across, depth_m if eagerness > 0.0 else 0.0, look))
+            if self._moves.free(look.now_s, look.lag_s):
+                by_m = (across[0], across[1], depth_m if eagerness > 0.0 else 0.0)
+                across_m_s = GENTLY_M_S if self._gently_across else _PEAK_ACROSS_M_S
+                self._moves.begin(look.now_s, by_m, across_m_s, GENTLY_M_S if self._gently_along else _PEAK_M_S)
+            self._go(self._moves.velocity_m_s(look.now_s))
             return
         x, y = (look.gain * component for component in across)
         self._go((x, y, eagerness * look.gain * depth_m))
 
-    def _single_move(self, across_m: tuple[float, ...], depth_m: float, look: Glance) -> Vector3:
-        """The velocity of the present move; the next one is planned once the last one's outcome is seen."""
-        if self._moves.free(look.now_s, look.lag_s):
-            x, y = across_m
-            across_m_s = GENTLY_M_S if self._gently_across else _PEAK_ACROSS_M_S
-            along_m_s = GENTLY_M_S if self._gently_along else _PEAK_M_S
-            self._moves.begin(look.now_s, (x, y, depth_m), across_m_s, along_m_s)
-        return self._moves.velocity_m_s(look.now_s)
-
-    def _close(self, look: Glance) -> None:
+    def _grasping(self, look: Glance) -> None:
         self._fingers.do(0.0, _REST, {Button.CROSS})
         if look.view.holding and self._elapsed_s(look) > 0.3:
             self._from, self._holding_s = look.view.tool_position_m, look.now_s
             self._gripped_height_m = look.view.tool_position_m[2]
-            self._enter("lift", look.now_s)
+            self._enter(Doing.LIFTING, look.now_s)
         elif self._elapsed_s(look) > 2.5 + 2 * self._settings.visual_reaction_s:
             self._attempt += 1
-            self._enter("retreat" if self._attempt < self._settings.attempts else "done", look.now_s)
+            self._enter(Doing.RETREATING if self._attempt < self._settings.attempts else Doing.DONE, look.now_s)
 
-    def _retreat(self, look: Glance) -> None:
+    def _retreating(self, look: Glance) -> None:
         """Open, draw back a little, and look again."""
         self._fingers.do(-0.4, _REST, {Button.SQUARE})
         if self._elapsed_s(look) > 1.0:
@@ -225,19 +206,19 @@ class SimulatedOperator:
             self._holding_s = look.now_s
         if look.now_s - self._holding_s <= _DROPPED_S:
             return False
-        self._enter("done", look.now_s)
+        self._enter(Doing.DONE, look.now_s)
         return True
 
-    def _lift(self, look: Glance) -> None:
+    def _lifting(self, look: Glance) -> None:
         """Move against gravity, whichever way the tool points."""
         up = look.view.up_in_tool
         if not self._dropped(look) and math.dist(look.view.tool_position_m, self._from) > self._settings.lift_m:
             self._from = look.view.tool_position_m
-            self._enter("carry", look.now_s)
+            self._enter(Doing.CARRYING, look.now_s)
         # Half speed: a person carries with care.
         self._fingers.do(0.5 * up[2], (0.5 * up[0], -0.5 * up[1]), {Button.CROSS})
 
-    def _carry(self, look: Glance) -> None:
+    def _carrying(self, look: Glance) -> None:
         """Back towards the robot, level; a tool that points straight up or down has no back."""
         if self._dropped(look):
             return
@@ -248,37 +229,37 @@ class SimulatedOperator:
         if left_m < self._REACHED_M:
             self._judge_depth()
             self._from = look.view.tool_position_m
-            self._enter("lower", look.now_s)
+            self._enter(Doing.LOWERING, look.now_s)
             left_m = 0.0
         speed = min(_CARRY_M_S, max(look.gain * left_m, 0.0)) / max(level, self._REACHED_M)
         self._go((speed * back[0], speed * back[1], speed * back[2]), {Button.CROSS})
 
-    def _lower(self, look: Glance) -> None:
+    def _lowering(self, look: Glance) -> None:
         """Down to where it should stand, gently near there and once that is felt, until it is felt or seen to stand."""
         if self._dropped(look):
             return
         height_m = look.view.tool_position_m[2]
         if self._sinking.see(height_m, GENTLY_M_S, look) or self._stands:
             self._from = look.view.tool_position_m
-            self._enter("release", look.now_s)
+            self._enter(Doing.LETTING_GO, look.now_s)
         left_m = height_m - self._gripped_height_m + self._depth_error_m
         x, y, z = (-min(_CARRY_M_S, max(look.gain * left_m, GENTLY_M_S)) * part for part in look.view.up_in_tool)
         self._go((x, y, z), {Button.CROSS})
 
-    def _release(self, look: Glance) -> None:
+    def _letting_go(self, look: Glance) -> None:
         """Open, and rise a little out of where they have pressed it down; what stands stays."""
         risen_m = look.view.tool_position_m[2] - self._from[2]
         if not look.view.holding and (risen_m > _CLEAR_M or self._elapsed_s(look) > _CLEARS_S + look.lag_s):
             self._from = look.view.tool_position_m
-            self._enter("withdraw", look.now_s)
+            self._enter(Doing.DRAWING_BACK, look.now_s)
         rises = 0.0 if look.view.holding or self._elapsed_s(look) < 0.6 else GENTLY_M_S
         x, y, z = (rises * part for part in look.view.up_in_tool)
         self._go((x, y, z), {Button.SQUARE})
 
-    def _withdraw(self, look: Glance) -> None:
+    def _drawing_back(self, look: Glance) -> None:
         back_m = math.dist(look.view.tool_position_m, self._from)
         if back_m > _BACK_M:
-            self._enter("done", look.now_s)
+            self._enter(Doing.DONE, look.now_s)
         self._go((0.0, 0.0, -_CARRY_M_S), {Button.SQUARE} if back_m < 0.5 * _BACK_M else set())
 
     def _done(self, look: Glance) -> None:

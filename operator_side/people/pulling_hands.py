@@ -1,6 +1,5 @@
 """A person who arms the robot and then pulls as told: no eyes for the scene, no will of their own."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -51,17 +50,8 @@ def constant_force(force_n: float, across: Vector2 = (0.0, 0.0), turning: Vector
     They rest after 1.5 s: a tool that turns on and on ends where its arm cannot follow.
     """
     straight = Hands(r2_n=force_n)
-    aside = Hands(r2_n=force_n, left_stick=_beyond_dead_zone(across), right_stick=_beyond_dead_zone(turning))
+    aside = Hands(r2_n=force_n, left_stick=_STICK.raw(across), right_stick=_STICK.raw(turning))
     return lambda since_s: aside if since_s < _ASIDE_S else straight
-
-
-def _beyond_dead_zone(deflection: Vector2) -> Vector2:
-    """Where the stick has to be for this to count."""
-    length = math.hypot(*deflection)
-    if length == 0.0:
-        return deflection
-    part = (_STICK.dead_zone + (1.0 - _STICK.dead_zone) * length) / length
-    return deflection[0] * part, deflection[1] * part
 
 
 class PullingHands:
@@ -98,7 +88,9 @@ class PullingHands:
             case "grip":
                 self._act(Hands(), Action.CLOSE_GRIPPER)
             case "pull":
-                self._follow_pull(now_s)
+                self.pull_began_s = now_s if self.pull_began_s is None else self.pull_began_s
+                hands = self._pull(now_s - self.pull_began_s)
+                self._act(hands, Action.CLOSE_GRIPPER if self._grips else None)
 
     def _choose_phase(self, now_s: float, for_s: float, screen: Telemetry) -> None:
         if self.phase == "rest" and for_s > _REST_S:
@@ -114,12 +106,6 @@ class PullingHands:
 
     def _enter(self, phase: Phase, now_s: float) -> None:
         self.phase, self._since_s = phase, now_s
-
-    def _follow_pull(self, now_s: float) -> None:
-        if self.pull_began_s is None:
-            self.pull_began_s = now_s
-        hands = self._pull(now_s - self.pull_began_s)
-        self._act(hands, Action.CLOSE_GRIPPER if self._grips else None)
 
     def _act(self, hands: Hands, action: Action | None = None) -> None:
         self._device.set_finger_force(hands.l2_n, hands.r2_n)

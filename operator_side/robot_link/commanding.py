@@ -1,20 +1,30 @@
-"""What the hands mean, or a stop that was pressed elsewhere, as the command that goes to the robot side."""
+"""What leaves for the robot side: what the hands mean, or a stop that was pressed elsewhere, as commands."""
 
 import math
-from typing import Final, NamedTuple
+from operator import attrgetter
+from typing import Any, Final, NamedTuple
 
-from common.protocol.messages import Compensation, Header, MotionCommand, MotionState
+from common.protocol.codec import encode
+from common.protocol.link_end import LinkEnd
+from common.protocol.messages import Compensation, MotionCommand, MotionState
 from common.silence import LONGEST_HELD_S, MOTION_PERIOD_S
 from operator_side.hands.intent import OperatorIntent
 
 STOP_HELD_S: Final = 0.2
 """A stop that was pressed away from the controller is held for so long at least."""
+HEARTBEAT_PERIOD_S: Final = 0.2
+"""A Hello this often while nothing else is sent: it opens the session, and then shows that we are alive."""
 _NOTICED: Final = 0.01
 """Of a travel or a stick: the triggers' own noise is less."""
 _LATEST_S: Final = LONGEST_HELD_S - MOTION_PERIOD_S / 2.0
 """A command leaves in the turn that is nearest to `LONGEST_HELD_S`, however early or late that turn comes."""
 STOPPING: Final = OperatorIntent(emergency_stop=True)
 """What the hands mean while it is held, whatever they do."""
+
+_BUTTONS: Final = ("run", "arm", "emergency_stop", "next_target", "hand_over")
+_NAMES: Final = ("l2", "r2", "lateral", "turning", *_BUTTONS)
+_PRESSED: Final[Any] = attrgetter(*_BUTTONS)
+_MEANT: Final[Any] = attrgetter(*_NAMES)
 
 
 class ToRobot(NamedTuple):
@@ -71,38 +81,39 @@ class HeldCommand:
 
         At once: a button, another token, a travel or stick by more than 0.01, and rest, which is never approximated.
         """
-        pressed = (
-            *(intent.run, intent.arm, intent.emergency_stop, intent.next_target, intent.hand_over),
-            *(intent.gripper, token),
-        )
+        pressed = (*_PRESSED(intent), intent.gripper, token)
         moved = (intent.l2, intent.r2, *intent.lateral, *intent.turning)
-        changed = pressed != self._pressed
-        if not (self._full_rate or changed or self._differs(moved) or now_s - self._sent_s > _LATEST_S):
+        changed, rests = pressed != self._pressed, moved != self._moved and not any(moved)
+        at_once = self._full_rate or changed or rests or now_s - self._sent_s > _LATEST_S
+        if not at_once and all(abs(now - held) <= _NOTICED for now, held in zip(moved, self._moved, strict=True)):
             return None
-        rests = moved != self._moved and not any(moved)
         self._pressed, self._moved, self._sent_s = pressed, moved, now_s
         return ToRobot(b"", everywhere=changed or rests or intent.emergency_stop)
 
-    def _differs(self, moved: tuple[float, ...]) -> bool:
-        if moved != self._moved and not any(moved):
-            return True
-        return any(abs(now - held) > _NOTICED for now, held in zip(moved, self._moved, strict=True))
 
+class Commands:
+    """Makes commands of what the hands mean, else a Hello every so often."""
 
-def motion_command(header: Header, intent: OperatorIntent, token: int, compensation: Compensation) -> MotionCommand:
-    """`intent` under the lease of `token`."""
-    return MotionCommand(
-        header,
-        l2=intent.l2,
-        r2=intent.r2,
-        lateral=intent.lateral,
-        turning=intent.turning,
-        gripper=float(intent.gripper),
-        run=intent.run,
-        arm=intent.arm,
-        emergency_stop=intent.emergency_stop,
-        next_target=intent.next_target,
-        hand_over=intent.hand_over,
-        token=token,
-        compensation=compensation,
-    )
+    def __init__(self, link: LinkEnd, compensation: Compensation, *, full_rate: bool) -> None:
+        """full_rate: see HeldCommand."""
+        self.sent = 0
+        self.stop_button = StopButton()
+        self.held = HeldCommand(full_rate=full_rate)
+        self._link, self._compensation = link, compensation
+        self._hello_s = -math.inf
+
+    def due(self, intent: OperatorIntent, token: int, now_s: float) -> tuple[ToRobot, MotionCommand] | None:
+        """Return the message that has to leave now, and its command; None for what may wait."""
+        if (leaving := self.held.due(intent, token, now_s)) is None:
+            return None
+        meant = dict(zip(_NAMES, _MEANT(intent), strict=True)) | {"gripper": float(intent.gripper), "token": token}
+        command = MotionCommand(self._link.stamp(now_s), compensation=self._compensation, **meant)
+        self.sent += 1
+        return leaving._replace(payload=encode(command)), command
+
+    def hello(self, now_s: float) -> list[ToRobot]:
+        """Return a Hello if one is due."""
+        if now_s - self._hello_s < HEARTBEAT_PERIOD_S:
+            return []
+        self._hello_s = now_s
+        return [ToRobot(encode(self._link.hello(now_s)), everywhere=True)]

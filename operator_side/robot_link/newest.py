@@ -1,9 +1,9 @@
-"""The newest that came from the robot side: stiffness and view."""
+"""The newest stiffness that came from the robot side, and what is newer."""
 
 from typing import Final
 
 from common.protocol.link_end import Arrival
-from common.protocol.messages import StiffnessUpdate, Telemetry
+from common.protocol.messages import Header, StiffnessUpdate
 from common.statistics import RunningStatistics
 
 STIFFNESS_EXPIRES_S: Final = 0.2
@@ -53,16 +53,6 @@ class NewestStiffness:
         return self.update is not None and now_s - self.received_s <= age_s
 
 
-class NewestView:
-    """The newest telemetry of one robot side."""
-
-    def __init__(self) -> None:
-        self.telemetry: Telemetry | None = None
-        """None before the first"""
-        self._order = (-1, -1)
-
-    def take(self, message: Telemetry) -> None:
-        """Keep it unless it was overtaken."""
-        order = (message.header.epoch, message.header.sequence)
-        if order[0] != self._order[0] or order[1] > self._order[1]:
-            self.telemetry, self._order = message, order
+def overtakes(header: Header, known: Header | None) -> bool:
+    """Tell whether the message with `header` is newer than the one with `known`, or of another run."""
+    return known is None or header.epoch != known.epoch or header.sequence > known.sequence

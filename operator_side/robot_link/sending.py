@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any
 
-from common.emulation.delay_line import BitFlip, DelayLine, link_summary
+from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import LinkSpec
 from common.emulation.tuned import tuned_link
 from common.rate.budget import Budget
@@ -12,24 +12,22 @@ from common.sockets.operator import OperatorSockets
 from operator_side.robot_link.commanding import ToRobot
 
 
-def _corrupted(message: ToRobot, flip: BitFlip) -> ToRobot:
-    return message._replace(payload=flip(message.payload))
-
-
 class Sending:
     """Everything leaves at once: commands are few, and nothing here can give way to them."""
 
     def __init__(self, link: LinkSpec, sockets: OperatorSockets) -> None:
         self._link = link
         self._sockets = sockets
-        self._line: DelayLine[ToRobot] = DelayLine(link.profile("to_robot"), corrupt=_corrupted)
+        self.line: DelayLine[ToRobot] = DelayLine(
+            link.profile("to_robot"), corrupt=lambda message, flip: message._replace(payload=flip(message.payload))
+        )
         self._budget: Budget[str] = Budget()
 
     def push(self, messages: Iterable[ToRobot], now_s: float) -> None:
         """Take in what the core and the console made."""
         for message in messages:
             self._budget.spend("haptics", len(message.payload), now_s)
-            self._line.push(now_s, message, len(message.payload))
+            self.line.push(now_s, message, len(message.payload))
 
     def measure(self, queue: OutgoingQueue, now_s: float) -> None:
         """Take in the echoes that have arrived. queue: in front of our messages."""
@@ -38,22 +36,13 @@ class Sending:
 
     def send(self, now_s: float) -> bool:
         """Let go of what is due; False where some of it found no connection that takes it."""
-        taken = [self._sockets.send(one.payload, everywhere=one.everywhere) for one in self._line.pop(now_s)]
+        taken = [self._sockets.send(one.payload, everywhere=one.everywhere) for one in self.line.pop(now_s)]
         return all(taken)
 
     def tune(self, words: str) -> None:
         """From now on do to messages what `words` say."""
         self._link = tuned_link(self._link, words)
-        self._line.change(self._link.profile("to_robot"))
-
-    def next_due(self) -> float | None:
-        """When the next message is due in the emulated link; None while nothing waits there."""
-        return self._line.next_due()
-
-    @property
-    def asked(self) -> str:
-        """The emulated profile in the grammar's words."""
-        return self._line.profile.words
+        self.line.change(self._link.profile("to_robot"))
 
     @property
     def queue_ms(self) -> float:
@@ -62,5 +51,5 @@ class Sending:
 
     def summary(self) -> dict[str, Any]:
         """`link`, as it was emulated, and `rate`."""
-        link = link_summary("to_robot", {"haptics": self._line})
+        link = link_summary("to_robot", {"haptics": self.line})
         return {"link": link, "rate": {"operator": self._budget.summary()}}

@@ -6,6 +6,7 @@ from typing import Any, Final
 from common.protocol.messages import LeaseNotice, LinkReport
 from common.protocol.session import OWNING, SessionState
 from common.status.codes import LinkState
+from operator_side.robot_link.newest import overtakes
 
 NOTICE_EXPIRES_S: Final = 0.5
 """Without a notice for this long nobody knows whose lease it is."""
@@ -52,8 +53,7 @@ class Standing:
 
     def note(self, report: LinkReport, now_s: float) -> None:
         """A report of the link arrived; one that was overtaken counts no more."""
-        known = self._report
-        if known is None or report.header.epoch != known.header.epoch or report.header.sequence > known.header.sequence:
+        if overtakes(report.header, None if self._report is None else self._report.header):
             self._report, self._reported_s = report, now_s
 
     def status_fields(self, now_s: float, *, linked: bool, heard: bool) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Literal
 import msgspec
 
 from common.protocol.messages import Telemetry
-from common.status.codes import Doing, Hands, Readiness
+from common.status.codes import Hands
 from common.status.statuses import OperatorStatus, RobotStatus
 
 Ten = tuple[int, int, int, int, int, int, int, int, int, int]
@@ -47,20 +47,15 @@ class DelayFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     newest_ms: float | None
 
 
-class HandsFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class HandsFacts(msgspec.Struct, frozen=True):
     """What a page has to know to drive, or to say why it cannot"""
 
     may_drive: bool
     """Whether a page can drive at all: not where a real controller does"""
     driver: str | None
     """The word by which the page that drives calls itself; None while none does"""
-    readiness: Readiness
-    rest_s: float
-    """For how long all keys still have to be up before hold-to-run counts"""
     person: bool
     """Whether there is a scripted person who could go on"""
-    doing: Doing | None
-    """None for a real controller"""
     tuning_refused: str
     """Why the last wish to tune was refused; empty where it was not"""
     link_asked: str | None

@@ -22,7 +22,6 @@ class Surroundings(msgspec.Struct, frozen=True):
     hands: Hands
     asked_to_robot: str = ""
     """The profile that this side emulates, in the grammar's words"""
-    swap_sides: bool = False
     page: HandsFacts | None = None
 
 
@@ -32,7 +31,7 @@ def operator_facts(
     """The facts of `now_s`; `status`: `core.status(now_s)`, with what the process knows."""
     felt, written, lease = core.stiffness, core.haptics.written, core.lease
     pulled = [status.l2_pulled, status.r2_pulled]
-    order = -1 if around.swap_sides else 1
+    order = -1 if core.settings.swap_sides else 1
     needed: list[float | None] = [None, None]
     fields = [None, None] if felt is None else [felt.l2, felt.r2][::order]
     if felt is not None:
@@ -67,7 +66,7 @@ def operator_facts(
         l2=triggers[0],
         r2=triggers[1],
         rumble=0.0 if written.rumble is None else max(written.rumble.left, written.rumble.right),
-        advancing="L2" if around.swap_sides else "R2",
+        advancing="R2" if order == 1 else "L2",
         to_operator=_delay("", (there for _, there, _ in recent)),
         to_robot=_delay(around.asked_to_robot, (_back(there, both) for _, there, both in recent)),
         round_trip_ms=None if offset.round_trip_s is None else 1e3 * offset.round_trip_s,

@@ -1,5 +1,6 @@
 """Whoever looks at a run from this side: the console, and what the robot side is asked to render for it."""
 
+import contextlib
 import math
 from collections.abc import Callable
 from typing import Final
@@ -18,7 +19,6 @@ from operator_side.settings import OperatorSettings
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts import FACTS_PERIOD_S, SceneFacts
 from operator_side.viewing.facts_of_core import Surroundings, operator_facts
-from operator_side.viewing.following_pages import hear_pages
 from operator_side.viewing.pages.driving_page import DrivingPage
 
 _WATCH_PERIOD_S: Final = 0.25
@@ -32,34 +32,19 @@ def view_topics(settings: OperatorSettings) -> tuple[bytes, ...]:
 
 
 class SceneFigures:
-    """Overlaps and ticks of the robot side's scene, unpacked from the newest bytes when somebody asks."""
+    """Overlaps and ticks of the robot side's scene."""
 
     def __init__(self) -> None:
-        self._newest: bytes | None = None
-        self._figures: SceneFacts | None = None
+        self.newest: SceneFacts | None = None
+        """None before the first"""
 
     def take(self, payload: bytes) -> None:
-        """One payload of the topic `scene`; shapes, which are large, are passed over."""
-        if claims_to_be("scene", payload):
-            self._newest = payload
-
-    def figures(self) -> SceneFacts | None:
-        """Those of the newest; None before the first."""
-        payload, self._newest = self._newest, None
-        if payload is not None:
-            try:
-                state = decode_view(payload)
-            except RemoteProtocolError:
-                return self._figures
-            if isinstance(state, SceneState):
+        """One payload of the topic `scene`; shapes, which are large, and what is broken are passed over."""
+        with contextlib.suppress(RemoteProtocolError):
+            if claims_to_be("scene", payload) and isinstance(state := decode_view(payload), SceneState):
                 by_trigger = zip(*((l2, r2) for _, l2, r2 in state.overlaps), strict=True)
-                self._figures = SceneFacts(
-                    overlap_mm3=1e9 * max(map(sum, by_trigger), default=0.0),
-                    tick_us=state.tick_p50_us,
-                    tick_p99_us=state.tick_p99_us,
-                    overruns=state.overruns,
-                )
-        return self._figures
+                overlap_mm3 = 1e9 * max(map(sum, by_trigger), default=0.0)
+                self.newest = SceneFacts(overlap_mm3, state.tick_p50_us, state.tick_p99_us, state.overruns)
 
 
 class Viewing:
@@ -111,7 +96,7 @@ class Viewing:
     def requests(self, now_s: float) -> list[bytes]:
         """What to send to the robot side now: what is looked at, while anything is."""
         if self.console is not None:
-            hear_pages(self.console, self._pages, now_s)
+            self._hear(self.console, now_s)
         pages = self.console is not None and self.console.pages > 0
         lacks = None if self.console is None else self.console.lacks
         stands_still = lacks is not None and any(lacks) and not self._asked
@@ -122,6 +107,15 @@ class Viewing:
         if self._recording is not None:
             self._recording.noted.append((Kind.WATCHED, now_s, b""))
         return [encode(watch)]
+
+    def _hear(self, console: Console, now_s: float) -> None:
+        console.receive()
+        while console.words:
+            page, said = console.words.popleft()
+            if said is None:
+                self._pages.close(page, now_s)
+            else:
+                self._pages.receive(page, said, now_s)
 
     def facts_due(self, now_s: float) -> bool:
         """Whether to call `show`."""
@@ -150,5 +144,5 @@ class Viewing:
         """Tell the status of `now_s`, and the facts where somebody wants them."""
         self._status.show(now_s, operator=status)
         if self._status.wants_facts:
-            scene = self._figures.figures()
-            self._status.show_facts(operator_facts(self._core, status, self._surroundings(now_s), now_s, scene))
+            around, scene = self._surroundings(now_s), self._figures.newest
+            self._status.show_facts(operator_facts(self._core, status, around, now_s, scene))

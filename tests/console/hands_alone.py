@@ -13,6 +13,7 @@ import msgspec
 from common.protocol.messages import Telemetry
 from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import AS_GIVEN
+from operator_side.viewing.console.names import names
 from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
 from tests.console.browser import Browser, Page
@@ -32,19 +33,21 @@ _PAGE: Final = b"""<!doctype html><meta charset="utf-8"><title>hands</title><lin
   document.getElementById("other").onclick = () => { window.clicked += 1; };
   window.hands = new Hands(document, (message) => { window.sent.push([performance.now(), JSON.stringify(message)]); });
 </script>"""
+_MADE: Final = {"/": ("html", _PAGE), "/names.js": ("javascript", names().encode())}
 _SILENT_STATUS: Final = {"state": "disarmed", "link": "up", "owner": "ready"}
 
 
 class _Handler(SimpleHTTPRequestHandler):
     def do_GET(self) -> None:
-        if self.path != "/":
+        if self.path not in _MADE:
             super().do_GET()
             return
+        kind, content = _MADE[self.path]
         self.send_response(200)
-        self.send_header("Content-Type", "text/html; charset=utf-8")
-        self.send_header("Content-Length", str(len(_PAGE)))
+        self.send_header("Content-Type", f"text/{kind}; charset=utf-8")
+        self.send_header("Content-Length", str(len(content)))
         self.end_headers()
-        self.wfile.write(_PAGE)
+        self.wfile.write(content)
 
     def log_message(self, *arguments: object) -> None:
         """Log nothing."""
@@ -104,17 +107,19 @@ class HandsAlone:
             self.state = "stopped"
         screen: Telemetry = msgspec.structs.replace(VIEW, state=self.state)
         self.shared.tick(now_s, screen, 0.0)
-        self.intent = operator_intent(self.shared.read(now_s), AS_GIVEN)
+        state = self.shared.read(now_s)
+        assert state is not None
+        self.intent = operator_intent(state, AS_GIVEN)
         if self.intent.arm:
             self.state = "armed"
         if self.hears:
             self.page.ask("(facts) => window.hands.show(facts)", self._facts(now_s))
 
     def _facts(self, now_s: float) -> dict[str, Any]:
-        rest_s = self.pages.rest_s(now_s)
+        self.pages.driven(now_s)  # first, as it looks whether the page is still there
         nothing_asked = {"asked": "", "mean_ms": None, "p99_ms": None, "newest_ms": None}
         return {
-            "status": _SILENT_STATUS | {"state": self.state},
+            "status": _SILENT_STATUS | {"state": self.state, "person": self.shared.doing},
             "hands": "person" if self.person and not self.pages.driver else "browser",
             "advancing": "R2",
             "may_tune": True,
@@ -124,10 +129,7 @@ class HandsAlone:
             "page": {
                 "may_drive": self.pages.may_drive,
                 "driver": self.pages.driver,
-                "readiness": str(self.pages.readiness),
-                "rest_s": rest_s,
                 "person": self.person,
-                "doing": self.shared.doing,
                 "tuning_refused": "",
                 "link_asked": None,
             },
@@ -149,7 +151,7 @@ class HandsAlone:
     def expect(self, words: str) -> None:
         """The page says so of the hands; AssertionError otherwise."""
         if words not in (said := self.page.text("#hands_state")):
-            raise AssertionError(f"the page says {said!r}, not {words!r}; {self.pages.readiness}, {self.state}")
+            raise AssertionError(f"the page says {said!r}, not {words!r}; {self.pages.doing}, {self.state}")
 
     @property
     def pulled(self) -> tuple[float, float]:

@@ -65,7 +65,7 @@ def _near(events: Sequence[dict[str, Any]]) -> Screen:
         elif event["event"] == "facts":
             facts = msgspec.convert(event["facts"], OperatorFacts)
             screen.add(facts)
-            if facts.page is not None and facts.page.doing == "advancing" and facts.r2.meets >= _STIFF:
+            if facts.page is not None and facts.status.person == "advancing" and facts.r2.meets >= _STIFF:
                 found = copy.deepcopy(screen)
     if found is None:
         raise AssertionError(f"R2 never met {_STIFF} of 8 on the way to the target")

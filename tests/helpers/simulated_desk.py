@@ -8,12 +8,13 @@ from typing import Any
 import msgspec
 
 from common.protocol.messages import Header, Telemetry, Vector3
+from common.status.codes import Doing
 from operator_side.controller.feel import FREE_TRIGGER, SENSED_TRAVEL, Feel, Strengths
 from operator_side.controller.state import Button, Stick
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
 from operator_side.hands.travel_calibration import TravelCalibration
-from operator_side.people.person import Phase, SimulatedOperator
+from operator_side.people.person import SimulatedOperator
 from operator_side.people.settings import PersonSettings
 from tests.helpers.felt import telemetry
 
@@ -46,7 +47,7 @@ class Hands:
     """What the hands did in one tick."""
 
     now_s: float
-    phase: Phase
+    phase: Doing
     l2_n: float
     r2_n: float
     left: Stick
@@ -107,7 +108,7 @@ class Desk:
             seen.append(self.tick(next(frames), delay_s))
         return seen
 
-    def until(self, phase: Phase, screen: Telemetry, at_most_s: float, delay_s: float = 0.0) -> float:
+    def until(self, phase: Doing, screen: Telemetry, at_most_s: float, delay_s: float = 0.0) -> float:
         """Watch until the person gets to `phase`; how long that took."""
         start_s, frames = self.now_s, self._frames(screen)
         while self.person.phase != phase:
@@ -117,8 +118,8 @@ class Desk:
 
     def arm(self, screen: Telemetry | None = None) -> None:
         """Up to the advance, from where the person sees `screen`."""
-        self.until("arm", VIEW, 3.0)
-        self.until("advance", screen or armed((0.0, 0.0, 0.3)), 1.0)
+        self.until(Doing.ARMING, VIEW, 3.0)
+        self.until(Doing.ADVANCING, screen or armed((0.0, 0.0, 0.3)), 1.0)
 
     def resist(self, r2: Strengths, l2: Strengths | None = None) -> None:
         self.tell(Feel(l2=l2 or FREE_TRIGGER, r2=r2))

@@ -108,10 +108,10 @@ ARROWS = """
     operator_side/viewing/facts.py: common/protocol common/status
     operator_side/viewing/terminal: common common/command common/companion common/status operator_side/controller
         operator_side/viewing/facts.py
-    operator_side/viewing/pages: common common/protocol common/status operator_side/controller operator_side/hands
-        operator_side/people
-    operator_side/viewing/console: common common/companion common/protocol common/status common/video
-        operator_side/controller operator_side/viewing/facts.py operator_side/viewing/pages
+    operator_side/viewing/pages: common common/protocol common/status operator_side/controller operator_side/core.py
+        operator_side/dualsense/simulated operator_side/hands operator_side/people operator_side/viewing/facts.py
+    operator_side/viewing/console: common common/command common/companion common/protocol common/status common/video
+        operator_side/controller operator_side/viewing/facts.py
     operator_side/viewing: common common/command common/protocol common/rate common/recording common/status
         operator_side/controller operator_side/core.py operator_side/settings.py operator_side/viewing/console
         operator_side/viewing/facts.py operator_side/viewing/pages

@@ -32,10 +32,9 @@ class Run:
         self.both.connection = Connection(VirtualSearch(Finder(self.system), lambda: False), self.both.operator)
 
     def unplug(self) -> None:
-        self.system.devices.pop(PLACE).unplug()
+        self.system.unplug(PLACE)
 
     def plug_in(self) -> None:
-        self.both.device.plug_in()
         self.system.devices[PLACE] = self.both.device
 
     def let_go_of_the_person(self) -> None:

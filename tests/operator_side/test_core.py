@@ -84,7 +84,7 @@ def test_without_haptics_nothing_is_ever_written_and_the_hands_rest_all_the_same
     bench.hands(Button.L1, r2=1.0)
     assert [command.r2 for command in bench.commands()] == [0.0]
     bench.write()
-    assert bench.device.write_count == 0
+    assert bench.side.haptics.writes == 0
 
 
 def test_a_controller_that_comes_while_blind_is_released_then_told(bench: Bench) -> None:

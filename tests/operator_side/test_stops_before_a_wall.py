@@ -119,7 +119,7 @@ def test_a_finger_of_two_newtons_stops_at_the_same_place_whatever_the_link(delay
     assert 1e3 * approach.left_m == pytest.approx(3.3, abs=0.2)
     assert speeds.max() > 0.1
     assert np.abs(speeds[-500:]).max() < 1e-3
-    assert approach.device.write_count < 120
+    assert approach.side.haptics.writes < 120
 
 
 @pytest.mark.parametrize("delay_ms", [0, 200, 400])

@@ -1,13 +1,12 @@
 """Which of the controllers that are there to use: the one from before, on USB rather than Bluetooth."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
 from common.errors import DeviceError, NoDeviceError
 from operator_side.controller.feel import RELEASED
 from operator_side.controller.port import OpenController
-from operator_side.dualsense.hid.device import HidBackend, HidDualSense, Identity
+from operator_side.dualsense.hid.device import HidBackend, HidDualSense
 from operator_side.dualsense.reports.models import PRODUCT_IDS, SONY_VENDOR_ID
 from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport
@@ -26,7 +25,13 @@ class Sighting:
 
 def sightings(backend: HidBackend) -> list[Sighting]:
     """Every place once, in the system's order; nothing is opened."""
-    return list(dict.fromkeys(_listed(backend)))  # one that serves several purposes is listed for each
+    listed = (
+        Sighting(found["path"], model)
+        for product_id, model in PRODUCT_IDS.items()
+        for found in backend.enumerate(SONY_VENDOR_ID, product_id)
+    )
+    # One that serves several purposes is listed for each.
+    return list(dict.fromkeys(one for one in listed if isinstance(one.path, bytes) and one.path))
 
 
 class Finder:
@@ -63,9 +68,15 @@ def find_controller(backend: HidBackend, preferred: str | None = None, *, others
             failure = failure or error
     if failure is not None and not opened:
         raise failure
-    sighting, chosen = min(opened, key=lambda pair: _rank(pair[1].identity, preferred))
-    is_another = preferred is not None and chosen.identity.address != preferred
-    left_alone = is_another and (failure is not None or not others)
+
+    def is_another(one: HidDualSense) -> bool:
+        return preferred is not None and one.identity.address != preferred
+
+    def rank(pair: tuple[Sighting, HidDualSense]) -> tuple[bool, bool]:
+        return is_another(pair[1]), pair[1].identity.transport is Transport.BLUETOOTH
+
+    sighting, chosen = min(opened, key=rank)
+    left_alone = is_another(chosen) and (failure is not None or not others)
     for _, other in opened:
         if left_alone or other is not chosen:
             other.close()
@@ -73,35 +84,9 @@ def find_controller(backend: HidBackend, preferred: str | None = None, *, others
         raise failure or NoDeviceError(
             f"the controller {preferred} is not there, only another: {chosen.identity.address}"
         )
-    transport = chosen.identity.transport
-    return OpenController(
-        device=chosen,
-        name=described(sighting.model, chosen.identity),
-        address=chosen.identity.address,
-        path=sighting.path,
-        release=build_output_report(RELEASED, transport),
-    )
-
-
-def described(model: str, identity: Identity) -> str:
-    """A controller in a few words."""
-    address = "" if identity.address is None else f" ({identity.address})"
-    return f"{model} on {identity.transport.value}{address}"
-
-
-def _listed(backend: HidBackend) -> Iterator[Sighting]:
-    for product_id, model in PRODUCT_IDS.items():
-        for found in backend.enumerate(SONY_VENDOR_ID, product_id):
-            path = found["path"]
-            if isinstance(path, bytes) and path:
-                yield Sighting(path, model)
-
-
-def _rank(identity: Identity, preferred: str | None) -> tuple[bool, bool]:
-    return (
-        preferred is not None and identity.address != preferred,
-        identity.transport is Transport.BLUETOOTH,
-    )
+    transport, address = chosen.identity.transport, chosen.identity.address
+    name = f"{sighting.model} on {transport.value}{'' if address is None else f' ({address})'}"
+    return OpenController(chosen, name, address, sighting.path, build_output_report(RELEASED, transport))
 
 
 def _none_found() -> NoDeviceError:

@@ -44,11 +44,6 @@ class ReleaseGuard:
             self._process.stdout.close()
 
     @property
-    def process_id(self) -> int | None:
-        """The operating system's number for the watchdog; None before it is started."""
-        return None if self._process is None else self._process.pid
-
-    @property
     def running(self) -> bool:
         """Whether there is anybody to release the triggers; False when somebody ended the watchdog."""
         return self._process is not None and self._process.poll() is None

@@ -4,13 +4,9 @@ On Bluetooth their last four bytes are a checksum. Layout: Linux hid-playstation
 """
 
 import struct
-from dataclasses import dataclass
-from typing import Annotated, Final, Self
-
-from msgspec import Meta
+from typing import Final, NamedTuple, Self
 
 from common.errors import RemoteProtocolError
-from common.limits import Limited
 from operator_side.controller.port import checked_address
 from operator_side.dualsense.reports.transport import CHECKSUM_LENGTH, Seed, Transport, check, described, sealed
 
@@ -22,9 +18,6 @@ FEATURE_LENGTHS: Final = {CALIBRATION_ID: 41, ADDRESS_ID: 20, FIRMWARE_ID: 64}
 
 _VERSIONS: Final = struct.Struct("<II")
 _HARDWARE, _UPDATE = 24, 44
-
-Word = Annotated[int, Meta(ge=0, le=2**32 - 1)]
-HalfWord = Annotated[int, Meta(ge=0, le=2**16 - 1)]
 
 
 def _checked(report: bytes, report_id: int, transport: Transport) -> bytes:
@@ -64,13 +57,12 @@ def build_address(address: str, transport: Transport = Transport.USB) -> bytes:
     return _finished(ADDRESS_ID, bytes.fromhex(checked_address(address).replace(":", ""))[::-1], transport)
 
 
-@dataclass(frozen=True, slots=True)
-class Firmware(Limited):
-    """The versions of a controller."""
+class Firmware(NamedTuple):
+    """The versions of a controller: words of 32 bits, and one of 16."""
 
-    hardware_version: Word
-    firmware_version: Word
-    update_version: HalfWord
+    hardware_version: int
+    firmware_version: int
+    update_version: int
     """Which features of the firmware to expect."""
 
     @classmethod

@@ -9,8 +9,7 @@ from functools import lru_cache
 from typing import Final
 
 from common.errors import RemoteProtocolError
-from operator_side.controller.state import Button, ControllerState
-from operator_side.dualsense.reports.battery import BATTERIES, battery_byte
+from operator_side.controller.state import Battery, BatteryState, Button, ControllerState
 from operator_side.dualsense.reports.transport import (
     CHECKSUM_LENGTH,
     INPUT_FRAMING,
@@ -72,16 +71,8 @@ _BUTTON_BITS: Final = {
 
 
 def _axis(byte: int) -> float:
-    """-1 at 0, 0 at 128, 1 at 255: the halves differ by one step."""
+    """A stick's byte to -1 at 0, 0 at 128, 1 at 255: the halves differ by one step."""
     return (byte - 128) / (127 if byte > 128 else 128)
-
-
-AXIS: Final = tuple(_axis(byte) for byte in range(256))
-"""A stick's byte to -1 to 1."""
-AXIS_DOWN: Final = tuple(0.0 - _axis(byte) for byte in range(256))
-"""A stick's byte of a vertical axis to -1 to 1: down is positive on the wire."""
-TRAVEL: Final = tuple(byte / 255 for byte in range(256))
-"""A trigger's byte to 0 to 1."""
 
 
 def byte_of_axis(axis: float) -> int:
@@ -106,6 +97,34 @@ def code_of(pressed: frozenset[Button]) -> int:
     return code
 
 
+_BATTERY_STATES: Final = {
+    0x0: BatteryState.DISCHARGING,
+    0x1: BatteryState.CHARGING,
+    0x2: BatteryState.FULL,
+    0xA: BatteryState.OUT_OF_RANGE,
+    0xB: BatteryState.TEMPERATURE,
+    0xF: BatteryState.FAULT,
+}
+_BATTERY_CODES: Final = {state: code for code, state in _BATTERY_STATES.items()} | {BatteryState.UNKNOWN: 0x3}
+
+
+@lru_cache
+def _battery(byte: int) -> Battery:
+    """A step of the fraction stands for ten per cent, and the middle of them is meant (hid-playstation)."""
+    state = _BATTERY_STATES.get(byte >> 4, BatteryState.UNKNOWN)
+    if state is BatteryState.FULL:
+        return Battery(1.0, state)
+    if state not in (BatteryState.DISCHARGING, BatteryState.CHARGING):
+        return Battery(None, state)
+    return Battery(min((2 * (byte & 0x0F) + 1) / 20, 1.0), state)
+
+
+def _battery_byte(battery: Battery) -> int:
+    """The byte that says `battery`."""
+    tenths = 0 if battery.fraction is None else min(int(battery.fraction * 10 + 1e-9), 10)
+    return _BATTERY_CODES[battery.state] << 4 | tenths
+
+
 def parse_input_report(report: bytes) -> ControllerState:
     """Read an input report of either transport; every one of a valid id, length and checksum can be read.
 
@@ -114,12 +133,12 @@ def parse_input_report(report: bytes) -> ControllerState:
     start = INPUT_FRAMING[_checked_transport(report)].start
     left_x, left_y, right_x, right_y, l2, r2, _, *buttons, _, _, _, _, battery, _ = _COMMON.unpack_from(report, start)
     return ControllerState(
-        left_stick=(AXIS[left_x], AXIS_DOWN[left_y]),
-        right_stick=(AXIS[right_x], AXIS_DOWN[right_y]),
-        l2=TRAVEL[l2],
-        r2=TRAVEL[r2],
+        left_stick=(_axis(left_x), 0.0 - _axis(left_y)),  # down is positive on the wire
+        right_stick=(_axis(right_x), 0.0 - _axis(right_y)),
+        l2=l2 / 255,
+        r2=r2 / 255,
         pressed=pressed_of(int.from_bytes(buttons, "little")),
-        battery=BATTERIES[battery],
+        battery=_battery(battery),
     )
 
 
@@ -159,7 +178,7 @@ def build_input_report(
         round(sensor_time_s * _SENSOR_TICKS_PER_S) % 2**32,
         _NOT_TOUCHED,
         _NOT_TOUCHED,
-        battery_byte(state.battery),
+        _battery_byte(state.battery),
         _USB_DATA_AND_POWER if transport is Transport.USB else 0,
     )
     return bytes(report) if transport is Transport.USB else sealed(Seed.INPUT, bytes(report[:-CHECKSUM_LENGTH]))

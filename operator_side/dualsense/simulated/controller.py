@@ -60,8 +60,6 @@ class SimulatedDualSense:
         self.transport: Final = transport
         self.model: Final = model
         self.address: Final = address
-        self.write_count = 0
-        """Writes that were accepted from outside."""
         self._l2 = SimulatedTrigger(strength_step_n)
         self._r2 = SimulatedTrigger(strength_step_n)
         wireless = transport is Transport.BLUETOOTH
@@ -73,15 +71,11 @@ class SimulatedDualSense:
         }
         self._now_s = -math.inf
         self._closed = False
-        self._plugged_in = True
-        self._start()
-
-    def _start(self) -> None:
-        """Begin as the controller does once it has found its host."""
         self._woke_s: float | None = None
         self._newest_report = -1
         self._unread: bytes | None = None
-        self._told = RELEASED
+        self.told = RELEASED
+        """All that it has been told and still does; None where nothing was."""
         self._apply(RELEASED)
 
     # The hands
@@ -122,11 +116,6 @@ class SimulatedDualSense:
         return self._l2.travel, self._r2.travel
 
     @property
-    def told(self) -> Feel:
-        """All that it has been told and still does; None where nothing was."""
-        return self._told
-
-    @property
     def strengths(self) -> tuple[Strengths, Strengths]:
         """The strengths in force, L2 and R2."""
         return self._l2.strengths, self._r2.strengths
@@ -139,20 +128,7 @@ class SimulatedDualSense:
     @property
     def rumble(self) -> Rumble:
         """The motors' present drive."""
-        return self._told.rumble or Rumble()
-
-    # The cable, or the radio
-
-    def unplug(self) -> None:
-        """Be gone: every other call raises DeviceError. All effects are forgotten (assumed)."""
-        self._plugged_in = False
-        self._start()
-
-    def plug_in(self) -> None:
-        """Be there again, as at first and as newly opened, even if it was closed in the meantime."""
-        self._plugged_in = True
-        self._closed = False
-        self._start()
+        return self.told.rumble or Rumble()
 
     # The port
 
@@ -162,15 +138,14 @@ class SimulatedDualSense:
         return None if report is None else parse_input_report(report)
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Do what `feel` sets from `now_s` on; DeviceError when it is unplugged or closed."""
+        """Do what `feel` sets from `now_s` on; DeviceError when it is closed."""
         self._require_open()
         self._advance(now_s)
         self._apply(feel)
-        self.write_count += 1
 
     def close(self) -> None:
         """Take effects, rumble and a warning light off; `read` and `write` raise DeviceError from then on."""
-        self._apply(self._told.farewell)
+        self._apply(self.told.farewell)
         self._closed = True
 
     # The wire, for a system that is offered this controller
@@ -178,7 +153,7 @@ class SimulatedDualSense:
     def read_report(self, now_s: float) -> bytes | None:
         """The newest input report, of the state at its own time, or None until the next one is due.
 
-        ValueError when `now_s` runs backwards or is not finite; DeviceError when it is unplugged or closed.
+        ValueError when `now_s` runs backwards or is not finite; DeviceError when it is closed.
         """
         self._require_open()
         self._advance(now_s)
@@ -199,7 +174,7 @@ class SimulatedDualSense:
     def get_feature(self, report_id: int) -> bytes:
         """Answer a feature report: calibration 0x05, address 0x09, firmware 0x20.
 
-        DeviceError for another id, and when it is unplugged or closed.
+        DeviceError for another id, and when it is closed.
         """
         self._require_open()
         if report_id not in self._features:
@@ -208,15 +183,13 @@ class SimulatedDualSense:
         return self._features[report_id]
 
     def _require_open(self) -> None:
-        if not self._plugged_in:
-            raise DeviceError("the simulated controller is gone (unplugged): plug it in again")
         if self._closed:
             raise DeviceError("the simulated controller is closed; open a new one")
 
     def _apply(self, feel: Feel) -> None:
-        self._told = feel.following(self._told)
-        self._l2.set_strengths(self._told.l2 or FREE_TRIGGER)
-        self._r2.set_strengths(self._told.r2 or FREE_TRIGGER)
+        self.told = feel.following(self.told)
+        self._l2.set_strengths(self.told.l2 or FREE_TRIGGER)
+        self._r2.set_strengths(self.told.r2 or FREE_TRIGGER)
 
     def _advance(self, now_s: float) -> None:
         """Let time pass until `now_s`, and make the newest input report on the way that has come due."""

@@ -19,6 +19,8 @@ from typing import Any, Final
 
 import msgspec
 
+from common.command.live_view import LiveView
+from common.command.words import link_words, words
 from common.companion.channel import Channel
 from common.companion.process import companion_channel
 from common.errors import RemoteProtocolError
@@ -26,14 +28,13 @@ from common.protocol.codec import decode_view
 from common.protocol.view_messages import (
     VIEW_NAMES,
     AnyViewMessage,
-    EnlargementTerms,
     SceneShapes,
     SceneState,
     VideoFrame,
     VideoStep,
 )
 from common.roles import ROLES, Role
-from common.status.phase import phase_of
+from common.status.codes import Hands, Look
 from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts, ShownKind
 
@@ -135,7 +136,7 @@ class _Process:
         if kind == b"f":
             self._facts = facts = msgspec.msgpack.decode(content, type=OperatorFacts)
             at = [None if trigger.raw is None else SENSED_TRAVEL * trigger.raw for trigger in (facts.l2, facts.r2)]
-            shown = {"kind": ShownKind.FACTS, "facts": facts, "phase": phase_of(None, facts.status), "fingers": at}
+            shown = {"kind": ShownKind.FACTS, "facts": facts, "said": said(facts), "fingers": at}
             self._pages.show(ShownKind.FACTS, msgspec.json.encode(shown).decode())
         elif kind == b"n":
             note = {"kind": ShownKind.NOTE, "text": content.decode("utf-8", "replace")}
@@ -181,7 +182,6 @@ class _Process:
         listed += [(index, 0.0, 0.0) for index in targets if index not in known]
         scene = {
             "kind": ShownKind.SCENE,
-            "taken_s": state.taken_s,
             "overlap_mm3": (1e9 * total_l2, 1e9 * total_r2),
             "objects": [
                 {
@@ -193,18 +193,23 @@ class _Process:
             ],
             "left_out": 0 if self._shapes is None else self._shapes.left_out,
             "sigma_mm": (1e3 * state.l2.sigma_m, 1e3 * state.r2.sigma_m),
-            "terms": {"l2": _terms_mm(state.l2), "r2": _terms_mm(state.r2)},
             "tick_us": (state.tick_p50_us, state.tick_p99_us),
-            "overruns": state.overruns,
         }
         self._pages.show(ShownKind.SCENE, msgspec.json.encode(scene).decode())
 
 
-def _terms_mm(terms: EnlargementTerms) -> dict[str, float]:
-    """Those of eq. 9-10, for people."""
+def said(facts: OperatorFacts) -> dict[str, Any]:
+    """The sentences of a page, and how it looks; None for what is not known."""
+    status, view = facts.status, LiveView(None, facts.status)
+    state = view.phase if view.alarm or view.look is Look.STARTING else words(view.look)
     return {
-        name: 1e3 * getattr(terms, f"{name}_m")
-        for name in ("sigma", "mean", "kinematic_sd", "camera_sd", "prediction_sd", "displacement")
+        "look": view.look,
+        "state": state.upper(),
+        "why": (None if state == view.phase else view.phase, view.reason),
+        "link": link_words(status),
+        "lease": words(status.owner) or None,
+        "whose": "scripted person" if facts.hands is Hands.PERSON else words(facts.hands),
+        "holding": None if status.holding is None else f"{view.holding or 'nothing'}{view.stands}",
     }
 
 

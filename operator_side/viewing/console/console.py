@@ -1,7 +1,7 @@
 """The console as whoever feeds it sees it: a process beside ours, which ours never waits for."""
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final, Self
 
 import msgspec
@@ -24,8 +24,8 @@ PageWords = tuple[int, dict[str, Any] | None]
 class Console:
     """The browser console; without viser there is none, which a note says."""
 
-    def __init__(self, title: str, *, port: int = 0, live: bool = True, tunable: Sequence[str] = ()) -> None:
-        """Start it on `port` of this machine, 0 for any. `tunable`: names of what a page may tune."""
+    def __init__(self, title: str, *, port: int = 0, live: bool = True) -> None:
+        """Start it on `port` of this machine, 0 for any; `live`: no recording."""
         self.address: str | None = None
         """Where its page is, with the token that lets in; None until it is ready, and when it is gone."""
         self.pages = 0
@@ -42,19 +42,13 @@ class Console:
         self.gone = False
         """Whether there is none any more; a note says why."""
         self._companion = Companion("operator_side.viewing.console", [str(port)])
-        run = {"title": title, "live": live, "tunable": list(tunable)}
-        self._companion.channel.send(b"r", msgspec.msgpack.encode(run))
+        self._companion.channel.send(b"r", msgspec.msgpack.encode({"title": title, "live": live}))
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    @property
-    def process_id(self) -> int:
-        """The operating system's number for it."""
-        return self._companion.process_id
 
     def fileno(self) -> int:
         """To wait for what it says."""

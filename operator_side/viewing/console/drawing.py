@@ -47,6 +47,22 @@ def compose(outer: Floats, inner: Floats) -> Floats:
     return np.concatenate([outer[:, :3] + turn.apply(inner[:, :3]), turns], axis=1)
 
 
+def _add(scene: viser.SceneApi, name: str, solid: Solid, places: Any, **looks: Any) -> viser.BatchedMeshHandle:
+    """Draw a solid at many places (n, 3), not turned yet."""
+    return scene.add_batched_meshes_simple(
+        name,
+        solid.vertices,
+        solid.triangles,
+        batched_wxyzs=np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (len(places), 1)),
+        batched_positions=places,
+        flat_shading=solid.flat,
+        lod="off",
+        cast_shadow=False,
+        receive_shadow=False,
+        **looks,
+    )
+
+
 class _Batch:
     """Shapes that share a mesh."""
 
@@ -56,19 +72,8 @@ class _Batch:
         self.owner = np.array([shape.owner for shape in shapes])
         self._inner = np.array([shape.pose for shape in shapes], np.float64)
         self._colors = (255.0 * np.array([shape.color[:3] for shape in shapes])).astype(np.uint8)
-        self._handle = scene.add_batched_meshes_simple(
-            name,
-            solid.vertices,
-            solid.triangles,
-            batched_wxyzs=np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (len(members), 1)),
-            batched_positions=np.zeros((len(members), 3)),
-            batched_scales=np.array([scale for _, scale in members]),
-            batched_colors=self._colors,
-            flat_shading=solid.flat,
-            lod="off",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        places, scales = np.zeros((len(members), 3)), np.array([scale for _, scale in members])
+        self._handle = _add(scene, name, solid, places, batched_scales=scales, batched_colors=self._colors)
         self._poses = np.full((len(members), 7), np.nan, np.float32)
 
     def place(self, links: Floats, objects: Floats, object_colors: NDArray[np.uint8]) -> None:
@@ -108,20 +113,9 @@ class _Ghost:
         if self._handle is None or self._count != len(spheres):
             if self._handle is not None:
                 self._handle.remove()
-            ball, self._count = sphere(1), len(spheres)
-            self._handle = self._scene.add_batched_meshes_simple(
-                self._name,
-                ball.vertices,
-                ball.triangles,
-                batched_wxyzs=np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (len(spheres), 1)),
-                batched_positions=moved,
-                batched_scales=radii,
-                batched_colors=self._color,
-                opacity=_GHOST_OPACITY,
-                lod="off",
-                cast_shadow=False,
-                receive_shadow=False,
-            )
+            self._count = len(spheres)
+            looks = {"batched_scales": radii, "batched_colors": self._color, "opacity": _GHOST_OPACITY}
+            self._handle = _add(self._scene, self._name, sphere(1), moved, **looks)
         else:
             self._handle.batched_positions = moved
             if not np.array_equal(radii, self._radii):
@@ -205,17 +199,14 @@ class Drawing:
             if self._label is not None:
                 self._label.visible = False
             return
-        text, position = f"target: {shapes.objects[targets[0]]}", self._place_of(int(targets[0]))
+        index, text = int(targets[0]), f"target: {shapes.objects[targets[0]]}"
+        # The middle of its first shape: its own frame may be anywhere.
+        pose = next((shape.pose for shape in shapes.shapes if shape.owner == index and not shape.of_robot), _STILL)
+        position = compose(self._objects[index : index + 1], np.array([pose]))[0, :3]
         if self._label is None:
             self._label = self._server.scene.add_label("/target", text, position=position, anchor="bottom-center")
         elif self._label.text != text or not np.array_equal(self._label.position, position):
             self._label.text, self._label.position, self._label.visible = text, position, True
-
-    def _place_of(self, index: int) -> Floats:
-        """The middle (3,) of an object's first shape: its own frame may be anywhere."""
-        shapes = () if self._shapes is None else self._shapes.shapes
-        pose = next((shape.pose for shape in shapes if shape.owner == index and not shape.of_robot), _STILL)
-        return compose(self._objects[index : index + 1], np.array([pose]))[0, :3]
 
 
 def _colors(roles: NDArray[np.uint8], state: SceneState) -> NDArray[np.uint8]:

@@ -1,7 +1,7 @@
 """The open pages: each gets the newest of everything as fast as it takes it, and says what its hands do."""
 
 import asyncio
-from collections import deque
+import contextlib
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -23,8 +23,7 @@ ROUND_ENDS: Final = f'{{"kind":"{ShownKind.END}"}}'
 """A page answers it with `taken`."""
 
 Heard = Callable[[str, bytes], None]
-"""Called with `h`, `t` or `p` and MessagePack of `{"page": number, "hands", "tune" or "play": what the page said}`. A
-page that is gone says `hands` of nil."""
+"""Called with `s` and MessagePack of PageWords."""
 
 
 class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -47,23 +46,21 @@ class _Page:
 
     def __init__(self) -> None:
         self.newest: dict[str, bytes | str] = {}
-        self.notes: deque[str] = deque(maxlen=_MOST_NOTES)
         self.something = asyncio.Event()
         self.taken = asyncio.Event()
         self.slow = False
         self.looks = True
 
     async def send(self, connection: ServerConnection) -> None:
-        while True:
-            await self.something.wait()
-            self.something.clear()
-            self.taken.clear()
-            this_round = [*self.notes, *self.newest.values()]
-            self.notes.clear()
-            self.newest.clear()
-            for message in (*this_round, ROUND_ENDS):
-                await connection.send(message)
-            await self.taken.wait()
+        with contextlib.suppress(ConnectionClosed):  # whoever listens to it notices, too
+            while True:
+                await self.something.wait()
+                self.something.clear()
+                self.taken.clear()
+                this_round, self.newest = self.newest, {}
+                for message in (*this_round.values(), ROUND_ENDS):
+                    await connection.send(message)
+                await self.taken.wait()
 
 
 class Pages:
@@ -76,7 +73,7 @@ class Pages:
         self._pages: dict[int, _Page] = {}
         self._number = 0
         self._lasting: dict[str, bytes | str] = {}
-        self._notes: deque[str] = deque(maxlen=_MOST_NOTES)
+        self._noted = 0
 
     @property
     def slow(self) -> bool:
@@ -86,6 +83,7 @@ class Pages:
     def show(self, kind: str, message: bytes | str, *, lasting: bool = False) -> None:
         """Send this, text or bytes, instead of what of this kind has not left yet; `lasting`: to later pages, too."""
         if lasting:
+            self._lasting.pop(kind, None)  # the newest comes last
             self._lasting[kind] = message
         for page in self._pages.values():
             if page.looks or lasting:
@@ -94,10 +92,8 @@ class Pages:
 
     def note(self, message: str) -> None:
         """Send this to every page, and to later ones."""
-        self._notes.append(message)
-        for page in self._pages.values():
-            page.notes.append(message)
-            page.something.set()
+        self._noted += 1
+        self.show(f"{ShownKind.NOTE} {self._noted % _MOST_NOTES}", message, lasting=True)
 
     async def serve(self, connection: ServerConnection) -> None:
         """One page, until it goes."""
@@ -107,16 +103,14 @@ class Pages:
         self._number += 1
         number, page = self._number, _Page()
         page.newest.update(self._lasting)
-        page.notes.extend(self._notes)
-        if page.newest or page.notes:
+        if page.newest:
             page.something.set()
         self._pages[number] = page
         self._count()
-        sending = asyncio.create_task(self._send(page, connection))
+        sending = asyncio.create_task(page.send(connection))
         try:
-            await self._listen(number, page, connection)
-        except ConnectionClosed:
-            pass
+            with contextlib.suppress(ConnectionClosed):
+                await self._listen(number, page, connection)
         finally:
             sending.cancel()
             del self._pages[number]
@@ -125,12 +119,6 @@ class Pages:
 
     def _count(self) -> None:
         self._changed(sum(page.looks for page in self._pages.values()))
-
-    async def _send(self, page: _Page, connection: ServerConnection) -> None:
-        try:
-            await page.send(connection)
-        except ConnectionClosed:
-            return  # whoever listens to it notices, too
 
     async def _listen(self, number: int, page: _Page, connection: ServerConnection) -> None:
         loop = asyncio.get_running_loop()

@@ -20,6 +20,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from operator_side.viewing.console.gate import LIVE, SCENE, SOCKETS, Gate
+from operator_side.viewing.console.names import names
 from operator_side.viewing.console.pages import MOST_PAGES, Pages
 
 _LARGEST_MESSAGE: Final = 1 << 16
@@ -48,14 +49,14 @@ class Viser(viser.ViserServer):
 
 
 def read_page() -> dict[str, tuple[str, bytes]]:
-    """The page's files by their place: content type and content."""
+    """The page's files by their place, and its names: content type and content."""
     folder = resources.files("operator_side.viewing.console") / "page"
     files = {
         f"/{file.name}": (_TYPES[file.name[file.name.rindex(".") :]], file.read_bytes())
         for file in folder.iterdir()
         if file.name.endswith(tuple(_TYPES))
     }
-    return files | {"/": files["/index.html"]}
+    return files | {"/": files["/index.html"], "/names.js": (_TYPES[".js"], names().encode())}
 
 
 class Server:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from common.protocol.messages import Telemetry
-from common.status.codes import Doing, Hands, Readiness
+from common.status.codes import Doing, Hands
 from operator_side.controller.feel import RELEASED, Feel
 from operator_side.controller.state import ControllerState
 from operator_side.hands.button_map import Action, button_of
@@ -20,8 +20,8 @@ _GRIPPER: Final = {1: Action.CLOSE_GRIPPER, -1: Action.OPEN_GRIPPER}
 class BrowserHands:
     """Hold-to-run arms, once per press; what moves the arm counts from when it was seen at rest while armed."""
 
-    has_person: Final = False
-    hands: Final = Hands.BROWSER
+    has_person = False
+    """Whether there is a scripted person who could go on."""
 
     def __init__(
         self, pages: DrivingPage, calibrate: Callable[[TravelCalibration], None], *, swap_sides: bool = False
@@ -37,10 +37,15 @@ class BrowserHands:
         self._told = RELEASED
 
     @property
+    def hands(self) -> Hands:
+        """Whose hands they are."""
+        return Hands.BROWSER
+
+    @property
     def doing(self) -> Doing:
         """What they do."""
-        if self._pages.readiness is not Readiness.RUNNING or self._moves:
-            return Doing(self._pages.readiness)
+        if self._pages.doing is not Doing.RUNNING or self._moves:
+            return self._pages.doing
         return Doing.AT_REST_FIRST if self._was_armed else Doing.ARMING
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
@@ -73,7 +78,7 @@ class BrowserHands:
         """Nothing that was told holds or shakes; a page only shows it."""
         return self._told.releases
 
-    def read(self, now_s: float) -> ControllerState:
+    def read(self, now_s: float) -> ControllerState | None:
         """The state by the last tick."""
         del now_s
         return self._state
@@ -88,8 +93,8 @@ class BrowserHands:
         self._told = self._told.farewell
 
     def _held(self, hands: PageHands, pressed: set[Action]) -> ControllerState:
-        chosen = {Action.NEXT_TARGET: hands.next_target, Action.HAND_OVER: hands.hand_over}
-        pressed |= {action for action, is_pressed in chosen.items() if is_pressed}
+        pressed |= {Action.NEXT_TARGET} if hands.next_target else set()
+        pressed |= {Action.HAND_OVER} if hands.hand_over else set()
         if self._moves and hands.gripper in _GRIPPER:
             pressed.add(_GRIPPER[hands.gripper])
         button = button_of(swap_sides=self._swap_sides)

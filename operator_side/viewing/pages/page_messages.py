@@ -5,7 +5,6 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from common.errors import RemoteProtocolError
 from common.limits import Share
 
 Deflection = tuple[Annotated[float, Meta(ge=-1.0, le=1.0)], Annotated[float, Meta(ge=-1.0, le=1.0)]]
@@ -59,24 +58,9 @@ class TuneWish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     link: Annotated[str, Meta(max_length=200)] | None = None
     """Netem's words"""
 
-    def over(self, earlier: "TuneWish | None") -> "TuneWish":
-        """This wish, and of an earlier one what this one leaves."""
-        if earlier is None:
-            return self
-        probability = earlier.probability if self.probability is None else self.probability
-        return TuneWish(probability, earlier.link if self.link is None else self.link)
-
 
 class PageMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One message of a page."""
 
     hands: PageHands | None = None
     tune: TuneWish | None = None
-
-
-def read_page_message(content: object) -> PageMessage:
-    """Validate what was JSON; RemoteProtocolError, in one line, for what is no message of a page."""
-    try:
-        return msgspec.convert(content, PageMessage)
-    except msgspec.ValidationError as error:
-        raise RemoteProtocolError(f"no valid message of a page: {error}") from error

@@ -1,58 +1,40 @@
 """A controller that a person in a browser may take out of the scripted person's hands, and give back."""
 
 from collections.abc import Callable
-from typing import Final, Protocol
 
 from common.protocol.messages import Telemetry
 from common.status.codes import Doing, Hands
 from operator_side.controller.feel import Feel
-from operator_side.controller.port import Controller
 from operator_side.controller.state import ControllerState
+from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.whoever import Whoever
 from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
 
 
-class MovedHands(Protocol):
-    """Hands that are moved in every turn."""
-
-    @property
-    def has_person(self) -> bool:
-        """Whether there is a scripted person who could go on."""
-
-    @property
-    def hands(self) -> Hands:
-        """Whose hands they are: the person's or a browser's."""
-
-    @property
-    def doing(self) -> Doing:
-        """What they do."""
-
-    def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Move the hands; `delay_s` is the round trip that the person has got used to."""
-
-
-class SharedHands:
+class SharedHands(BrowserHands):
     """The scripted person lets go as soon as a page drives or stops, and goes on only when told to: silence tells
     nothing. Whoever goes on is a new person, who believes nothing of what was before.
 
     As a controller it is the person's, or the page; both are told what to feel.
     """
 
-    has_person: Final = True
+    has_person = True
 
     def __init__(
         self,
         pages: DrivingPage,
-        page: BrowserHands,
-        device: Controller,
+        calibrate: Callable[[TravelCalibration], None],
+        device: SimulatedDualSense,
+        calibration: TravelCalibration,
         new_person: Callable[[], Whoever],
-        let_go: Callable[[], None],
-        calibrate: Callable[[], None],
+        *,
+        swap_sides: bool = False,
     ) -> None:
-        """`device` is held by who comes from `new_person`, until `let_go`, and read by what `calibrate` says."""
-        self._pages, self._page, self._device = pages, page, device
-        self._new_person, self._let_go, self._calibrate = new_person, let_go, calibrate
+        """`device` is held by who comes from `new_person`, and read by `calibration`."""
+        super().__init__(pages, calibrate, swap_sides=swap_sides)
+        self._device, self._calibration, self._new_person = device, calibration, new_person
         self._person: Whoever | None = new_person()
 
     @property
@@ -63,37 +45,39 @@ class SharedHands:
     @property
     def doing(self) -> Doing:
         """What they do."""
-        return (self._person or self._page).doing
+        return super().doing if self._person is None else self._person.doing
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """Move the hands; `delay_s` is the round trip that the person has got used to."""
         given_back = self._pages.take_give_back()
         if self._pages.stopping(now_s) or self._pages.driven(now_s):
             self._person = None
-            self._let_go()
+            self._device.hands_off()
         elif given_back and self._person is None:
             self._person = self._new_person()
-        if self._person is not None:
-            self._calibrate()
-        (self._person or self._page).tick(now_s, screen, delay_s)
+        if self._person is None:
+            super().tick(now_s, screen, delay_s)
+        else:
+            self._calibrate(self._calibration)
+            self._person.tick(now_s, screen, delay_s)
 
     # The port
 
     @property
     def released(self) -> bool:
         """Both are."""
-        return self._device.released and self._page.released
+        return self._device.released and super().released
 
     def read(self, now_s: float) -> ControllerState | None:
         """The state by whose hands they are."""
-        return (self._page if self._person is None else self._device).read(now_s)
+        return super().read(now_s) if self._person is None else self._device.read(now_s)
 
     def write(self, feel: Feel, now_s: float) -> None:
         """Tell both: whoever goes on feels what there is."""
         self._device.write(feel, now_s)
-        self._page.write(feel, now_s)
+        super().write(feel, now_s)
 
     def close(self) -> None:
         """Release both."""
         self._device.close()
-        self._page.close()
+        super().close()

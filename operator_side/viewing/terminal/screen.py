@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from common.command.live_line import UNKNOWN, millimetres, percent
-from common.command.live_view import LiveView, live_view, number
+from common.command.live_view import LiveView, number
 from common.command.words import link_words, printable, words
 from common.status.codes import Sight
 from operator_side.controller.feel import SENSED_TRAVEL
@@ -42,7 +42,7 @@ class Screen:
     def lines(self, age_s: float, width: int) -> Group:
         """Draw at most `width` columns, the most important lines first. `age_s`: time since the facts came."""
         facts = self.facts
-        view = LiveView() if facts is None else live_view(facts.robot, facts.status)
+        view = LiveView() if facts is None else LiveView(facts.robot, facts.status)
         drawn: list[RenderableType] = [_banner(view, 0.0 if facts is None else age_s, width)]
         if facts is not None:
             triggers = Table.grid("", "", padding=(0, 2, 0, 0), expand=True)
@@ -71,15 +71,15 @@ def _banner(view: LiveView, age_s: float, width: int) -> Text:
     text = view.phase if view.reason is None else f"{view.phase}: {view.reason}"
     if (old := age_s > SILENT_AFTER_S) or view.alarm:
         return _line(f"!!! {f'NO NEWS for {age_s:.1f} s' if old else text} ".ljust(width, "!"), style=_ALARM)
-    if view.state in ("armed", "disarmed"):
-        text = f"{view.state.upper()}  {'' if view.phase == view.state else view.phase}".rstrip()
-    sign = ">" if view.armed else "-" if view.state == "disarmed" else "."
+    if (state := view.side.state) in ("armed", "disarmed"):
+        text = f"{state.upper()}  {'' if view.phase == state else view.phase}".rstrip()
+    sign = ">" if view.armed else "-" if state == "disarmed" else "."
     return _line(f"{3 * sign} {text} {3 * sign}".ljust(width), style=_ARMED if view.armed else _QUIET)
 
 
 def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
     """Show what both sides say of the link, over the last second, and of what is ahead and in the hand."""
-    status, robot, known = facts.status, facts.robot, facts.robot or facts.status
+    status, robot, known = view.operator, view.robot, view.scene
     felt = {} if status.feel in (None, Sight.SEEING) else {"feel": words(status.feel)}
     who = {"lease": words(status.owner), "hands": words(facts.hands), "controller": words(status.controller)}
     lines = [_named(link=link_words(status), **who, **felt)]
@@ -90,22 +90,21 @@ def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
     rate, queue, lost = map(_figure, (known.rate_kbit_s, known.queue_ms, known.lost_percent))
     rates = {"rate": f"{rate} kbit/s", "queue": f"{queue} ms", "lost": f"{lost} %"}
     lines.append(_named(**rates, pictures=known.pictures, held_back=known.held_back))
-    ages = (facts.round_trip_ms, facts.field_age_ms, None if robot is None else robot.loop_age_ms)
+    ages = (facts.round_trip_ms, facts.field_age_ms, robot.loop_age_ms)
     round_trip, field_age, loop_age = (f"{_figure(age)} ms" for age in ages)
-    target = UNKNOWN if view.has_target is None else "none"
-    if view.has_target:
-        centre, way_mm = ("", view.target_mm) if view.target_mm is not None else ("centre ", view.target_centre_mm)
-        target = f"{known.target} {centre}at {millimetres(way_mm)}"
-    nearest = f"{view.nearest or 'nearest thing'} at {millimetres(view.nearest_mm)}"
+    target = "none" if known.target is None else UNKNOWN
+    if isinstance(known.target, str):
+        centre = number(robot.target_mm) is None
+        way = f"centre at {millimetres(status.target_centre_mm)}" if centre else f"at {millimetres(robot.target_mm)}"
+        target = f"{known.target} {way}"
+    nearest = f"{robot.nearest or 'nearest thing'} at {millimetres(robot.nearest_mm)}"
     asked = "" if facts.probability is None else f"   P {facts.probability:g}"
     enlarged_mm = None if facts.screen is None else 1e3 * facts.screen.enlargement_m
     grown = f"enlargement {_figure(enlarged_mm)} mm   rumble {_figure(facts.rumble)}"
     return [
         *(*lines, _named(round_trip=round_trip, field_age=field_age, loop_age=loop_age)),
-        _named(
-            nearest=nearest, target=target, holding=f"{view.holding or 'nothing'}{', it stands' if view.stands else ''}"
-        ),
-        _line(grown, asked, "" if view.haptics else "   haptics off"),
+        _named(nearest=nearest, target=target, holding=f"{view.holding or 'nothing'}{view.stands}"),
+        _line(grown, asked, "" if status.haptics else "   haptics off"),
     ]
 
 

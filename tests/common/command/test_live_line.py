@@ -1,7 +1,6 @@
 """A run in words: the live line, which never says half of something, and the story, which tells each change once."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,7 +11,7 @@ from rich.cells import cell_len
 
 from common.command.live_line import _facts, live_line
 from common.command.live_story import SHORTEST_GAP_S, Resistance, Story, next_resistance
-from common.command.live_view import LiveView, TriggerView, live_view
+from common.command.live_view import LiveView
 from common.protocol.session import SessionState
 from common.status.codes import ConnectionState, Doing, LinkState, Sight
 from common.status.statuses import OperatorStatus, RobotStatus, SideStatus
@@ -32,7 +31,7 @@ OPERATOR = OperatorStatus(
 
 def approach(**changes: Any) -> LiveView:
     """Both sides' statuses of an approach, but for these figures of either."""
-    return live_view(replaced(ROBOT, **of(ROBOT, changes)), replaced(OPERATOR, **of(OPERATOR, changes)))
+    return LiveView(replaced(ROBOT, **of(ROBOT, changes)), replaced(OPERATOR, **of(OPERATOR, changes)))
 
 
 def of(one: SideStatus, changes: dict[str, Any]) -> dict[str, Any]:
@@ -41,22 +40,22 @@ def of(one: SideStatus, changes: dict[str, Any]) -> dict[str, Any]:
 
 names = st.one_of(st.none(), st.text(max_size=40))
 shares = st.one_of(st.none(), st.floats(0.0, 1.0))
-distances_mm = st.one_of(st.none(), st.floats(-1e3, 1e7))
-triggers = st.builds(TriggerView, shares, shares)
+distances_mm = st.one_of(st.none(), st.floats())
 views = st.builds(
-    LiveView,
-    phase=st.one_of(st.sampled_from(["advancing", "STOPPED", "LINK LOST"]), st.text(max_size=90)),
-    reason=names,
-    alarm=st.booleans(),
-    linked=st.one_of(st.none(), st.booleans()),
+    approach,
+    person=st.sampled_from([None, *Doing]),
+    state=st.sampled_from([None, "armed", "disarmed", "stopped"]),
+    link=st.sampled_from(LinkState),
+    link_reason=names,
+    stopped_because=names,
     real_time=shares,
     delay_ms=distances_mm,
-    l2=triggers,
-    r2=triggers,
+    r2=shares,
+    r2_pulled=shares,
     haptics=st.booleans(),
     nearest=names,
     nearest_mm=distances_mm,
-    has_target=st.one_of(st.none(), st.booleans()),
+    target=names,
     target_mm=distances_mm,
     target_centre_mm=distances_mm,
     holding=names,
@@ -106,12 +105,11 @@ def test_what_keeps_the_arm_from_moving_comes_first_and_in_words(changed: dict[s
 
 
 def test_what_is_not_known_is_no_zero() -> None:
-    line = live_line(live_view(None, OperatorStatus(link=LinkState.UP)), 79)
+    line = live_line(LiveView(None, OperatorStatus(link=LinkState.UP)), 79)
     assert line == "starting  L2/R2 pull –/–% resist –/–%  near –mm  target –mm  link –ms"
-    assert live_line(live_view(RobotStatus(nearest_mm=math.nan, r2=math.inf)), 79) == (
+    assert live_line(LiveView(RobotStatus(nearest_mm=math.nan, r2=math.inf)), 79) == (
         "waiting for an operator  L2/R2 pull –/–% resist –/–%  near –mm  target –mm"
     )
-    assert live_view() == LiveView()
 
 
 def test_without_haptics_nothing_resists() -> None:
@@ -137,13 +135,14 @@ def test_the_target_in_other_words(changed: dict[str, Any], expected: str) -> No
 
 def test_control_characters_of_a_peer_do_not_reach_the_terminal() -> None:
     refused = OperatorStatus(link=LinkState.REFUSED, link_reason="\x1b[2J\nhello")
-    view = live_view(RobotStatus(nearest="a\rb", holding="\x07"), refused)
-    assert (view.reason, view.nearest, view.holding) == ("?[2J?hello", "a?b", "?")
+    view = LiveView(RobotStatus(nearest="a\rb", nearest_mm=0.0, holding="\x07"), refused)
+    assert (view.reason, view.holding) == ("?[2J?hello", "?")
+    assert told(view) == ["   0.0 s  REFUSED: ?[2J?hello; touches a?b, as perceived; holds ?"]
 
 
 @given(view=views, width=st.integers(0, 200))
 @example(view=approach(), width=79)
-@example(view=replace(LiveView(), phase="界" * 5), width=9)
+@example(view=approach(link=LinkState.LOST, link_reason="界" * 5), width=19)
 def test_it_fits_and_holds_whole_facts_only(view: LiveView, width: int) -> None:
     line = live_line(view, width)
     assert cell_len(line) <= width
@@ -159,17 +158,12 @@ def test_it_fits_and_holds_whole_facts_only(view: LiveView, width: int) -> None:
     assert left == "" or line == f"{phase}  {' '.join(rest)}"
 
 
-RESTING = LiveView(
-    phase="resting",
-    linked=True,
-    l2=TriggerView(0.0, 0.0),
-    r2=TriggerView(0.0, 0.0),
-    nearest="tin",
-    nearest_mm=80.0,
-    has_target=True,
-    target_mm=120.0,
-)
-ADVANCING = replace(RESTING, phase="advancing", armed=True, r2=TriggerView(0.62, 0.0))
+def resting(**changes: Any) -> LiveView:
+    return approach(**{"state": "disarmed", "person": Doing.RESTING, "nearest_mm": 80.0, "r2_pulled": 0.0} | changes)
+
+
+def advancing(**changes: Any) -> LiveView:
+    return approach(**{"nearest_mm": 80.0, "r2": 0.0} | changes)
 
 
 def told(*views: LiveView, step_s: float = 1.0) -> list[str]:
@@ -179,16 +173,17 @@ def told(*views: LiveView, step_s: float = 1.0) -> list[str]:
 
 
 def test_a_run_reads_as_a_story() -> None:
-    near = replace(ADVANCING, nearest="carton", nearest_mm=10.0, target_mm=10.0, r2=TriggerView(0.5, 0.3))
+    near: dict[str, Any] = {"nearest": "carton", "nearest_mm": 10.0, "target_mm": 10.0, "r2_pulled": 0.5}
+    held = near | {"r2": 0.5, "holding": "carton"}
     lines = told(
-        replace(RESTING, phase="waiting for the robot side", linked=False),
-        RESTING,
-        ADVANCING,
-        near,
-        replace(near, nearest_mm=-0.5, target_mm=-0.5, r2=TriggerView(0.5, 1.0)),
-        replace(near, r2=TriggerView(0.5, 0.5), phase="lifting", holding="carton"),
-        replace(near, r2=TriggerView(0.5, 0.5), phase="lowering", holding="carton", stands=True),
-        replace(ADVANCING, phase="LINK LOST", reason="nothing heard", alarm=True, linked=False, armed=False),
+        resting(link=LinkState.WAITING),
+        resting(),
+        advancing(),
+        advancing(**near, r2=0.3),
+        advancing(**near | {"nearest_mm": -0.5, "target_mm": -0.5}, r2=1.0),
+        advancing(**held, person=Doing.LIFTING),
+        advancing(**held, person=Doing.LOWERING, stands=True),
+        advancing(link=LinkState.LOST, link_reason="nothing heard", state=None),
     )
     assert lines == [
         "   0.0 s  waiting for the robot side",
@@ -219,16 +214,16 @@ def test_a_stiffness_that_hovers_is_one_word(stiffnesses: list[float], expected:
 
 
 def test_a_touch_that_rattles_is_told_once() -> None:
-    rattling = [replace(ADVANCING, nearest_mm=0.0 if step % 2 else 5.0) for step in range(40)]
+    rattling = [advancing(nearest_mm=0.0 if step % 2 else 5.0) for step in range(40)]
     assert len(told(*rattling)) == 2
 
 
 def test_what_goes_to_and_fro_is_bounded() -> None:
-    flapping = [replace(ADVANCING, phase=("advancing", "grasping")[step % 2]) for step in range(1000)]
+    flapping = [advancing(person=(Doing.ADVANCING, Doing.GRASPING)[step % 2]) for step in range(1000)]
     assert len(told(*flapping, step_s=0.01)) <= 10.0 / SHORTEST_GAP_S + 1
 
 
 def test_an_alarm_does_not_wait_even_if_it_is_short() -> None:
-    stopped = replace(RESTING, phase="STOPPED", reason="emergency stop", alarm=True)
-    lines = told(ADVANCING, stopped, ADVANCING, ADVANCING, step_s=0.01)
+    stopped = resting(state="stopped", stopped_because="emergency stop")
+    lines = told(advancing(), stopped, advancing(), advancing(), step_s=0.01)
     assert [line.partition(" s  ")[2] for line in lines[1:]] == ["STOPPED: emergency stop"]

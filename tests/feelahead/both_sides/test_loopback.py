@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 from common.protocol.messages import Compensation
+from common.status.codes import Doing
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from feelahead.lab.approaches.approach import Approach, PullRun
 from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT
-from operator_side.people.person import Phase, SimulatedOperator
+from operator_side.people.person import SimulatedOperator
 from operator_side.people.pulling_hands import Hands
 from operator_side.people.settings import PersonSettings
 from operator_side.settings import OperatorSettings
@@ -39,7 +40,7 @@ episodes = pytest.mark.xdist_group("episodes")
 class Moment:
     """The person's doing and feeling."""
 
-    phase: Phase
+    phase: Doing
     l2: Strengths
     r2: Strengths
     held: bool
@@ -52,7 +53,7 @@ class Episode:
     moments: tuple[Moment, ...]
     summary: dict[str, Any]
 
-    def during(self, phase: Phase) -> list[Moment]:
+    def during(self, phase: Doing) -> list[Moment]:
         return [moment for moment in self.moments if moment.phase == phase]
 
 
@@ -85,7 +86,7 @@ def test_the_target_is_reached_grasped_and_lifted(delay_ms: int, compensation: C
 @episodes
 @pytest.mark.parametrize("delay_ms", [0, 200])
 def test_what_is_ahead_is_felt_on_the_advancing_trigger_alone(delay_ms: int) -> None:
-    advancing = episode(delay_ms).during("advance")
+    advancing = episode(delay_ms).during(Doing.ADVANCING)
     assert max(max(moment.l2) for moment in advancing) == 0
     assert max(max(moment.r2) for moment in advancing) == 8
     # A released trigger is free until the target is near.
@@ -97,7 +98,7 @@ def test_what_is_ahead_is_felt_on_the_advancing_trigger_alone(delay_ms: int) -> 
 @episodes
 @pytest.mark.parametrize("delay_ms", [0, 200])
 def test_the_free_travel_shrinks_as_the_target_comes_nearer(delay_ms: int) -> None:
-    free = [moment.r2.count(0) for moment in episode(delay_ms).during("advance")]
+    free = [moment.r2.count(0) for moment in episode(delay_ms).during(Doing.ADVANCING)]
     assert free[0] == 10
     assert free[-1] <= 1
     assert all(later <= earlier + 1 for earlier, later in itertools.pairwise(free))
@@ -117,7 +118,7 @@ def test_what_is_to_be_touched_never_stops_the_finger_that_touches_it(delay_ms: 
 @episodes
 @pytest.mark.parametrize("delay_ms", [0, 200])
 def test_what_is_held_is_felt_no_more_and_the_table_is(delay_ms: int) -> None:
-    lifting = episode(delay_ms).during("lift")
+    lifting = episode(delay_ms).during(Doing.LIFTING)
     assert all(moment.held for moment in lifting)
     assert max(max(moment.l2) for moment in lifting) == 0
     # The table lies ahead of a gripper that points down, within what a full pull would need to stop.

@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
+from common.status.codes import Doing
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.controller.connection import Connection
 from operator_side.controllers import DEVICES, Given
 from operator_side.settings import OperatorSettings
-from operator_side.viewing.following_pages import hands_facts
 from operator_side.viewing.pages.driving_page import DrivingPage
 from robot_side.settings import RobotSettings
 from tests.operator_side.viewing.pages.talking_page import AtThePage, Does, TalkingPage
@@ -121,8 +121,8 @@ def test_the_person_goes_on_from_the_start_once_they_are_told_to() -> None:
     run.run_until(4.9)
     assert state(run) == "armed"
     run.run_until(7.0)
-    facts = hands_facts(run.pages, None, run.operator, 7.0)
-    assert (facts.driver, facts.readiness) == (None, "nobody_drives")
+    assert run.pages.facts(run.operator, 7.0, person=False).driver is None
+    assert run.pages.doing is Doing.NOBODY_DRIVES
     assert speed_m_s(run) < 0.002
     run.run_until(17.0)
     assert run.summary()["task"]["time_to_grasp_s"] is not None

@@ -7,7 +7,7 @@ from typing import Any
 from common.clock import VirtualClock
 from common.errors import DeviceError
 from operator_side.controller.background_writes import STALL_S
-from operator_side.controller.feel import Feel
+from operator_side.controller.feel import RELEASED, Feel
 from operator_side.controller.port import Controller, OpenController
 from operator_side.controller.search import BackgroundSearch
 from operator_side.controller.state import ControllerState
@@ -25,10 +25,11 @@ class SimulatedHandle:
 
     def __init__(self, system: "SimulatedSystem") -> None:
         self._system = system
+        self._path = b""
         self._device: SimulatedDualSense | None = None
 
     def open_path(self, path: bytes) -> None:
-        self._device = self._system.devices.get(path)
+        self._path, self._device = path, self._system.devices.get(path)
         if self._device is None:
             raise OSError("open failed")
 
@@ -44,7 +45,10 @@ class SimulatedHandle:
             raise OSError("read error") from error
 
     def write(self, data: bytes) -> int:
-        return len(data) if self._system.transfer(self._open(), data) else -1
+        try:
+            return len(data) if self._system.transfer(self._open(), data) else -1
+        except DeviceError:
+            return -1
 
     def get_feature_report(self, report_num: int, max_length: int) -> list[int]:
         try:
@@ -60,6 +64,8 @@ class SimulatedHandle:
 
     def _open(self) -> SimulatedDualSense:
         assert self._device is not None
+        if self._system.devices.get(self._path) is not self._device:
+            raise DeviceError("unplugged")
         return self._device
 
 
@@ -72,16 +78,18 @@ class SimulatedSystem:
         self.failing = 0
         """Number of transfers, to any controller, that will fail."""
 
+    def unplug(self, path: bytes) -> None:
+        """The controller there is gone; without power it does nothing."""
+        self.devices.pop(path).write(RELEASED, self.clock.now())
+
     def transfer(self, device: SimulatedDualSense, report: bytes) -> bool:
         """Hand an output report over; False for a transfer that failed."""
         if self.failing > 0:
             self.failing -= 1
             return False
-        try:
+        if device in self.devices.values():
             device.take_report(report, self.clock.now())
-        except DeviceError:
-            return False
-        return True
+        return device in self.devices.values()
 
     def enumerate(self, vendor_id: int, product_id: int) -> list[dict[str, Any]]:
         assert vendor_id == SONY_VENDOR_ID

@@ -128,8 +128,8 @@ class Plugs(RuleBasedStateMachine):
 
     @rule(path=st.sampled_from(["usb A", "bluetooth A", "usb B"]))
     def plug_or_unplug(self, path: str) -> None:
-        if (device := self.system.devices.pop(path.encode(), None)) is not None:
-            device.unplug()
+        if path.encode() in self.system.devices:
+            self.system.unplug(path.encode())
             return
         transport = Transport.USB if path.startswith("usb") else Transport.BLUETOOTH
         device = SimulatedDualSense(transport, address=f"0{path[-1].lower()}:00:00:00:00:00")

@@ -63,8 +63,8 @@ def leave(guard: ReleaseGuard) -> None:
 
 
 def process_of(guard: ReleaseGuard) -> int:
-    assert guard.process_id is not None
-    return guard.process_id
+    assert guard._process is not None
+    return guard._process.pid
 
 
 def wait_for_end(process_id: int) -> None:
@@ -195,12 +195,12 @@ def test_a_watchdog_that_has_ended_is_replaced_and_told_what_is_held(
     guard: ReleaseGuard, controller: FakeController
 ) -> None:
     guard.hold(controller.path, REPORT)
-    first = guard.process_id
+    first = process_of(guard)
     end_watchdog(guard)
     assert guard.take_notes() == ["the watchdog process has ended; another one has taken its place"]
     assert guard.take_notes() == []
     assert guard.running
-    assert guard.process_id != first
+    assert process_of(guard) != first
     leave(guard)
     assert controller.written(LIMIT_S) == REPORT  # by the other one: it was still held when we left
 

@@ -6,6 +6,7 @@ import math
 import pytest
 
 from common.protocol.messages import Telemetry, Vector3
+from common.status.codes import Doing
 from operator_side.controller.feel import FREE_TRIGGER, SENSED_TRAVEL, USUAL_LIGHT, WARNING_LIGHT, Color, Feel, Rumble
 from operator_side.controller.state import Button
 from operator_side.dualsense.simulated.trigger_model import SPRING_PRELOAD_N, SPRING_RISE_N
@@ -57,9 +58,9 @@ def carried(settings: PersonSettings = CLEAR_SIGHTED) -> Desk:
     """Up to where the person begins to lower what they hold."""
     desk = Desk(settings)
     desk.arm()
-    desk.until("lift", armed(holding=True), 3.0)
-    desk.until("carry", at_height(UP_AT_M, 0.5), 1.0)
-    desk.until("lower", at_height(UP_AT_M), 1.0)
+    desk.until(Doing.LIFTING, armed(holding=True), 3.0)
+    desk.until(Doing.CARRYING, at_height(UP_AT_M, 0.5), 1.0)
+    desk.until(Doing.LOWERING, at_height(UP_AT_M), 1.0)
     return desk
 
 
@@ -80,40 +81,40 @@ def test_the_task_from_waiting_to_withdrawing() -> None:
     desk = Desk(start_s=1e6)
     for hands in desk.watch(None, 0.5):
         assert (hands.l2_n, hands.r2_n, hands.left, hands.buttons) == (0.0, 0.0, (0.0, 0.0), frozenset({Button.L1}))
-        assert hands.phase == "wait"
+        assert hands.phase == Doing.RESTING
     # The first picture takes a reaction time, and resting the hands as long as arming asks for.
-    assert 0.7 < desk.until("arm", VIEW, 3.0) < 1.3
+    assert 0.7 < desk.until(Doing.ARMING, VIEW, 3.0) < 1.3
     assert all(hands.buttons == {Button.L1, Button.OPTIONS} for hands in desk.watch(VIEW, 0.1))
-    desk.until("advance", armed((0.0, 0.0, 0.3)), 0.5)
+    desk.until(Doing.ADVANCING, armed((0.0, 0.0, 0.3)), 0.5)
     assert desk.watch(armed((0.0, 0.0, 0.3)), 1.0)[-1].r2_n > 0.0
     assert desk.person.doing == "advancing"
-    desk.until("close", armed(), 0.5)
+    desk.until(Doing.GRASPING, armed(), 0.5)
     closing = desk.watch(armed(), 0.2)
     assert all(Button.CROSS in hands.buttons for hands in closing)
     assert closing[-1].r2_n == closing[-1].l2_n == 0.0
-    desk.until("lift", armed(holding=True), 1.0)
+    desk.until(Doing.LIFTING, armed(holding=True), 1.0)
     desk.watch(armed(holding=True), 1.0)
     # They carry it back, level, and no farther than they meant.
-    desk.until("carry", at_height(UP_AT_M, 0.5), 0.5)
+    desk.until(Doing.CARRYING, at_height(UP_AT_M, 0.5), 0.5)
     back = desk.watch(at_height(UP_AT_M, 0.5), 0.5)[-1]
     assert (back.l2_n > 0.0, back.r2_n, back.left, Button.CROSS in back.buttons) == (True, 0.0, (0.0, 0.0), True)
     assert 0.0 < desk.watch(at_height(UP_AT_M, 0.46), 1.0)[-1].l2_n < back.l2_n
-    desk.until("lower", at_height(UP_AT_M), 0.5)
+    desk.until(Doing.LOWERING, at_height(UP_AT_M), 0.5)
     # What sags before it is lowered does not stand yet.
     sinks(desk, UP_AT_M, UP_AT_M - 0.004, 0.01)
     lowering = desk.watch(at_height(UP_AT_M - 0.004), 1.0)[-1]
-    assert lowering.phase == "lower"
+    assert lowering.phase == Doing.LOWERING
     assert stick_speed_m_s(lowering) == pytest.approx(0.05, abs=1e-6)
     sinks(desk, UP_AT_M, 0.32, 0.05)
-    assert desk.person.phase == "lower"
-    desk.until("release", at_height(0.32), 1.0)
+    assert desk.person.phase == Doing.LOWERING
+    desk.until(Doing.LETTING_GO, at_height(0.32), 1.0)
     assert all(hands.buttons == {Button.L1, Button.SQUARE} for hands in desk.watch(at_height(0.32), 0.5)[1:])
     # Out of where they have pressed it down, before they draw back.
     rising = desk.watch(at_height(0.32, holding=False), 1.0)[-1]
-    assert (rising.phase, stick_speed_m_s(rising) < 0.0) == ("release", True)
-    desk.until("withdraw", at_height(0.335, holding=False), 0.5)
+    assert (rising.phase, stick_speed_m_s(rising) < 0.0) == (Doing.LETTING_GO, True)
+    desk.until(Doing.DRAWING_BACK, at_height(0.335, holding=False), 0.5)
     assert desk.watch(at_height(0.335, holding=False), 0.5)[-1].l2_n > 0.0
-    desk.until("done", at_height(0.335, 0.33, holding=False), 0.5)
+    desk.until(Doing.DONE, at_height(0.335, 0.33, holding=False), 0.5)
     for hands in desk.watch(at_height(0.335, 0.33, holding=False), 1.0):
         assert (hands.l2_n, hands.r2_n, hands.left, hands.buttons) == (0.0, 0.0, (0.0, 0.0), frozenset({Button.L1}))
     assert all(Button.L1 in hands.buttons and hands.right == (0.0, 0.0) for hands in desk.hands)
@@ -141,8 +142,8 @@ def test_a_robot_that_stopped_makes_them_let_go_and_begin_anew(state: str) -> No
     assert desk.watch(armed((0.0, 0.0, 0.3)), 1.0)[-1].r2_n > 0.0
     stopped = desk.watch(view(state=state), 1.0)
     assert [hands.r2_n == 0.0 for hands in stopped].index(True) * TICK_S == pytest.approx(0.25, abs=2 * TICK_S)
-    assert stopped[-1].phase == "wait"
-    desk.until("arm", view(state=state), 2.0)
+    assert stopped[-1].phase == Doing.RESTING
+    desk.until(Doing.ARMING, view(state=state), 2.0)
 
 
 # Steering
@@ -184,7 +185,7 @@ def test_lifting_goes_up_whichever_way_the_tool_points(up: Vector3) -> None:
     desk = Desk()
     desk.arm()
     screen = armed(holding=True, up_in_tool=up)
-    desk.until("lift", screen, 3.0)
+    desk.until(Doing.LIFTING, screen, 3.0)
     hands = desk.watch(screen, 1.0)[-1]
     x, y = CALIBRATION.left_stick.deflection(hands.left)
     # Right, down and forward of the tool frame, each as a share of its full speed.
@@ -201,15 +202,15 @@ def test_lifting_goes_up_whichever_way_the_tool_points(up: Vector3) -> None:
 def test_between_attempts_they_open_and_draw_back_and_in_the_end_they_give_up() -> None:
     desk = Desk(dataclasses.replace(CLEAR_SIGHTED, attempts=2))
     desk.arm()
-    desk.until("retreat", armed(), 5.0)
+    desk.until(Doing.RETREATING, armed(), 5.0)
     for hands in desk.watch(armed(), 0.5)[1:]:
         assert hands.buttons == {Button.L1, Button.SQUARE}
         assert hands.l2_n >= habitual_force_n(0.4)
         assert hands.r2_n == 0.0
-    assert desk.until("advance", armed(), 1.0) == pytest.approx(0.5, abs=3 * TICK_S)
-    desk.until("done", armed(), 12.0)
+    assert desk.until(Doing.ADVANCING, armed(), 1.0) == pytest.approx(0.5, abs=3 * TICK_S)
+    desk.until(Doing.DONE, armed(), 12.0)
     phases = [hands.phase for hands in desk.hands]
-    assert sum(pair == ("close", "advance") for pair in zip(phases[1:], phases, strict=False)) == 2
+    assert sum(pair == (Doing.GRASPING, Doing.ADVANCING) for pair in zip(phases[1:], phases, strict=False)) == 2
     assert {hands.buttons for hands in desk.watch(armed(), 3.0)[1:]} == {frozenset({Button.L1})}
 
 

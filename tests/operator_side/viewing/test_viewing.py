@@ -89,7 +89,7 @@ def test_what_is_needed_is_d_at_the_present_travel_by_the_controllers_own_names(
     facts = facts_of(felt_bench(r2=1.0))
     assert facts.r2.needed_m == pytest.approx(DISPLACED_M + FULL_M_S * HORIZON_S + FULL_M_S**2 / (2 * A_M_S2))
     assert facts.l2.needed_m == pytest.approx(-DISPLACED_M)
-    swapped = facts_of(felt_bench(l2=1.0, swap_sides=True), Surroundings(Hands.CONTROLLER, swap_sides=True))
+    swapped = facts_of(felt_bench(l2=1.0, swap_sides=True))
     assert (swapped.advancing, swapped.l2, swapped.r2) == ("L2", facts.r2, facts.l2)
 
 
@@ -232,8 +232,7 @@ def test_what_pages_say_reaches_whoever_follows_them() -> None:
     looking.turns(0.02)
     pages = looking.viewing._pages
     assert pages.driver == "ours"
-    assert (wish := pages.take_wish()) is not None
-    assert wish.probability == 0.9
+    assert [wish.probability for wish in pages.wishes] == [0.9]
     looking.console.words.append((3, None))
     looking.turns(0.02)
     assert pages.driver is None
@@ -241,7 +240,7 @@ def test_what_pages_say_reaches_whoever_follows_them() -> None:
 
 def test_overlaps_of_the_trigger_with_more_and_ticks_are_read_from_the_newest_scene() -> None:
     figures = SceneFigures()
-    assert figures.figures() is None
+    assert figures.newest is None
     scene = decode_view(state(0.0))
     assert isinstance(scene, SceneState)
     scene = msgspec.structs.replace(scene, overlaps=((0, 1e-6, 2e-6), (3, 0.5e-6, 0.0)), overruns=3, tick_p50_us=60.0)
@@ -252,5 +251,5 @@ def test_overlaps_of_the_trigger_with_more_and_ticks_are_read_from_the_newest_sc
         for payload in (None, shapes(), encode(scene)[:-3], b"", b"scene"):
             if payload is not None:
                 figures.take(payload)
-            assert (found := figures.figures()) is not None
+            assert (found := figures.newest) is not None
             assert msgspec.structs.astuple(found) == pytest.approx(expected)

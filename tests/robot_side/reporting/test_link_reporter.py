@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from common.command.live_line import live_line
-from common.command.live_view import live_view
+from common.command.live_view import LiveView
 from common.protocol.codec import decode, encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import LinkReport
@@ -78,6 +78,6 @@ def test_the_owner_sees_it_until_it_is_old(session: OperatorSession) -> None:
 
 def test_the_line_has_a_queue_and_losses_where_there_are_some() -> None:
     status = RobotStatus(link=LinkState.UP, delay_ms=52.0, queue_ms=14.2, lost_percent=1.25)
-    assert live_line(live_view(status), 200).endswith("link 52ms  queue 14ms  lost 1.2%")
+    assert live_line(LiveView(status), 200).endswith("link 52ms  queue 14ms  lost 1.2%")
     status = msgspec.structs.replace(status, queue_ms=1.0, lost_percent=0.0)
-    assert live_line(live_view(status), 200).endswith("link 52ms")
+    assert live_line(LiveView(status), 200).endswith("link 52ms")

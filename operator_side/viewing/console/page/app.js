@@ -1,9 +1,9 @@
 // The page: what the console sends, shown as it comes.
 import { Chart } from "./charts.js";
 import { Hands as PageHands } from "./hands.js";
-import { Hands, LinkState, Look, ShownKind, VIEWS } from "./names.js";
+import { make } from "./make.js";
+import { LinkState, ShownKind, VIEWS } from "./names.js";
 import { Player } from "./player.js";
-import { holdingWords, linkWords, phaseWords, reasonWords, WORDS, words } from "./words.js";
 import { Clock, View } from "./views.js";
 import { Trigger } from "./triggers.js";
 
@@ -24,12 +24,7 @@ const FIGURES = {
 const byId = (id) => document.getElementById(id);
 
 for (const [id, title] of Object.entries(FIGURES)) {
-  const place = document.createElement("div");
-  place.append(
-    Object.assign(document.createElement("dt"), { textContent: title }),
-    Object.assign(document.createElement("dd"), { id, textContent: "–" }),
-  );
-  byId("figures").append(place);
+  byId("figures").append(make("div", {}, make("dt", {}, title), make("dd", { id }, "–")));
 }
 
 const clock = new Clock();
@@ -49,7 +44,7 @@ let facts = null;
 let drawn = true;
 const frame = document.querySelector("#scene iframe");
 const slow = drawsSlowly();
-let run = { title: "", live: true, tunable: [] };
+let run = { title: "", live: true };
 
 const send = (object) => {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(object));
@@ -94,8 +89,8 @@ function receive(message) {
 function goWithoutFacts(atS) {
   everHeard = true;
   clock.set(atS, null);
-  text("state", WORDS.recorded);
-  text("why", WORDS.robotAlone);
+  text("state", "RECORDED");
+  text("why", "the robot side alone · replay");
 }
 
 function text(id, value, bad = false) {
@@ -113,21 +108,19 @@ function showFacts(message) {
   facts = message.facts;
   clock.set(facts.now_s, facts.offset_s);
   const { status } = facts;
-  const { look, alarm } = message.phase;
-  document.body.dataset.state = look;
-  const said = phaseWords(message.phase, status), reason = reasonWords(message.phase);
-  const word = alarm || look === Look.STARTING ? said : words(look);
-  text("state", word.toUpperCase());
-  text("why", [alarm || said === word ? null : said, reason, run.live ? null : WORDS.replay].filter(Boolean).join(" · "));
-  text("link", linkWords(status), status.link !== LinkState.UP);
-  text("lease", words(status.owner));
-  text("whose", facts.hands === Hands.PERSON ? WORDS.person : words(facts.hands));
+  const { said } = message;
+  document.body.dataset.state = said.look;
+  text("state", said.state);
+  text("why", [...said.why, run.live ? null : "replay"].filter(Boolean).join(" · "));
+  text("link", said.link, status.link !== LinkState.UP);
+  text("lease", said.lease);
+  text("whose", said.whose);
   text("delay", `${ms(facts.to_robot.mean_ms)} / ${ms(facts.to_operator.mean_ms)} ms`, facts.field_age_ms > 200);
   showLink(status);
-  text("target", status.target ?? WORDS.none);
-  text("holding", holdingWords(status));
-  const fingers = { l2: message.fingers[0], r2: message.fingers[1] };
-  for (const side of ["l2", "r2"]) triggers[side].show(facts[side], fingers[side], facts.advancing === side.toUpperCase());
+  text("target", status.target ?? "none");
+  text("holding", said.holding);
+  triggers.l2.show(facts.l2, message.fingers[0], facts.advancing === "L2");
+  triggers.r2.show(facts.r2, message.fingers[1], facts.advancing === "R2");
   charts.delay.add(clock.nowMs, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
   const asked = [["robot", facts.to_robot.asked], ["operator", facts.to_operator.asked]].filter(([, words]) => words);
   charts.delay.said = asked.map(([side, words]) => `asked to the ${side}: ${words}`).join("; ");
@@ -179,7 +172,7 @@ function showScene(scene) {
       const cell = row.insertCell();
       cell.className = kind;
       cell.textContent = kind ? (content ? content.toFixed(0) : "–") : content;
-      if (small) cell.append(" ", Object.assign(document.createElement("small"), { textContent: small }));
+      if (small) cell.append(" ", make("small", {}, small));
     }
     return row;
   });
@@ -190,7 +183,7 @@ function showScene(scene) {
 }
 
 function showNote(note) {
-  const item = Object.assign(document.createElement("li"), { textContent: note });
+  const item = make("li", {}, note);
   byId("notes").append(item);
   while (byId("notes").childElementCount > MOST_NOTES) byId("notes").firstChild.remove();
   item.scrollIntoView({ block: "nearest" });

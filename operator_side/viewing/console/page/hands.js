@@ -6,7 +6,7 @@
 //
 // The operator side judges the same by itself (operator_side/viewing/pages/driving_page.py); this is to show it.
 import { atRest, both, Grips, Keys, readGamepads, REST } from "./inputs.js";
-import { Doing, MotionState, Readiness } from "./names.js";
+import { Doing, MotionState } from "./names.js";
 import { Panel } from "./panel.js";
 import { Tuning } from "./tuning.js";
 
@@ -41,7 +41,6 @@ export class Hands {
   #stopHeld = new Set();
   #giveBack = false;
   #why = "";
-  #timer;
 
   constructor(document, send) {
     this.#document = document;
@@ -64,7 +63,7 @@ export class Hands {
     document.addEventListener("focusin", ({ target }) => {
       if (target.matches?.(EDITS)) this.#release("A field has the keys.");
     });
-    this.#timer = setInterval(() => this.#step(), PERIOD_MS);
+    setInterval(() => this.#step(), PERIOD_MS);
   }
 
   show(facts) {
@@ -85,7 +84,7 @@ export class Hands {
 
   // Armed by the operator side's own hands, which may know it later than the status line.
   get #moves() {
-    return this.#armed && this.#hands?.doing === Doing.RUNNING;
+    return this.#armed && this.#facts.status.person === Doing.RUNNING;
   }
 
   #keyDown(event) {
@@ -208,7 +207,7 @@ export class Hands {
   #follow(hands, allUp, nowMs) {
     if (this.#state === "resting") {
       this.#upSinceMs = allUp ? this.#upSinceMs ?? nowMs : null;
-      const agreed = this.#hands?.driver === this.#page && this.#hands.readiness === Readiness.READY;
+      const agreed = this.#hands?.driver === this.#page && this.#facts.status.person === Doing.READY;
       if (allUp && agreed && nowMs - this.#upSinceMs >= REST_MS) this.#enter("ready", "");
     } else if (this.#state === "ready" && !allUp) {
       if (hands.run && !this.#stops) this.#enter("running", "");
@@ -226,7 +225,7 @@ export class Hands {
     if (!known.may_drive) this.#end("A real controller drives.");
     else if (known.driver !== null && known.driver !== this.#page && nowMs - this.#drivingSinceMs > AGREES_MS)
       this.#end("Another page drives.");
-    else if (known.readiness === Readiness.RESTING && this.#state !== "resting" && nowMs - this.#sinceMs > AGREES_MS) {
+    else if (this.#facts.status.person === Doing.ALL_KEYS_UP_FIRST && this.#state !== "resting" && nowMs - this.#sinceMs > AGREES_MS) {
       this.#enter("resting", this.#armed ? "" : "The arm was disarmed or stopped.");
     }
   }
@@ -253,10 +252,5 @@ export class Hands {
       mine: this.#hands?.driver === this.#page, level: this.#keys.level,
       stop: this.#stopMs === null ? null : { sinceMs: performance.now() - this.#stopMs, goesOn: this.#stops },
     });
-  }
-
-  close() {
-    clearInterval(this.#timer);
-    this.#end("The page was left.");
   }
 }

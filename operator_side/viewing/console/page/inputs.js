@@ -56,10 +56,6 @@ export class Keys {
     this.#ways.clear();
   }
 
-  get any() {
-    return this.#down.size > 0;
-  }
-
   // `moves`: only then ways grow; keys that are held count as pressed in any case.
   read(passed_s, moves) {
     const held = new Set([...this.#down].map((code) => DOES.get(code)));

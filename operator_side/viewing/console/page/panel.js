@@ -1,5 +1,6 @@
 // What the hands' part of the page shows, and what of it can be held.
 import { KEYS, keyWords } from "./inputs.js";
+import { make } from "./make.js";
 import { Doing, Hands, MotionState, SessionState } from "./names.js";
 
 const FULL = "How far a key goes: 1 to 9";
@@ -10,14 +11,7 @@ export class Panel {
   #shown = new Map();
 
   constructor(document, { drive, stop, giveBack }) {
-    const make = (tag, properties = {}, ...content) => {
-      const element = Object.assign(document.createElement(tag), properties);
-      element.append(...content);
-      return element;
-    };
     const place = (name, element) => (this.#places[name] = element);
-    const style = make("link", { rel: "stylesheet", href: new URL("hands.css", import.meta.url).href });
-    document.head.append(style);
     this.#section = document.getElementById("hands");
     const stopButton = place("stop", make("button", { type: "button", id: "stop", title: "Esc" }, "Emergency stop (Esc)"));
     stopButton.addEventListener("pointerdown", () => stop(true));
@@ -103,7 +97,7 @@ export class Panel {
       watching: [why, taken, cannot || (taken ? "" : "You are watching.")].filter(Boolean).join(" "),
       resting: [why, "All keys up for a second."].filter(Boolean).join(" "),
       ready: "Ready: hold Space to arm and run.",
-      running: moves ? "You drive." : hands?.doing === Doing.AT_REST_FIRST ? "Let go of all but hold-to-run." : "Arming: keep holding.",
+      running: moves ? "You drive." : facts?.status.person === Doing.AT_REST_FIRST ? "Let go of all but hold-to-run." : "Arming: keep holding.",
     }[state]);
     this.#text("rest", state === "resting" ? `still ${(restMs / 1000).toFixed(1)} s` : "");
     this.#text("level", state === "watching" ? "" : `${FULL}; now ${level}`);

@@ -1,4 +1,6 @@
 // A recording: play and pause, the moment that is shown, and the speed.
+import { make } from "./make.js";
+
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10];
 const FOLLOWS_MS = 500; // after a move of the slider it stays, and then shows what holds
 
@@ -10,17 +12,14 @@ export class Player {
 
   constructor(section, send) {
     this.#send = send;
-    const make = (tag, properties = {}) => Object.assign(document.createElement(tag), properties);
     this.#button = make("button", { type: "button", id: "play" });
     this.#slider = make("input", { type: "range", id: "moment", min: 0, max: 1, step: 0.1, value: 0 });
     this.#slider.setAttribute("aria-label", "Moment");
     this.#where = make("output", { htmlFor: "moment" });
     this.#speed = make("select", { id: "speed" });
     this.#speed.setAttribute("aria-label", "Speed");
-    const [first, second] = [make("div"), make("div")];
-    first.append(this.#button, this.#speed, this.#where);
-    second.append(this.#slider);
-    section.replaceChildren(make("h2", { textContent: "Recording" }), first, second);
+    const first = make("div", {}, this.#button, this.#speed, this.#where);
+    section.replaceChildren(make("h2", {}, "Recording"), first, make("div", {}, this.#slider));
     this.#button.onclick = () => this.#state && this.#wish({ paused: !this.#state.paused });
     this.#speed.onchange = () => this.#wish({ speed: Number(this.#speed.value) });
     this.#slider.oninput = () => {

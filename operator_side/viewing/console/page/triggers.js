@@ -1,4 +1,6 @@
 // One trigger: how stiff each tenth of its travel is, where the finger is, and what that meets.
+import { make } from "./make.js";
+
 const ZONES = 10;
 const STRONGEST = 8;
 
@@ -7,17 +9,17 @@ export class Trigger {
 
   constructor(place, name) {
     this.#name = name;
-    const make = (tag, parent, kind = "") => Object.assign(parent.appendChild(document.createElement(tag)), { className: kind });
-    const head = make("header", place);
-    this.#title = make("h2", head);
-    this.#meets = make("span", head, "meets");
-    const zones = make("div", place, "zones");
+    const add = (tag, parent, className = "") => parent.appendChild(make(tag, { className }));
+    const head = add("header", place);
+    this.#title = add("h2", head);
+    this.#meets = add("span", head, "meets");
+    const zones = add("div", place, "zones");
     this.#bars = Array.from({ length: ZONES }, () => {
-      const zone = make("div", zones);
-      return [make("i", zone), make("b", zone)];
+      const zone = add("div", zones);
+      return [add("i", zone), add("b", zone)];
     });
-    this.#finger = make("span", make("div", place, "travel"));
-    this.#words = Array.from({ length: 2 }, () => make("p", place));
+    this.#finger = add("span", add("div", place, "travel"));
+    this.#words = Array.from({ length: 2 }, () => add("p", place));
   }
 
   show(facts, finger, advances) {

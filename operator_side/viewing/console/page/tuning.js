@@ -1,4 +1,5 @@
 // What may be tuned while the run goes on: P of eq. 10 and the emulated link, where the run permits it.
+import { make } from "./make.js";
 import { SessionState } from "./names.js";
 
 const PROBABILITIES = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998, 0.999];
@@ -32,11 +33,6 @@ export class Tuning {
   constructor(document, send) {
     this.#send = send;
     const section = document.getElementById("tuning");
-    const make = (tag, properties = {}, ...content) => {
-      const element = Object.assign(document.createElement(tag), properties);
-      element.append(...content);
-      return element;
-    };
     this.#reason = make("p", { id: "tuning_reason" });
     const row = (name, label, most, step, words) => {
       const slider = make("input", { type: "range", id: `tune_${name}`, min: 0, max: most, step, value: 0, disabled: true });

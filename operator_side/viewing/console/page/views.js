@@ -37,7 +37,6 @@ export class View {
   #busy = false;
   #capturedS = null;
   #shownMs = -Infinity;
-  frames = 0;
 
   constructor(place, clock) {
     this.#place = place;
@@ -67,8 +66,7 @@ export class View {
         picture.close();
         this.#capturedS = new DataView(data).getFloat64(1, true);
         this.#shownMs = this.#clock.nowMs;
-        this.frames += 1;
-        this.#place.dataset.frames = this.frames;
+        this.#place.dataset.frames = Number(this.#place.dataset.frames ?? 0) + 1;
       } catch {
         continue; // a broken picture is as good as none
       }

@@ -7,10 +7,12 @@ import msgspec
 
 from common.protocol.messages import Telemetry
 from common.status.statuses import OperatorStatus
-from operator_side.viewing.console.names import PATH, names
+from operator_side.viewing.console.names import names
 from operator_side.viewing.facts import DelayFacts, HandsFacts, OperatorFacts, TriggerFacts
+from tests.helpers.repository import ROOT
 
-_SOURCES: Final = {path.name: path.read_text(encoding="utf-8") for path in PATH.parent.glob("*.js")}
+_PLACE: Final = ROOT / "operator_side" / "viewing" / "console" / "page"
+_SOURCES: Final = {path.name: path.read_text(encoding="utf-8") for path in _PLACE.glob("*.js")}
 _TEXT: Final = r"""(?:"[^"\n]*"|'[^'\n]*'|`[^`\n]*`)"""
 _COMPARED: Final = re.compile(
     rf"(?:[=!]==?|\bcase\b)\s*({_TEXT})|({_TEXT})\s*[=!]==?|\.(?:startsWith|endsWith|includes)\(\s*({_TEXT})"
@@ -26,8 +28,14 @@ _READ: Final = {
 """Where the page reads a struct, with the ones that it may be"""
 
 
-def test_the_names_of_the_page_are_up_to_date() -> None:
-    assert _SOURCES[PATH.name] == names(), "to be run: python -m operator_side.viewing.console.names"
+def test_the_page_uses_only_codes_that_there_are() -> None:
+    there = names()
+    used = {name for source in _SOURCES.values() for name in re.findall(r"\b[A-Z][A-Za-z]+\.[A-Z_]{2,}\b", source)}
+    used = {name for name in used if name.partition(".")[0] in there}
+    assert len(used) > 10
+    for name in used:
+        of, _, code = name.partition(".")
+        assert re.search(rf'{of} = .*"{code}": ', there), name
 
 
 def test_the_page_compares_no_sentence() -> None:

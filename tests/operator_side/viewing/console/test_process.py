@@ -167,7 +167,9 @@ def test_pages_get_facts_pictures_and_the_scene_as_they_are_fed(console: Console
                 facts, scene = newest["facts"], newest["scene"]
                 assert isinstance(facts, dict)
                 assert isinstance(scene, dict)
-                assert (facts["phase"]["doing"], facts["facts"]["advancing"]) == ("advancing", "R2")
+                assert (facts["said"]["state"], facts["said"]["why"]) == ("ARMED", ["advancing", None])
+                assert (facts["said"]["whose"], facts["said"]["holding"]) == ("scripted person", "nothing")
+                assert facts["facts"]["advancing"] == "R2"
                 assert {row["name"] for row in scene["objects"]} <= set(OBJECTS)
             assert console.pages == 2
             await first.send('{"hands": {"Space": true}}')
@@ -191,7 +193,7 @@ def test_the_hands_of_a_console_that_is_killed_are_gone_and_the_run_goes_on() ->
             while not console.words:
                 await asyncio.sleep(0.002)
             assert console.words.popleft()[1] == {"hands": {"Space": True}}
-            os.kill(console.process_id, signal.SIGKILL)
+            os.kill(console._companion.process_id, signal.SIGKILL)
             while not console.gone:
                 await asyncio.sleep(0.002)
         ends.set()
@@ -245,8 +247,8 @@ def test_it_outlives_ctrl_c_and_ends_with_whoever_feeds_it() -> None:
     with Console("a test") as console:
         until(console, lambda: console.address is not None)
         port = urlsplit(address_of(console)).port
-        os.kill(console.process_id, signal.SIGINT)
-        os.kill(console.process_id, signal.SIGTERM)
+        os.kill(console._companion.process_id, signal.SIGINT)
+        os.kill(console._companion.process_id, signal.SIGTERM)
         assert status_of(address_of(console)) == 200
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection(("127.0.0.1", port or 0))

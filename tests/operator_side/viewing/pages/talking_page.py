@@ -4,8 +4,8 @@ from collections.abc import Callable
 from typing import Any
 
 from common.protocol.messages import Telemetry
+from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
-from operator_side.viewing.pages.shared_hands import MovedHands
 
 PERIOD_S = 0.02
 
@@ -41,7 +41,7 @@ Does = Callable[[float], dict[str, Any] | None]
 class AtThePage:
     """Whoever has the controller, and somebody at a page who does as told: for whole runs."""
 
-    def __init__(self, page: TalkingPage, whoever: MovedHands, does: Does) -> None:
+    def __init__(self, page: TalkingPage, whoever: BrowserHands, does: Does) -> None:
         self.page = page
         self.whoever = whoever
         self.does = does

@@ -1,6 +1,5 @@
 """A page as a controller, and whose hands count: the person's, the page's, or nobody's."""
 
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -39,12 +38,12 @@ class Desk:
         self.screen: Telemetry | None = VIEW
         self.people = 0
         self.calibrate(WORN)
-        self.hands: BrowserHands | SharedHands = BrowserHands(self.pages, self.calibrate, swap_sides=swap_sides)
-        if person:
-            calibrate = partial(self.calibrate, WORN)
-            self.hands = SharedHands(
-                self.pages, self.hands, self.device, self.new_person, self.device.hands_off, calibrate
-            )
+        about = self.pages, self.calibrate
+        self.hands = (
+            SharedHands(*about, self.device, WORN, self.new_person, swap_sides=swap_sides)
+            if person
+            else BrowserHands(*about, swap_sides=swap_sides)
+        )
         self.ticks = 0
 
     def calibrate(self, calibration: TravelCalibration) -> None:

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from common.status.codes import Readiness
+from common.status.codes import Doing
 from operator_side.viewing.pages.driving_page import REST_S, SILENCE_S, DrivingPage
-from operator_side.viewing.pages.page_messages import PageHands, TuneWish, read_page_message
+from operator_side.viewing.pages.page_messages import PageHands, PageMessage
 from tests.operator_side.viewing.pages.talking_page import PERIOD_S, TalkingPage
 
 NO_HANDS: list[object] = [
@@ -46,16 +47,16 @@ def pages() -> DrivingPage:
 @pytest.mark.parametrize("content", NO_HANDS, ids=str)
 def test_what_is_no_message_is_refused_whole_and_counted(pages: DrivingPage, content: object) -> None:
     pages.receive(1, content, 0.0)
-    assert (pages.rejected, pages.driver, pages.take_wish()) == (1, None, None)
+    assert (pages.rejected, pages.driver, len(pages.wishes)) == (1, None, 0)
     assert not pages.stopping(0.0)
 
 
 def test_hold_to_run_counts_after_a_full_second_of_rest_and_until_it_is_let_go(pages: DrivingPage) -> None:
     page = TalkingPage(pages)
     now_s = page.go_on(0.0, REST_S)
-    assert pages.readiness is Readiness.RESTING
+    assert pages.doing is Doing.ALL_KEYS_UP_FIRST
     page.say(now_s)
-    assert (pages.readiness, pages.driver) == (Readiness.READY, "page1")
+    assert (pages.doing, pages.driver) == (Doing.READY, "page1")
     page.say(now_s + 0.02, run=True, r2=0.5)
     hands = pages.hands(now_s + 0.02)
     assert hands is not None
@@ -64,13 +65,13 @@ def test_hold_to_run_counts_after_a_full_second_of_rest_and_until_it_is_let_go(p
     assert pages.hands(now_s + 0.04) is None
     page.say(now_s + 0.06, run=True, r2=0.5)
     assert pages.hands(now_s + 0.06) is None
-    assert pages.rest_s(now_s + 0.06) == REST_S
+    assert pages.doing is Doing.ALL_KEYS_UP_FIRST
 
 
 def running(pages: DrivingPage, page: TalkingPage, start_s: float = 0.0) -> float:
     now_s = page.go_on(start_s, 1.1)
     page.say(now_s, run=True)
-    assert pages.readiness is Readiness.RUNNING
+    assert pages.doing is Doing.RUNNING
     return now_s
 
 
@@ -138,13 +139,6 @@ def test_the_person_goes_on_only_by_the_page_that_drives_or_any_when_none_does(p
     assert pages.take_give_back()
 
 
-def test_wishes_that_come_at_once_are_kept_together_the_newest_of_each_kind(pages: DrivingPage) -> None:
-    for tune in ({"probability": 0.8}, {"link": "delay 5ms"}, {"probability": 0.9}):
-        pages.receive(1, {"tune": tune}, 0.0)
-    assert pages.take_wish() == TuneWish(0.9, "delay 5ms")
-    assert pages.take_wish() is None
-
-
 @dataclass(frozen=True)
 class Heard:
     """What a page said, and when."""
@@ -201,7 +195,7 @@ def test_hands_count_only_while_fresh_and_after_a_second_of_rest(script: list[tu
                 content = talkers[number].content(**KINDS[kind])
                 said[number].append(content)
                 pages.receive(number, content, now_s)
-                hands = read_page_message(content).hands
+                hands = msgspec.convert(content, PageMessage).hands
                 assert hands is not None
                 heard.append(Heard(now_s, number, hands))
             judge(pages, heard, now_s)
