@@ -1,5 +1,7 @@
 """Settings to a robot side: which law and which table, how the gripper is covered, and what a person is told."""
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -152,9 +154,27 @@ def test_a_scene_needs_no_kernels_for_primitives_that_it_lacks(
     needed = {kernel.name.rpartition(".")[2] for kernel in parts.kernels}
     assert needed >= {"look", "sense", "drive"}
     assert ("overlap_one_box" in needed, "overlap_one_tetrahedron" in needed) == (boxes, tetrahedra)
-    assert not [name for name in needed if "mesh" in name]
     # Those of the library of overlaps are not for ticks.
     assert not needed & {"overlap_boxes", "precise_boxes", "overlap_tetrahedra", "precise_tetrahedra"}
+
+
+@pytest.mark.processes
+def test_a_scene_without_meshes_loads_no_kernel_for_them() -> None:
+    program = (
+        "import feelahead.both_sides.loopback, robot_side.main\n"
+        "from robot_side.core import RobotSide\n"
+        "from robot_side.parts import build_parts\n"
+        "from robot_side.compiled.kernel import imported_kernels\n"
+        "from robot_side.settings import RobotSettings\n"
+        "parts = build_parts(RobotSettings(), 1, 'clock')\n"
+        "RobotSide(parts).tick(0.0)\n"
+        "assert not [note for note in parts.notes if 'perceived larger' in note]\n"
+        "print(*(kernel.name for kernel in imported_kernels()))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    names = done.stdout.split()
+    assert any("overlap.kernels" in name for name in names)
+    assert [name for name in names if "mesh" in name] == []
 
 
 def test_a_tick_among_boxes_runs_no_kernel_that_was_not_made_ready(
