@@ -1,9 +1,4 @@
-"""Solids with a point of a chosen face, edge or vertex and the way out of it, to place spheres exactly.
-
-Two ways of making them: general, with directions rounded to doubles, and grid-aligned, where every coordinate
-is a multiple of 1/8 and the directions are whole-number vectors of whole length, so that a sphere is tangent
-exactly and not to the last digit only.
-"""
+"""Solids with a point of a chosen face, edge or vertex and the way out of it, to place spheres exactly."""
 
 from dataclasses import dataclass
 
