@@ -199,7 +199,7 @@ def _by_noise(propagated: Table) -> Shown:
 
 
 def _spreads(judged: Table, names: Sequence[str], *, within_reach: bool) -> Iterator[Sequence[str]]:
-    """Make a row for each loop age, over all pulls and for each."""
+    """Yield a row for each loop age and pull, and for all pulls together."""
     for ages_s in AGE_BINS_S:
         for pull in ("all", *PULL_KINDS):
             mine = judged if pull == "all" else judged.where(pull=pull)
@@ -209,12 +209,12 @@ def _spreads(judged: Table, names: Sequence[str], *, within_reach: bool) -> Iter
 
 
 def cell_of(found: Spread) -> str:
-    """Write mean, standard deviation, 99 % and greatest, in mm."""
+    """Return mean, standard deviation, 99 % quantile and maximum as text, in mm."""
     return "-" if not found.moments else f"{found.mean_mm:+.2f} {found.sd_mm:.2f} {found.p99_mm:.2f} {found.max_mm:.2f}"
 
 
 def draw(_: ErrorSettings, table: Table, path: Path) -> None:
-    """Draw run time against error of the propagation, and the predictions' errors against the loop age."""
+    """Draw run time against error of the propagation, and the prediction errors against the loop age."""
     with figure(path, 1, 2, f"frozen {frozen_hash()}", figsize=(11.0, 4.4)) as (_, (left, right)):
         times_us = {row["method"]: row["run_time_us"] for row in table.where(kind="run time")}
         _draw_propagation(left, table.where(kind="propagation"), times_us)

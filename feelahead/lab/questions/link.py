@@ -149,7 +149,7 @@ def show(settings: LinkSweep, table: Table) -> Iterator[RenderableType]:
 
 
 def ratio(turns: Table) -> float:
-    """Return the median over the turns, each beside the peer's of the same turn: the machine's speed varies."""
+    """Return the median over turns of both ends' share over bare ZeroMQ's in the same turn: machine speed varies."""
     ours, bare = ([row["robot"] + row["operator"] for row in turns.where(kind=kind)] for kind in _KINDS)
     return float(np.median(np.divide(ours, bare)))
 

@@ -38,12 +38,12 @@ _LOOK: Final = "look to message"
 
 @dataclass(frozen=True)
 class TickSweep(Sweep):
-    """Both sides as in the demo, for some seconds each, with a scripted person: the robot side's processor time.
+    """Measure the robot side's processor time, with both sides as in the demo and a scripted person.
 
-    Each figure stands beside its ratio to "mixed", a fixed piece of work that takes turns with the ticks
-    (feelahead/lab/tick): p50 to p50, p99 to p99. look to message: from the arm's readings to what leaves, without
-    physics. without physics: with the camera frame that is taken in afterwards. whole look: the law in ticks that
-    looked ahead.
+    Each figure is shown with its ratio to "mixed", a fixed workload in turns with the ticks (feelahead/lab/tick):
+    p50 to p50, p99 to p99. look to message: from the arm's readings to the sent messages, without physics. without
+    physics: the same with the camera frame, which is read in afterwards. whole look: the law in ticks that looked
+    ahead.
     """
 
     seconds: Annotated[float, Meta(ge=3.0, le=600.0)] = 10.0
@@ -54,7 +54,7 @@ class TickSweep(Sweep):
 
 @dataclass(frozen=True)
 class Case:
-    """One run: with stages timed or not, further objects, and the scene's own or none."""
+    """One run: with stages timed or not, further objects, and the scene's own objects or none."""
 
     case: str
     seconds: float
@@ -65,7 +65,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Concave:
-    """Looks at the concave thing of a frozen scene."""
+    """Looks at the concave object of a frozen scene."""
 
     case: str
     seconds: float

@@ -1,4 +1,4 @@
-"""What may be changed of a link while a run goes on, and a line that changes."""
+"""Changes of an emulated link during a run, and a line that takes them over."""
 
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""What a turn's stages took, in virtual time."""
+"""Durations of a turn's stages, in virtual time."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from common.statistics import BLOCK
 
 
 class Both:
-    """A wall clock and a processor's, which a test moves on."""
+    """Wall clock and processor clock, advanced by a test."""
 
     def __init__(self) -> None:
         self.wall, self.processor = VirtualClock(), VirtualClock()
@@ -24,7 +24,7 @@ def test_a_stage_adds_up_within_a_turn_and_starts_anew_in_the_next() -> None:
     send, think = stages.timed("sockets", clocks.pass_), stages.timed("law", clocks.pass_)
     for _ in range(3):
         send(2e-6, 1e-6)
-    clocks.pass_(1.0, 1.0)  # is nobody's
+    clocks.pass_(1.0, 1.0)  # Belongs to no stage.
     think(10e-6, 8e-6)
     stages.end_turn()
     send(4e-6, 4e-6)

@@ -1,4 +1,4 @@
-"""The port for a driver, over real sockets on loopback."""
+"""Port for a driver, over real sockets on loopback."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def driver(context: "zmq.Context[zmq.Socket[bytes]]", port: DriverPort, name: by
 
 
 def heard(port: DriverPort) -> list[tuple[bytes, bytes]]:
-    """What comes next."""
+    """Return the next messages."""
     for _ in range(_ROUNDS):
         port.wait(0.01)
         if found := port.receive():
@@ -121,7 +121,7 @@ def test_a_key_that_is_allowed_while_the_robot_side_waits_gets_in(tmp_path: Path
         assert told == [f"refused an unknown key; to let it in: {folder.command(f'allow NAME {public}')}"]
         folder.allow("driver", public)
         assert port.refresh_keys() == []
-        # ZeroMQ gives up a connection that was refused.
+        # ZeroMQ does not retry a refused connection.
         part.disconnect(port.endpoint)
         part.connect(port.endpoint)
         part.send(b"state")

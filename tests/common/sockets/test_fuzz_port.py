@@ -1,4 +1,4 @@
-"""Strangers at the open port, by raw TCP: whatever they do, the operator is heard and nothing piles up."""
+"""Strangers at the open port, by raw TCP: the operator is always heard and nothing accumulates."""
 
 import contextlib
 import os
@@ -32,7 +32,7 @@ def operator(robot: RobotSockets) -> Iterator[OperatorSockets]:
 
 
 def is_heard(robot: RobotSockets, operator: OperatorSockets) -> bool:
-    """Whether a message of the operator arrives and one goes back, whatever else is received meanwhile."""
+    """Return whether an operator's message arrives and an answer returns, whatever else is received."""
     for _ in range(ROUNDS):
         operator.send(b"operator")
         robot.wait(0.01)
@@ -49,7 +49,7 @@ def stranger(robot: RobotSockets) -> RawConnection:
 
 
 def drain(robot: RobotSockets, limit_s: float = 0.1) -> list[bytes]:
-    """What comes within `limit_s`, and then until nothing does for a moment."""
+    """Return the messages within `limit_s`, and then until none comes for a moment."""
     received: list[bytes] = []
     while robot.wait(0.1 if received else limit_s):
         received += [payload for _, payload in robot.receive()]
@@ -57,7 +57,7 @@ def drain(robot: RobotSockets, limit_s: float = 0.1) -> list[bytes]:
 
 
 class StandingClock(MonotonicClock):
-    """For what is counted in each second."""
+    """Clock at 0 s, so that everything falls into one second."""
 
     def now(self) -> float:
         return 0.0
@@ -132,13 +132,13 @@ def test_a_crowd_is_hung_up_on_and_who_is_in_stays_in(monkeypatch: pytest.Monkey
         [told] = robot.news()
         assert "more than 20 connections at once" in told
         assert robot.news() == []
-        # One that is quick still gets in.
+        # A fast newcomer still gets in.
         with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as late:
             assert is_heard(robot, late)
 
 
 def come_and_go(robot: RobotSockets, endpoint: str, count: int) -> None:
-    """That many strangers are accepted and leave again while the robot side looks at nothing."""
+    """Let `count` strangers connect and leave while the robot side reads nothing."""
     before = descriptors()
     crowd = [RawConnection(port_of(endpoint)) for _ in range(count)]
     assert any(descriptors() >= before + 2 * count for _ in range(ROUNDS) if not robot.wait(0.01))
@@ -230,7 +230,7 @@ def test_a_message_of_too_many_frames_is_dropped_in_bounded_steps(
 
 
 def within_one_second(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let all happen within the same second of its clock, however long it takes."""
+    """Keep everything within the same second of the robot's clock, however long it takes."""
     monkeypatch.setattr(robot, "_second", 0)
     monkeypatch.setattr(robot, "_clock", StandingClock())
 

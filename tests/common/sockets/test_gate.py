@@ -1,4 +1,4 @@
-"""A gate that is closed before the socket it watches."""
+"""A gate closed before the socket that it watches."""
 
 import zmq
 

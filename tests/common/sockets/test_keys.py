@@ -1,4 +1,4 @@
-"""The folder of keys: what is written, who may read it, and what is refused in one line."""
+"""Folder of keys: its content, its readers, and refusals in one line."""
 
 import errno
 import os
@@ -26,7 +26,7 @@ def folder(tmp_path: Path) -> KeyFolder:
 
 @pytest.fixture
 def allowed(folder: KeyFolder) -> AllowList:
-    """It has read that anna is let in."""
+    """Return a list that has read anna's key."""
     folder.allow("anna", KEY)
     found = AllowList(folder)
     found.refresh()
@@ -206,7 +206,7 @@ def test_a_file_that_vanishes_while_it_is_looked_at_throws_nobody_else_out(
 ) -> None:
     folder.allow("ben", OTHER)
     allowed.refresh()
-    folder.allow("carl", "ef" * 32)  # so that the list is read anew
+    folder.allow("carl", "ef" * 32)  # So that the list is read again.
 
     def read_late(path: Path, largest_bytes: int) -> bytes:
         folder.peer_path("anna").unlink(missing_ok=True)

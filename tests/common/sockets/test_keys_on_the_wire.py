@@ -1,4 +1,4 @@
-"""CURVE over real sockets on loopback: who gets in, who does not, and who is thrown out while running."""
+"""CURVE over real sockets on loopback: peers that get in, stay out, and are disconnected while running."""
 
 import errno
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ EPHEMERAL = "tcp://127.0.0.1:0"
 PATIENT_S = 20.0
 LIMIT_S = 600.0
 REFUSAL_S = 0.5
-"""Long for a handshake on loopback: who has said nothing by then was not let in."""
+"""Time in seconds after which a silent peer was not let in: long for a handshake on loopback."""
 
 
 @dataclass
@@ -52,7 +52,7 @@ def robot(tmp_path: Path) -> Iterator[Robot]:
 
 @dataclass
 class Seen:
-    """What came through within some time."""
+    """Messages that got through within some time."""
 
     at_robot: list[tuple[bytes, bytes]]
     control: list[bytes]
@@ -60,7 +60,7 @@ class Seen:
 
 
 def exchange(robot: Robot, operator: OperatorSockets, limit_s: float, *, until_both: bool) -> Seen:
-    """Both send and receive for `limit_s`, or until control and view have come through."""
+    """Send and receive on both ends for `limit_s`, or until control and view got through."""
     clock = MonotonicClock()
     end_s = clock.now() + limit_s
     seen = Seen([], [], [])
@@ -87,7 +87,7 @@ def stays_out(robot: Robot, operator: OperatorSockets, limit_s: float = REFUSAL_
 
 
 def stays_out_and_says(robot: Robot, operator: OperatorSockets, text: str) -> bool:
-    """Nothing comes through while the operator side finds out, however long a busy machine takes, and says so."""
+    """Return whether the operator side reports `text` while nothing gets through, however slow the machine."""
     clock = MonotonicClock()
     end_s = clock.now() + LIMIT_S
     while clock.now() < end_s and stays_out(robot, operator, 0.1):
