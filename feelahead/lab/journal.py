@@ -48,7 +48,7 @@ class Journal:
             self._file.close()
 
     def keep(self, key: str, rows: list[Row]) -> None:
-        """Write one finished piece. If the write fails, FeelaheadError; the piece is in `done` nevertheless."""
+        """Write one finished piece; FeelaheadError if the write fails, though the piece is then in `done`."""
         self.done[key] = rows
         self._write(json.dumps({"key": key, "rows": rows}).encode())
 

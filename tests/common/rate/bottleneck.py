@@ -1,4 +1,4 @@
-"""A robot side that feels, tells and shows through one bottleneck, in virtual time: everything but the picture."""
+"""Robot side that sends haptics, telemetry and views through a bottleneck, in virtual time; pictures are dummies."""
 
 import itertools
 import math

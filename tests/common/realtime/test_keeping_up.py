@@ -37,7 +37,7 @@ class Loop:
     def run(
         self, for_s: float, computes_s: float, lasts_s: float | None = None, *, physics: float = 0.0, every: int = 1
     ) -> None:
-        """Turns of which each `every`-th computes for so long, `physics` of it in physics, and lasts so long."""
+        """Run turns; each `every`-th computes for `computes_s`, `physics` of it in physics, and lasts `lasts_s`."""
         end_s, turn = self.wall.now() + for_s, 0
         while self.wall.now() < end_s:
             self.wall.advance_to(max(self.wall.now(), self.pacer.deadline_s))

@@ -158,12 +158,12 @@ def test_nobody_gets_in_while_nobody_serves_the_handshakes(robot: Robot) -> None
 
 def test_a_revoked_key_is_cut_off_from_control_and_view_and_others_see_on(robot: Robot) -> None:
     with robot.operator("anna") as anna, robot.operator("ben") as ben:
-        # Anna alone has sent so far, so that the first peer is hers.
+        # Only anna has sent so far, so that the first peer is hers.
         anna_peer = exchange(robot, anna, LIMIT_S, until_both=True).at_robot[0][0]
         assert gets_in(robot, ben)
         robot.folder.revoke("anna")
         robot.sockets.refresh_keys()
-        # What was on its way before the revocation may still stand in her own buffers.
+        # Messages sent before the revocation may still be in her own buffers.
         anna.receive(), anna.receive_view()
         clock = MonotonicClock()
         end_s = clock.now() + LIMIT_S
@@ -212,7 +212,7 @@ def test_a_view_that_cannot_be_opened_anew_is_tried_again(robot: Robot, monkeypa
             robot.sockets.publish(b"telemetry", b"state")
         robot.sockets.refresh_keys()
         assert gets_in(robot, ben)
-        exchange(robot, anna, 0.1, until_both=False)  # what was under way
+        exchange(robot, anna, 0.1, until_both=False)  # Messages under way.
         assert stays_out(robot, anna)
 
 

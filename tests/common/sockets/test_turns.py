@@ -1,4 +1,4 @@
-"""Several connections of one peer: in turn, everywhere, broken off, taken over, and not read any more."""
+"""Several connections of one peer: used in turn or together, broken, taken over, and no longer read."""
 
 import fcntl
 import socket
@@ -72,7 +72,7 @@ def test_who_was_full_is_tried_again_before_long() -> None:
 
 
 def test_who_is_silent_gets_a_copy_twice_a_second_and_is_back_once_heard() -> None:
-    """Both ends pass over what is silent: without it a connection that came back late would stay so on both."""
+    """Both ends pass over silent connections: without copies, one that came back late would stay silent on both."""
     turns: Turns[Fed] = Turns(Fed.offered)
     lively, silent = Fed(), Fed()
     turns.ways.extend((lively, silent))
@@ -176,7 +176,7 @@ def test_a_taken_over_routing_id_gives_another_key_neither_the_group_nor_its_ans
             )
         )
         peer = greet(robot, anna)
-        # Nobody but anna and the robot side can know it: the handshake hides it.
+        # Only anna and the robot side can know it: the handshake hides it.
         stolen = min(robot._peers.connections)
         context = stack.enter_context(zmq.Context())
         ben = stack.enter_context(context.socket(zmq.DEALER))
@@ -202,7 +202,7 @@ def test_a_taken_over_routing_id_gives_another_key_neither_the_group_nor_its_ans
         assert robot.send(claimed, b"ben's")
         assert ben.poll(round(1e3 * PATIENT_S))
         assert ben.recv() == b"ben's", "nothing of anna's came before"
-        # Anna's connection was ended with it, so that she takes her place again.
+        # Anna's connection was ended, too, so that she takes her place again.
         for _ in range(ROUNDS):
             anna.send(b"anna")
             robot.wait(0.01)
@@ -228,16 +228,16 @@ def test_an_operator_of_sixteen_connections_stays_in_in_a_crowd(monkeypatch: pyt
         assert robot.send(peer, b"and heard")
 
 
-# Who does not read
+# Peers that do not read
 
 
 def unsent_bytes(descriptor: int) -> int:
-    """Bytes of a connection that the kernel holds and has not sent (SIOCOUTQNSD)."""
+    """Return the bytes of a connection that the kernel holds and has not sent (SIOCOUTQNSD)."""
     return int(struct.unpack("i", fcntl.ioctl(descriptor, 0x894B, bytes(4)))[0])
 
 
 def held_back(end: RobotSockets) -> list[int]:
-    """TCP_NOTSENT_LOWAT of this process's ends of the connections to both ports."""
+    """Return TCP_NOTSENT_LOWAT of this process's ends of the connections to both ports."""
     ports, marks = {port_of(end.control_endpoint), port_of(end.view_endpoint)}, []
     for descriptor in Path("/proc/self/fd").iterdir():
         try:
@@ -271,7 +271,7 @@ def test_the_kernel_holds_little_for_any_connection_of_either_side(
 def test_little_waits_for_who_stops_reading_and_others_lose_nothing(
     robot: RobotSockets, operator: OperatorSockets
 ) -> None:
-    """Both sides hold back: some messages and kilobytes for each connection, however long it goes on."""
+    """Both sides limit what waits: some messages and kilobytes for each connection, however long."""
     owner = greet(robot, operator)
     group, receive_bytes = new_group(), 4096
     port = port_of(robot.control_endpoint)
