@@ -37,7 +37,7 @@ def along(
     quantile: float = 0.0,
     reach_m: float = REACH_M,
 ) -> Along:
-    """A direction; `inflated_m` is the D_σ of every sphere where nothing varies."""
+    """Return a direction; `inflated_m` is the D_σ of every sphere if nothing varies."""
     return Along(np.ascontiguousarray(direction), inflated_m, variance_m2, quantile, reach_m)
 
 

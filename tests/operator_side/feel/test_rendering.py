@@ -1,4 +1,4 @@
-"""From fields and time to what both triggers and the motors do."""
+"""From fields and time to both triggers' zones and the motors."""
 
 import pytest
 from hypothesis import given
@@ -66,7 +66,7 @@ def test_what_comes_to_stand_is_said_by_one_short_pulse_of_the_right_motor() -> 
     assert motors(True, 1.082) == motors(True, 9.0) == motors(False, 9.001) == Rumble()
     assert motors(True, 9.002) == Rumble(0.0, 0.7)
     assert rendering.render(None, LET_GO, None, 9.01) == RELEASED
-    # What still stands when the field is back is no news.
+    # An object still in contact when the field is back is no news.
     assert motors(True, 20.0) == Rumble()
 
 
@@ -113,7 +113,7 @@ def test_with_swapped_sides_each_gets_the_others() -> None:
     assert swapped.l2 == plain
     assert swapped.r2 is not None
     assert swapped.r2[-1] == 1
-    assert swapped.r2[0] == 0  # it retreats only once it is pulled farther than what advances
+    assert swapped.r2[0] == 0  # It retreats only once it is pulled farther than the advancing trigger.
 
 
 def test_another_reaction_time_is_another_free_travel() -> None:
@@ -141,11 +141,13 @@ def test_people_are_told_the_free_way_as_they_are_told_how_far_they_pull() -> No
     trigger = RenderedTrigger(USUAL, TriggerTravel(0.0, 1.0))
     assert trigger.free_travel == 1.0
     trigger.render(field(ways(0.06)), 1.0, 0.0, STILL, 0.0)
-    assert trigger.free_travel == pytest.approx(0.5 / 0.75)  # zone 5 begins at 0.5 of the travel, 0.75 of it sensed
+    assert trigger.free_travel == pytest.approx(
+        0.5 / 0.75
+    )  # Zone 5 begins at 0.5 of the travel, of which 0.75 is sensed.
     trigger.render(field(ways(0.04, 0.045, 0.06)), 1.0, 0.0, STILL, 1.0)
     assert trigger.free_travel == pytest.approx(0.4 / 0.75)
     trigger.release()
     assert trigger.render(field(ways(0.0855)), 1.0, 0.0, STILL, 2.0) == FREE_TRIGGER
-    short = RenderedTrigger(USUAL, TriggerTravel(0.0, 0.88))  # a full pull ends at 0.66
+    short = RenderedTrigger(USUAL, TriggerTravel(0.0, 0.88))  # A full pull ends at 0.66.
     assert short.render(field(ways(0.085)), 1.0, 0.0, STILL, 0.0) == (0,) * 7 + (8,) * 3
     assert short.free_travel == 1.0

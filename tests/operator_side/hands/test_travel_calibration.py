@@ -1,4 +1,4 @@
-"""Raw travel to calibrated travel: dead zones, saturation, sticks that do not rest at the centre."""
+"""From raw to calibrated travel: dead zones, saturation, sticks that rest off centre."""
 
 import math
 
