@@ -34,7 +34,7 @@ def run_of(does: Does, device: Any = "browser", link: str = "", *, permit_tuning
 
 
 def timetable(*rows: tuple[float, dict[str, Any] | None]) -> Does:
-    """Do each thing until its time, in turn."""
+    """Return hands that do each thing until its time, in turn."""
     return lambda now_s: next((hands for until_s, hands in rows if now_s < until_s), rows[-1][1])
 
 

@@ -141,9 +141,7 @@ def test_people_are_told_the_free_way_as_they_are_told_how_far_they_pull() -> No
     trigger = RenderedTrigger(USUAL, TriggerTravel(0.0, 1.0))
     assert trigger.free_travel == 1.0
     trigger.render(field(ways(0.06)), 1.0, 0.0, STILL, 0.0)
-    assert trigger.free_travel == pytest.approx(
-        0.5 / 0.75
-    )  # Zone 5 begins at 0.5 of the travel, of which 0.75 is sensed.
+    assert trigger.free_travel == pytest.approx(0.5 / 0.75)  # Zone 5 begins at 0.5 of the travel, 0.75 of it sensed.
     trigger.render(field(ways(0.04, 0.045, 0.06)), 1.0, 0.0, STILL, 1.0)
     assert trigger.free_travel == pytest.approx(0.4 / 0.75)
     trigger.release()

@@ -27,7 +27,7 @@ repeatable = settings(derandomize=True, deadline=None, max_examples=40)
 
 
 def thing(kind: str, face_m: float, x_m: float = 0.0, rotation: FloatArray | None = None) -> PerceivedObjects:
-    """Something whose nearest point is `face_m` ahead of the origin; thin things lie across the approach, at x_m."""
+    """Return an object whose nearest point is `face_m` ahead of the origin; thin ones lie across, at x_m."""
     turned = np.eye(3) if rotation is None else rotation
     half_m = {"wall": (0.6, 0.6, 0.05), "plate": (0.1, 0.1, 0.001)}
     half_m |= {f"{mm} mm rod": (5e-4 * mm, 0.3, 5e-4 * mm) for mm in (10, 5, 2, 1, 0.4)}

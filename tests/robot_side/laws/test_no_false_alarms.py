@@ -141,7 +141,7 @@ def test_inside_a_u_the_way_is_the_one_to_its_bottom(side_gap_m: float, seamless
         scene.box([side * (side_m + 0.02), 0.0, bottom_m + (0.02 if seamless else 0.0) - length], [0.02, 0.1, length])
     scene.box([0.0, 0.0, bottom_m + 0.01], [side_m + (0.0 if seamless else 0.04), 0.1, 0.01])
     ways = ways_of(ball_pose(), scene.objects(), along(AHEAD, INFLATED_M))
-    # In a narrow U less of the bottom is met, so that strengths are due a little earlier.
+    # A narrow U exposes less of the bottom, so that strengths are due a little earlier.
     assert free_m - 0.012 < ways[0] <= alone[0] + 1e-5
     assert free_m - 0.0015 < ways[7] <= free_m
 

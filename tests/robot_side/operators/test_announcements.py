@@ -1,4 +1,4 @@
-"""One owner, many observers: who gets the lease when, with virtual operators on a real robot side."""
+"""One owner, many observers: the lease over time, with virtual operators on a real robot side."""
 
 import msgspec
 import numpy as np
@@ -35,13 +35,13 @@ def test_observers_feel_at_a_reduced_rate_and_see_the_robots_state(bench: Bench)
     owner.inbox.clear()
     observer.inbox.clear()
     bench.drive(0.5, owner)
-    assert len(owner.felt) == pytest.approx(0.5 / KEEP_ALIVE_S, abs=1)  # nothing changes
+    assert len(owner.felt) == pytest.approx(0.5 / KEEP_ALIVE_S, abs=1)  # Nothing changes.
     assert len(observer.felt) == pytest.approx(0.5 / OBSERVER_PERIOD_S, abs=1)
     assert observer.felt[-1].state == "armed"
 
 
 def to_owner(bench: Bench, ticks: int) -> list[tuple[float, bool, AnyMessage]]:
-    """When each message left, and if everywhere."""
+    """Return the time of each message to the owner, and whether it went everywhere."""
     found = []
     for _ in range(ticks):
         bench.ticks += 1

@@ -21,7 +21,7 @@ NOWHERE = np.zeros(3)
 
 
 class Posed:
-    """A frozen scene, and where its keyframe has the joints."""
+    """Frozen scene, and the joints of its keyframe."""
 
     def __init__(self, name: str) -> None:
         self.scene = load_scene(DATA / f"{name}.xml", "tool")
