@@ -53,10 +53,7 @@ def cluster(address: str, own_file: str | None) -> Iterator[Executor]:
     import distributed  # noqa: PLC0415  # large
     from distributed.comm.core import CommClosedError  # noqa: PLC0415
 
-    for name in (
-        "distributed",
-        "distributed.client",
-    ):  # The import has set them up; the raised error says what went wrong.
+    for name in ("distributed", "distributed.client"):  # set up by the import; the raised error says what went wrong
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client: Any = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]

@@ -17,8 +17,7 @@ class Journal:
     """File whose first line holds the settings and versions, with one line for each finished piece of work.
 
     A piece is written and synced before the next one. A last line torn by kill -9 is cut off and its piece is run
-    again,
-    so that no row is lost or doubled.
+    again, so that no row is lost or doubled.
     """
 
     def __init__(self, path: Path | None, made_by: Mapping[str, Any]) -> None:

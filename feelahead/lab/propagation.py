@@ -36,10 +36,8 @@ class Chain:
     """One point carried by n joints, near one configuration, as a product of exponentials (Brockett 1984).
 
     x = exp(ξ₁ δ₁) ... exp(ξₙ δₙ) p with the joints' screws ξ at that configuration, base to tip: joint i turns
-    everything
-    beyond it about its axis there, by δᵢ. The screws are the columns of the geometric Jacobian, so that no other model
-    of
-    the robot is needed.
+    everything beyond it about its axis there, by δᵢ. The screws are the columns of the geometric Jacobian, so that no
+    other model of the robot is needed.
     """
 
     def __init__(self, jacobian: FloatArray, tool_position_m: FloatArray, point_m: FloatArray) -> None:
@@ -117,8 +115,7 @@ def monte_carlo_sd_m(displacements: Displacements, errors_rad: FloatArray, axis:
 def places(gripper: PosedGripper, count: int, seed: int) -> dict[str, FloatArray]:
     """Return named configurations (n,): home, `count` seeded ones within the joints' ranges, and a singular one.
 
-    Of all sampled ones, the singular one has the least error along the approach relative to the largest in any
-    direction.
+    Of all samples, the singular one has the least error along the approach relative to the largest in any direction.
     """
 
     def share_along(configuration: FloatArray) -> float:

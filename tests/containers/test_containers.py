@@ -104,7 +104,7 @@ def test_sigterm_ends_both_sides_well(running: Engine) -> None:
 
 
 def test_a_trial_of_the_latency_experiment(compose: Compose, tmp_path: Path) -> None:
-    """Both media have a contact or none, and the containers leave nothing."""
+    """Both media have a contact, and the containers leave nothing."""
     words = ["--links", "lan", "--haptics", "off", "--seeds", "1", "--duration", "8", "--media", "virtual", "--compose"]
     # Trials of others, and remains of older ones, are not judged here.
     before = compose.existing(f"name={TRIALS}")

@@ -68,8 +68,7 @@ def round_mesh(subdivisions: int) -> tuple[FloatArray, IntArray]:
 
 def cup() -> tuple[FloatArray, IntArray]:
     """Return vertices (v, 3) in m and triangles (t, 3) of a block of 3³ cubes without its middle and upper middle cube.
-    The mouth opens upward, 40 mm wide and 80 mm deep, between walls and over a floor of 40 mm.
-    """
+    The mouth opens upward, 40 mm wide and 80 mm deep, between walls and over a floor of 40 mm."""
     places, tetrahedra = grid_tetrahedra(3)
     middles = np.floor(places[tetrahedra].mean(axis=1))
     mouth = (middles[:, 0] == 1.0) & (middles[:, 1] == 1.0) & (middles[:, 2] >= 1.0)

@@ -214,8 +214,7 @@ def typed(block: str, names: dict[str, str]) -> list[str]:
     """Return the typed lines of a block, one a command: those after `$ ` if there are any, else all.
 
     `names` of one capital letter are variables: they are replaced, and stored where they are assigned. Options in
-    brackets
-    are left out.
+    brackets are left out.
     """
     lines = [line for line in block.replace("\\\n", " ").splitlines() if line.strip()]
     if any(line.startswith("$ ") for line in lines):

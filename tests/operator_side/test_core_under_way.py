@@ -62,8 +62,7 @@ def test_commands_under_way_bring_it_nearer() -> None:
     assert bench.r2 == FREE
     bench.drive(0.2)
     bench.feel_field(bench.report())
-    # δ = 0.25 * 0.2 - 0.25²/6 = 40 mm, w = 0.25 m/s.
-    # A zone of 0.184 m/s needs 40 + 55 + 5.6 + 0.7 = 101 mm.
+    # δ = 0.25 * 0.2 - 0.25²/6 = 40 mm, w = 0.25 m/s. A zone of 0.184 m/s needs 40 + 55 + 5.6 + 0.7 = 101 mm.
     assert bench.r2 == (0,) * 5 + (8,) * 5
     assert bench.device.strengths[0] == FREE
     assert bench.without_history == 0

@@ -116,7 +116,6 @@ def test_a_finger_of_two_newtons_stops_at_the_same_place_whatever_the_link(delay
     speeds = approach.pull(2.0, 8.0)
     # Strength 6 in the first zone holds 2 N. It begins 12 (1 - sqrt(5.5 / 8)) = 2.0 mm before the wall.
     # The zone's own 4.5 mm/s need 1.4 mm.
-    # own 4.5 mm/s need 1.4 mm.
     assert 1e3 * approach.left_m == pytest.approx(3.3, abs=0.2)
     assert speeds.max() > 0.1
     assert np.abs(speeds[-500:]).max() < 1e-3

@@ -37,7 +37,7 @@ class FullDualSense(SimulatedDualSense):
         super().write(_FULL, now_s)
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Read the state; resist with full strength if nothing was written yet."""
+        """Read the state; free triggers resist with full strength from then on."""
         if self.released:
             super().write(_FULL, now_s)
         return super().read(now_s)

@@ -9,8 +9,7 @@ Law = Literal["swept", "swept_robot", "paper", "none", "full"]
 """swept: contact distances along each trigger, rendered over its travel (docs/feel.md); compensation by the operator.
 swept_robot: the same with v t_d by the robot side (--compensation robot). paper: the printed law (§4.2), the total
 overlap over a fixed share of the enlarged gripper. none: no haptics. full: always the strongest effect on both
-triggers.
-"""
+triggers."""
 LAWS: Final[tuple[Law, ...]] = get_args(Law)
 
 

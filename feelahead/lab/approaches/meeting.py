@@ -44,8 +44,7 @@ def place(
     """Draw a placement of the objects in which the approach collides, uniformly over its length.
 
     The placement lies on the tool's path, drift and turning included. speed_m_s: speed of the objects along the
-    approach
-    axis as the pull begins; below 0 they come nearer. None if 40 draws found none, or if the approach is too short.
+    approach axis as the pull begins; below 0 they come nearer. None if 40 draws found none, or for too short a pull.
     """
     record = replay.record
     posed.put(*_pose(replay, record.began_s), np.zeros(3))

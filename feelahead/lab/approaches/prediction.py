@@ -20,16 +20,12 @@ from robot_side.drivers.mujoco.joint_reference import MotionLimits
 Compensation = Literal["operator", "robot", "momentary"]
 COMPENSATIONS: Final[tuple[Compensation, ...]] = get_args(Compensation)
 """operator: the commands under way, known by their sender. robot: v t_d with the robot's high quantile of the loop age
-(eq. 8). momentary: v times the present loop age.
-"""
+(eq. 8). momentary: v times the present loop age."""
 _STEP_S: Final = 0.01
 _LEAST_SPEED: Final = 1e-9
 AGE_BINS_S: Final = tuple(pairwise((0.0, 0.02, 0.06, 0.13, 0.28, 0.58, 1.2)))
-"""Bins of the loop age in seconds; approaches are pooled by the median of theirs.
-
-A moment's own age does not choose the bin: where it is short by chance, the next command takes longer than the last,
-which would look like an error.
-"""
+"""Bins of the loop age in seconds; approaches are pooled by the median of theirs. A moment's own age does not choose:
+where it is short by chance, the next command takes longer than the last, which would look like an error."""
 PoseAt = Callable[[FloatArray], GripperPose]
 """Pose of the gripper for joints (n,)."""
 

@@ -21,8 +21,7 @@ def stopping_path(replay: Replay, time_s: float, speed_m_s: float, share: float 
 
     The path is the record until a command sent at `time_s` arrives. Then the arm moves towards `speed_m_s` along its
     approach axis for 0.3 s, and brakes. `share` of the sticks commanded at `time_s` continues from the arrival until
-    the
-    arm stops. The joints' acceleration bounds each change, in proportion to the remaining change.
+    the arm stops. The joints' acceleration bounds each change, in proportion to the remaining change.
     """
     record, arrives_s = replay.record, min(replay.record.arrives_s(time_s), replay.end_s)
     between = slice(record.pose_row(time_s) + 1, record.pose_row(arrives_s) + 1)

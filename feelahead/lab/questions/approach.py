@@ -46,8 +46,7 @@ class ApproachSettings(Sweep):
 
     Both sides run in virtual time with the real messages, link, trigger effects and physics. Without --model, every
     frozen scene of tests/data that ends in a contact is tried; with --quick two of them. Options with several values
-    are
-    combined with each other; a single run gets a summary in words.
+    are combined with each other; of a single run, --summary holds the run's figures.
     """
 
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
@@ -64,12 +63,10 @@ class ApproachSettings(Sweep):
     """datagram lets jitter reorder messages, stream keeps them in order."""
     law: tuple[Literal["swept", "paper", "none", "full"], ...] = ("swept",)
     """Law that is felt: the objects ahead along the trigger, the paper's printed law, nothing, or always the
-    strongest effect. Several are compared.
-    """
+    strongest effect. Several are compared."""
     compensation: tuple[Compensation, ...] = ("operator",)
     """Side that compensates the delay: the operator side by the commands under way, or the robot side by v t_d
-    (eq. 8). The paper's law always uses eq. 8.
-    """
+    (eq. 8). The paper's law always uses eq. 8."""
     haptics: bool = True
     """--no-haptics: the same as --law none."""
     probability: Annotated[float, Meta(gt=0.0, lt=1.0), tyro.conf.arg(metavar="P")] = 0.99

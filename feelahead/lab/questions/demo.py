@@ -1,4 +1,4 @@
-"""Does the demo's person grasp, lift and place, and feel the contact before setting down?
+"""Does the demo's person grasp, lift and place, and feel the place before the object touches it?
 
 feelahead try demo --seeds 10 --link "" "delay 200ms 10ms distribution normal"
 """

@@ -50,8 +50,7 @@ class FeltSweep(Sweep):
     """Instead: measure how closely spheres cover grippers: the built-in one, and those of --model."""
     field: bool = False
     """Instead: measure how far before objects R2's strengths begin, without camera error. The frozen scenes with one
-    convex object ahead, or those of --model, are moved along the approach.
-    """
+    convex object ahead, or those of --model, are moved along the approach."""
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
     """--cover, --field: MJCF files with an arm."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None

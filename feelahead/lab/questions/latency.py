@@ -52,10 +52,8 @@ class LatencySettings(Sweep):
     """Pull R2 with a constant force towards a wall, over measured links: the effect of the delay.
 
     Each link runs with and without haptics, over the same seeds, in several media: virtual time, two processes that
-    delay
-    their own messages, and containers with the kernel's netem between them. A second table shows whether the media
-    agree
-    on the link's figures. Trials in real time take turns.
+    delay their own messages, and containers with the kernel's netem between them. A second table shows whether the
+    media agree on the link's figures. Trials in real time take turns.
     """
 
     seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 5

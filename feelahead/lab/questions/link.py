@@ -55,8 +55,7 @@ class Played:
     """Size of a message, which `rate` in the link counts: 100 bytes with their UDP, IPv4 and Ethernet headers."""
     against: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
     """With --virtual: a recording to compare with (seq, sent_ns, delay_ns); its send times replace --rate and
-    --count.
-    """
+    --count."""
 
     def profile(self, seed: int) -> LinkProfile:
         """Parse the link."""

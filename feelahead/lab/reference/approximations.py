@@ -23,8 +23,7 @@ def satellite_points() -> FloatArray:
 
     They are those of the divided void fraction in CFDEMcoupling (Goniva et al. 2012). The shells end at the radii that
     hold 1, 15 and 29 parts of 29 of the ball. The points lie at a shell's mean radius, along the axes and diagonals of
-    a
-    cube.
+    a cube.
     """
     axes = [sign * row for row in np.eye(3) for sign in (1.0, -1.0)]
     diagonals = [np.array(signs) / math.sqrt(3.0) for signs in product((1.0, -1.0), repeat=3)]

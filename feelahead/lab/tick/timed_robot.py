@@ -41,8 +41,7 @@ _OF_STEPS: Final[dict[Step, str]] = {
 }
 COLUMNS: Final = ("now_s", "run", "spent_s", "thread_s", "wall_s", "looks", *STAGES)
 """Columns of the log: time; the run of turns that count (even: ticks, odd: "mixed"); processor time of the tick or of
-"mixed"; the thread's at its end; wall time; number of looks that the tick began; each stage's processor time.
-"""
+"mixed"; the thread's at its end; wall time; number of looks that the tick began; each stage's processor time."""
 _TURNS: Final = 17
 _MIXED: Final = 4
 _UNCOUNTED: Final = (0, _MIXED, _MIXED + 1)

@@ -128,7 +128,7 @@ def listening(accept: bool = False) -> Iterator[str]:
 
 @contextlib.contextmanager
 def closed() -> Iterator[str]:
-    """Yield a bound port on which nobody listens."""
+    """Yield a port on which nobody listens, bound so that no other process gets it."""
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         yield f"tcp://127.0.0.1:{taken.getsockname()[1]}"

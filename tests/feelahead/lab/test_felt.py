@@ -129,9 +129,7 @@ def test_strengths_begin_as_far_before_each_thing_however_far_it_is(
         before_mm = np.array([[row["free_mm"] - row[way_name(strength)] for strength in range(1, 9)] for row in far])
         np.testing.assert_allclose(before_mm, np.broadcast_to(before_mm[0], before_mm.shape), atol=0.1)
         assert (np.diff(before_mm, axis=1) <= 0.0).all()
-        # The eighth at D_σ and the spheres' stand-out, or a little earlier, as strengths are rounded; the first on
-        # the rise before.
-        # the ramp before.
+        # The eighth at D_σ and the spheres' stand-out, or a little earlier, as strengths are rounded; the first before.
         begins_mm = before_mm[0] - far[0]["sigma_mm"]
         assert 0.0 < begins_mm[7] < COVER_MM + 0.25 * RAMP_MM
         assert begins_mm[7] < begins_mm[0] < COVER_MM + RAMP_MM

@@ -26,10 +26,8 @@ def uncovered_cells(half_sizes_m: FloatArray, cover: SphereCover) -> FloatArray:
     """Return middles of the surface's cells that no one sphere contains, down to the smallest cells.
 
     A proof, not a sample: cells tile the faces with their edges and corners. A cell counts as covered only if its
-    farthest
-    point is within TOLERANCE_M of being in a sphere. The others are cut, down to that tolerance. One eighth of the box
-    is
-    enough, as the spheres are mirror-symmetric: the nearest images are those in it.
+    farthest point is within TOLERANCE_M of being in a sphere. The others are cut, down to that tolerance. One eighth of
+    the box is enough, as the spheres are mirror-symmetric: the nearest images are those in it.
     """
     spheres = np.unique(np.column_stack([np.abs(cover.centers_m), cover.radii_m + TOLERANCE_M]), axis=0)
     left = []

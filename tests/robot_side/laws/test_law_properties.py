@@ -61,8 +61,7 @@ def test_strength_is_0_until_the_margin_before_the_free_way_and_full_from_there_
     objects = thing(kind, front_m + INFLATED_M + FREE_M, FINGERTIP_X_M if gripper else 0.0, rotation)
     ways = ways_of(pose, objects, along(rotation[:, 2], INFLATED_M))
     assert (np.diff(ways) > 0.0).all()
-    # Similar for all: each strength's distance differs by less than 4 mm, though the overlaps differ by a factor of
-    # 300.
+    # Similar for all: a strength's distances differ by less than 4 mm, though the overlaps differ by a factor of 300.
     assert FREE_M - MARGIN_M < ways[0] < FREE_M - 0.009
     # A thin rod's overlap hardly grows before it is full.
     assert FREE_M - 0.003 < ways[7] <= FREE_M
