@@ -402,7 +402,7 @@ def test_a_message_that_is_prepared_is_the_same_under_any_header(message: AnyVie
 
 
 @pytest.mark.parametrize("strength", range(-1, STRENGTHS + 2))
-def test_a_uniform_field_begins_so_many_ways_before_any_distance(strength: int) -> None:
+def test_a_uniform_field_has_its_strength_at_every_distance(strength: int) -> None:
     if not 0 <= strength <= STRENGTHS:
         with pytest.raises(ValueError, match=f"strength = {strength}; valid: 0 to 8"):
             uniform_field(strength)

@@ -63,7 +63,7 @@ def test_a_stop_ends_by_arming_alone() -> None:
 
 
 @pytest.mark.parametrize("event", SessionEvent)
-def test_what_each_event_does_to_who_is_armed_who_owns_and_who_has_ended(event: SessionEvent) -> None:
+def test_effect_of_each_event_on_arming_ownership_and_ended_epochs(event: SessionEvent) -> None:
     if event in STOPPING:
         assert after(SessionState.ARMED, event) is not SessionState.ARMED
     if event is SessionEvent.EMERGENCY_STOP:

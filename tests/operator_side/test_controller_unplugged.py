@@ -112,7 +112,7 @@ def test_plugged_in_again_it_resumes_disarmed_and_is_armed_on_purpose() -> None:
     run.until(lambda: run.state == "armed", 0.1)
 
 
-def test_whoever_holds_the_arming_button_through_it_all_arms_nothing_before_a_healthy_second() -> None:
+def test_a_held_arming_button_arms_nothing_before_a_healthy_second() -> None:
     run = advancing()
     run.both.device.set_buttons(frozenset({Button.L1, Button.OPTIONS}))
     run.unplug()

@@ -125,7 +125,7 @@ def epoch_of(bench: Bench) -> int:
     return epoch
 
 
-def test_an_epoch_that_ended_is_followed_by_another_and_not_by_a_third_for_what_was_under_way(bench: Bench) -> None:
+def test_an_ended_epoch_is_followed_by_one_epoch_despite_messages_under_way(bench: Bench) -> None:
     epochs = [epoch_of(bench)]
     for after_s in (0.3, 0.3, 2.0, 2.0, 1.0):
         bench.now_s += after_s

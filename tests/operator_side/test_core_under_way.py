@@ -68,7 +68,7 @@ def test_commands_under_way_bring_it_nearer() -> None:
     assert bench.without_history == 0
 
 
-def test_who_stops_commanding_has_said_stop() -> None:
+def test_ending_commands_means_stop() -> None:
     bench = Driving()
     bench.drive(0.1)
     for _ in range(2):  # Without a report of the controller nothing is sent.
@@ -94,7 +94,7 @@ def test_without_history_the_robot_sides_counts_and_is_counted(echo_s: float | N
     assert bench.without_history == 1
 
 
-def test_who_observes_does_not_know_what_others_command() -> None:
+def test_an_observer_does_not_know_others_commands() -> None:
     bench = Driving()
     bench.drive(0.2)
     bench.notice(SessionState.OBSERVING)

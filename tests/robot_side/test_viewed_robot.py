@@ -94,7 +94,7 @@ def test_pictures_and_scene_come_while_somebody_looks_and_a_killed_companion_com
     assert summary["looked_at"]["overview"]["nobody_looks"] > 0
 
 
-def test_steps_go_to_who_shows_them_and_one_that_is_lacking_brings_a_whole_one() -> None:
+def test_steps_go_to_viewers_that_show_them_and_a_missing_one_brings_a_whole_picture() -> None:
     pytest.importorskip("av", reason="needs the extra `video`")
     from common.video.steps import Steps  # noqa: PLC0415  # only now it is known to work
 

@@ -64,7 +64,7 @@ class ErrorSettings(Sweep):
     pull R2 over links of 0 to 400 ms in each direction, in virtual time. The gripper's displacement from the robot's
     newest report until a command sent now takes effect is predicted by the commands under way, and as v t_d (eq. 8).
     --table writes mean and standard deviation of the errors, for eq. 10. A seed always gives the same figures, except
-    run times. Five minutes on a free core. --quick: a minute, with one seed and less of everything else.
+    run times. Five minutes on a free core. --quick: a minute; fewer draws, configurations, pulls and links; one seed.
     """
 
     seeds: Annotated[int, Meta(ge=1, le=10_000), tyro.conf.arg(metavar="N")] = 3

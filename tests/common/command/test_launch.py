@@ -64,7 +64,7 @@ def test_a_run_that_never_began_has_a_summary(tmp_path: Path, flag: list[str], w
 
 @pytest.mark.processes
 @pytest.mark.parametrize("flag", ["--summary=None", "--summary=", "--summary"])
-def test_where_none_is_asked_for_there_is_none(tmp_path: Path, flag: str) -> None:
+def test_without_a_summary_flag_there_is_no_summary(tmp_path: Path, flag: str) -> None:
     code = IMPORT.replace('["command"]', repr(["command", flag])).replace("stop)", "stop, has_summary=True)")
     with start("-c", f"import os; os.chdir({str(tmp_path)!r})" + code) as process:
         assert process.stdout is not None

@@ -68,7 +68,7 @@ def test_reordering_sends_a_share_at_once() -> None:
     assert run.line.summary()["achieved"]["late_share"] == pytest.approx(0.75 * (1.0 - 0.75**9), abs=0.02)
 
 
-def test_a_gap_leaves_so_many_in_order() -> None:
+def test_a_gap_leaves_that_number_in_order() -> None:
     delays_s = Run("delay 10ms reorder 100% gap 5", 100).delays_s
     assert [number for number, delay_s in enumerate(delays_s) if delay_s == 0.0] == list(range(4, 100, 5))
     half = Run("delay 10ms reorder 50% gap 5", 20_000).delays_s

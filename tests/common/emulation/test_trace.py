@@ -88,7 +88,7 @@ def deliveries(profile: LinkProfile, count: int) -> dict[int, float]:
     return delays_ms
 
 
-def test_a_trace_is_replayed_by_position_and_begins_anew_at_its_end(tmp_path: Path) -> None:
+def test_a_trace_is_replayed_by_position_and_restarts_at_its_end(tmp_path: Path) -> None:
     path = written(tmp_path, "delay_ns,x\n1000000,\n,\n3000000,\n")
     profile = LinkProfile.parse(f"trace {path}")
     assert deliveries(profile, 7) == pytest.approx({0: 1.0, 2: 3.0, 3: 1.0, 5: 3.0, 6: 1.0})

@@ -150,7 +150,7 @@ def test_a_start_outside_of_the_bounds_is_refused() -> None:
 
 
 @given(st.integers(0, 2**32))
-def test_who_makes_one_only_where_none_waits_never_sees_one_give_way(seed: int) -> None:
+def test_a_picture_made_only_while_none_waits_never_gives_way(seed: int) -> None:
     chance = np.random.default_rng(seed)
     budget, under_way, stands_until_ms = Budget[str](("video", "scene")), dict[int, int](), 0
     for now_ms in range(2000):

@@ -191,7 +191,7 @@ TestConnections = Connections.TestCase
 TestConnections.settings = settings(max_examples=200, stateful_step_count=30, phases=[Phase.explicit, Phase.generate])
 
 
-def test_who_has_the_descriptor_of_a_sender_that_was_gone_before_it_was_read_stays(
+def test_the_new_owner_of_a_departed_senders_descriptor_stays(
     robot: RobotSockets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The descriptor may be another's by now, for example a viewer's, unknown to the control port."""
@@ -222,7 +222,7 @@ def test_a_flooding_stranger_takes_nothing_from_the_operator_or_from_other_stran
         assert seen(admission, *crowd) == [], "however often one receives within the tick"
 
 
-def test_of_a_crowd_the_oldest_newcomer_goes_and_who_was_introduced_stays() -> None:
+def test_a_crowd_loses_its_oldest_newcomer_and_keeps_introduced_peers() -> None:
     crowd = Crowd(limit=3, introduced_s=2.0)
     for descriptor in (0, 1, 2):
         crowd.came(descriptor, 0.0)

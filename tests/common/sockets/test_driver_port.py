@@ -74,7 +74,7 @@ def test_beyond_this_machine_it_asks_for_keys_in_the_words_of_the_control_port(f
         DriverPort("here", flag, LIMIT_BYTES)
 
 
-def test_with_keys_only_who_is_allowed_gets_in_and_who_is_revoked_is_not_heard(tmp_path: Path) -> None:
+def test_with_keys_only_allowed_peers_get_in_and_revoked_ones_are_not_heard(tmp_path: Path) -> None:
     folder, (public, secret), (mine, own) = KeyFolder(tmp_path), make_key_pair(), make_key_pair()
     folder.write_pair("robot", public, secret)
     folder.allow("driver", mine)

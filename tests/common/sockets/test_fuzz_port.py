@@ -114,7 +114,7 @@ def test_a_connection_that_never_introduces_itself_is_ended(monkeypatch: pytest.
         assert all(connection.ended() for connection in slow)
 
 
-def test_a_crowd_is_hung_up_on_and_who_is_in_stays_in(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_crowd_is_hung_up_on_and_connected_peers_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
     with (
         RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as robot,
@@ -156,7 +156,7 @@ def test_a_crowd_that_has_left_before_anybody_looked_is_nothing(monkeypatch: pyt
         assert robot.crowded == 0
 
 
-def test_nobody_is_hung_up_on_for_a_stranger_whose_descriptor_they_have(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_new_owner_of_a_strangers_descriptor_is_not_hung_up_on(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
     monkeypatch.setattr(robot_sockets, "_EVENTS_PER_CALL", 10)
     hung_up: list[int] = []
@@ -171,7 +171,7 @@ def test_nobody_is_hung_up_on_for_a_stranger_whose_descriptor_they_have(monkeypa
             assert robot._all_seen
 
 
-def test_what_is_no_connection_any_more_is_left_alone() -> None:
+def test_an_ended_connection_is_left_alone() -> None:
     reading, writing = os.pipe()
     shut_down(reading)
     os.close(writing)
@@ -180,7 +180,7 @@ def test_what_is_no_connection_any_more_is_left_alone() -> None:
     shut_down(reading)
 
 
-def test_who_comes_back_by_the_same_name_is_no_stranger(robot: RobotSockets) -> None:
+def test_a_peer_back_under_its_name_is_no_stranger(robot: RobotSockets) -> None:
     before = descriptors()
     for _ in range(2):
         with zmq.Context() as context, context.socket(zmq.DEALER) as dealer:
@@ -253,7 +253,7 @@ def test_a_peer_that_floods_is_cut_off_and_the_operator_is_not(
     assert is_heard(robot, operator)
 
 
-def test_who_sends_more_than_twenty_operators_floods(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sending_more_than_twenty_operators_floods(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
     within_one_second(robot, monkeypatch)
     most = round(20 / MOTION_PERIOD_S)
     with contextlib.closing(stranger(robot)) as connection:

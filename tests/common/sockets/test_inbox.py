@@ -50,7 +50,7 @@ def settle(inbox: Inbox) -> None:
         list(inbox.read())
 
 
-def test_who_has_nothing_is_asked_once(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"], asked: list[Any]) -> None:
+def test_an_empty_socket_is_asked_once(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"], asked: list[Any]) -> None:
     inbox = Inbox(pair[0], frames=1)
     pair[1].send(b"hello")
     assert signal_of(inbox)
@@ -91,7 +91,7 @@ def test_a_signal_that_another_use_took_is_no_message_lost(
     assert [frame.bytes for message in inbox.read() for frame in message] == [b"second"]
 
 
-def test_what_had_come_before_is_found(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"]) -> None:
+def test_earlier_messages_are_found(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"]) -> None:
     ours, theirs = pair
     theirs.send(b"early")
     while not int(ours.getsockopt(zmq.EVENTS)) & zmq.POLLIN:  # Takes the signal.

@@ -148,7 +148,7 @@ def test_the_next_command_is_named_where_a_key_is_missing(folder: KeyFolder) -> 
 # The list while it is in use
 
 
-def test_a_running_side_notices_who_came_and_who_went(folder: KeyFolder) -> None:
+def test_a_running_side_notices_added_and_removed_keys(folder: KeyFolder) -> None:
     allowed = AllowList(folder)
     assert allowed.refresh() == set()
     folder.allow("anna", KEY)
@@ -221,7 +221,7 @@ def test_a_file_that_vanishes_while_it_is_looked_at_throws_nobody_else_out(
 
 @pytest.mark.parametrize("number", [errno.EMFILE, errno.ENFILE, errno.ENOMEM])
 @pytest.mark.parametrize("where", ["iterdir", "open"])
-def test_who_was_let_in_stays_in_when_nothing_can_be_opened(
+def test_allowed_keys_stay_allowed_when_no_file_can_be_opened(
     folder: KeyFolder, allowed: AllowList, monkeypatch: pytest.MonkeyPatch, where: str, number: int
 ) -> None:
     folder.allow("ben", OTHER)

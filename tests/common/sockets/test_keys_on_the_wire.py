@@ -197,7 +197,7 @@ def test_an_operator_that_has_left_can_be_revoked(robot: Robot) -> None:
         assert gets_in(robot, ben)
 
 
-def test_a_view_that_cannot_be_opened_anew_is_tried_again(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_view_that_cannot_be_reopened_is_tried_again(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     def short(*_: object) -> None:
         raise zmq.ZMQError(errno.EMFILE)
 

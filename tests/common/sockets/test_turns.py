@@ -50,7 +50,7 @@ class Fed(Way):
 
 
 @given(answers=st.lists(st.sampled_from([Offered.TAKEN, Offered.FULL]), min_size=1, max_size=16))
-def test_each_takes_its_turn_and_who_is_full_is_passed_over(answers: list[Offered]) -> None:
+def test_connections_take_turns_and_a_full_one_is_passed_over(answers: list[Offered]) -> None:
     turns: Turns[Fed] = Turns(Fed.offered)
     turns.ways.extend(Fed(answer=answer) for answer in answers)
     able = answers.count(Offered.TAKEN)
@@ -62,7 +62,7 @@ def test_each_takes_its_turn_and_who_is_full_is_passed_over(answers: list[Offere
     assert sum(way.taken for way in turns.ways) == 4 * able
 
 
-def test_who_was_full_is_tried_again_before_long() -> None:
+def test_a_full_connection_is_tried_again_soon() -> None:
     turns: Turns[Fed] = Turns(Fed.offered)
     turns.ways.append(only := Fed(answer=Offered.FULL))
     assert not turns.send(b"newest", 1.0, everywhere=False)
@@ -71,7 +71,7 @@ def test_who_was_full_is_tried_again_before_long() -> None:
     assert turns.send(b"newest", 1.0015, everywhere=False)
 
 
-def test_who_is_silent_gets_a_copy_twice_a_second_and_is_back_once_heard() -> None:
+def test_a_silent_connection_gets_a_copy_twice_a_second_and_returns_once_heard() -> None:
     """Both ends pass over silent connections: without copies, one that came back late would stay silent on both."""
     turns: Turns[Fed] = Turns(Fed.offered)
     lively, silent = Fed(), Fed()
@@ -89,7 +89,7 @@ def test_who_is_silent_gets_a_copy_twice_a_second_and_is_back_once_heard() -> No
     assert silent.taken == 5 + 5
 
 
-def test_who_has_long_been_silent_is_passed_over_until_the_others_are_gone() -> None:
+def test_a_long_silent_connection_is_passed_over_until_the_others_are_gone() -> None:
     turns: Turns[Fed] = Turns(Fed.offered)
     turns.ways.extend([silent := Fed(), heard := Fed()])
     turns.heard(silent, 1.0)
@@ -105,7 +105,7 @@ def test_who_has_long_been_silent_is_passed_over_until_the_others_are_gone() -> 
 
 
 @given(name=st.binary(max_size=20))
-def test_only_what_we_name_is_grouped(name: bytes) -> None:
+def test_only_our_own_names_are_grouped(name: bytes) -> None:
     ours = len(name) == 17 and name[0] == 1 and name[16] < MOST_CONNECTIONS_EACH
     assert group_of(name) == (name[:16] if ours else name)
     group = new_group()
@@ -268,7 +268,7 @@ def test_the_kernel_holds_little_for_any_connection_of_either_side(
     assert held_back(robot) == expected
 
 
-def test_little_waits_for_who_stops_reading_and_others_lose_nothing(
+def test_little_waits_for_a_peer_that_stops_reading_and_others_lose_nothing(
     robot: RobotSockets, operator: OperatorSockets
 ) -> None:
     """Both sides limit what waits: some messages and kilobytes for each connection, however long."""

@@ -179,7 +179,7 @@ def test_our_own_interrupt_of_a_side_that_has_not_begun_is_no_failure() -> None:
         side.check()
 
 
-def test_anothers_interrupt_is_one() -> None:
+def test_another_processs_signal_is_a_failure() -> None:
     with SideProcess("robot_side", "robot", [], before=UNPREPARED) as side:
         os.kill(side.process_id, signal.SIGKILL)
         side.wait(LIMIT_S)
@@ -270,7 +270,7 @@ def free_port() -> int:
 
 @pytest.mark.parametrize("side", ["robot", "operator"])
 @pytest.mark.parametrize(("kind", "mode"), [("pipe", "json"), ("terminal", "line")])
-def test_a_signal_ends_a_side_whoever_stalls_its_output(side: str, kind: str, mode: str, tmp_path: Path) -> None:
+def test_a_signal_ends_a_side_with_a_stalled_output(side: str, kind: str, mode: str, tmp_path: Path) -> None:
     path = tmp_path / "out.json"
     control, view = (f"tcp://127.0.0.1:{free_port()}" for _ in range(2))
     robot = [f"--bind={control}", f"--view-bind={view}"]

@@ -45,7 +45,7 @@ def test_only_what_was_said_goes_over_the_sides_own_files(tmp_path: Path) -> Non
     assert not [flag for flag in operator if flag.startswith(unsaid)]
 
 
-def test_what_was_said_is_passed_on_even_where_it_is_the_default_to_who_takes_it(tmp_path: Path) -> None:
+def test_given_flags_are_passed_on_to_the_side_that_takes_them_even_if_default(tmp_path: Path) -> None:
     robot, operator = passed_on("--seed", "0", "--link=delay 5ms", "--probability", "0.99", "--haptics", "--realtime")
     assert {"--seed=0", "--link=delay 5ms", "--probability=0.99", "--realtime"} <= set(robot)
     assert {"--seed=0", "--link=delay 5ms", "--haptics", "--realtime"} <= set(operator)

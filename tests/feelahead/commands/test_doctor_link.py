@@ -195,7 +195,7 @@ def test_all_is_well_and_nobody_was_let_in(doctor: Doctor) -> None:
         assert robot.session.leases_granted == robot.session.refused == robot.session.motion_received == 0
 
 
-def test_whoever_has_the_arm_keeps_it(doctor: Doctor) -> None:
+def test_the_owner_of_the_arm_keeps_it(doctor: Doctor) -> None:
     with ServingRobot() as robot:
         owner = LinkEnd("operator", 2, "an operator's")
         now_s = robot._clock.now()

@@ -228,7 +228,7 @@ def test_strengths_on_the_other_trigger_show(monkeypatch: pytest.MonkeyPatch) ->
     assert [row["coverage"] for row in judged("swept")] == [0.0, None]
 
 
-def test_places_after_whose_judging_the_stick_moves_are_counted_apart() -> None:
+def test_placements_whose_stick_moves_after_judgement_are_counted_apart() -> None:
     (row,) = evaluate(Pulls("drift", "200 ms", "empty", (Placed("rod_5mm"),), (1, 8), (0.5,), ("full",)), 0)
     assert (row["places"], row["unavoidable"], row["unknowable"], row["coverage"]) == (8, 0, 1, 1.0)
     # The same number of draws in each other placement, 20 or more in all.

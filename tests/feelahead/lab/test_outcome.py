@@ -163,7 +163,7 @@ def test_what_is_gripped_counts_as_gripper() -> None:
         ("terrain_ahead", "terrain", FAR, 4.5),
     ],
 )
-def test_whatever_leads_there_a_light_finger_stops_and_one_that_overcomes_the_effect_touches_slowly(
+def test_a_light_finger_stops_and_a_strong_one_touches_slowly_on_every_path(
     scene: str, thing: str, link: str, stops_in_s: float
 ) -> None:
     stick, turn = ASIDE.get(scene, ((0.0, 0.0), (0.0, 0.0)))

@@ -193,7 +193,7 @@ def test_it_takes_as_long_as_the_speed_says_and_leaves_nothing_out(recording: Re
 
 
 @pytest.mark.parametrize("moments_s", [(3.0,), (5.0, 3.0), (1.0, 2.0, 3.0), (0.0, 3.0, 3.0)])
-def test_a_moment_looks_the_same_however_one_came_to_it(recording: Recording, moments_s: tuple[float, ...]) -> None:
+def test_a_moment_looks_the_same_however_it_was_reached(recording: Recording, moments_s: tuple[float, ...]) -> None:
     playback = Playback(recording)
     shown: list[Seen] = []
     for moment_s in moments_s:
@@ -213,7 +213,7 @@ def test_what_is_no_wish_changes_nothing(recording: Recording, words: Any) -> No
     assert playback.state() == before
 
 
-def test_who_comes_to_look_later_sees_the_moment_at_which_it_rests(recording: Recording) -> None:
+def test_a_later_viewer_sees_the_moment_of_the_pause(recording: Recording) -> None:
     playback = Playback(recording)
     playback.wish({"at_s": 3.0})
     shown = newest(playback.advance(0.02))

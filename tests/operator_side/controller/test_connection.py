@@ -129,7 +129,7 @@ def world() -> World:
     return World()
 
 
-def test_the_first_look_is_at_once_the_others_once_a_second_and_that_there_is_none_is_said_once(world: World) -> None:
+def test_the_first_search_is_at_once_then_once_a_second_and_a_missing_controller_is_noted_once(world: World) -> None:
     world.run(PERIOD_S)
     assert len(world.search.looks) == 1
     world.run(10.0)
@@ -145,7 +145,7 @@ def test_the_first_look_is_at_once_the_others_once_a_second_and_that_there_is_no
     assert len(world.search.looks) == looks
 
 
-def test_the_watchdog_knows_before_anything_is_written_and_hears_of_us_while_an_effect_is_on(world: World) -> None:
+def test_the_watchdog_gets_the_hold_before_any_write_and_beats_while_an_effect_is_on(world: World) -> None:
     device = world.connected()
     world.run(3.0)
     assert world.connection.write(STIFF, world.now_s)
@@ -206,7 +206,7 @@ def test_unplugged_it_is_lost_at_once_and_looked_for_a_second_later(world: World
         (None, "bb", "controller: DualSense on USB"),
     ],
 )
-def test_who_comes_back_is_told_by_the_address(world: World, before: str | None, after: str | None, note: str) -> None:
+def test_a_return_is_recognised_by_the_address(world: World, before: str | None, after: str | None, note: str) -> None:
     device = world.plug_in(before)
     world.run(2 * PERIOD_S)
     world.unplug(device)

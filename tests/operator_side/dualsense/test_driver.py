@@ -38,7 +38,7 @@ def open_fake(handle: FakeHandle) -> HidDualSense:
 
 
 @TRANSPORTS
-def test_what_it_is_is_asked_and_nothing_is_written(transport: Transport) -> None:
+def test_its_identity_is_read_and_nothing_is_written(transport: Transport) -> None:
     handle = FakeHandle(transport, garbled=3 if transport is BLUETOOTH else 0)  # asked again
     identity = open_fake(handle).identity
     assert (handle.opened, handle.nonblocking, handle.written) == (PATH, 1, [])

@@ -82,7 +82,7 @@ def test_it_is_what_a_fine_stepping_of_time_gives(
 
 
 @given(COMMANDS, SPEED, TRAVEL, st.data())
-def test_what_the_robot_gives_the_newest_command_takes_the_place_of_what_that_asked_for(
+def test_the_speed_given_to_the_newest_command_replaces_the_speed_asked_for(
     travels: list[float], speed: float, gives: float, data: st.DataObject
 ) -> None:
     echo = data.draw(st.integers(0, len(travels) - 1))

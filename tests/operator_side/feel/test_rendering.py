@@ -54,7 +54,7 @@ def test_a_release_does_not_fall() -> None:
     assert rendering.render(felt(HEADER), LET_GO, None, 1.0) == RELEASED
 
 
-def test_what_comes_to_stand_is_said_by_one_short_pulse_of_the_right_motor() -> None:
+def test_a_contact_is_signalled_by_one_short_pulse_of_the_right_motor() -> None:
     rendering = TriggerRendering(USUAL, TravelCalibration())
 
     def motors(stands: bool, now_s: float, rumble: float = 0.0) -> Rumble | None:
@@ -94,7 +94,7 @@ def test_the_free_travel_is_the_way_that_is_left() -> None:
     assert free == [10, 5, 3, 1, 0]
 
 
-def test_each_trigger_gets_its_own_with_what_is_under_way_and_with_what_the_other_one_is_pulled() -> None:
+def test_each_trigger_gets_its_own_zones_with_the_displacement_and_the_other_triggers_pull() -> None:
     def shown(moving: Displacement | None, pulled: tuple[float, float] = LET_GO) -> tuple[tuple[int, ...], ...]:
         return zones(TriggerRendering(USUAL, TravelCalibration()).render(update(PARTED, PARTED), pulled, moving, 0.0))
 

@@ -121,7 +121,7 @@ def test_the_task_from_waiting_to_withdrawing() -> None:
 
 
 @pytest.mark.parametrize("trust", [0.0, 1.0])
-def test_who_believes_what_rumbles_lowers_gently_a_reaction_later_and_until_it_stands(trust: float) -> None:
+def test_a_trusting_person_lowers_gently_from_a_reaction_after_rumble_until_contact(trust: float) -> None:
     desk = carried(dataclasses.replace(CLEAR_SIGHTED, trust=trust))
     sinks(desk, UP_AT_M, 0.38, 0.05)
     desk.tell(Feel(rumble=Rumble(left=0.25)))
@@ -136,7 +136,7 @@ def test_who_believes_what_rumbles_lowers_gently_a_reaction_later_and_until_it_s
 
 
 @pytest.mark.parametrize("state", ["disarmed", "stopped"])
-def test_a_robot_that_stopped_makes_them_let_go_and_begin_anew(state: str) -> None:
+def test_a_stopped_robot_makes_them_release_and_restart(state: str) -> None:
     desk = Desk()
     desk.arm()
     assert desk.watch(armed((0.0, 0.0, 0.3)), 1.0)[-1].r2_n > 0.0
@@ -223,7 +223,7 @@ TOWARDS = armed((0.0, 0.0, 0.06))
 @pytest.mark.parametrize(
     ("strength", "noticeable", "eases"), [(0, 0.07, False), (1, 0.07, True), (8, 0.07, True), (1, 0.5, False)]
 )
-def test_who_notices_and_believes_a_stiffer_trigger_eases_off_a_reaction_later(
+def test_a_trusting_person_eases_off_a_reaction_after_a_stiffer_trigger(
     strength: int, noticeable: float, eases: bool
 ) -> None:
     desk = Desk(dataclasses.replace(CLEAR_SIGHTED, noticeable_force=noticeable))
@@ -242,7 +242,7 @@ PULSE = Feel(rumble=Rumble(left=1.0, right=0.7))
 
 
 @pytest.mark.parametrize(("trust", "light"), [(1.0, USUAL_LIGHT), (0.0, USUAL_LIGHT), (1.0, WARNING_LIGHT)])
-def test_who_feels_the_pulse_of_what_stands_lets_go_a_reaction_later(trust: float, light: Color) -> None:
+def test_a_person_who_feels_the_contact_pulse_releases_a_reaction_later(trust: float, light: Color) -> None:
     desk = carried(dataclasses.replace(CLEAR_SIGHTED, trust=trust))
     desk.watch(at_height(UP_AT_M), 0.5)
     desk.tell(dataclasses.replace(PULSE, light=light))
@@ -273,7 +273,7 @@ def test_at_the_warning_light_they_rest_their_hands_and_go_on_a_moment_after_it(
 # Moving and waiting
 
 
-def test_who_moves_and_waits_moves_as_far_as_it_is_and_looks_again_only_after_the_delay() -> None:
+def test_a_person_who_moves_and_waits_moves_the_seen_distance_and_looks_after_the_delay() -> None:
     desk = Desk(dataclasses.replace(CLEAR_SIGHTED, aiming="move-and-wait"))
     desk.arm(armed((0.0, 0.0, 0.2)))
     delay_s, seen = 0.4, desk.watch(armed((0.0, 0.0, 0.2)), 6.0, 0.4)

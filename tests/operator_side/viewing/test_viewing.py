@@ -225,7 +225,7 @@ def test_without_a_console_nothing_is_asked_for_and_pictures_are_passed_over() -
     assert set(view_topics(OperatorSettings(console=True))) == {b"telemetry", VIDEO_TOPIC, SCENE_TOPIC}
 
 
-def test_what_pages_say_reaches_whoever_follows_them() -> None:
+def test_messages_of_pages_reach_their_listeners() -> None:
     looking = Looking()
     looking.console.words.append((3, {"hands": {"page": "ours", "number": 1, "driving": True}}))
     looking.console.words.append((3, {"tune": {"probability": 0.9}}))

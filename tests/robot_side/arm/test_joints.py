@@ -138,7 +138,7 @@ def test_the_solution_is_the_damped_one_on_both_sides_of_the_threshold(smallest:
 
 @settings(derandomize=True, deadline=None, max_examples=60)
 @given(seed=seeds, joints=st.integers(1, 9), least=st.sampled_from([0.0, 0.02, 0.2]))
-def test_it_is_what_the_resolved_rates_come_to(seed: int, joints: int, least: float) -> None:
+def test_the_speed_is_that_of_the_resolved_rates(seed: int, joints: int, least: float) -> None:
     random = np.random.default_rng(seed)
     jacobian = random.normal(size=(6, joints))
     jacobian[:, 0] *= least

@@ -64,7 +64,7 @@ def test_it_gives_way_for_a_moment() -> None:
     assert (arm.touching_down.stands, arm.touching_down.gives_way) == (True, False)
 
 
-def test_it_stands_until_the_tool_has_risen_by_3_mm_and_may_stand_anew() -> None:
+def test_a_contact_lasts_until_the_tool_has_risen_by_3_mm_and_may_come_again() -> None:
     arm = Arm()
     assert arm.go(-0.025, 5.0)
     arm.go(0.01, 0.25)

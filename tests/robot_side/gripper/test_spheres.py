@@ -101,7 +101,7 @@ def test_the_built_in_gripper_needs_few_spheres() -> None:
     assert len(cover.radii_m) <= 246
 
 
-def test_a_very_large_box_gets_the_stand_out_that_2000_spheres_take_and_the_others_what_was_asked_for() -> None:
+def test_a_very_large_box_stands_out_as_2000_spheres_require_and_others_as_set() -> None:
     half_sizes = np.array([(0.05, 5.0, 5.0), PALM_M])
     cover = cover_boxes(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), half_sizes)
     wall = int((cover.box == 0).sum())

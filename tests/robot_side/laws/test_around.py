@@ -71,7 +71,7 @@ def post(x_m: float, y_m: float, z_m: float = 0.06) -> PerceivedObjects:
     return Scene().add().box([x_m, y_m, z_m], [0.01, 0.01, 0.01]).objects()
 
 
-def test_nobody_gets_it_who_does_not_ask() -> None:
+def test_only_those_who_ask_get_a_map() -> None:
     assert around(swept(), walls(0.1)) is None
 
 
@@ -150,7 +150,7 @@ def test_what_matters_sooner_is_never_late_for_it(law: SweptLaw) -> None:
         assert now_s - law.memory.looked_s[:2, 0].min() < 0.02
 
 
-def test_it_is_looked_at_anew_where_roles_or_p_change(law: SweptLaw) -> None:
+def test_changed_roles_or_p_cause_new_looks(law: SweptLaw) -> None:
     looks(law, 300, np.zeros(6), 0.0)
     law.expect(0.5)
     assert looks(law, 500, np.zeros(6), 0.3) > 100 + PROBES
@@ -246,7 +246,7 @@ def test_errors_of_the_prediction_shorten_these_ways_too() -> None:
     assert told[0] - told[1] == pytest.approx(0.005, abs=2e-3)
 
 
-def test_who_explains_what_was_before_a_grip_changes_nothing() -> None:
+def test_explaining_a_moment_before_a_grip_changes_nothing() -> None:
     """A map's validity restarts once an object is held; people's explanations are older than the newest tick."""
     until_s = []
     for explains in (True, False):

@@ -53,7 +53,7 @@ def felt(objects: PerceivedObjects, velocity: list[float], turning: list[float] 
     return bool(first_ways(objects, velocity, turning or [0.0, 0.0, 0.0])[1][7] < 0.1)
 
 
-def test_a_post_beside_the_way_is_felt_by_who_drifts_towards_it_and_by_nobody_else() -> None:
+def test_a_post_beside_the_path_is_felt_only_in_a_drift_towards_it() -> None:
     for x_m in (0.04, 0.055):
         assert not felt(post(x_m, 0.08), [0.0, 0.0, 0.2])
         assert felt(post(x_m, 0.08), [0.1, 0.0, 0.2])
@@ -75,7 +75,7 @@ def test_a_post_that_a_turn_brings_into_the_way_is_felt() -> None:
     assert not felt(post(0.045, 0.09), [0.0, 0.0, 0.2], [0.0, -1.0, 0.0])
 
 
-def test_what_is_ahead_is_felt_as_before_by_who_drifts() -> None:
+def test_an_object_ahead_is_felt_in_a_drift_as_before() -> None:
     wall = Scene().add().box([0.0, 0.0, 0.15], [0.5, 0.5, 0.05]).objects()
     straight, drifting = (first_ways(wall, [drift, 0.0, 0.2], [0.0, 0.0, 0.0])[1] for drift in (0.0, 0.1))
     np.testing.assert_allclose(drifting, straight, atol=2e-4)

@@ -145,7 +145,7 @@ def test_a_camera_that_sees_things_too_near_lengthens_the_ways_on_its_side_and_s
     np.testing.assert_allclose(arm.l2.fast_m, known.l2.fast_m, atol=1e-9)
 
 
-def test_what_the_prediction_misses_is_that_of_whoever_predicts() -> None:
+def test_prediction_errors_are_those_of_the_predicting_side() -> None:
     missed = PredictionErrors({"operator": ((0.2, 0.001, 0.0),), "robot": ((0.2, 0.0, 0.02),)})
     pose, wall = ball_pose(0.1), walls(0.15, front_m=0.1)
 

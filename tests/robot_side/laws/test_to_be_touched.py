@@ -97,7 +97,7 @@ def test_both_lists_are_the_least_over_spheres_that_err_differently(seed: int) -
     assert whole.sigma_m == max(one.sigma_m for one in alone)
 
 
-def test_what_is_known_better_may_touch_first_though_it_is_felt_last() -> None:
+def test_a_better_known_sphere_may_touch_first_though_felt_last() -> None:
     """An outer sphere may err by 20 mm, as the tool may turn; the one on the axis is exactly 3 mm farther ahead."""
     outer, middle = ([0.2, 0.0, 0.0], [0.0, 0.0, 0.003])
     turning = Ahead(np.array([0.0, 0.0, 0.0, 0.0, 0.1 / QUANTILE, 0.0]))

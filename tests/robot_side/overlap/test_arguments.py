@@ -103,7 +103,7 @@ def test_numbers_at_their_limits_are_in_range(kind: str) -> None:
         np.testing.assert_allclose(result, near, rtol=1e-14, atol=1e-60)
 
 
-def test_what_nobody_vouched_for_is_doubtful() -> None:
+def test_bad_unvouched_numbers_are_doubtful() -> None:
     rng = np.random.default_rng(9)
     centers, vertices = rng.normal(size=(200, 3)), rng.normal(size=(200, 4, 3))
     for threads in (1, 2):

@@ -65,7 +65,7 @@ def test_such_a_frame_is_the_whole_frame(seed: int, share: float) -> None:
     assert replace(found, time_s=4.0).since is None
 
 
-def test_what_nobody_knows_of_some_nobody_knows_of_all() -> None:
+def test_figures_unknown_for_some_objects_are_unknown_for_all() -> None:
     first = replace(whole(np.random.default_rng(1)), velocities_m_s=None)
     movers = Movers(first, np.array([0, 4]))
     assert movers.frame(0.0, movers.at_first, first.roles).velocities_m_s is None

@@ -125,7 +125,7 @@ def any_objects(seed: int) -> tuple[PerceivedObjects, np.random.Generator]:
 
 @settings(derandomize=True, deadline=None, max_examples=30)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_a_table_has_what_is_defined_of_each_primitive_and_so_has_that_of_the_next_frame(seed: int) -> None:
+def test_the_tables_of_a_frame_and_the_next_agree_with_the_definitions(seed: int) -> None:
     first, rng = any_objects(seed)
     assert_as_defined(make(first), first)
     last, objects = scene_table(first), moved(first, rng)

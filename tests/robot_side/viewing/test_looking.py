@@ -41,7 +41,7 @@ def test_nobody_looks_nothing_is_made() -> None:
         assert 55 <= made["nobody_looks"] <= 61
 
 
-def test_what_is_looked_at_comes_thirty_times_a_second_and_ends_a_second_after_the_last_watch() -> None:
+def test_watched_views_come_thirty_times_a_second_until_a_second_after_the_last_watch() -> None:
     table = Table()
     table.watch(**ALL)
     table.run(3.0)

@@ -126,7 +126,7 @@ def test_after_a_minute_without_anybody_it_ends_and_begins_anew_for_the_next(des
     assert desk.notes == []
 
 
-def test_who_cannot_start_a_process_is_told_so(desk: Desk) -> None:
+def test_a_process_that_cannot_start_is_noted(desk: Desk) -> None:
     desk.fails_to_start = "no process can be started: Cannot allocate memory"
     desk.cameras.update(0.0, 0.0, BOTH)
     assert "Cannot allocate memory" in desk.notes[0]
@@ -165,7 +165,7 @@ def test_a_whole_picture_is_ordered_once_for_each_that_is_lacking_and_not_too_of
     assert began == [12, 100]
 
 
-def test_nothing_is_ordered_before_the_companion_is_ready_so_that_no_picture_is_as_old_as_its_start(desk: Desk) -> None:
+def test_nothing_is_ordered_before_the_companion_is_ready(desk: Desk) -> None:
     companion = desk.started()
     companion.channel.receive()
     for turn in range(1, 100):

@@ -21,7 +21,7 @@ def admits(path: str, host: str | None = HERE, origin: str | None = None, *, upg
 
 
 @pytest.mark.parametrize("host", [HERE, f"localhost:{PORT}"])
-def test_who_has_the_token_is_let_in_by_either_name(host: str) -> None:
+def test_the_token_opens_the_gate_by_either_name(host: str) -> None:
     origin = f"http://{host}"
     assert admits(f"/{TOKEN}/", host) == "/"
     assert admits(f"/{TOKEN}/app.js?x=1", host, origin) == "/app.js"

@@ -109,7 +109,7 @@ def test_what_hands_and_sliders_say_is_passed_on_with_the_pages_number() -> None
     assert sorted(page for _, (page, said) in heard[3:] if said is None) == [1, 2]
 
 
-def test_slow_is_whoever_says_so_until_that_page_is_gone() -> None:
+def test_a_page_that_reports_slow_counts_until_it_is_gone() -> None:
     async def story(desk: Desk, opens: Opens) -> None:
         async with opens() as page:
             assert not desk.pages.slow
@@ -134,7 +134,7 @@ def test_slow_is_whoever_says_so_until_that_page_is_gone() -> None:
         pytest.param("[" * 30_000, id="nested"),
     ],
 )
-def test_who_talks_nonsense_is_shown_out_alone(nonsense: str | bytes) -> None:
+def test_a_page_that_sends_nonsense_is_disconnected_alone(nonsense: str | bytes) -> None:
     async def story(desk: Desk, opens: Opens) -> None:
         async with opens() as guest, opens() as page:
             await guest.send(nonsense)
@@ -146,7 +146,7 @@ def test_who_talks_nonsense_is_shown_out_alone(nonsense: str | bytes) -> None:
     assert [said for _, (_, said) in run(story).heard if said is not None] == []
 
 
-def test_who_talks_without_end_is_shown_out() -> None:
+def test_a_page_that_sends_without_end_is_disconnected() -> None:
     async def story(desk: Desk, opens: Opens) -> None:
         async with opens() as page:
             with contextlib.suppress(ConnectionClosed):

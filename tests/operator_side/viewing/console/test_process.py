@@ -123,7 +123,7 @@ def test_steps_become_pictures_and_a_gap_is_told(console: Console) -> None:
     asyncio.run(story())
 
 
-def test_the_gate_keeps_out_who_is_not_ours(console: Console) -> None:
+def test_the_gate_keeps_strangers_out(console: Console) -> None:
     address = address_of(console)
     parts = urlsplit(address)
     here, token = f"http://{parts.netloc}", parts.path.strip("/")
@@ -243,7 +243,7 @@ def test_no_more_scenes_than_pages_are_drawn_for(console: Console) -> None:
     asyncio.run(story())
 
 
-def test_it_outlives_ctrl_c_and_ends_with_whoever_feeds_it() -> None:
+def test_it_outlives_ctrl_c_and_ends_with_its_feeder() -> None:
     with Console("a test") as console:
         until(console, lambda: console.address is not None)
         port = urlsplit(address_of(console)).port

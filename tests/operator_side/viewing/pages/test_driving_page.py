@@ -101,7 +101,7 @@ def test_any_page_stops_and_then_all_keys_are_up_first(pages: DrivingPage) -> No
     assert pages.hands(now_s + 0.02) is None
 
 
-def test_what_was_overtaken_counts_no_more_but_for_a_stop_in_it(pages: DrivingPage) -> None:
+def test_an_overtaken_message_counts_only_for_its_stop(pages: DrivingPage) -> None:
     page = TalkingPage(pages)
     late, late_stop = page.content(run=True, r2=1.0), page.content(stop=True)
     now_s = running(pages, page)
