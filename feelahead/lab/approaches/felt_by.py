@@ -68,7 +68,7 @@ def _moved(objects: PerceivedObjects, velocity_m_s: FloatArray, after_s: float) 
 
 @dataclass(frozen=True)
 class Judged:
-    """One law at one P in the shipped pipeline; each message brings a map from around, of average age.
+    """One law at one P in the shipped pipeline, except that each message brings a map, of average age.
 
     The field uses the pose before the message left; the zones use the time at which they are felt. Nothing is rendered
     in between, so a strength falls from one of these times to the next.
