@@ -1,4 +1,4 @@
-"""What do measured links do to a finger of constant force, and do the emulations of a link agree?
+"""What do realistic links do to a finger of constant force, and do the emulations of a link agree?
 
 feelahead try latency --links lan wifi lte --seeds 5 --csv latency.csv --picture latency.png
 """
@@ -49,7 +49,7 @@ _WIDE: Final = 0.7
 
 @dataclass(frozen=True)
 class LatencySettings(Sweep):
-    """Pull R2 with a constant force towards a wall, over measured links: the effect of the delay.
+    """Pull R2 with a constant force towards a wall, over realistic links: the effect of the delay.
 
     Each link runs with and without haptics, over the same seeds, in several media: virtual time, two processes that
     delay their own messages, and containers with the kernel's netem between them. A second table shows whether the

@@ -33,7 +33,7 @@ _HALVINGS: Final = int(np.ceil(np.log2(_STEP_M / _FINEST_M)))
 _NOTHING: Final = 1e-9
 """Share of the sphere's volume below which a rise from an overlap is rounding."""
 _LEAST: Final = 1e-14
-"""The same for a rise from nothing: a splinter's tip enters long before a larger share does."""
+"""Share for a rise from nothing: a splinter's tip enters long before a larger share does."""
 _FIRST_M: Final = 3.0 * MARGIN_M
 """Distance to which a pair is followed at first, in metres."""
 _TOGETHER_M: Final = 0.5 * MARGIN_M

@@ -37,7 +37,7 @@ class Line:
     descriptor: int
     heard_s: float = 0.0
     seen: bool = False
-    """Whether one of its messages was read after the gates had reported everything."""
+    """Whether a message of the line was read after the gates had reported everything."""
     by_another: bool = True
     """Whether its descriptor differs from that of the last line with its routing id."""
     known: bool = False

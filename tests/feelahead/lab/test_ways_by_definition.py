@@ -88,7 +88,7 @@ def on_a_grid(
 @settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_any_look_is_defined_as_on_a_grid(seed: int) -> None:
-    """Of all kinds and roles, with moving and swallowed objects, and fingers near a target."""
+    """Objects of all kinds and roles, moving and swallowed ones, and fingers near a target."""
     rng = np.random.default_rng(seed)
     objects, count = any_scene(rng), int(rng.integers(1, 6))
     pose = free_pose(rng.uniform(-0.03, 0.03, (count, 3)), rng.uniform(0.004, 0.02, count), rng.random(count) < 0.5)

@@ -1,4 +1,4 @@
-"""From fields and time to both triggers' zones and the motors."""
+"""Rendering of fields over time: both triggers' zones, and the motors."""
 
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""From the controller's state to the operator's intent: calibration and the button map."""
+"""Operator's intent from the controller's state: calibration and the button map."""
 
 import pytest
 

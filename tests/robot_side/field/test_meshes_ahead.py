@@ -122,7 +122,7 @@ def test_beside_a_mesh_that_is_overlapped_nothing_is_worked_out() -> None:
 
 
 def test_along_a_convex_mesh_that_is_overlapped_little_is_worked_out() -> None:
-    """Its near end rises in few spheres; a sphere whose overlap does not rise now never rises."""
+    """The near end rises in few spheres; a sphere whose overlap does not rise now never rises."""
     box = Mesh(CUBE_CORNERS * [0.02, 0.4, 0.1], CUBE_TRIANGLES)
     pose = gripper_pose()
     side_m = float((pose.sphere_centers_m[:, 0] + pose.sphere_radii_m).max())

@@ -162,7 +162,7 @@ def test_what_is_made_of_tetrahedra_is_felt_as_early_as_the_same_box() -> None:
 
 
 def test_a_cup_is_felt_at_its_wall_and_not_at_its_box() -> None:
-    """Its inside stays free: a mesh is covered by its own surface, convex or not."""
+    """The inside stays free: a mesh is covered by its own surface, convex or not."""
     turns = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
     ring = np.column_stack([np.cos(turns), np.sin(turns)])
     outline = [(0.0, 0.0), (0.03, 0.0), (0.03, 0.06), (0.025, 0.06), (0.025, 0.005), (0.0, 0.005)]

@@ -124,7 +124,7 @@ def test_a_ball_that_the_inflated_sphere_has_swallowed_is_felt(gap_m: float) -> 
 @repeatable
 @given(seed=seeds, ahead_m=st.floats(0.0, 0.05))
 def test_ways_fall_by_just_as_much_as_the_gripper_goes_ahead(seed: int, ahead_m: float) -> None:
-    """Until the contact: streamed distances are shortened by this motion between two looks."""
+    """Streamed distances are shortened by this motion between two looks, until the contact."""
     rng = np.random.default_rng(seed)
     direction, scene = rng.normal(size=3), Scene()
     direction /= np.linalg.norm(direction)
@@ -176,7 +176,7 @@ def test_moving_and_turning_everything_changes_no_way(seed: int) -> None:
 @repeatable
 @given(seed=seeds)
 def test_the_field_is_the_least_over_objects_and_spheres(seed: int) -> None:
-    """So no object, and no sphere, ever lengthens a distance; and nothing passed over for speed was needed."""
+    """No object and no sphere ever lengthens a distance; nothing passed over for speed was needed."""
     rng = np.random.default_rng(seed)
     objects, pose = random_scene(rng, 3, 0.15), any_gripper(rng)
     direction = rng.normal(size=3)

@@ -123,7 +123,7 @@ def test_what_is_ignored_is_not_felt() -> None:
 
 
 def test_toggling_the_target_changes_only_what_it_must() -> None:
-    """From frame to frame: fast distances do not change; slow ones shorten at once and lengthen after 0.1 s."""
+    """Fast distances never change; slow ones shorten at once and lengthen after 0.1 s."""
     senses = Senses(step_s=0.001)
     frames = {
         role: Scene().add(role).box([0.0, 0.0, 0.15], [0.2, 0.2, 0.05]).objects()

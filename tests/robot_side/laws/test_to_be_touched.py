@@ -146,7 +146,7 @@ def test_towards_anything_else_it_is_never_reduced(object_class: int) -> None:
 
 
 def test_a_limited_finger_still_meets_what_is_ahead_of_it() -> None:
-    """Its expected place follows the limited enlargement; the palm is not limited."""
+    """The expected place follows the limited enlargement; the palm is not limited."""
     pose = free_pose([[0.0, 0.0, 0.0]], [0.008], [True])
     looked = along(AHEAD, 0.001, variance_m2=1e-4, quantile=2.0)
     found = look(pose, WALL, looked, classes=[TARGET], widest_m=0.004)

@@ -96,7 +96,7 @@ def test_overlaps_are_the_closed_forms_within_the_stated_error(
     found = overlap_of(MujocoCamera(scene).perceive(0.0), "round", placed(scene, axis_points(*heights_m)), radius_m)
     for height, volume in zip(heights_m, found, strict=True):
         exact = closed_form(height)
-        # The mesh adds at most the allowance to the shape, wherever the sphere is.
+        # The mesh adds at most the allowance to the shape, for every place of the sphere.
         assert exact * (1.0 - 1e-9) <= volume <= exact + allowance * (1.0 + 1e-12)
 
 
