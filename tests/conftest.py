@@ -1,4 +1,4 @@
-"""What holds for every test: no time of a busy machine fails it, and whoever starts a process carries the marker."""
+"""Rules for every test: a busy machine's timing fails none, and a test that starts a process carries the marker."""
 
 import sys
 from collections.abc import Iterator
@@ -13,11 +13,11 @@ settings.load_profile("here")
 
 STARTS = {"subprocess.Popen", "os.fork", "os.posix_spawn"}
 FONTS = "fc-list"
-"""What matplotlib runs by itself before it draws for the first time on a machine."""
+"""Program that matplotlib runs before its first figure on a machine."""
 KERNELS = "robot_side.compiled.beside"
-"""What compiles the kernels before the first test that needs them on a machine."""
+"""Module that compiles the kernels before the first test that needs them on a machine."""
 unmarked: list[str] = []
-"""The test that runs, unless it carries the marker."""
+"""Name of the running test, unless it carries the marker."""
 
 
 def refuse_processes(event: str, arguments: tuple[Any, ...]) -> None:

@@ -1,1 +1,1 @@
-"""Questions to the whole, and the engine that answers them: `feelahead bench NAME` and `feelahead try NAME`."""
+"""Questions to the whole system, and the engine that answers them: `feelahead bench NAME` and `feelahead try NAME`."""

@@ -25,11 +25,11 @@ _AT_A_TIME: Final = 4096
 
 @dataclass(frozen=True)
 class Gripper:
-    """One gripper, and how many points of either surface are tried."""
+    """One gripper, and the number of sampled points of either surface."""
 
     gripper: str
     model: Path | None
-    """Without a file it is the built-in gripper."""
+    """Model file; None: the built-in gripper."""
     site: str | None
     points: int
 
@@ -64,7 +64,7 @@ def _spread(stands_out_mm: FloatArray) -> Row:
 def _sticks_out_m(
     solids: Sequence[Solid], centers_m: FloatArray, radii_m: FloatArray, count: int, random: np.random.Generator
 ) -> float:
-    """Take points all over the solids' surfaces and their corners, but for those within another solid."""
+    """Return how far the solids stick out of the spheres: points of their surfaces and corners outside other solids."""
     farthest_m = 0.0
     for number, solid in enumerate(solids):
         corners = solid.corners_m
@@ -82,7 +82,7 @@ def _sticks_out_m(
 def _stand_out_m(
     solids: Sequence[Solid], centers_m: FloatArray, radii_m: FloatArray, count: int, random: np.random.Generator
 ) -> FloatArray:
-    """Take points all over the spheres that are in no other sphere; how far each is from the nearest solid."""
+    """Return the distances from points of the spheres' common surface to the nearest solid."""
     library = MeshLibrary(
         [Mesh(one.corners_m.reshape(-1, 3), np.arange(3 * len(one.corners_m)).reshape(-1, 3)) for one in solids]
     )
@@ -94,7 +94,7 @@ def _stand_out_m(
         outer = np.ascontiguousarray(piece[_from_spheres(piece, centers_m, radii_m) >= -1e-9])
         turns = np.ascontiguousarray(np.broadcast_to(np.eye(3), (len(outer), 3, 3)))
         still = np.zeros((len(outer), 3))
-        # A round geom is up to `excess_m` smaller than the polyhedron that stands for it.
+        # A round geom is up to `excess_m` smaller than its polyhedron.
         from_each = [
             nearest_mesh_pairs(outer, library, np.full(len(outer), number), still, turns)[0] + solid.excess_m
             for number, solid in enumerate(solids)

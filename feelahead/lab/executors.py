@@ -1,6 +1,6 @@
 """Run cells in several processes of this machine, or on a cluster of dask.distributed, through one interface.
 
-Both are executors of concurrent.futures. FeelaheadError is raised where a process, or the whole cluster, went away.
+Both are executors of concurrent.futures. They raise FeelaheadError if a process, or the whole cluster, is gone.
 """
 
 import logging
@@ -23,10 +23,10 @@ _CONNECT_S = "10s"
 
 @contextmanager
 def processes(workers: int) -> Iterator[Executor]:
-    """Yield a pool of processes of this machine; none of them outlives this one, not even after kill -9."""
+    """Yield a pool of processes of this machine; they end with this process, even after kill -9."""
     pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _end_with_parent, (os.getpid(),))
     try:
-        # A signal that is ignored when a process starts stays ignored in it: Ctrl-C is for this process to answer.
+        # A process inherits ignored signals: this process alone answers Ctrl-C.
         before = signal.signal(signal.SIGINT, signal.SIG_IGN)
         try:
             pool.submit(os.getpid)
@@ -45,15 +45,15 @@ def processes(workers: int) -> Iterator[Executor]:
 
 @contextmanager
 def cluster(address: str, own_file: str | None) -> Iterator[Executor]:
-    """Yield the workers of the dask scheduler at `address`; ConfigurationError where nobody answers there.
+    """Yield the workers of the dask scheduler at `address`; ConfigurationError if none answers there.
 
-    own_file: a question's file that the cluster does not have; it is sent there.
+    own_file: a question's file that the cluster lacks; it is uploaded.
     """
     require_packages("--scheduler", "distributed", extra="experiments")
     import distributed  # noqa: PLC0415  # large
     from distributed.comm.core import CommClosedError  # noqa: PLC0415
 
-    for name in ("distributed", "distributed.client"):  # its import has set them up; the error says what went wrong
+    for name in ("distributed", "distributed.client"):  # set up by the import; the raised error says what went wrong
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client: Any = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
@@ -72,7 +72,7 @@ def cluster(address: str, own_file: str | None) -> Iterator[Executor]:
 
 
 def _end_with_parent(parent: int) -> None:
-    """End a worker soon after its parent was killed."""
+    """End a worker soon after its parent is gone."""
 
     def watch() -> None:
         never = threading.Event()

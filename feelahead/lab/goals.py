@@ -1,4 +1,4 @@
-"""Goals: what a figure should be at most or at least, and whether it is."""
+"""Goals: upper or lower limits of figures, and whether they are met."""
 
 import math
 from collections.abc import Iterable
@@ -10,11 +10,11 @@ from rich.console import Console
 
 @dataclass(frozen=True)
 class Goal:
-    """One figure beside its limit."""
+    """One figure with its limit."""
 
     claim: str
     value: float | None
-    """None where it was not measured."""
+    """Measured figure; None: not measured."""
     limit: float
     compare: Literal["at most", "at least"] = "at most"
     detail: str = ""

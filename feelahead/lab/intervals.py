@@ -15,7 +15,7 @@ def share_interval(count: int, of: int) -> tuple[float, float]:
 
 
 def mcnemar_p(before: Sequence[bool], after: Sequence[bool]) -> float:
-    """Return McNemar's exact two-sided p: do pairs change as often one way as the other? 1 where none changes."""
+    """Return McNemar's exact two-sided p: whether changes in both directions are equally likely. 1 without changes."""
     gained = sum(not one and other for one, other in zip(before, after, strict=True))
     lost = sum(one and not other for one, other in zip(before, after, strict=True))
     return float(binomtest(gained, gained + lost, 0.5).pvalue) if gained + lost else 1.0

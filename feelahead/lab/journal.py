@@ -1,4 +1,4 @@
-"""Finished work, line by line in a file, so that a sweep that was stopped can go on: `--resume FILE.jsonl`."""
+"""Finished work, line by line in a file, from which a stopped sweep continues: `--resume FILE.jsonl`."""
 
 import fcntl
 import json
@@ -14,14 +14,14 @@ from feelahead.lab.table import Row
 
 
 class Journal:
-    """A file whose first line says what made it, with one line for each finished piece of work.
+    """File whose first line holds the settings and versions, with one line for each finished piece of work.
 
-    A piece is written and synced before the next one. A last line that kill -9 has torn is cut off and its piece run
+    A piece is written and synced before the next one. A last line torn by kill -9 is cut off and its piece is run
     again, so that no row is lost or doubled.
     """
 
     def __init__(self, path: Path | None, made_by: Mapping[str, Any]) -> None:
-        """Open or begin the file; ConfigurationError where it holds another run's work or another run writes to it."""
+        """Open or create the file; ConfigurationError if it holds another run's work or another run writes to it."""
         self.done: dict[str, list[Row]] = {}
         self._file: FileIO | None = None
         if path is None:
@@ -47,7 +47,7 @@ class Journal:
             self._file.close()
 
     def keep(self, key: str, rows: list[Row]) -> None:
-        """Write one finished piece, which is done even when the disk does not take it: FeelaheadError then."""
+        """Write one finished piece; FeelaheadError if the write fails, though the piece is then in `done`."""
         self.done[key] = rows
         self._write(json.dumps({"key": key, "rows": rows}).encode())
 

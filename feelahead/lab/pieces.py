@@ -1,4 +1,4 @@
-"""One cell of a grid with one seed, and how all of them are run: here, in processes, or on a cluster."""
+"""One cell of a grid with one seed, and the execution of all: here, in processes, or on a cluster."""
 
 import functools
 import importlib
@@ -29,12 +29,12 @@ class Piece:
 
     @functools.cached_property
     def key(self) -> str:
-        """Name it in the journal; equal for equal cells, whatever else the grid holds."""
+        """Key in the journal: equal for equal cells, whatever else the grid holds."""
         return f"{json.dumps(_plain(self.cell), sort_keys=True)} {self.seed}"
 
     @property
     def columns(self) -> Row:
-        """Return the scalars of the cell, and the seed."""
+        """Scalars of the cell, and the seed."""
         scalars = {name: value for name, value in _plain(self.cell).items() if not isinstance(value, list | dict)}
         return scalars | {"seed": self.seed}
 
@@ -45,7 +45,7 @@ class Piece:
 def results(
     question: Any, settings: Any, todo: Sequence[Piece], shown: Shown
 ) -> Iterator[tuple[Piece, list[Row] | str]]:
-    """Yield the pieces with what came of them, as they end."""
+    """Yield each piece with its rows or failure, as they end."""
     module = question.run.__module__
     if not todo:
         return
@@ -70,12 +70,12 @@ def results(
             found = future.result()
             left.remove(futures[future])
             if left:
-                shown.begin(str(left[0]))  # the one that has waited longest
+                shown.begin(str(left[0]))  # The longest waiting piece.
             yield futures[future], found
 
 
 def run_piece(module: str, cell: Any, seed: int) -> list[Row] | str:
-    """Run one cell of the question in `module`, here or in a worker; what failed is said as a line."""
+    """Run one cell of the question in `module`, here or in a worker; return its rows, or the failure as a line."""
     question: Any = importlib.import_module(module).QUESTION
     columns = Piece(cell, seed).columns
     try:
@@ -84,24 +84,24 @@ def run_piece(module: str, cell: Any, seed: int) -> list[Row] | str:
         raise
     except FeelaheadError as error:
         return str(error)
-    # Through JSON, so that a resumed sweep has the very same values as one that was never stopped.
+    # Through JSON, so that a resumed sweep has exactly the values of an uninterrupted one.
     plain: list[Row] = json.loads(json.dumps(rows, default=_of_numpy))
     return plain
 
 
 def _own_file(module: str) -> str | None:
-    """Return the file of a question that is in no package; None for one of the lab, which every release has."""
+    """Return the file of a question outside any package; None for one of the lab, which every release has."""
     return None if "." in module else sys.modules[module].__file__
 
 
 def _of_numpy(value: Any) -> Any:
-    """Turn numbers and arrays of NumPy into plain ones."""
+    """Convert numbers and arrays of NumPy to plain ones."""
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     raise TypeError(f"a row holds {value!r}; valid: numbers, texts, lists and None")
 
 
 def _plain(cell: object) -> dict[str, Any]:
-    """Turn a cell into what JSON has."""
+    """Convert a cell to JSON values."""
     plain: dict[str, Any] = msgspec.to_builtins(cell, enc_hook=str)
     return plain

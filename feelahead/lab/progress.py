@@ -1,4 +1,4 @@
-"""Show how far long work has got: a bar for people, a line a minute for a log."""
+"""Show the progress of long work: a bar for people, a line a minute for a log."""
 
 import sys
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ _EVERY_S: Final = 60.0
 
 
 class Shown:
-    """Takes what the work tells of itself."""
+    """Display of the work's progress."""
 
     def __init__(self, what: str, total: float, bars: Progress | None) -> None:
         """bars: on a terminal; None: lines on standard error."""
@@ -24,7 +24,7 @@ class Shown:
         self._next_s = self._clock.now() + _EVERY_S
 
     def begin(self, piece: str) -> None:
-        """Name the piece of work that takes its time now."""
+        """Name the current piece of work."""
         if self._bars is not None and self._task is not None:
             self._bars.update(self._task, description=f"{self._what}: {piece}")
         elif self._clock.now() >= self._next_s:
@@ -33,7 +33,7 @@ class Shown:
             sys.stderr.flush()
 
     def advance(self, share: float) -> None:
-        """Count what is done."""
+        """Add a finished share."""
         self._done += share
         if self._bars is not None and self._task is not None:
             self._bars.advance(self._task, share)
@@ -45,6 +45,6 @@ def progress(what: str, total: float) -> Iterator[Shown]:
     if not sys.stderr.isatty():
         yield Shown(what, total, None)
         return
-    # A piece may take minutes: the time left is reckoned from the whole run so far.
+    # A piece may take minutes: the time left is estimated from the whole run so far.
     with Progress(console=Console(stderr=True), transient=True, speed_estimate_period=1e6) as bars:
         yield Shown(what, total, bars)

@@ -1,4 +1,4 @@
-"""The standard deviation of a point of the gripper from the encoders' errors: eq. 5 and its alternatives.
+"""Standard deviation of a point of the gripper from the encoders' errors: eq. 5 and its alternatives.
 
 The truth is a Monte Carlo of the exact kinematics, with its own standard error.
 """
@@ -19,31 +19,31 @@ from robot_side.drivers.mujoco.scene import Scene
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
 
 NOISE_RAD: Final = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
-"""Standard deviations of every joint's error."""
+"""Standard deviations of every joint's error, in rad."""
 BATCHES: Final = 20
-"""Number of parts of the draws, whose spread gives the standard error of the whole."""
+"""Number of batches of the draws; their spread gives the standard error of the whole."""
 METHODS: Final = ("linear", "once", "unscented")
 SINGULAR: Final = "singular"
 _SAMPLED: Final = 256
-"""Configurations over which `once` takes the largest variance, as the robot side does."""
+"""Number of configurations over which `once` takes the largest variance, as the robot side does."""
 _ENCODER_RAD: Final = 2e-4
 
 Displacements = Callable[[FloatArray], FloatArray]
-"""Joint errors (k, n) to a point's displacements (k, 3)."""
+"""Function from joint errors (k, n) to a point's displacements (k, 3)."""
 
 
 class Chain:
     """One point carried by n joints, near one configuration, as a product of exponentials (Brockett 1984).
 
-    x = exp(ξ₁ δ₁) ... exp(ξₙ δₙ) p with the joints' screws ξ at that configuration, base to tip: joint i turns all
-    that is beyond it about its axis there, by δᵢ. The screws are the columns of the geometric Jacobian, so that no
+    x = exp(ξ₁ δ₁) ... exp(ξₙ δₙ) p with the joints' screws ξ at that configuration, base to tip: joint i turns
+    everything beyond it about its axis there, by δᵢ. The screws are the columns of the geometric Jacobian, so that no
     other model of the robot is needed.
     """
 
     def __init__(self, jacobian: FloatArray, tool_position_m: FloatArray, point_m: FloatArray) -> None:
         """jacobian (6, n) of the tool's point, linear rows first, base to tip; all in the world frame.
 
-        point_m (3,): the point to follow, anywhere on what the last joint moves.
+        point_m (3,): the point to follow, anywhere on the last joint's link.
         """
         self._point_m = point_m
         self._axes = np.ascontiguousarray(jacobian[3:].T)
@@ -52,9 +52,9 @@ class Chain:
         self._on_axes_m = tool_position_m - np.cross(self._linear, self._axes)
 
     def displacements(self, changes_rad: FloatArray) -> FloatArray:
-        """Move the joints by (k, n), and return the point's displacements (k, 3) in metres.
+        """Return the point's displacements (k, 3) in metres after joint changes (k, n).
 
-        The difference itself is added up: changes of 1e-5 rad keep their digits.
+        The differences themselves are summed: changes of 1e-5 rad keep their digits.
         """
         moved = np.zeros((len(changes_rad), 3))
         for joint in reversed(range(len(self._axes))):
@@ -68,19 +68,19 @@ class Chain:
 
 
 class PosedGripper:
-    """The gripper by eq. 4 in any configuration; the fingers stay as the scene starts."""
+    """Gripper by eq. 4 in any configuration; the fingers stay as the scene starts."""
 
     def __init__(self, scene: Scene) -> None:
         robot = scene.robot
         self.home_rad: FloatArray = scene.data.qpos[robot.arm_positions].copy()
         self.fingers: FloatArray = scene.data.qpos[robot.finger_positions].copy()
-        # A joint without limits is taken over one turn.
+        # A joint without limits is sampled over one turn.
         self._lower_rad = np.where(np.isfinite(robot.lower_rad), robot.lower_rad, -np.pi)
         self._upper_rad = np.where(np.isfinite(robot.upper_rad), robot.upper_rad, np.pi)
         self._kinematics = MujocoKinematics(scene)
 
     def at(self, joint_positions_rad: FloatArray) -> GripperPose:
-        """Pose the gripper with its joints (n,)."""
+        """Return the gripper's pose for joints (n,)."""
         still = np.zeros_like(joint_positions_rad)
         return self._kinematics.pose(ArmState(0.0, joint_positions_rad, still, self.fingers, 0.0, False))
 
@@ -91,31 +91,31 @@ class PosedGripper:
 
 
 def linear_sd_m(jacobian: FloatArray, noise_rad: float, axis: FloatArray) -> float:
-    """Propagate by eq. 5 in this configuration: √(ûᵀ J diag(σ²) Jᵀ û); jacobian (3, n) of the point."""
+    """Return the standard deviation by eq. 5: √(ûᵀ J diag(σ²) Jᵀ û); jacobian (3, n) of the point."""
     covariances = position_covariance(jacobian[None], np.full(jacobian.shape[1], noise_rad))
     return float(np.sqrt(directional_variance(covariances, axis[None])[0]))
 
 
 def unscented_sd_m(displacements: Displacements, joints: int, noise_rad: float, axis: FloatArray) -> float:
-    """Propagate 2n + 1 points: none, and each joint alone by ±√3 σ, κ = 3 - n (Julier, Uhlmann 1997)."""
+    """Propagate 2n + 1 points: zero, and each joint alone by ±√3 σ, κ = 3 - n (Julier, Uhlmann 1997)."""
     step = np.sqrt(3.0) * noise_rad * np.eye(joints)
     along = displacements(np.concatenate([np.zeros((1, joints)), step, -step])) @ axis
     weights = np.concatenate([[1.0 - joints / 3.0], np.full(2 * joints, 1.0 / 6.0)])
-    # The first weight is negative from n = 4 on, and so the variance may be.
+    # The first weight is negative from n = 4 on, so the variance may be negative, too.
     return float(np.sqrt(max(float(weights @ (along - weights @ along) ** 2), 0.0)))
 
 
 def monte_carlo_sd_m(displacements: Displacements, errors_rad: FloatArray, axis: FloatArray) -> tuple[float, float]:
-    """Take the truth from the joint errors (k, n), k a multiple of BATCHES; and its standard error."""
+    """Return the true deviation for joint errors (k, n), k a multiple of BATCHES, and its standard error."""
     along = np.concatenate([displacements(batch) for batch in np.split(errors_rad, BATCHES)]) @ axis
     spread = along.reshape(BATCHES, -1).std(axis=1).std(ddof=1)
     return float(along.std()), float(spread / np.sqrt(BATCHES))
 
 
 def places(gripper: PosedGripper, count: int, seed: int) -> dict[str, FloatArray]:
-    """Name configurations (n,): home, `count` seeded ones within the joints' ranges, and a singular one.
+    """Return named configurations (n,): home, `count` seeded ones within the joints' ranges, and a singular one.
 
-    The singular one has, of all sampled ones, the least error along the approach beside the largest in any direction.
+    Of all samples, the singular one has the least error along the approach relative to the largest in any direction.
     """
 
     def share_along(configuration: FloatArray) -> float:
@@ -129,13 +129,13 @@ def places(gripper: PosedGripper, count: int, seed: int) -> dict[str, FloatArray
 
 
 def once_sd_m(gripper: PosedGripper, seed: int) -> float:
-    """Take the paper's way: the largest singular value of J, m/rad, of any sphere in any sampled configuration."""
+    """Return the paper's factor, m/rad: the largest singular value of J of any sphere in any sampled configuration."""
     jacobians = (gripper.at(configuration).sphere_jacobians for configuration in gripper.drawn(_SAMPLED, seed, 2))
     return max(float(np.linalg.norm(of_spheres, 2, axis=(1, 2)).max()) for of_spheres in jacobians)
 
 
 def measure(gripper: PosedGripper, number: int, configurations: int, draws: int, seed: int) -> Iterator[Row]:
-    """Make a row for each point and noise in the configuration with this number; `draws` a multiple of BATCHES.
+    """Yield a row for each point and noise in configuration `number`; `draws` is a multiple of BATCHES.
 
     The points are the tool's and the centre of the gripper's sphere farthest from it.
     """
@@ -165,7 +165,7 @@ def measure(gripper: PosedGripper, number: int, configurations: int, draws: int,
 def run_times_us(gripper: PosedGripper, turns: int) -> dict[str, float]:
     """Measure one call of each method at home, for one point and direction: the least time of all turns.
 
-    "linear" has the Jacobian at hand, as a tick has. "unscented" takes 2n + 1 poses one by one.
+    "linear" uses a given Jacobian, as a tick does. "unscented" computes 2n + 1 poses one by one.
     """
     pose = gripper.at(gripper.home_rad)
     axis, joints = pose.tool_rotation[:, 2], len(gripper.home_rad)

@@ -1,4 +1,4 @@
-"""Draw the built-in scenes from above and from the side, as they stand before anything moves.
+"""Draw the built-in scenes from above and from the side, before anything moves.
 
 python -m feelahead.lab.scene_pictures --out docs/scenes
 """
@@ -28,9 +28,9 @@ class ScenePictures:
     """Draw the built-in scenes: the gripper at its start, and faint where it grasps."""
 
     out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path()
-    """One PNG for each scene goes there."""
+    """Folder for one PNG of each scene."""
     seed: Annotated[int, Meta(ge=0), tyro.conf.arg(metavar="N")] = 0
-    """The seed that draws wall, posts and shelf."""
+    """Seed that draws wall, posts and shelf."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -52,7 +52,7 @@ def draw_scene(path: Path, name: SceneName, seed: int) -> None:
     drawn = [(corners, colour) for corners, colour in drawn if len(corners)] + [(gripper, (*_GREY, 1.0))]
     with figure(path, 1, 2, f"{name}, seed {seed}", figsize=(9, 4), dpi=80) as (_, panels):
         for ax, view, up, towards in zip(panels, ("from above", "from the side"), (1, 2), (1.0, -1.0), strict=True):
-            # Whatever is nearer to the eye hides what is behind.
+            # Faces nearer to the eye hide those behind.
             nearest = sorted(drawn, key=lambda one: float((towards * one[0][:, :, 3 - up]).max()))
             for corners, colour in (*nearest, (gripper + to_grasp_m, (*_GREY, 0.15))):
                 ax.add_collection(PolyCollection(list(corners[:, :, [0, up]]), facecolor=colour))

@@ -9,7 +9,7 @@ from feelahead.lab.goals import short
 
 
 def shown(title: str, headings: Iterable[str], rows: Iterable[Iterable[str | float | None]]) -> Table:
-    """Make a table whose first column names the row; numbers have three digits, and None is a dash."""
+    """Return a table whose first column names the row; numbers have three digits, and None is a dash."""
     table = Table(title=title, title_justify="left", box=MARKDOWN)
     for number, heading in enumerate(headings):
         table.add_column(heading, justify="right" if number else "left")

@@ -1,8 +1,8 @@
-"""The engine of all questions: run each cell of a grid with each seed, and make one tidy table of the rows.
+"""Engine of all questions: run each cell of a grid with each seed, and collect one tidy table of the rows.
 
-A question says what a cell is, how one is run, and what is shown. The engine does the rest: seeds that depend on no
-order, progress, workers or a cluster, a journal that survives kill -9, CSV and Parquet, goals and figures. The table
-is the same to the byte for any number of workers and after any interruption: rows stand in the order of the grid.
+A question defines its cells, the run of one, and its tables. The engine does the rest: seeds that depend on no order,
+progress, workers or a cluster, a journal that survives kill -9, CSV and Parquet, goals and figures. The table is the
+same to the byte for any number of workers and after any interruption: rows are in the order of the grid.
 """
 
 import functools
@@ -36,37 +36,37 @@ _PACKAGES = ("common", "operator_side", "robot_side", "feelahead")
 _MOST_RUNS = 10_000_000
 _SCHEDULER = re.compile(r"[a-z]+://[^/:]+:\d{1,5}")
 _INTERRUPTED = 130
-"""The exit code that shells give a command that Ctrl-C has ended."""
+"""Exit code that shells give a command ended by Ctrl-C."""
 _WIDTH = 200
-"""Columns of output that no terminal shows."""
+"""Width of output outside a terminal, in columns."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """The flags of every question; a question's own settings inherit them."""
+    """Flags of every question; a question's own settings inherit them."""
 
     quick: bool = False
-    """A small grid that shows in a few minutes whether anything is wrong."""
+    """Run a small grid that shows in a few minutes whether anything is wrong."""
     seed: Annotated[int, Meta(ge=0), tyro.conf.arg(metavar="N")] = 0
-    """The first seed."""
+    """First seed."""
     seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 1
     """Number of seeds; each cell is run with each."""
     workers: Annotated[Annotated[int, Meta(ge=1)] | None, tyro.conf.arg(metavar="N")] = None
-    """Cells at the same time, each in a process of this machine; 2 unless given. 1: in this process."""
+    """Number of parallel cells, each in a process of this machine; 2 unless given. 1: in this process."""
     scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Run the cells on the dask.distributed cluster of this scheduler instead."""
     resume: Annotated[Path | None, tyro.conf.arg(metavar="FILE.jsonl")] = None
-    """Write each cell there as soon as it is done, and leave out what is there already."""
+    """Write each finished cell to this file, and skip the cells in it."""
     csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
-    """Write the table there, and settings, versions and hashes to FILE.csv.json beside it."""
+    """Write the table to this file, and settings, versions and hashes to FILE.csv.json."""
     parquet: Annotated[Path | None, tyro.conf.arg(metavar="FILE.parquet")] = None
     """Write the same as Parquet."""
     summary: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
-    """Write all figures there, lists included: those of the one run, or of several as `runs`."""
+    """Write all figures, lists included: those of the one run, or of several as `runs`."""
     picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
     """Draw the question's figure."""
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """Take these settings from a file."""
+    """Read settings from this file."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -94,7 +94,7 @@ C = TypeVar("C")
 
 
 def cell_of(kind: type[C], settings: Sweep) -> C:
-    """Make the cell of those settings that it declares for them, as a base of their class."""
+    """Make the cell whose fields the settings inherit from it."""
     return kind(**{name: getattr(settings, name) for name in kind.__dataclass_fields__})  # type: ignore[attr-defined]
 
 
@@ -107,33 +107,33 @@ class Question(Generic[S, C]):
     """One question; its module holds it as `QUESTION`, and the module's docstring begins with the question itself."""
 
     name: str
-    """The command: `try approach`, `bench tick`."""
+    """Command: `try approach`, `bench tick`."""
     settings: type[S]
-    """The grid's parameters, each a flag; the class's docstring is what `--help` says."""
+    """Parameters of the grid, each a flag; the class's docstring is shown by `--help`."""
     cells: Callable[[S], Iterable[C]]
-    """Lay out the grid: frozen dataclasses of plain values, whose scalars become columns."""
+    """Return the grid: frozen dataclasses of plain values, whose scalars become columns."""
     run: Callable[[C, int], Iterable[Row]]
-    """Run one cell with one seed; its randomness comes from the seed alone, as through `generator`."""
+    """Run one cell with one seed; all randomness comes from the seed, as through `generator`."""
     show: Callable[[S, Table], Iterable[RenderableType]]
-    """Make what people read: tables, sentences."""
+    """Return the tables and sentences for people."""
     draw: Callable[[S, Table, Path], object] | None = None
-    """Make the figure of `--picture`."""
+    """Draw the figure of `--picture`."""
     goals: Callable[[S, Table], Iterable[Goal]] = _nothing
-    """Hold figures against their limits."""
+    """Return the figures with their limits."""
     also: Callable[[S, Table], object] = _nothing
-    """Write what the question's own flags ask for."""
+    """Write the files of the question's own flags."""
     frozen: Callable[[S], str] = lambda _: ""
-    """Hash what must not change, lest the figures of two runs could not be compared."""
+    """Hash the inputs that must not change, so that the figures of two runs stay comparable."""
     failed: Callable[[Row], bool] = lambda _: False
-    """Recognise a row that answers nothing: with one, the exit code is 1."""
+    """Return whether a row answers nothing: then the exit code is 1."""
     timed: bool = False
-    """Cells measure time: they take turns in this process alone, and `--workers` is refused."""
+    """Whether cells measure time: they take turns in this process alone, and `--workers` is refused."""
     prepare: Callable[[], object] = _nothing
-    """Do once what each worker would do otherwise, such as compiling kernels."""
+    """Do once the work that each worker would repeat, such as compiling kernels."""
 
 
 def ask(question: Question[Any, Any], arguments: Sequence[str]) -> int:
-    """Answer a question from the command line; return 0 when every cell gave its rows, 130 after Ctrl-C."""
+    """Answer a question from the command line; return 0 if every cell gave its rows, 130 after Ctrl-C, else 1."""
     settings = parse_settings(question.settings, f"feelahead {question.name}", arguments)
     if settings.picture is not None and question.draw is None:
         raise ConfigurationError(f"--picture {settings.picture}: {question.name} has no figure")
@@ -154,7 +154,7 @@ def ask(question: Question[Any, Any], arguments: Sequence[str]) -> int:
 
 
 def _show(question: Question[S, C], settings: S, done: "Swept") -> None:
-    """Print what people read of the rows that there are."""
+    """Print tables, goals and failures of the finished rows."""
     console = Console(width=None if sys.stdout.isatty() else _WIDTH, highlight=False, markup=False)
     if len(done.table):
         for shown in question.show(settings, done.table):
@@ -168,23 +168,23 @@ def _show(question: Question[S, C], settings: S, done: "Swept") -> None:
 
 @dataclass(frozen=True)
 class Swept:
-    """Hold what came of a sweep."""
+    """Result of a sweep."""
 
     table: Table
     failures: list[str]
-    """A line for each cell that failed."""
+    """A line for each failed cell."""
     left: int
     """Number of runs that are neither finished nor failed."""
     ended: str | None = None
-    """Why it ended before its time."""
+    """Reason of an early end."""
     interrupted: bool = False
 
 
 def sweep(question: Question[S, C], settings: S) -> Swept:
-    """Run all that the journal does not hold.
+    """Run all pieces that the journal lacks.
 
-    A cell that raises FeelaheadError fails by itself. Ctrl-C, a worker that is killed and a journal that cannot be
-    written end the sweep with what is done. ConfigurationError for a grid that cannot be run.
+    A cell that raises FeelaheadError fails by itself. Ctrl-C, a killed worker and an unwritable journal end the sweep
+    with the finished rows. ConfigurationError for a grid that cannot be run.
     """
     if question.timed and (settings.scheduler or settings.workers not in (None, 1)):
         flag = f"--scheduler {settings.scheduler}" if settings.scheduler else f"--workers {settings.workers}"
@@ -199,7 +199,7 @@ def sweep(question: Question[S, C], settings: S) -> Swept:
     failures: list[str] = []
     ended, interrupted = None, False
     with Journal(settings.resume, made_by) as journal:
-        # Seed by seed, so that an interrupted sweep has something of every cell.
+        # Seed by seed, so that an interrupted sweep has rows of every cell.
         todo = sorted((piece for piece in order if piece.key not in journal.done), key=lambda piece: piece.seed)
         try:
             with progress(question.name, float(len(todo) or 1)) as shown:
@@ -223,14 +223,14 @@ def sweep(question: Question[S, C], settings: S) -> Swept:
 
 
 def generator(cell: object, seed: int) -> np.random.Generator:
-    """Make the random numbers of one cell and seed: the same in any order, and independent of other cells."""
+    """Return the random generator of one cell and seed: independent of the order and of other cells."""
     digest = hashlib.sha256(Piece(cell, seed).key.encode()).digest()
     return np.random.default_rng(int.from_bytes(digest[:16], "little"))
 
 
 @functools.cache
 def _code_hash(own: Path) -> str:
-    """Hash the code that figures come from: the packages', and the question's own file."""
+    """Hash the packages' code and the question's own file."""
     digest = hashlib.sha256(own.read_bytes())
     for package in _PACKAGES:
         for path in sorted((_ROOT / package).rglob("*.py")):
@@ -244,7 +244,7 @@ def code_hash(question: Question[Any, Any]) -> str:
 
 
 def _write(question: Question[S, C], settings: S, table: Table) -> None:
-    """Write the files that were asked for."""
+    """Write the files of the flags."""
     frozen = question.frozen(settings)
     if settings.summary is not None:
         runs = list(table)

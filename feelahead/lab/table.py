@@ -10,13 +10,13 @@ from common.files.output_file import output_file
 from common.recording.packages import require_packages
 
 Row = dict[str, Any]
-"""Figures by name, as JSON has them. Lists and tables go to `--summary` alone, the rest also to `--csv`."""
+"""Figures by name, as JSON values. Lists and tables go to `--summary` alone, the rest also to `--csv`."""
 
 _SCALARS = (str, int, float, bool, type(None))
 
 
 class Table:
-    """Rows in the order of cells, seeds and measurements; never changed."""
+    """Immutable rows in the order of cells, seeds and measurements."""
 
     def __init__(self, rows: Iterable[Row]) -> None:
         self.rows: Sequence[Row] = tuple(rows)
@@ -29,24 +29,24 @@ class Table:
 
     @property
     def columns(self) -> list[str]:
-        """The names of all scalar figures, in the order of their first appearance."""
+        """Names of all scalar figures, in the order of their first appearance."""
         names = {name: None for row in self.rows for name, value in row.items() if isinstance(value, _SCALARS)}
         return list(names)
 
     def values(self, name: str) -> list[Any]:
-        """The figures of one column; rows without it, or with None, are left out."""
+        """Return the figures of one column; rows without it, or with None, are left out."""
         return [row[name] for row in self.rows if row.get(name) is not None]
 
     def lines(self, *names: str) -> Iterator[list[Any]]:
-        """The figures of some columns, row by row; None where a row has none."""
+        """Return the figures of some columns, row by row; None where a row has none."""
         return ([row.get(name) for name in names] for row in self.rows)
 
     def where(self, **equal: Any) -> "Table":
-        """The rows whose columns have these values."""
+        """Return the rows whose columns have these values."""
         return Table(row for row in self.rows if all(row.get(name) == value for name, value in equal.items()))
 
     def groups(self, *names: str) -> Iterator[tuple[tuple[Any, ...], "Table"]]:
-        """The rows by the values of some columns, in the order of their first appearance."""
+        """Yield the rows by the values of some columns, in the order of their first appearance."""
         found: dict[tuple[Any, ...], list[Row]] = {}
         for row in self.rows:
             found.setdefault(tuple(row.get(name) for name in names), []).append(row)
@@ -69,7 +69,7 @@ class Table:
         columns = {name: [row.get(name) for row in self.rows] for name in self.columns}
         new = path.with_name(f".{path.name}.new")
         try:
-            # A file that was there before stays until all of the new one is written.
+            # An existing file stays until the new one is written completely.
             parquet.write_table(pa.table(columns), new)
             new.replace(path)
         except (OSError, pa.ArrowException) as error:

@@ -28,10 +28,10 @@ from robot_side.outcome.placing import Placing
 from robot_side.settings import CameraSettings, RobotSettings
 
 Arm = Literal["off", "mechanical", "reacting"]
-"""off: nothing is felt. mechanical: triggers stiffen, and the person takes no notice. reacting: they do."""
+"""off: nothing is felt. mechanical: triggers resist, and the person does not react. reacting: the person reacts."""
 _L2, _R2 = 0, 1
 _SAME_CONTACT_S: Final = 0.1
-"""A contact with a thing that comes back within this time is the same one."""
+"""Time within which a renewed contact with an object is the same contact, in seconds."""
 _LOOK_S: Final = 0.05
 _TRUTH_S: Final = 0.01
 _SETTLES_S: Final = 0.3
@@ -39,7 +39,7 @@ _SETTLES_S: Final = 0.3
 
 @dataclass(frozen=True)
 class Trial:
-    """The task; with the same seed, two that differ in `arm` alone are a pair."""
+    """Task of one trial; two with the same seed that differ in `arm` alone are a pair."""
 
     scene: SceneName
     link: str
@@ -48,44 +48,44 @@ class Trial:
     duration_s: float
     link_model: LinkModel = "datagram"
     tick_period_s: float = TICK_PERIOD_S
-    """The robot side's"""
+    """Period of the robot side's ticks"""
     camera_sd_m: float = CameraSettings().sd_m
-    """Standard deviation of the camera's error along each axis, which the law knows"""
+    """Standard deviation of the camera's error along each axis; the law knows it"""
     probability: float = RobotSettings().probability
     """P of eq. 10"""
 
 
 class _Silent:
-    """Stands in for a law that nobody feels, and works out nothing."""
+    """Stand-in for a law that nobody feels; computes nothing."""
 
     def __init__(self, law: Law) -> None:
         self._law = law
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Nothing ahead."""
+        """Return free triggers."""
         del situation, now_s
         free = uniform_field(0)
         return Sensed.of(free, free)
 
     def around(self, pose: GripperPose) -> Around | None:
-        """Nothing around."""
+        """Return no map."""
         del pose
         return None
 
     def summary(self) -> dict[str, int]:
-        """No work at all."""
+        """Return the law's summary: no work at all."""
         return self._law.summary()
 
 
 class _Watch(Listener):
-    """Truth, tick by tick."""
+    """Watcher of the truth, tick by tick."""
 
     def __init__(self, trial: Trial, seed: int) -> None:
         self.hits = 0
         self.hit_first: str | None = None
         self.fastest_m_s: float | None = None
         self.pulled_s = self.full_s = 0.0
-        """Time in which R2 was pulled, and in which R2 was full under the finger"""
+        """Time of R2 pulled, and of full strength under its finger, in seconds"""
         self.placing = Placing()
         self.scene = load_scene(name=trial.scene, seed=seed)
         self._contact, self._truth = TrueContact(self.scene), GroundTruth(self.scene)
@@ -116,11 +116,11 @@ class _Watch(Listener):
         )
 
     def on_sent(self, now_s: float) -> None:
-        """See what is true."""
+        """Sample the true contact, the strength and the target."""
         held, roles = self.loopback.robot.held, self.scene.roles
         onset = self._contact.update(held)
         if onset is not None and roles[onset.thing] is not Role.TARGET:
-            # What is held, and set down on a support, is where it should be.
+            # The held object, set down on a support, is where it should be.
             where_it_should_be = onset.gripper_part not in self._parts and roles[onset.thing] is Role.SUPPORT
             if not where_it_should_be:
                 self._hit(onset.thing, onset.closing_speed_m_s, now_s)
@@ -141,25 +141,25 @@ class _Watch(Listener):
         self.fastest_m_s = max(speed_m_s, self.fastest_m_s or 0.0)
 
     def _felt(self) -> bool:
-        """Whether a finger meets an effect, or the controller shakes."""
+        """Return whether a finger meets an effect, or the controller rumbles."""
         stiff = any((self._strength_of(trigger) or 0) > 0 for trigger in (_L2, _R2))
         return stiff or self.loopback.device.rumble.left > 0.0
 
     def _strength_of(self, trigger: int) -> int | None:
-        """Take the strength of the zone under the finger; None for a trigger that is not pulled."""
+        """Return the strength of the zone under the finger; None for a trigger that is not pulled."""
         device = self.loopback.device
         travel = device.travel[trigger]
         return device.strengths[trigger][zone_of(travel)] if travel > 0.0 else None
 
 
 def run_trial(trial: Trial, seed: int) -> Row:
-    """Run it until the person is done, or for its duration from the start; the same trial gives the same row.
+    """Run until the person is done, or for the trial's duration; the same trial gives the same row.
 
     The seed draws the scene, the errors of camera and encoders, the link and the person.
-    hits: contacts of the gripper with anything but the target, and of the held thing with obstacles.
-    full_share: of the time in which R2 is pulled, how much of it is full in the zone under the finger.
-    finished_s: from arming until the thing is placed and the hand has drawn back; None where time ran out.
-    felt_before_s: for how long rumble or a stiff trigger was felt without a break before the thing touched its place.
+    hits: contacts of the gripper with anything but the target, and of the held object with obstacles.
+    full_share: share of the time with R2 pulled in which the zone under the finger is at full strength.
+    finished_s: from arming until the object is placed and the hand has withdrawn; None if time ran out.
+    felt_before_s: how long rumble or a stiff trigger was felt without a break before the object touched its place.
     """
     watch = _Watch(trial, seed)
     loopback, person = watch.loopback, watch.loopback.person
@@ -171,7 +171,7 @@ def run_trial(trial: Trial, seed: int) -> Row:
             armed_s = loopback.clock.now()
         if person.phase == "done":
             done_s = loopback.clock.now()
-    # What was let go may still fall.
+    # A released object may still fall.
     loopback.run_until(loopback.clock.now() + _SETTLES_S)
     task = loopback.summary()["task"]
     placing = watch.placing.summary(armed_s)

@@ -1,4 +1,4 @@
-"""Times of what takes turns: the least of many, for other work on the machine only ever adds."""
+"""Times of calls in turns: the least of many, as other work on the machine only adds."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -9,13 +9,13 @@ from common.arrays import FloatArray
 from common.clock import Clock
 
 _TURN_S = 0.03
-"""A turn goes on for about this long."""
+"""Least length of a turn, in seconds."""
 
 
 def in_turns(contenders: Mapping[str, Callable[[], FloatArray]], turns: int) -> dict[str, float]:
-    """Sum up the least time of each contender's parts, by its name; all stay on one core where the system can.
+    """Sum the least time of each contender's parts, by name; all stay on one core where the system can.
 
-    A turn gives the times of all parts, each short enough to find the machine doing nothing else once.
+    A turn gives the times of all parts. Each part is short enough to run undisturbed in some turn.
     """
     least: dict[str, FloatArray] = {}
     allowed = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
@@ -33,7 +33,7 @@ def in_turns(contenders: Mapping[str, Callable[[], FloatArray]], turns: int) -> 
 
 
 def least_ns(parts: Sequence[Callable[[], object]], clock: Clock) -> FloatArray:
-    """Call all parts one after another for 30 ms, twice at least: the least ns of each."""
+    """Call all parts one after another for 30 ms, twice at least; return the least ns of each."""
     times_s, rounds, end_s = np.full(len(parts), np.inf), 0, clock.now() + _TURN_S
     while rounds < 2 or clock.now() < end_s:
         for number, part in enumerate(parts):

@@ -1,4 +1,4 @@
-"""The same recorded ticks, with the gripper covered by fewer spheres or more: what a look costs, and ways apart."""
+"""The same recorded ticks with covers of fewer or more spheres: cost of a look, and errors of contact distances."""
 
 import math
 import time
@@ -16,14 +16,14 @@ from robot_side.settings import RobotSettings
 
 COVER_M: Final = RobotSettings().cover_m
 COVERS_M: Final = (0.015, 0.008, 0.005, COVER_M, 0.0015, 0.001)
-"""How far spheres may stand out of the gripper: fewer of them for more. The last is the finest."""
+"""Limits of how far spheres stand out of the gripper, in metres; the last is the finest cover."""
 WAYS: Final = tuple(
     f"{side} {kind} {strength}" for side in ("R2", "L2") for kind in ("fast", "slow") for strength in ("first", "full")
 )
-"""Ways that are compared: where strength begins and is full, of both triggers' fast and slow zones."""
+"""Compared distances: where strength begins and is full, in both triggers' fast and slow lists."""
 KINDS: Final = ("fast first", "fast full", "slow first", "slow full")
 _FULL_SLOW: Final = 3
-"""Things to be touched are felt by four of the eight strengths at most."""
+"""Index of the last strength of objects to be touched: four of the eight at most."""
 _CHUNK: Final = 250
 
 
@@ -32,25 +32,25 @@ class Replayed:
     """One cover, over the ticks of one run."""
 
     took_us: FloatArray
-    """(t,) processor time of the law, the least of all times that the tick was gone through"""
+    """(t,) processor time of the law: the least of all passes over the tick"""
     ways_m: FloatArray
-    """(t, 8) those of WAYS; the horizon where nothing is felt"""
+    """(t, 8) distances of WAYS; the horizon where nothing is felt"""
     horizon_m: FloatArray
     """(t,)"""
     spheres: int
     looks_per_s: float
 
     def costs(self) -> dict[str, float]:
-        """Sum up the costs."""
+        """Return the costs as a row."""
         p50, p99 = np.quantile(self.took_us, (0.5, 0.99)).tolist()
         times = {"p50_us": p50, "p99_us": p99, "mean_us": float(self.took_us.mean())}
         return {"spheres": self.spheres, "looks_per_s": self.looks_per_s, **times}
 
 
 def errors_mm(found: Replayed, finest: Replayed, kind: str) -> dict[str, float]:
-    """Compare one kind of way of both triggers, in mm: too late is above 0, too early below.
+    """Compare one kind of distance of both triggers, in mm: too late is above 0, too early below.
 
-    A tick counts if either feels something; a way that only one of both feels counts up to the horizon.
+    A tick counts if either cover feels something; a distance that only one of them feels counts up to the horizon.
     """
     columns = [place for place, name in enumerate(WAYS) if name.endswith(kind)]
     horizon = np.minimum(found.horizon_m, finest.horizon_m)[:, None]
@@ -63,7 +63,7 @@ def errors_mm(found: Replayed, finest: Replayed, kind: str) -> dict[str, float]:
 
 
 def replay(recorded: Recorded, covers_m: Sequence[float], times: int) -> list[Replayed]:
-    """Ask the law the same ticks with each cover, in turns of a chunk, `times` times over."""
+    """Run the law over the same ticks with each cover, in turns of a chunk, `times` times."""
     warm_up()
     ticks = [with_cover(recorded, cover_m) if cover_m != COVER_M else recorded.ticks for cover_m in covers_m]
     count = len(recorded.ticks)
@@ -73,7 +73,7 @@ def replay(recorded: Recorded, covers_m: Sequence[float], times: int) -> list[Re
         for first in range(0, count, _CHUNK):
             for number, (law, own) in enumerate(zip(laws, ticks, strict=True)):
                 for place, tick in enumerate(own[first : first + _CHUNK], first):
-                    # A new frame is taken over equally often, whatever the cover.
+                    # Take over the frame outside the measured time, equally for each cover.
                     law.surroundings.see(tick.situation.objects)
                     began_s = time.thread_time()
                     sensed = law.sense(tick.situation, tick.now_s)

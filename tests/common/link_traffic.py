@@ -1,4 +1,4 @@
-"""Traffic between two clocks in virtual time, through both ends of a link, with the truth beside it."""
+"""Traffic between two clocks in virtual time, through both ends of a link, beside the truth."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -39,31 +39,31 @@ class Way:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A link and two clocks."""
+    """Link and two clocks."""
 
     to_robot: Way
     to_operator: Way
     skew: float
-    """The share by which the operator's clock gains on the robot's."""
+    """Relative rate by which the operator's clock gains on the robot's."""
     asymmetry_s: float = 0.0
-    """The least delay to the robot minus that to the operator."""
+    """Least delay to the robot minus that to the operator, in seconds."""
 
 
 @dataclass(frozen=True)
 class OperatorClock:
-    """The operator's clock by the robot's, which shows the true time."""
+    """Operator's clock as a function of the robot's, which shows the true time."""
 
     ahead_s: float
     skew: float
 
     def reads(self, true_s: float) -> float:
-        """Read it at `true_s`."""
+        """Return the reading at `true_s`."""
         return true_s * (1.0 + self.skew) + self.ahead_s
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """One end's opinion of the other's clock on an arrival, beside the truth."""
+    """One end's estimate of the other's clock at an arrival, beside the truth."""
 
     side: Literal["robot", "operator"]
     at_s: float
@@ -73,7 +73,7 @@ class Estimate:
 
 
 class Traffic:
-    """Two ends that talk at their real rates for `duration_s`; iterate to let it happen."""
+    """Two ends that send at their real rates for `duration_s`; iterate to run them."""
 
     def __init__(self, scenario: Scenario, seed: int, duration_s: float) -> None:
         generator = np.random.default_rng([seed, 4])
@@ -81,7 +81,7 @@ class Traffic:
         self.robot = LinkEnd("robot", 1, "robot's clock", seed, scenario.asymmetry_s)
         self.operator = LinkEnd("operator", 2, "operator's clock", seed, scenario.asymmetry_s)
         self._duration_s = duration_s
-        # Their ticks have nothing to do with each other.
+        # Their ticks are independent.
         phase_s = float(generator.uniform(0.0, OPERATOR_PERIOD_S))
         self._robot_sends_s = np.arange(0.0, duration_s, ROBOT_PERIOD_S)
         self._operator_sends_s = np.arange(phase_s, duration_s, OPERATOR_PERIOD_S)

@@ -95,7 +95,7 @@ def test_a_backlog_after_a_pause_is_old_however_long_the_pause(pause_s: float) -
         assert queueing.update(sent_s, 4.0 + pause_s) == pytest.approx(4.0 + pause_s - sent_s - 0.001)
 
 
-def test_queueing_age_starts_anew_with_another_clock() -> None:
+def test_queueing_age_restarts_with_another_clock() -> None:
     queueing = QueueingAge()
     queueing.update(1000.0, 5.0)
     assert queueing.update(3.0, 6.0) > 900.0

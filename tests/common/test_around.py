@@ -1,4 +1,4 @@
-"""A map of ways is refused for what cannot be, never says a longer way, and tells what differs."""
+"""Map from around: refusals of impossible values, rounding to shorter distances, and comparison."""
 
 import numpy as np
 import pytest

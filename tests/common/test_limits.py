@@ -1,4 +1,4 @@
-"""Ranges that are declared once, in a field's type hint."""
+"""Ranges declared once, in a field's type hint."""
 
 import dataclasses
 import importlib
@@ -71,7 +71,7 @@ def test_the_same_numbers_are_refused_here_and_by_the_decoder(value: float) -> N
         assert checked == decoded
 
 
-# Each value just outside of a range that a record of ours declares is refused by that record, and named
+# Values just outside a record's declared range are refused by that record, and named
 
 MODULES = (
     *("common.emulation.clauses", "common.emulation.loss", "common.emulation.profile"),
@@ -85,11 +85,11 @@ NEEDS: dict[type, tuple[float, ...]] = {
     **{Chance: (0.5,), Rate: (1.0,), Outage: (1.0, 1.0), RandomLoss: (0.5,), GilbertElliott: (0.5, 0.5)},
     Firmware: (0, 0, 0),
 }
-"""What has no default."""
+"""Arguments without a default."""
 
 
 def ranges(hint: Any) -> Iterator[tuple[type, Meta]]:
-    """Yield the type and the range of a field, and of what a tuple holds."""
+    """Yield the type and range of a field, and of a tuple's items."""
     kind, *rest = get_args(hint) if get_args(hint) else (hint,)
     if get_origin(hint) is Annotated and (metas := [one for one in rest if isinstance(one, Meta)]):
         yield kind, metas[0]

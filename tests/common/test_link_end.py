@@ -48,7 +48,7 @@ def test_the_loop_age_spans_both_ways_and_the_holding() -> None:
     robot.arrived(operator.hello(0.0), 0.0)
     operator.arrived(robot.hello(0.0), 0.0)
     operator.arrived(stiffness(robot.stamp(1.0)), 1.05)  # 50 ms to the operator
-    command = motion(operator.stamp(1.08))  # held for 30 ms, of which 16 need no message
+    command = motion(operator.stamp(1.08))  # Held for 30 ms, of which 16 need no message.
     arrival = robot.arrived(command, 1.10)  # 20 ms to the robot
     assert arrival.loop_age_s == pytest.approx(0.084)
     assert robot.round_trip.maximum == pytest.approx(0.07)
@@ -121,7 +121,7 @@ def test_an_invented_echo_is_not_measured() -> None:
     assert robot.round_trip.count == 0
 
 
-# What both ends say about clocks and delays, in virtual time at their real rates
+# Both ends' clocks and delays, in virtual time at their real rates
 
 QUEUES = Way("exponential", 0.050, 0.010)
 JITTER = Way("normal", 0.050, 0.010)
@@ -144,7 +144,7 @@ def test_both_ends_know_the_offset_after_five_seconds_of_queues(to_robot: Way, t
 
 
 def test_reordering_does_not_pull_the_mean() -> None:
-    # Echoes of the newest stamps alone would be 10 ms off here: at 1 kHz the newest to have arrived is an early one.
+    # Echoes of the newest stamps alone would be 10 ms off: at 1 kHz the newest to have arrived is an early one.
     traffic = Traffic(Scenario(JITTER, JITTER, 20e-6), seed=1, duration_s=10.0)
     for estimate in last_estimates(traffic).values():
         assert estimate.offset_error_s is not None
@@ -225,7 +225,7 @@ def test_a_peer_that_slept_is_followed_and_its_messages_are_not_old_for_ever(sle
     operator.arrived(robot.hello(500.02), 0.04)
     true_s, ages_s = 0.1, []
     for k in range(1000):
-        # The operator's machine is suspended once, in which its monotonic clock stands still.
+        # The operator's machine is suspended once: meanwhile its monotonic clock stops.
         ahead_s = 500.0 if k < 500 else 500.0 + slept_s
         true_s = 0.1 + 0.05 * k + (0.0 if k < 500 else slept_s)
         arrival = robot.arrived(motion(operator.stamp(true_s + 500.0 - ahead_s)), true_s + 500.02)

@@ -1,4 +1,4 @@
-"""Every message on the wire: it comes back as it was, is MessagePack, and is refused whole when a field is bad."""
+"""Messages on the wire: unchanged by a round trip, valid MessagePack, and refused whole for a bad field."""
 
 import math
 import struct
@@ -58,7 +58,7 @@ VALID: tuple[AnyMessage, ...] = (
 )
 
 
-# One strategy for every message class, made from its type hints; what is checked by hand is narrowed here.
+# One strategy for every message class, made from its type hints; fields checked by hand are narrowed here.
 
 unit, stick = st.floats(0.0, 1.0), st.floats(-1.0, 1.0)
 finite = st.floats(-1e6, 1e6)
@@ -121,7 +121,7 @@ def packed_by_msgpack(message: Message) -> bytes:
 
 
 def said(message: Message) -> dict[str, Any]:
-    """Flatten the message's numbers by name."""
+    """Flatten the message's values by name."""
     found: dict[str, Any] = {}
     for name, value in msgspec.structs.asdict(message).items():
         is_field = isinstance(value, TriggerField | Around)
@@ -137,7 +137,7 @@ def test_a_message_comes_back_as_it_was_and_is_messagepack(message: Any) -> None
     back = ours(payload)
     if isinstance(message, StiffnessUpdate | Telemetry):
         is_told_as_it_was(message, back)
-        assert decode(encode(back)) == back  # nothing is lost twice
+        assert decode(encode(back)) == back  # Nothing is lost twice.
         assert back.header == message.header
     else:
         assert back == message
@@ -173,7 +173,7 @@ def is_told_as_it_was(message: StiffnessUpdate | Telemetry, back: Any) -> None:
 def test_damaged_bytes_mean_what_they_mean_to_messagepack(message: AnyMessage, data: st.DataObject) -> None:
     hostile = bytearray(encode(message))
     for _ in range(data.draw(st.integers(1, 4))):
-        position = data.draw(st.integers(2, len(hostile)))  # bytes of another version are not looked into
+        position = data.draw(st.integers(2, len(hostile)))  # Bytes of another version are not decoded.
         removed = data.draw(st.integers(0, 3))
         hostile[position : position + removed] = data.draw(st.binary(max_size=3))
     try:
@@ -181,7 +181,7 @@ def test_damaged_bytes_mean_what_they_mean_to_messagepack(message: AnyMessage, d
     except (ValueError, TypeError, KeyError, msgspec.ValidationError, struct.error):
         expected = None
     decoded = survives(bytes(hostile))
-    # Where msgpack gives up on more than it must (keys that cannot be hashed), ours may still be valid.
+    # msgpack also fails on keys that cannot be hashed; ours may still be valid.
     assert expected is None or decoded == expected
 
 
@@ -243,7 +243,7 @@ def test_every_kind_of_them_was_measured() -> None:
 
 
 def survives(hostile: bytes) -> AnyMessage | None:
-    """None for what is refused; a message that is valid through and through for what is not."""
+    """Return None for refused bytes; otherwise the message, checked to be valid throughout."""
     try:
         message = decode(hostile)
     except RemoteProtocolError:
@@ -359,7 +359,7 @@ def test_what_is_checked_by_hand_is_refused_when_made(valid: Any, changes: dict[
 
 
 def declared() -> list[tuple[Any, str, Any]]:
-    """The values just outside of each range that a message class declares."""
+    """Return the values just outside each range that a message class declares."""
     found: list[tuple[Any, str, Any]] = []
     samples = [VIEWS[0], VALID[0], control.Tune(HEADER, 1), control.LeaseNotice(HEADER, "armed", "", 1, 0)]  # type: ignore[arg-type]
     for sample in samples:
@@ -402,7 +402,7 @@ def test_a_message_that_is_prepared_is_the_same_under_any_header(message: AnyVie
 
 
 @pytest.mark.parametrize("strength", range(-1, STRENGTHS + 2))
-def test_a_uniform_field_begins_so_many_ways_before_any_distance(strength: int) -> None:
+def test_a_uniform_field_has_its_strength_at_every_distance(strength: int) -> None:
     if not 0 <= strength <= STRENGTHS:
         with pytest.raises(ValueError, match=f"strength = {strength}; valid: 0 to 8"):
             uniform_field(strength)

@@ -1,4 +1,4 @@
-"""The session's table: what it promises for every state, and that docs/session.md shows it as it is."""
+"""Table of the session: its promises for every state, and docs/session.md, which shows the same table."""
 
 import re
 
@@ -63,7 +63,7 @@ def test_a_stop_ends_by_arming_alone() -> None:
 
 
 @pytest.mark.parametrize("event", SessionEvent)
-def test_what_each_event_does_to_who_is_armed_who_owns_and_who_has_ended(event: SessionEvent) -> None:
+def test_effect_of_each_event_on_arming_ownership_and_ended_epochs(event: SessionEvent) -> None:
     if event in STOPPING:
         assert after(SessionState.ARMED, event) is not SessionState.ARMED
     if event is SessionEvent.EMERGENCY_STOP:
@@ -105,7 +105,7 @@ def test_the_document_shows_every_row_in_its_table_and_its_diagram() -> None:
         for before, after, events in re.findall(r"(\w+) --> (\w+): (.*)", text)
         for event in events.split(" / ")
     }
-    # A lease stands in a box: an arrow to it leads to `disarmed`, one from it holds for every state in it.
+    # A lease is a box: an arrow to the box leads to `disarmed`, one from it holds for every state in it.
     drawn = {
         (one, event, "disarmed" if after == "owner" else after)
         for before, event, after in arrows

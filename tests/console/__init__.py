@@ -1,1 +1,1 @@
-"""The console in a real browser, fed by a real run: `python -m tests.console`."""
+"""Console in a real browser, fed by a real run: `python -m tests.console`."""

@@ -1,4 +1,4 @@
-"""Chromium without a screen, and a page in it whose every complaint is kept."""
+"""Chromium without a screen, and a page in it whose every error is kept."""
 
 import base64
 import io
@@ -14,15 +14,15 @@ from tests.console.provide import provide_playwright, provided_browser
 from tests.helpers.machines.waiting import wait_until
 
 _ARGUMENTS: Final = (
-    "--no-sandbox",  # root has none
-    # Without a graphics processor WebGL is drawn by software. Not the whole page: that would take ten times as much.
+    "--no-sandbox",  # Root has no sandbox.
+    # Without a graphics processor WebGL is drawn by software. Not the whole page: that would take ten times as long.
     "--enable-unsafe-swiftshader",
     "--force-color-profile=srgb",
 )
 SMALL: Final = (1280, 720)
 LARGE: Final = (1920, 1080)
 _LIMIT_MS: Final = 60_000
-"""For one step, on a machine that has much else to do."""
+"""Limit of one step in milliseconds, for a busy machine."""
 _DRAWS_SCENE: Final = "button#drawn[aria-pressed=true]"
 _BRIGHTNESS: Final = (0.2126, 0.7152, 0.0722)
 _FAKE_GAMEPAD: Final = """
@@ -32,7 +32,7 @@ navigator.getGamepads = () => [window.pretended, null, null, null];
 
 
 class Browser:
-    """One browser; each page has a context of its own, as another person's would."""
+    """One browser; each page has a separate context, like another person's."""
 
     def __init__(self, chromium: Any, out: Path) -> None:
         self._chromium = chromium
@@ -48,9 +48,9 @@ class Browser:
         gamepad: bool = False,
         script: str = "",
     ) -> Iterator["Page"]:
-        """`address` open at `size`; whatever the page complained of fails the context's end.
+        """Yield `address` open at `size`; any error of the page fails at the context's end.
 
-        `scene`: with the drawn scene, which without a graphics processor takes most of a core. `script`: goes first.
+        scene: with the drawn scene, which without a graphics processor takes most of a core. script: runs first.
         """
         context = self._chromium.new_context(viewport={"width": size[0], "height": size[1]})
         context.set_default_timeout(_LIMIT_MS)
@@ -72,7 +72,7 @@ class Browser:
 
 
 class Page:
-    """A person at a page. `raw`: Playwright's own page, for all else."""
+    """Person at a page. `raw`: Playwright's page, for everything else."""
 
     def __init__(self, raw: Any, out: Path) -> None:
         self.raw = raw
@@ -84,7 +84,7 @@ class Page:
         raw.on("pageerror", lambda error: self.complaints.append(str(error)))
 
     def text(self, selector: str) -> str:
-        """The text of an element."""
+        """Return the text of an element."""
         return str(self.raw.text_content(selector) or "").strip()
 
     def ask(self, script: str, argument: object = None) -> Any:
@@ -92,8 +92,8 @@ class Page:
         return self.raw.evaluate(script, argument)
 
     def wait(self, script: str, what: str, limit_s: float = 20.0) -> None:
-        """Wait until a piece of JavaScript is true; AssertionError when it does not become so."""
-        # Asked from here: the page's own policy forbids what Playwright's waiting does within the page.
+        """Wait until a piece of JavaScript is true; AssertionError otherwise."""
+        # Evaluated from here: the page's policy forbids Playwright's own waiting within the page.
         try:
             wait_until(what, lambda: bool(self.ask(script)), limit_s)
         except AssertionError:
@@ -106,7 +106,7 @@ class Page:
         self.wait(script, f"{words!r} in {selector}", limit_s)
 
     def pixels(self, selector: str | None = None) -> np.ndarray[Any, np.dtype[np.uint8]]:
-        """(height, width, 3) of what is drawn there, or of the whole page."""
+        """Return the pixels (height, width, 3) of an element, or of the whole page."""
         return np.asarray(Image.open(io.BytesIO(self.shot(selector))).convert("RGB"))
 
     def picture(self, name: str) -> None:
@@ -114,7 +114,7 @@ class Page:
         (self._out / f"{name}.png").write_bytes(self.shot())
 
     def shot(self, selector: str | None = None) -> bytes:
-        """A PNG, as Chromium itself takes it: Playwright's way waits for the fonts of a scene that is busy drawing."""
+        """Return a PNG by Chromium's own tool: Playwright's would wait for the fonts of a busy scene."""
         clip = {}
         if selector is not None:
             box = self.raw.locator(selector).bounding_box()
@@ -123,12 +123,12 @@ class Page:
         return base64.b64decode(answer["data"])
 
     def press(self, key: str) -> None:
-        """Down and up."""
+        """Press and release a key."""
         self.raw.keyboard.press(key)
 
     @contextmanager
     def held(self, *keys: str) -> Iterator[None]:
-        """These keys down."""
+        """Hold these keys down."""
         for key in keys:
             self.raw.keyboard.down(key)
         try:
@@ -138,11 +138,11 @@ class Page:
                 self.raw.keyboard.up(key)
 
     def blur(self) -> None:
-        """The window loses the focus, as when a person goes to another one."""
+        """Take the focus from the window, as when a person goes to another one."""
         self.ask("window.dispatchEvent(new Event('blur'))")
 
     def hide(self) -> None:
-        """The tab is hidden, as when a person goes to another one."""
+        """Hide the tab, as when a person goes to another one."""
         self.ask(
             """() => {
             Object.defineProperty(document, 'visibilityState', { value: 'hidden', configurable: true });
@@ -152,7 +152,7 @@ class Page:
         )
 
     def pretend_gamepad(self, axes: tuple[float, ...], buttons: tuple[float, ...]) -> None:
-        """A gamepad in these positions, in the browser's standard order, until told otherwise."""
+        """Simulate a gamepad in these positions, in the browser's standard order, until changed."""
         script = """([axes, values]) => {
             const buttons = values.map((value) => ({ value, pressed: value > 0.5, touched: value > 0 }));
             const before = window.pretended;
@@ -166,19 +166,19 @@ class Page:
 
 
 def brightness(pixels: np.ndarray[Any, np.dtype[np.uint8]]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """(height, width), 0 to 255: the picture for a person who sees no colours."""
+    """Return the brightness (height, width), 0 to 255: the picture without colours."""
     made: np.ndarray[Any, np.dtype[np.float64]] = pixels.astype(np.float64) @ np.asarray(_BRIGHTNESS)
     return made
 
 
 def border(pixels: np.ndarray[Any, np.dtype[np.uint8]], width: int = 8) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    """(n, 3): the outermost pixels of the page's upper edge, corners aside."""
+    """Return the outermost pixels (n, 3) of the page's upper edge, without corners."""
     return pixels[:width, 4 * width : -4 * width].reshape(-1, 3)
 
 
 @contextmanager
 def browser(out: Path) -> Iterator[Browser]:
-    """Chromium, until the context ends; its pictures go to `out`. Skips the test where none can be had."""
+    """Yield Chromium; its pictures go to `out`. Skip the test if unavailable."""
     program = provided_browser()
     provide_playwright()
     from playwright.sync_api import sync_playwright  # noqa: PLC0415  # not part of our environment

@@ -1,4 +1,4 @@
-"""One browser for all, and demos whose console it opens: their person needs half a minute for the task, then rests."""
+"""One browser for all, and demos with a console: their person needs half a minute for the task, then rests."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -14,26 +14,26 @@ _OUT = Path("console-pictures")
 
 @pytest.fixture(scope="session", name="browser")
 def chromium() -> Iterator[Browser]:
-    """Chromium, and pictures of what it shows in console-pictures/."""
+    """Chromium; its pictures go to console-pictures/."""
     with browser(_OUT.absolute()) as opened:
         yield opened
 
 
 @pytest.fixture(scope="module")
 def link(request: pytest.FixtureRequest) -> Sequence[str]:
-    """The demos' arguments: a module without a link says `LINK = ()`."""
+    """Arguments of the demos: a module without a link has `LINK = ()`."""
     return getattr(request.module, "LINK", _LINK)
 
 
 @pytest.fixture(scope="module")
 def demo(link: Sequence[str]) -> Iterator[Run]:
-    """One for a whole module."""
+    """One demo for a whole module."""
     with running(link) as run:
         yield run
 
 
 @pytest.fixture
 def fresh_demo(link: Sequence[str]) -> Iterator[Run]:
-    """One whose person has just begun."""
+    """Demo whose person has just begun."""
     with running(link) as run:
         yield run

@@ -1,4 +1,4 @@
-"""A moving picture of the console's page: a recorded demo, a picture at a time, however slowly a machine draws."""
+"""Film of the console's page: a recorded demo, a picture at a time, however slowly a machine draws."""
 
 import io
 import time
@@ -20,7 +20,7 @@ from tests.helpers.machines.waiting import wait_until
 _DURATION_S: Final = 20.0
 _PERIOD_S: Final = 0.1
 _DRAWN_S: Final = 0.3
-"""The time that the scene, another site's page, needs to draw."""
+"""Time that the scene, another site's page, needs to draw."""
 _START_S: Final = 60.0
 _SIZE: Final = (960, 540)
 _QUALITY: Final = 40
@@ -30,11 +30,11 @@ WebGLRenderingContext.prototype.getParameter = function (name) {
   return name === 0x9246 ? "patient" : asked.call(this, name);
 };
 """
-"""A page that draws by software asks for four drawings a second; this one has the time for all."""
+"""Script for a page that draws by software: it would ask for four drawings a second; this one has time for all."""
 
 
 def make_film(folder: Path, paths: Sequence[Path]) -> None:
-    """20 s of a demo at 10 pictures a second, as a WebP."""
+    """Film 20 s of a demo at 10 pictures a second, as a WebP."""
     (path,) = paths
     recording = folder / "film.mcap"
     record_demo(recording, _DURATION_S)

@@ -1,4 +1,4 @@
-"""The hands of the page alone: real keys in a real browser, the operator side judging them, in virtual time."""
+"""Hands of the page alone: real keys in a real browser, judged by the operator side, in virtual time."""
 
 import functools
 import threading
@@ -55,7 +55,7 @@ class _Handler(SimpleHTTPRequestHandler):
 
 @contextmanager
 def served() -> Iterator[str]:
-    """The address of the page, while the context lasts."""
+    """Yield the address of the page."""
     server = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(_Handler, directory=str(_PLACE)))
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()
@@ -69,7 +69,7 @@ def served() -> Iterator[str]:
 
 @dataclass
 class HandsAlone:
-    """The page, and an operator side whose robot arms as soon as it is asked to. Time stands unless it is let pass."""
+    """Page, and an operator side whose robot arms on request. Time passes only by `let_pass`."""
 
     page: Page
     person: bool = False
@@ -79,7 +79,7 @@ class HandsAlone:
     now_ms: float = 0.0
     state: str = "disarmed"
     hears: bool = True
-    """Whether what the page sends arrives, and whether facts come"""
+    """Whether messages from the page arrive, and facts come"""
     messages: list[dict[str, Any]] = field(default_factory=list)
     intent: OperatorIntent | None = None
 
@@ -88,7 +88,7 @@ class HandsAlone:
         self.let_pass(0.1)
 
     def let_pass(self, for_s: float) -> None:
-        """Virtual time passes, here and there, in frames of 20 ms."""
+        """Advance virtual time, here and in the page, in frames of 20 ms."""
         for _ in range(round(1000 * for_s / _FRAME_MS)):
             self.now_ms += _FRAME_MS
             self.page.raw.clock.run_for(_FRAME_MS)
@@ -116,7 +116,7 @@ class HandsAlone:
             self.page.ask("(facts) => window.hands.show(facts)", self._facts(now_s))
 
     def _facts(self, now_s: float) -> dict[str, Any]:
-        self.pages.driven(now_s)  # first, as it looks whether the page is still there
+        self.pages.driven(now_s)  # First, as it checks whether the page is still there.
         nothing_asked = {"asked": "", "mean_ms": None, "p99_ms": None, "newest_ms": None}
         return {
             "status": _SILENT_STATUS | {"state": self.state, "person": self.shared.doing},
@@ -136,37 +136,37 @@ class HandsAlone:
         } | self.facts
 
     def drive(self) -> None:
-        """Up to where hold-to-run counts."""
+        """Run until hold-to-run counts."""
         self.page.raw.click("#drive")
         self.let_pass(1.3)
         self.expect("Ready")
 
     def run(self) -> None:
-        """Up to where this page moves the arm: Space is held."""
+        """Run until this page moves the arm: Space is held."""
         self.drive()
         self.page.raw.keyboard.down("Space")
         self.let_pass(0.2)
         self.expect("You drive")
 
     def expect(self, words: str) -> None:
-        """The page says so of the hands; AssertionError otherwise."""
+        """Assert that the page says these words of the hands."""
         if words not in (said := self.page.text("#hands_state")):
             raise AssertionError(f"the page says {said!r}, not {words!r}; {self.pages.doing}, {self.state}")
 
     @property
     def pulled(self) -> tuple[float, float]:
-        """The triggers' meaning: retreat and advance."""
+        """Meaning of the triggers: retreat and advance."""
         return (0.0, 0.0) if self.intent is None else (self.intent.l2, self.intent.r2)
 
     @property
     def runs(self) -> bool:
-        """Whether hold-to-run is held."""
+        """Return whether hold-to-run is held."""
         return self.intent is not None and self.intent.run
 
 
 @contextmanager
 def hands_alone(browser: Browser, *, person: bool = False, may_drive: bool = True) -> Iterator[HandsAlone]:
-    """The page open in a browser of its own, at time 0."""
+    """Yield the page open in a new browser context, at time 0."""
     with served() as address, browser.page("about:blank", gamepad=True) as page:
         page.raw.clock.install(time=0)
         page.raw.goto(address)

@@ -1,4 +1,4 @@
-"""Make the documents' pictures of real runs again, into docs/: `python -m tests.console.pictures [PART...]`."""
+"""Remake the documents' pictures of real runs, into docs/: `python -m tests.console.pictures [PART...]`."""
 
 import sys
 import tempfile
@@ -20,12 +20,12 @@ PARTS: Final[Mapping[str, tuple[Sequence[str], Callable[[Path, Sequence[Path]], 
     "recording": (["console/terminal.svg", "recording/run.png"], make_pictures_of_recording),
     "film": (["console/demo.webp"], make_film),
 }
-"""The files of each within docs/, and nothing else is in these folders."""
+"""Files of each part within docs/, the only content of their folders."""
 _TRIES: Final = 3
 
 
 def main(names: Sequence[str]) -> int:
-    """0 when all were made, or where no browser can be had, which the last line says."""
+    """Make the parts; return 0 if all were made, or if no browser is available, as the last line says."""
     for name in names or PARTS:
         files, make = PARTS[name]
         paths = [DOCS / file for file in files]
@@ -35,7 +35,7 @@ def main(names: Sequence[str]) -> int:
                     make(Path(folder), paths)
                 break
             except (AssertionError, FeelaheadError) as error:
-                # A run that a busy machine spoils is repeated.
+                # A run spoilt by a busy machine is repeated.
                 print(f"{name}: {error}")
                 if not left:
                     return 1

@@ -22,7 +22,7 @@ _LOOK_S: Final = 0.1
 
 
 def make_first_minute(folder: Path, paths: Sequence[Path]) -> None:
-    """Open, near the target, carrying, driven from the page, stopped: five PNG of 1280x720."""
+    """Keep opened, near the target, carrying, driven from the page, stopped: five PNG of 1280x720."""
     opened, near, carrying, driving, stopped = paths
     with browser(folder) as one, running(()) as run, one.page(run.address, scene=True) as page:
         _settle(page)
@@ -45,7 +45,7 @@ def make_first_minute(folder: Path, paths: Sequence[Path]) -> None:
 
 
 def _settle(page: Page) -> None:
-    """Let the person wait until all is drawn, which takes long without a graphics processor; then they go on."""
+    """Let the person wait until all is drawn, which takes long without a graphics processor; then let them continue."""
     page.wait("document.querySelector('#drive:enabled') !== null", "a button to drive by", 60.0)
     page.ask("document.querySelector('#drive').click()")
     page.wait("!document.querySelector('#give_back').hidden", "the person's hands off", 60.0)
@@ -61,7 +61,7 @@ def _settle(page: Page) -> None:
 
 
 def _keep_stiffest(page: Page, run: Run, folder: Path, path: Path) -> None:
-    """Keep the moment of the approach when R2 resists most: looks are too slow to wait for one."""
+    """Keep the moment of the approach when R2 resists most: sampling is too slow to wait for one."""
     most = 0
     run.wait_until("near", lambda run: max(run.facts[-1]["r2"]["zones"]) > 0, 60.0)
     while _doing(run) in ("advancing", "grasping"):
@@ -78,7 +78,7 @@ def _doing(run: Run) -> str:
 
 
 def _keep(page: Page, folder: Path, path: Path) -> None:
-    """Keep the page as it looks, in few colours."""
+    """Keep the present page, in few colours."""
     page.picture(path.stem)
     with Image.open(folder / path.name) as whole:
         whole.convert("RGB").quantize(_COLORS, dither=Image.Dither.NONE).save(path, optimize=True)

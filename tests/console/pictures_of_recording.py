@@ -25,7 +25,7 @@ _COLUMNS, _ROWS = 80, 24
 _COLORS: Final = 256
 _STIFF: Final = 4
 _FONT: Final = re.compile(r"@font-face \{.*?\}", re.DOTALL)
-"""Rich's own style would load fonts from elsewhere."""
+"""Fonts of Rich's own style, which would be loaded from the network."""
 
 
 def make_pictures_of_recording(folder: Path, paths: Sequence[Path]) -> None:
@@ -47,7 +47,7 @@ def record_demo(recording: Path, duration_s: float) -> list[dict[str, Any]]:
 
 
 def _feelahead(*arguments: str) -> str:
-    """Run a command and return its output; AssertionError with its last words where it failed."""
+    """Run a command and return its output; AssertionError with its last words if it failed."""
     command = [sys.executable, "-P", "-m", "feelahead", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT_S, check=False, cwd=ROOT)
     if done.returncode != 0:
@@ -56,8 +56,8 @@ def _feelahead(*arguments: str) -> str:
 
 
 def _near(events: Sequence[dict[str, Any]]) -> Screen:
-    """The terminal view at the last moment of the approach when R2 resists clearly."""
-    # What a recording holds is the operator side's alone; the terminal view of a demo is told what both sides know.
+    """Return the terminal view at the last moment of the approach when R2 resists clearly."""
+    # A recording holds the operator side's view alone; a demo's terminal view gets the facts of both sides.
     screen, found = Screen(), None
     for event in events:
         if event["event"] == "note":

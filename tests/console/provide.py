@@ -1,4 +1,4 @@
-"""A real browser and what drives it: Debian's Chromium, and Playwright by a lock and in a place of its own."""
+"""Real browser and its driver: Debian's Chromium, and Playwright by a lock in a separate folder."""
 
 import hashlib
 import platform
@@ -16,7 +16,7 @@ _NAMES: Final = ("chromium", "chromium-browser", "google-chrome")
 
 
 def provided_browser() -> str:
-    """Find a Chromium; in CI, root gets Debian's. Skips the test where none can be had."""
+    """Find a Chromium; in CI, root gets Debian's. Skip the test if unavailable."""
     found = next(filter(None, map(shutil.which, _NAMES)), None)
     if found is None:
         install((_NAMES[0], "fonts-dejavu-core"), _NAMES[0])
@@ -25,7 +25,7 @@ def provided_browser() -> str:
 
 
 def provide_playwright() -> None:
-    """Make `import playwright` work in this process; skips the test where it cannot be installed."""
+    """Make `import playwright` work in this process; skip the test if it cannot be installed."""
     pinned = hashlib.sha256(_LOCK.read_bytes()).hexdigest()[:12]
     place = cache_folder("console") / f"{platform.machine()}-{sys.version_info.major}.{sys.version_info.minor}-{pinned}"
     if not (place / "playwright").exists():

@@ -1,4 +1,4 @@
-"""A real run with a console: both sides as the demo starts them, and what it says of itself meanwhile."""
+"""Real run with a console: both sides as the demo starts them, and its events meanwhile."""
 
 import os
 import signal
@@ -15,27 +15,27 @@ from tests.helpers.machines.waiting import wait_until
 Event = dict[str, Any]
 STATE: Final = "document.body.dataset.state"
 DRAWN: Final = "['overview', 'first_person'].every((view) => document.getElementById(view).dataset.frames > 2)"
-"""Both cameras' pictures have come."""
+"""Script: both cameras' pictures have come."""
 _START_S: Final = 300.0
-"""The first start compiles the overlap kernels."""
+"""Limit of the start in seconds: the first one compiles the overlap kernels."""
 _KEPT: Final = 400
 
 
 class Run:
-    """A demo, and its newest facts."""
+    """Demo, and its newest facts."""
 
     def __init__(self, demo: StartedSide) -> None:
         self._demo = demo
         self.address = ""
-        """The console's, with its token."""
+        """Address of the console, with its token."""
         self.process_ids: dict[str, int] = {}
         """Process ids by side."""
         self.facts: deque[Event] = deque(maxlen=_KEPT)
-        """The newest last, ten a second."""
+        """Newest last, ten a second."""
         self.notes: list[str] = []
 
     def look(self) -> None:
-        """Take what it has said since."""
+        """Read its new events."""
         for event in self._demo.events():
             kind = event["event"]
             if kind == "console":
@@ -49,7 +49,7 @@ class Run:
         self._demo.check()
 
     def wait_until(self, what: str, holds: Callable[["Run"], object], limit_s: float = 30.0) -> float:
-        """Wait, and return the seconds that it took; AssertionError when it does not come."""
+        """Wait, and return the seconds it took; AssertionError if it does not come."""
         began_s = time.monotonic()
 
         def looked() -> bool:
@@ -61,12 +61,12 @@ class Run:
 
     @property
     def status(self) -> Event:
-        """The status in the newest facts."""
+        """Status in the newest facts."""
         return dict(self.facts[-1]["status"]) if self.facts else {}
 
     @contextmanager
     def frozen(self, side: str) -> Iterator[None]:
-        """kill -STOP it, and let it go on."""
+        """Stop a side's process with kill -STOP, and continue it at the end."""
         os.kill(self.process_ids[side], signal.SIGSTOP)
         try:
             yield
@@ -76,7 +76,7 @@ class Run:
 
 @contextmanager
 def running(arguments: Sequence[str]) -> Iterator[Run]:
-    """A demo that has a console and a link, until the context ends."""
+    """Yield a demo with a console and a link."""
     command = [sys.executable, "-P", "-m", "feelahead", "demo", "--status", "facts", "--duration", "3600", *arguments]
     with StartedSide("demo", command) as demo:
         run = Run(demo)

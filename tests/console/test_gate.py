@@ -1,4 +1,4 @@
-"""The gate: another web site is refused, with the token, too."""
+"""Gate: another web site is refused, even with the token."""
 
 import http.server
 import threading
@@ -31,7 +31,7 @@ def test_another_site_is_refused(browser: Browser, demo: Run) -> None:
             return { opened, read, image };
         }"""
         seen = page.ask(script, demo.address)
-        page.complaints.clear()  # the refusals themselves
+        page.complaints.clear()  # The refusals themselves.
         assert not seen["opened"], "its WebSocket was let in"
         assert not seen["read"], "it could read the page"
     with browser.page(demo.address) as page:
@@ -48,7 +48,7 @@ def _another_site() -> Iterator[str]:
             self.wfile.write(_PAGE)
 
         def log_message(self, format: str, *args: object) -> None:  # noqa: A002  # as the base class has it
-            """Say nothing."""
+            """Log nothing."""
 
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Answers)
     thread = threading.Thread(target=server.serve_forever)

@@ -1,4 +1,4 @@
-"""The keyboard drives a real run, lets go, and stops it; test_hands_alone.py has all else."""
+"""The keyboard drives a real run, releases, and stops it; test_hands_alone.py covers everything else."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ pytestmark = [pytest.mark.console, pytest.mark.processes]
 
 
 def test_space_drives(browser: Browser, demo: Run) -> None:
-    """Space held arms and runs, a pull moves, and the key that comes up lets go."""
+    """Space held arms and runs, a pull moves, and releasing its key ends the pull."""
     with browser.page(demo.address) as page:
         take_over(page, demo)
         with page.held("Space"):
@@ -38,7 +38,7 @@ def test_escape_stops(browser: Browser, fresh_demo: Run) -> None:
 
 
 def take_over(page: Page, run: Run) -> None:
-    """The page asks to drive, and its keys rest until it may."""
+    """Let the page ask to drive, and rest its keys until it may."""
     page.wait("document.querySelector('#drive:enabled') !== null", "a button to drive by", 20.0)
     page.raw.click("#drive")
     run.wait_until("the page's hands", lambda run: _newest(run)["hands"] == "browser", 10.0)
@@ -50,12 +50,12 @@ def _newest(run: Run) -> dict[str, Any]:
 
 
 def is_armed(run: Run) -> bool:
-    """Armed, by the newest facts."""
+    """Return whether the arm is armed, by the newest facts."""
     return run.status.get("state") == "armed"
 
 
 def pull(run: Run) -> float:
-    """R2's travel, by the newest facts."""
+    """Return R2's travel, by the newest facts."""
     return float(_newest(run)["r2"]["travel"] or 0.0)
 
 

@@ -1,4 +1,4 @@
-"""Keys, pointers and a gamepad at the page alone, in virtual time: what moves the controller, and what lets it go."""
+"""Keys, pointers and a gamepad at the page alone, in virtual time: what moves the controller and what releases it."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final
@@ -16,7 +16,7 @@ _AXES: Final = (0.0, 0.0, 0.0, 0.0)
 
 
 def test_keys_ramp_up_and_let_go_at_once(browser: Browser) -> None:
-    """Space arms and runs; W grows to the level over 0.6 s, and is nothing with the next message once it is up."""
+    """Space arms and runs; W grows to the level over 0.6 s, and is 0 with the next message after its release."""
     with hands_alone(browser) as alone:
         alone.run()
         keyboard = alone.page.raw.keyboard
@@ -44,7 +44,7 @@ def test_keys_ramp_up_and_let_go_at_once(browser: Browser) -> None:
 
 
 def test_every_key_does_what_it_says(browser: Browser) -> None:
-    """Each key, whatever the layout, moves what the page says, and nothing else."""
+    """Each key, in any layout, moves what the page says, and nothing else."""
     with hands_alone(browser) as alone:
         alone.run()
         keyboard = alone.page.raw.keyboard
@@ -99,7 +99,7 @@ ENDS: Final[Mapping[str, Callable[[HandsAlone], object]]] = {
 
 @pytest.mark.parametrize("end", ENDS.values(), ids=ENDS)
 def test_whatever_takes_the_keys_lets_go(browser: Browser, end: Callable[[HandsAlone], object]) -> None:
-    """Keys that are still down count no more, nor does one that goes down again too soon, however long it is held."""
+    """Keys that are still down count no more, nor does one pressed again too soon, however long it is held."""
     with hands_alone(browser) as alone:
         alone.run()
         keyboard = alone.page.raw.keyboard
@@ -120,7 +120,7 @@ def test_whatever_takes_the_keys_lets_go(browser: Browser, end: Callable[[HandsA
 
 
 def test_driving_begins_on_purpose_and_after_a_rest(browser: Browser) -> None:
-    """Keys do nothing before the button; Enter on it does; keys that are down then keep it from beginning."""
+    """Keys do nothing before the button; Enter on it begins; keys that are down then delay the beginning."""
     with hands_alone(browser) as alone:
         keyboard = alone.page.raw.keyboard
         keyboard.down("Space")
@@ -155,7 +155,7 @@ def test_driving_begins_on_purpose_and_after_a_rest(browser: Browser) -> None:
 
 
 def test_escape_is_sent_until_it_is_confirmed(browser: Browser) -> None:
-    """Esc stops in a field, for who only looks, and goes on until the state says so."""
+    """Esc stops in a field, also for an observer, and is sent until the state confirms it."""
     with hands_alone(browser) as alone:
         alone.page.raw.focus("#field")
         alone.facts = {"status": {"state": "armed", "link": "up", "owner": "armed"}}
@@ -179,7 +179,7 @@ def test_escape_is_sent_until_it_is_confirmed(browser: Browser) -> None:
 
 
 def test_pointer_and_gamepad_drive(browser: Browser) -> None:
-    """A pointer that drags, and a gamepad's travel as it is; both let go at once."""
+    """A pointer drags, and a gamepad's travel counts as it is; both release at once."""
     with hands_alone(browser) as alone:
         alone.drive()
         mouse, box = alone.page.raw.mouse, alone.page.raw.locator("#grip_advance").bounding_box()
@@ -239,7 +239,7 @@ def test_what_cannot_be_done_is_said(browser: Browser) -> None:
 
 
 def test_sliders_tune(browser: Browser) -> None:
-    """Keys move the sliders, the wish is sent once they rest, and what holds is written beside it."""
+    """Keys move the sliders, the wish is sent once they rest, and the present value is shown beside it."""
     with hands_alone(browser) as alone:
         keyboard = alone.page.raw.keyboard
         alone.let_pass(2.5)

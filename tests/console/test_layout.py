@@ -1,4 +1,4 @@
-"""Everything has its place, at the smallest size that is promised and at a large one, and by keyboard alone."""
+"""Everything fits at the smallest promised size and at a large one, and works by keyboard alone."""
 
 from typing import Final
 
@@ -49,7 +49,7 @@ def test_nothing_overflows(browser: Browser, demo: Run, size: tuple[int, int]) -
 
 
 def test_keyboard_reaches_everything(browser: Browser, demo: Run) -> None:
-    """Tab goes to everything that can be used, each with a mark to see, and not into a trap."""
+    """Tab reaches everything usable, each with a visible mark, and is never trapped."""
     with browser.page(demo.address) as page:
         page.wait(DRAWN, "drawn both views")
         names = page.ask(_FOCUSABLE)
@@ -70,7 +70,7 @@ def test_keyboard_reaches_everything(browser: Browser, demo: Run) -> None:
 
 
 def _inside(page: Page, selector: str, size: tuple[int, int]) -> tuple[float, float]:
-    """Return its width and height; AssertionError unless it lies within the page."""
+    """Return an element's width and height; AssertionError unless it is within the page."""
     box = page.raw.locator(selector).bounding_box() or dict.fromkeys(("x", "y", "width", "height"), 0.0)
     x, y, width, height = box["x"], box["y"], box["width"], box["height"]
     assert width > 0

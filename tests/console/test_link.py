@@ -1,4 +1,4 @@
-"""A link that is lost is unmistakable, also without colours."""
+"""A lost link is unmistakable, also without colours."""
 
 import time
 from typing import Any, Final
@@ -14,11 +14,11 @@ pytestmark = [pytest.mark.console, pytest.mark.processes]
 
 _ASKED_S: Final = 1.0
 _LIMIT_S: Final = 4.0
-"""A busy machine may take its time; the line says what it took."""
+"""Limit in seconds, for a busy machine; the printed line gives the time taken."""
 
 
 def test_frozen_robot_is_unmistakable(browser: Browser, demo: Run) -> None:
-    """kill -STOP of the robot side: words, border and both views say so, and it all comes back."""
+    """kill -STOP of the robot side: words, border and both views say so, and everything comes back."""
     with browser.page(demo.address) as page:
         page.wait(DRAWN, "drawn both views")
         page.wait(f"{STATE} == 'armed'", "armed", 60.0)
@@ -38,7 +38,7 @@ def test_frozen_robot_is_unmistakable(browser: Browser, demo: Run) -> None:
         assert words != words_before
         colour = np.abs(before.mean(axis=0) - lost.mean(axis=0)).max()
         assert colour > 40
-        # One flat brightness while armed, stripes while lost: seen without colours, too.
+        # One flat brightness while armed, stripes while lost: visible without colours, too.
         flat, striped = brightness(before).std(), brightness(lost).std()
         assert flat < 10
         assert striped > 50
@@ -49,7 +49,7 @@ def test_frozen_robot_is_unmistakable(browser: Browser, demo: Run) -> None:
 
 
 def _fresh_view(page: Page) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    """The overview at a moment when it was not stale: on a busy machine it may be, now and then."""
+    """Return the overview at a fresh moment: on a busy machine it may be stale now and then."""
     end_s = time.monotonic() + 60.0
     while time.monotonic() < end_s:
         page.wait("document.querySelector('#overview.old') === null", "a fresh view", 60.0)

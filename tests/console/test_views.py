@@ -16,18 +16,18 @@ VIEWS: Final = ("overview", "first_person")
 _OLDEST_MS: Final = 500.0
 _PATIENCE_S: Final = 60.0
 _LEAST_DETAIL: Final = 8.0
-"""Standard deviation of a picture's colours: an empty one has none."""
+"""Least standard deviation of a picture's colours: an empty one has none."""
 
 
 def test_both_views_move(browser: Browser, fresh_demo: Run) -> None:
-    """Both cameras' pictures are drawn, have something on them, change, and say their age."""
+    """Both cameras' pictures are drawn, are not empty, change, and show their age."""
     with browser.page(fresh_demo.address) as page:
         page.wait(DRAWN, "drawn both views")
         for view in VIEWS:
             before = page.pixels(f"#{view} canvas")
             assert before.std() > _LEAST_DETAIL
             _wait_for_change(page, view, before)
-        # How old on a busy machine is for a benchmark to say; at some moment both have to be fresh.
+        # Ages on a busy machine are for a benchmark; at some moment both must be fresh.
         end_s = time.monotonic() + _PATIENCE_S
         while _oldest_ms(page) >= _OLDEST_MS:
             assert time.monotonic() < end_s
@@ -35,7 +35,7 @@ def test_both_views_move(browser: Browser, fresh_demo: Run) -> None:
 
 
 def test_scene_is_drawn(browser: Browser, fresh_demo: Run) -> None:
-    """The scene has something on it, beside what the page says of it in words."""
+    """The scene is not empty, beside the page's words about it."""
     with browser.page(fresh_demo.address, scene=True) as page:
         page.wait("!document.querySelector('#scene iframe').hidden", "a scene", _PATIENCE_S)
         end_s = time.monotonic() + _PATIENCE_S
@@ -75,7 +75,7 @@ def test_triggers_agree(browser: Browser, fresh_demo: Run) -> None:
 
 
 def _wait_for_change(page: Page, view: str, before: Any) -> None:
-    """Wait until some of the view has changed; the arm moves most of the time."""
+    """Wait until a part of the view has changed; the arm moves most of the time."""
     end_s = time.monotonic() + 15.0
     while time.monotonic() < end_s:
         after = page.pixels(f"#{view} canvas")
@@ -87,7 +87,7 @@ def _wait_for_change(page: Page, view: str, before: Any) -> None:
 
 
 def _oldest_ms(page: Page) -> float:
-    """The greatest age that either view says within two seconds."""
+    """Return the greatest age that either view shows within two seconds."""
     ages = []
     for _ in range(20):
         for view in VIEWS:

@@ -1,4 +1,4 @@
-"""An engine to try the containers on, and both sides and the router running on it."""
+"""Container engine for the tests, and both sides and the router running on it."""
 
 import os
 import signal
@@ -25,7 +25,7 @@ _PATIENCE_S: Final = 60.0
 
 @pytest.fixture(scope="session")
 def engine() -> Iterator[Engine]:
-    """The engine that runs here; else, in CI and as root, one of our own, which ends with us."""
+    """Running engine; otherwise, in CI and as root, a new one that ends with the tests."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield Engine(_PROJECT)
@@ -39,7 +39,7 @@ def engine() -> Iterator[Engine]:
 
 @pytest.fixture(scope="session")
 def compose(engine: Engine) -> Iterator[Compose]:
-    """All of it, from nothing but images; nothing is left of it afterwards."""
+    """Containers of both sides and the router, from images alone, and removed afterwards."""
     options = dict.fromkeys(("ROBOT_OPTIONS", "OPERATOR_OPTIONS"), "--status json")
     settings = {"LINK": _LINK, "FEELAHEAD_BASE": _base_image(engine), "FEELAHEAD_IMAGES": engine.project, **options}
     one = Compose(engine, settings)
@@ -55,7 +55,7 @@ def compose(engine: Engine) -> Iterator[Compose]:
 
 
 def _base_image(engine: Engine) -> str:
-    """A base image, which is made of Debian's packages where none can be had."""
+    """Return a base image, made of Debian's packages if none is available."""
     for image, get in (
         (_OFFICIAL, ("image", "inspect")),
         (_OWN, ("image", "inspect")),
@@ -72,7 +72,7 @@ def _base_image(engine: Engine) -> str:
 
 
 def _own_engine(cache: Path) -> Iterator[Engine]:
-    """A daemon with files and a socket of its own; the bridge that it made goes with it."""
+    """Yield a daemon with separate files and socket; its bridge is removed with it."""
     had_bridge = Path("/sys/class/net/docker0").exists()
     place = {name: str(cache / name) for name in ("docker.sock", "data", "exec", "pid")}
     words = [
@@ -82,13 +82,13 @@ def _own_engine(cache: Path) -> Iterator[Engine]:
     environment = {"DOCKER_HOST": f"unix://{place['docker.sock']}"}
     with (
         (cache / "log").open("w") as log,
-        # Ctrl-C reaches this process alone, which needs the engine to remove what it made.
+        # Ctrl-C must reach only this process, which needs the engine for removing everything.
         subprocess.Popen(words, stdout=log, stderr=log, start_new_session=True) as daemon,
     ):
         try:
             _wait_for_daemon(daemon, environment, cache / "log")
             yield Engine(_PROJECT, environment)
-            # What older versions of the images were built of.
+            # Layers of older versions of the images.
             _tidy("docker", "image", "prune", "--force", "--filter", "until=168h", environment=environment)
         finally:
             daemon.terminate()
@@ -110,6 +110,6 @@ def _wait_for_daemon(daemon: subprocess.Popen[bytes], environment: Mapping[str, 
 
 
 def _tidy(*words: str, environment: Mapping[str, str]) -> bool:
-    """Run a command that may fail; whether it did well."""
+    """Run a command that may fail; return whether it succeeded."""
     asked = subprocess.run(words, env=os.environ | dict(environment), capture_output=True, check=False)
     return asked.returncode == 0

@@ -21,12 +21,12 @@ pytestmark = [pytest.mark.containers, pytest.mark.processes]
 SERVICES: Final = ("router", "robot", "operator")
 DISTURBED: Final = re.compile(r"warning|traceback|error|exception|refused|denied|failed|cannot", re.IGNORECASE)
 MOST_GAP_MS: Final = 1000.0
-"""100 ms are promised, and 20 more in the worst case; only a quiet machine can be held to that."""
+"""Limit of a gap in milliseconds: 100 ms are promised, and 20 more at worst, but only a quiet machine keeps them."""
 
 
 @pytest.fixture(scope="session")
 def running(compose: Compose) -> Engine:
-    """Everything is up, and a trigger has stiffened."""
+    """All containers are up, and a trigger has stiffened."""
     began_s = time.monotonic()
     compose.engine.compose("up", "--detach", settings=compose.settings)
     operator = Watched(compose.engine, "operator")
@@ -58,7 +58,7 @@ def test_the_health_checks_agree(running: Engine) -> None:
 
 def test_no_log_tells_of_trouble_and_the_routers_tells_the_link(running: Engine) -> None:
     lines = running.compose("logs", "--no-color").splitlines()
-    # Names of figures, such as `refused`, count and do not complain.
+    # Names of figures, such as `refused`, are no complaints.
     told = [re.sub(r'"[a-z_0-9]+": ?', "", line) for line in lines if "NO netem" not in line]
     assert [line for line in told if DISTURBED.search(line)] == []
     [how] = [line.split("feelahead-router: ", 1)[1] for line in lines if "netem" in line]
@@ -71,7 +71,7 @@ def test_killed_the_arm_stops_and_comes_back_disarmed(running: Engine, service: 
 
 
 def test_the_router_taken_out_of_a_network_and_put_back(running: Engine) -> None:
-    """It gets another address and another interface."""
+    """The router gets another address and another interface."""
     network, router = f"{running.project}_operator", running.container("router")
 
     def take() -> None:
@@ -83,7 +83,7 @@ def test_the_router_taken_out_of_a_network_and_put_back(running: Engine) -> None
 
 
 def test_the_robot_side_killed(running: Engine) -> None:
-    """The triggers are released, and it comes back disarmed, with none of the old commands."""
+    """The triggers are released, and the robot side comes back disarmed, without any old command."""
     robot, operator = Watched(running, "robot"), Watched(running, "operator")
     armed(robot)
     operator.new_events()
@@ -104,9 +104,9 @@ def test_sigterm_ends_both_sides_well(running: Engine) -> None:
 
 
 def test_a_trial_of_the_latency_experiment(compose: Compose, tmp_path: Path) -> None:
-    """Both media know of one contact, and the containers leave nothing."""
+    """Both media have a contact, and the containers leave nothing."""
     words = ["--links", "lan", "--haptics", "off", "--seeds", "1", "--duration", "8", "--media", "virtual", "--compose"]
-    # Others' trials, and what older ones left, are not ours to judge.
+    # Trials of others, and remains of older ones, are not judged here.
     before = compose.existing(f"name={TRIALS}")
     summary = tmp_path / "latency.json"
     command = [sys.executable, "-P", "-m", "feelahead", "try", "latency", *words, f"--summary={summary}"]
@@ -122,7 +122,7 @@ def test_a_trial_of_the_latency_experiment(compose: Compose, tmp_path: Path) -> 
 
 
 def disturbed_and_back(engine: Engine, disturb: Callable[[], None]) -> None:
-    """Stopped in time, then armed by the person."""
+    """Assert that the arm stops in time, and that the person arms it again."""
     robot = Watched(engine, "robot")
     armed(robot)
     robot.new_events()
@@ -134,13 +134,13 @@ def disturbed_and_back(engine: Engine, disturb: Callable[[], None]) -> None:
 
 
 def armed(robot: Watched) -> None:
-    """Wait until it is, from now on."""
+    """Wait until the robot side is armed from now on."""
     robot.new_events()
     robot.wait_for("armed", state_is("armed"), 120.0)
 
 
 def came_back_disarmed(robot: Watched) -> None:
-    """After a stop or a start: armed only after it was seen disarmed once more, and with a link."""
+    """Assert that after a stop or a start the arm was seen disarmed, and with a link, before it was armed."""
     heard = [event for event in robot.wait_for("armed", state_is("armed"), 120.0) if event.get("event") == "status"]
-    # Five statuses fit into the healthy second that arming asks for.
+    # Five statuses fit into the healthy second that arming needs.
     assert any(link_up(event) and state_is("disarmed", "ready")(event) for event in heard[-2:-1])

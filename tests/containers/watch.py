@@ -1,4 +1,4 @@
-"""The containers of a run, and what each says, event by event."""
+"""Containers of a run, and their events."""
 
 import json
 import os
@@ -15,14 +15,14 @@ Event = dict[str, Any]
 
 @dataclass(frozen=True)
 class Compose:
-    """A run on an engine."""
+    """Run on an engine."""
 
     engine: Engine
     settings: Mapping[str, str]
-    """The variables of compose.yaml."""
+    """Variables of compose.yaml."""
 
     def existing(self, which: str) -> set[str]:
-        """The containers, networks and volumes that a filter of the engine lets through."""
+        """Return the containers, networks and volumes that match a filter of the engine."""
         kinds = (("ps", "--all"), ("network", "ls"), ("volume", "ls"))
         return {one for kind in kinds for one in self.engine.docker(*kind, "--quiet", "--filter", which).split()}
 
@@ -45,7 +45,7 @@ class Watched:
         return said
 
     def wait_for(self, what: str, holds: Callable[[Event], bool], limit_s: float = 60.0) -> list[Event]:
-        """Everything that it says up to the first event that holds; AssertionError when none does in time."""
+        """Return its events up to the first that holds; AssertionError if none does in time."""
         heard: list[Event] = []
 
         def found() -> bool:
@@ -61,15 +61,15 @@ class Watched:
         return heard
 
     def kill(self) -> None:
-        """kill -9 its first process, as the system would when memory runs out."""
+        """Kill its first process with kill -9, as the system would when memory runs out."""
         os.kill(int(self._engine.inspect(self.container)["State"]["Pid"]), signal.SIGKILL)
 
 
 def state_is(*states: str) -> Callable[[Event], bool]:
-    """Whether a status tells one of these states of the arm."""
+    """Return a test whether a status has one of these states of the arm."""
     return lambda event: event.get("event") == "status" and event.get("state") in states
 
 
 def link_up(event: Event) -> bool:
-    """Whether a status tells of a link."""
+    """Return whether a status has a link."""
     return event.get("event") == "status" and event.get("link") == "up"

@@ -1,4 +1,4 @@
-"""Small arms in MJCF that the tests write to files, each unlike the built-in one in one respect."""
+"""Small arms in MJCF that the tests write to files, each different from the built-in one in one respect."""
 
 from pathlib import Path
 
@@ -54,14 +54,14 @@ TENDON_GRIPPER = (
     '<general name="hand" tendon="split" forcerange="-100 100" ctrlrange="0 255" biastype="affine"'
     ' gainprm="0.0156863 0 0" biasprm="0 -100 -10"/>'
 )
-# Two servos that run against each other: the right finger's joint opens towards negative values.
+# Two opposed servos: the right finger's joint opens towards negative values.
 MIRRORED_GRIPPER = (
     '<position name="left" joint="left" kp="500" kv="20" ctrlrange="0 0.04"/>'
     '<position name="right" joint="right" kp="500" kv="20" ctrlrange="-0.04 0"/>'
 )
 COUPLING = '<equality><joint joint1="left" joint2="right"/></equality>'
 
-# Objects of every shape for the planar arm, two of them in trees of bodies and one that is there to be looked at.
+# Objects of every shape for the planar arm, two in trees of bodies and one that is only visible.
 SHAPES = """
   <body name="post" pos="0.9 0.3 0.2" euler="20 30 40">
     <geom name="cylinder" type="cylinder" size="0.05 0.1"/>
@@ -92,7 +92,7 @@ def planar_arm(
     extra_bottom: str = COUPLING,
     mirrored: bool = False,
 ) -> Path:
-    """Write the planar arm to `path`/arm.xml and give that file."""
+    """Write the planar arm to `path`/arm.xml and return that file."""
     file = path / "arm.xml"
     file.write_text(
         PLANAR_ARM.format(

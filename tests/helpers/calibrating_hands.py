@@ -1,4 +1,4 @@
-"""Hands that follow the calibration's steps on a controller whose wear a test chooses."""
+"""Hands that follow the calibration's steps on a controller with a chosen wear."""
 
 import math
 from collections.abc import Callable
@@ -15,18 +15,18 @@ _PULL_S = 0.8
 
 @dataclass(frozen=True)
 class Wear:
-    """What a controller reports at rest and at the end of its travel, with uniform noise to either side."""
+    """Reports of a controller at rest and at the end of its travel, with uniform noise to either side."""
 
     l2: tuple[float, float] = (0.0, 1.0)
     r2: tuple[float, float] = (0.0, 1.0)
     left: tuple[Stick, Stick] = ((0.0, 0.0), (0.0, 0.0))
-    """Where it rests before it is moved, and after."""
+    """Resting position before and after the first movement."""
     right: tuple[Stick, Stick] = ((0.0, 0.0), (0.0, 0.0))
     noise: float = 0.0
 
 
 PullDepth = Callable[[str, int], float]
-"""How far of the whole way a trigger is pulled for the n-th time."""
+"""Function from trigger and number of the pull to its depth, as a share of the full travel."""
 
 
 def fully(trigger: str, number: int) -> float:
@@ -35,7 +35,7 @@ def fully(trigger: str, number: int) -> float:
 
 
 class Hands:
-    """Does what the procedure asks for."""
+    """Hands that follow the procedure's steps."""
 
     def __init__(self, wear: Wear, depth: PullDepth = fully, seed: int = 0) -> None:
         self.procedure = CalibrationProcedure()
@@ -49,7 +49,7 @@ class Hands:
         self._moved = False
 
     def run(self, longest_s: float = 200.0) -> CalibrationProcedure:
-        """Until it is done."""
+        """Run until the procedure is done, for at most `longest_s`."""
         while self.procedure.step is not Step.DONE and self.now_s < longest_s:
             before = self.procedure.step
             self.procedure.feed(self._state(), self.now_s)

@@ -1,4 +1,4 @@
-"""Exchanges of stamps between two clocks whose offset is known."""
+"""Exchanges of stamps between two clocks of known offset."""
 
 from collections.abc import Callable
 
@@ -10,12 +10,12 @@ Clock = Callable[[float], float]
 
 
 def ahead(by_s: float, skew: float = 0.0) -> Clock:
-    """A peer's clock by ours."""
+    """Return a peer's clock as a function of ours."""
     return lambda now_s: now_s * (1.0 + skew) + by_s
 
 
 def exchange(offset: ClockOffset, start_s: float, there_s: float, held_s: float, back_s: float, clock: Clock) -> float:
-    """One exchange with a peer that has `clock`; when its answer was received, by our clock."""
+    """Run one exchange with a peer that has `clock`; return the time of the answer's receipt by our clock."""
     peer_received_s, peer_sent_s = clock(start_s + there_s), clock(start_s + there_s + held_s)
     received_s = start_s + there_s + held_s + back_s
     offset.update(start_s, peer_sent_s, peer_sent_s - peer_received_s, received_s)
@@ -30,7 +30,7 @@ def talk(
     start_s: float = 0.0,
     period_s: float = 0.004,
 ) -> float:
-    """An exchange each `period_s`, received in order of arrival; when the last one was, by our clock."""
+    """Run an exchange each `period_s`, received in order of arrival; return the last receipt by our clock."""
     sent_s = start_s + period_s * np.arange(there_s.size)
     received_s = sent_s + there_s + 0.001 + back_s
     for k in np.argsort(received_s):

@@ -1,4 +1,4 @@
-"""A companion that renders nothing and does as a test says, with Cameras in front of it."""
+"""Companion that renders nothing and acts as a test says, with Cameras in front of it."""
 
 import socket
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from robot_side.viewing.settings import CamerasSettings
 
 
 class FakeCompanion:
-    """Both ends of a channel, and what the other end was sent."""
+    """Both ends of a channel, and the other end's received messages."""
 
     def __init__(self) -> None:
         ours, theirs = socket.socketpair()
@@ -33,13 +33,13 @@ class FakeCompanion:
         self.other.send(encode(message))
 
     def picture(self, order: Order, content: bytes = b"\xff\xd8", number: int = 0, *, whole: bool = True) -> None:
-        """As JPEG, or with a `number` as H.264."""
+        """Send a picture as JPEG, or with a `number` as H.264."""
         size = (320, 240) if order.halved else (640, 480)
         self.answer(Picture(order.view, order.captured_s, *size, content, 0.003, number, whole))
 
 
 class Desk:
-    """Cameras, the companions that they started, and what a person was told."""
+    """Cameras, their started companions, and their notes to a person."""
 
     def __init__(self, scene: Scene, settings: CamerasSettings | None = None) -> None:
         self.scene = scene

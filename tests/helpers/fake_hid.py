@@ -1,4 +1,4 @@
-"""A stand-in for hidapi that behaves as measured: `[]` and OSError, -1 on a dead write, [] on a silent read."""
+"""Stand-in for hidapi that behaves as measured: `[]` and OSError, -1 on a dead write, [] on a silent read."""
 
 import zlib
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from operator_side.dualsense.reports.transport import Transport
 ADDRESS = "a4:5e:60:01:02:03"
 FIRMWARE = Firmware(hardware_version=0x0616, firmware_version=0x0110002A, update_version=0x0630)
 SIMPLE_REPORT = bytes.fromhex("01 80808080 080000 0000")
-"""The first report over Bluetooth: nothing touched."""
+"""First report over Bluetooth: nothing touched."""
 USB, BLUETOOTH = Transport.USB, Transport.BLUETOOTH
 
 
@@ -26,9 +26,9 @@ class FakeHandle:
     opens: bool = True
     reason: str = ""
     answers: bool = True
-    """Whether it answers feature reports."""
+    """Whether the controller answers feature reports."""
     garbled: int = 0
-    """Number of feature reports that come over the air with a wrong bit."""
+    """Number of feature reports that arrive over Bluetooth with a wrong bit."""
     silent: bool = False
     plugged_in: bool = True
     waiting: list[bytes] = field(default_factory=list)
@@ -94,7 +94,7 @@ class FakeHandle:
 
 
 class FakeBackend:
-    """The system's controllers by product id and path; one that is opened again is the same."""
+    """System's controllers by product id and path; reopening one gives the same controller."""
 
     def __init__(self, found: dict[int, dict[bytes, FakeHandle]]) -> None:
         self.found = found
@@ -108,7 +108,7 @@ class FakeBackend:
 
 
 class _Unopened(FakeHandle):
-    """A handle that becomes the controller's own when it is opened."""
+    """Handle that becomes the controller's own when opened."""
 
     def __init__(self, backend: FakeBackend) -> None:
         super().__init__()
@@ -128,5 +128,5 @@ class _Unopened(FakeHandle):
 
 
 def valid_checksum(report: bytes) -> bool:
-    """Whether an output report over Bluetooth is one that hardware would take; written out apart from our own code."""
+    """Return whether hardware would accept an output report over Bluetooth; computed apart from our own code."""
     return zlib.crc32(b"\xa2" + report[:-4]) == int.from_bytes(report[-4:], "little")

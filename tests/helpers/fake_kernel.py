@@ -1,4 +1,4 @@
-"""The kernel's end of /dev/uhid, in virtual time, and a controller of the simplest kind."""
+"""Kernel's end of /dev/uhid, in virtual time, and a controller of the simplest kind."""
 
 import struct
 from collections import deque
@@ -15,7 +15,7 @@ FEATURE, OUT = 0, 1
 
 
 def said(kind: int, payload: bytes = b"") -> bytes:
-    """An event as the kernel gives it: as long as the longest."""
+    """Return an event as the kernel gives it, padded to the longest."""
     return (struct.pack("=I", kind) + payload).ljust(EVENT_LENGTH, b"\0")
 
 
@@ -29,11 +29,11 @@ def get_report(request: int, report_id: int, kind: int = FEATURE) -> bytes:
 
 @dataclass
 class FakeKernel(UhidFile):
-    """The file that the loop reads, waits for and writes; a wait lets the time pass."""
+    """File that the loop reads, waits for and writes; a wait advances the clock."""
 
     clock: VirtualClock
     to_say: deque[tuple[float, bytes]] = field(default_factory=deque)
-    """(when, event), in order."""
+    """(time, event), in order."""
     heard: list[tuple[float, bytes]] = field(default_factory=list)
     refuses_from_s: float = float("inf")
 
@@ -58,7 +58,7 @@ class FakeKernel(UhidFile):
 
 
 class PlainController(SimulatedDualSense):
-    """A report that counts, at each reading; takes what begins with 2, and has feature 5."""
+    """Controller whose report counts the readings; it accepts output 2 and has feature 5."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Messages that a robot side may send, and strengths that they become: what tests need often."""
+"""Messages from a robot side, and strengths made of them, for many tests."""
 
 import struct
 from typing import Any
@@ -12,13 +12,13 @@ from operator_side.controller.feel import Strengths
 
 
 def ways(*metres: float) -> Ways:
-    """Eight ways; the last of those given, again and again, for those that are not."""
+    """Return eight distances; the last given one fills the rest."""
     whole: Ways = (*metres, *(metres[-1],) * (8 - len(metres)))  # type: ignore[assignment]
     return whole
 
 
 def field(fast_m: Ways, slow_m: Ways | None = None, **changes: Any) -> TriggerField:
-    """A field with these ways, v_max = 0.25 m/s and a = 3 m/s² unless `changes` say otherwise."""
+    """Return a field with these distances, v_max = 0.25 m/s and a = 3 m/s² unless changed."""
     return msgspec.structs.replace(uniform_field(0), fast_m=fast_m, slow_m=slow_m or fast_m, **changes)
 
 
@@ -31,7 +31,7 @@ def felt(
     state: MotionState = "armed",
     stands: bool = False,
 ) -> StiffnessUpdate:
-    """The same strength in every zone of each trigger, 0 to 8, whatever the hands and the arm do."""
+    """Return an update with the same strength, 0 to 8, in every zone of each trigger, whatever hands and arm do."""
     return StiffnessUpdate(
         *(header, uniform_field(l2), uniform_field(r2), 0.0, FAR_M, rumble, state),
         stands=stands,
@@ -39,7 +39,7 @@ def felt(
 
 
 def telemetry(header: Header, **changes: Any) -> Telemetry:
-    """A tool at the origin that looks downwards, disarmed, and nothing else, unless `changes` say otherwise."""
+    """Return telemetry of a disarmed tool at the origin that points downwards, unless changed."""
     still = Telemetry(
         *(header, "disarmed", (0.0, 0.0, 0.0), None, None, (0.0, -1.0, 0.0), 0.0),
         *(0.0, False, 0.0, 0.0, 0.0),
@@ -48,7 +48,7 @@ def telemetry(header: Header, **changes: Any) -> Telemetry:
 
 
 def scene_state(header: Header, version: int = 1) -> SceneState:
-    """One link, one object and no sphere, all in one place."""
+    """Return a scene of one link, one object and no sphere, all in one place."""
     pose = (0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0)
     row, terms = struct.pack("<7f", *pose), EnlargementTerms(0.01, 0.0, 0.001, 0.003, 0.002, 2.3, 0.1, 0.02)
     return SceneState(
@@ -58,5 +58,5 @@ def scene_state(header: Header, version: int = 1) -> SceneState:
 
 
 def feedback(position: int, strength: int) -> Strengths:
-    """One strength from a zone to the end of the travel."""
+    """Return strengths that are constant from zone `position` to the end of the travel."""
     return (0,) * position + (strength,) * (10 - position)

@@ -1,4 +1,4 @@
-"""Environments of their own, and commands that run in them."""
+"""Isolated environments, and commands that run in them."""
 
 import os
 import subprocess
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def run(*command: str | Path) -> subprocess.CompletedProcess[str]:
-    """Run a command that sees nothing of the environment that the tests run in."""
+    """Run a command without the environment that the tests run in."""
     environment = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "VIRTUAL_ENV"}}
     return subprocess.run(
         [str(part) for part in command], capture_output=True, text=True, timeout=1200, env=environment, check=False
@@ -15,12 +15,12 @@ def run(*command: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 def wanted(wheel: Path, extra: str = "") -> str:
-    """The wheel with an extra, as pip wants it."""
+    """Return the wheel with an extra, in pip's syntax."""
     return f"feelahead{extra and f'[{extra}]'} @ {wheel.as_uri()}"
 
 
 def installed(extra: str, wheel: Path, constraints: Path, folder: Path) -> Path:
-    """The bin folder of a new environment with that extra alone, or none."""
+    """Return the bin folder of a new environment with that extra alone, or none."""
     venv.create(folder, with_pip=True)
     install = run(folder / "bin/python", "-m", "pip", "install", "-q", "-c", constraints, wanted(wheel, extra))
     assert install.returncode == 0, install.stderr
@@ -28,7 +28,7 @@ def installed(extra: str, wheel: Path, constraints: Path, folder: Path) -> Path:
 
 
 def absent(bin_folder: Path, *modules: str) -> None:
-    """AssertionError when one of the modules is there."""
+    """Assert that none of the modules is there."""
     for module in modules:
         found = run(bin_folder / "python", "-c", f"import {module}")
         assert "ModuleNotFoundError" in found.stderr, f"{module} is installed"

@@ -1,4 +1,4 @@
-"""Messages sent through an emulated line at even times, and what became of them."""
+"""Messages sent through an emulated line at even times, and their deliveries."""
 
 import itertools
 import math
@@ -13,7 +13,7 @@ PERIOD_S = 1e-3
 
 
 class Run:
-    """What became of messages sent every millisecond: a list of (time of delivery, number)."""
+    """Deliveries of messages sent every millisecond: a list of (time of delivery, number)."""
 
     def __init__(
         self,

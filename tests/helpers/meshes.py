@@ -1,4 +1,4 @@
-"""Closed meshes, convex or not, for the tests of whatever takes one."""
+"""Closed meshes, convex or not."""
 
 from itertools import permutations
 
@@ -37,7 +37,7 @@ def grid_tetrahedra(size: int) -> tuple[FloatArray, IntArray]:
 
 
 def surface_of(tetrahedra: IntArray) -> IntArray:
-    """Return the outward triangles (t, 3) of positively oriented tetrahedra: the faces that no two of them share."""
+    """Return the outward triangles (t, 3) of positively oriented tetrahedra: the faces that only one has."""
     faces: dict[tuple[int, ...], IntArray] = {}
     for tetrahedron in tetrahedra:
         for face in tetrahedron[TETRAHEDRON_TRIANGLES]:
@@ -67,8 +67,8 @@ def round_mesh(subdivisions: int) -> tuple[FloatArray, IntArray]:
 
 
 def cup() -> tuple[FloatArray, IntArray]:
-    """Vertices (v, 3) in m and triangles (t, 3) of a block of 3³ cubes without the middle and upper one of its middle
-    column: a mouth that opens upward, 40 mm wide and 80 mm deep, between walls and over a floor of 40 mm."""
+    """Return vertices (v, 3) in m and triangles (t, 3) of a block of 3³ cubes without its middle and upper middle cube.
+    The mouth opens upward, 40 mm wide and 80 mm deep, between walls and over a floor of 40 mm."""
     places, tetrahedra = grid_tetrahedra(3)
     middles = np.floor(places[tetrahedra].mean(axis=1))
     mouth = (middles[:, 0] == 1.0) & (middles[:, 1] == 1.0) & (middles[:, 2] >= 1.0)

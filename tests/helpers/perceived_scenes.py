@@ -17,7 +17,7 @@ _FIVE_TETRAHEDRA = np.array([[0, 4, 2, 1], [6, 4, 2, 7], [5, 4, 1, 7], [3, 2, 1,
 
 
 class Scene:
-    """Objects, each of one or more primitives, in the order in which they are added."""
+    """Objects, each of one or more primitives, in the order of their addition."""
 
     def __init__(self) -> None:
         self.roles: list[Role] = []
@@ -30,7 +30,7 @@ class Scene:
         self._shapes: list[Mesh] = []
 
     def add(self, role: Role = Role.OBSTACLE) -> "Scene":
-        """A new object; what follows belongs to it."""
+        """Begin a new object, to which the next primitives belong."""
         self.roles.append(role)
         return self
 
@@ -108,7 +108,7 @@ def random_rotation(rng: np.random.Generator) -> FloatArray:
 def random_scene(
     rng: np.random.Generator, of_each_kind: int, extent_m: float = 1.0, meshes: int = 0
 ) -> PerceivedObjects:
-    """Objects of every kind, and `meshes`, each of one primitive, within `extent_m` of the origin."""
+    """Return objects of every kind, and `meshes`, each of one primitive, within `extent_m` of the origin."""
     scene = Scene()
     for _ in range(of_each_kind):
         center = rng.uniform(-extent_m, extent_m, 3)

@@ -1,9 +1,9 @@
-"""feelahead-operator on a controller made of two files: a program for tests/operator_side/test_controller_processes.py.
+"""feelahead-operator on a controller made of two files, for tests/operator_side/test_controller_processes.py.
 
     python plugged_operator.py FOLDER [feelahead-operator's flags]
 
-FOLDER/hidraw3 is a FIFO that gets what is written to the controller. While FOLDER/plugged exists, the controller is
-plugged in; FOLDER/broken makes reading it fail as no driver should. While FOLDER/hangs exists, no write returns.
+FOLDER/hidraw3 is a FIFO for the writes to the controller. While FOLDER/plugged exists, the controller is plugged in.
+FOLDER/broken makes reading it fail as no driver should. While FOLDER/hangs exists, no write returns.
 """
 
 import os
@@ -24,7 +24,7 @@ REPORT_PERIOD_S = 0.004
 
 
 class PluggedHandle(FakeHandle):
-    """A controller that is there while a file is."""
+    """Controller that exists while a file does."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -61,7 +61,7 @@ class PluggedHandle(FakeHandle):
 
 
 class PluggedBackend:
-    """The system's controllers: one or none."""
+    """System's controllers: one or none."""
 
     def enumerate(self, vendor_id: int, product_id: int) -> list[dict[str, Any]]:
         del vendor_id

@@ -1,4 +1,4 @@
-"""Python processes of ours, with their output and errors to be read."""
+"""Python processes with readable output and errors."""
 
 import os
 import subprocess
@@ -7,11 +7,11 @@ import sys
 from tests.helpers.repository import ROOT
 
 LIMIT_S = 600.0
-"""Long enough for a machine that is busy with other things, too."""
+"""Time limit in seconds, long enough for a busy machine."""
 
 
 def start(*arguments: str, **environment: str) -> "subprocess.Popen[str]":
-    """Start Python with these arguments, and more variables of the environment."""
+    """Start Python with these arguments and additional environment variables."""
     return subprocess.Popen(
         [sys.executable, *arguments],
         stdout=subprocess.PIPE,
@@ -23,7 +23,7 @@ def start(*arguments: str, **environment: str) -> "subprocess.Popen[str]":
 
 
 def ended(*arguments: str, **environment: str) -> tuple[int, str, str]:
-    """The exit code of such a process at its end, its output and its errors."""
+    """Run such a process to its end; return its exit code, output and errors."""
     with start(*arguments, **environment) as process:
         said, complaint = process.communicate(timeout=LIMIT_S)
     return process.returncode, said, complaint

@@ -1,4 +1,4 @@
-"""The words of a refusal."""
+"""Text of a refusal."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,7 +9,7 @@ from common.errors import ConfigurationError
 
 
 def refusal(call: Callable[..., object], *arguments: Any) -> str:
-    """The one line in which `call` refuses its arguments; AssertionError for none, and for several."""
+    """Return the one line in which `call` refuses its arguments; fail on none or several."""
     with pytest.raises(ConfigurationError) as caught:
         call(*arguments)
     assert "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""Where the repository is, for tests that read its files or start its commands."""
+"""Root of the repository, for tests that read its files or start its commands."""
 
 from pathlib import Path
 

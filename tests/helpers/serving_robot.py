@@ -1,4 +1,4 @@
-"""A robot side without an arm: real sockets and the real session, in a thread."""
+"""Robot side without an arm: real sockets and the real session, in a thread."""
 
 import threading
 from typing import Self
@@ -15,11 +15,11 @@ from robot_side.operators.safety import Safety, SafetySettings
 from tests.helpers.felt import telemetry
 
 LEASE_S = 59.0
-"""Long enough for an owner who says nothing to stay one."""
+"""Lease in seconds, long enough for a silent owner to keep it."""
 
 
 class ServingRobot:
-    """Answers as a robot side does, and publishes telemetry."""
+    """Robot side that answers and publishes telemetry."""
 
     def __init__(
         self,
@@ -69,4 +69,4 @@ class ServingRobot:
                 self.sockets.publish(b"telemetry", encode(telemetry(self.session.view_header(now_s))))
 
     def tick(self, now_s: float) -> None:
-        """Do more than answer, where a test needs that; `now_s`: the turn's time."""
+        """Hook of a test for additional work in a turn at `now_s`."""

@@ -1,4 +1,4 @@
-"""A simulated person at a controller, before a screen on which a test puts views of a robot that is not there."""
+"""Simulated person with a controller, before a screen that shows a test's views of an imaginary robot."""
 
 import math
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ TICK_S, FRAME_S = 0.004, 0.02
 CALIBRATION = TravelCalibration()
 GRASP_M = 0.02
 CLEAR_SIGHTED = PersonSettings(depth_error_sd_m=0.0, grasp_depth_m=GRASP_M)
-"""A person who judges distances rightly, so that a test can say where the target seems to be."""
+"""Person who judges distances rightly, so that the target is seen where it is."""
 VIEW = telemetry(
     Header(epoch=1, sequence=1, sent_s=0.0),
     tool_position_m=(0.5, 0.0, 0.3),
@@ -44,7 +44,7 @@ def armed(target_in_tool_m: Vector3 | None = IN_REACH, **changes: Any) -> Teleme
 
 @dataclass(frozen=True)
 class Hands:
-    """What the hands did in one tick."""
+    """State of the hands after one tick."""
 
     now_s: float
     phase: Doing
@@ -56,7 +56,7 @@ class Hands:
 
 
 class WatchedDualSense(SimulatedDualSense):
-    """Remembers what the hands do to it."""
+    """Controller that remembers the hands' actions."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -78,7 +78,7 @@ class WatchedDualSense(SimulatedDualSense):
 
 
 class Desk:
-    """A person with a controller before a screen on which the test puts views."""
+    """Person with a controller before a screen that shows the test's views."""
 
     def __init__(self, settings: PersonSettings = CLEAR_SIGHTED, seed: int = 0, start_s: float = 0.0) -> None:
         self.device = WatchedDualSense()
@@ -101,7 +101,7 @@ class Desk:
         return done
 
     def watch(self, screen: Telemetry | None, duration_s: float, delay_s: float = 0.0) -> list[Hands]:
-        """The same picture for a while, as a stream of frames."""
+        """Show the same picture for a while, as a stream of frames."""
         seen = []
         frames = self._frames(screen)
         for _ in range(round(duration_s / TICK_S)):
@@ -109,7 +109,7 @@ class Desk:
         return seen
 
     def until(self, phase: Doing, screen: Telemetry, at_most_s: float, delay_s: float = 0.0) -> float:
-        """Watch until the person gets to `phase`; how long that took."""
+        """Watch until the person reaches `phase`; return the time it took."""
         start_s, frames = self.now_s, self._frames(screen)
         while self.person.phase != phase:
             assert self.now_s - start_s <= at_most_s, f"still in {self.person.phase} after {at_most_s} s"
@@ -117,7 +117,7 @@ class Desk:
         return self.now_s - start_s
 
     def arm(self, screen: Telemetry | None = None) -> None:
-        """Up to the advance, from where the person sees `screen`."""
+        """Run up to the advance, from where the person sees `screen`."""
         self.until(Doing.ARMING, VIEW, 3.0)
         self.until(Doing.ADVANCING, screen or armed((0.0, 0.0, 0.3)), 1.0)
 
@@ -139,7 +139,7 @@ class Desk:
 
 
 def habitual_force_n(meant: float) -> float:
-    """What a free trigger takes for that calibrated travel."""
+    """Return the force in newtons that holds a free trigger at the calibrated travel `meant`."""
     raw = CALIBRATION.r2.raw(meant)
     return SPRING_PRELOAD_N + SPRING_RISE_N * raw * SENSED_TRAVEL
 

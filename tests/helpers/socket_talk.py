@@ -1,4 +1,4 @@
-"""Real sockets on loopback that find each other, and say something."""
+"""Real sockets on loopback that connect and exchange messages."""
 
 from collections.abc import Callable
 
@@ -9,9 +9,9 @@ from common.sockets.robot import RobotSockets
 
 EPHEMERAL = "tcp://127.0.0.1:0"
 PATIENT_S = 60.0
-"""A heartbeat time-out that a busy machine does not trip."""
+"""Heartbeat time-out in seconds that a busy machine does not exceed."""
 ROUNDS = 6000
-"""At most so many waits of 10 ms until a test gives up."""
+"""Number of waits of 10 ms after which a test gives up."""
 
 
 def send_until_connected(operator: OperatorSockets, payload: bytes) -> None:
@@ -29,11 +29,11 @@ def receive_one(robot: RobotSockets) -> tuple[bytes, bytes]:
 
 
 def greet(robot: RobotSockets, operator: OperatorSockets) -> bytes:
-    """Connect by every connection, and tell by what name the robot side knows `operator`."""
+    """Connect over every connection; return the robot side's name of `operator`."""
     connections = len(operator._connections)
     for _ in range(ROUNDS):
         if not operator.send(b"hello"):
-            robot.wait(0.01)  # which answers handshakes, too
+            robot.wait(0.01)  # The wait answers handshakes, too.
             continue
         name, payload = receive_one(robot)
         assert payload == b"hello"
@@ -53,7 +53,7 @@ def publish_until_seen(robot: RobotSockets, operator: OperatorSockets, topic: by
 
 
 def drain_until(received: Callable[[], list[bytes]], wait: Callable[[float], bool], last: bytes) -> list[bytes]:
-    """All that has arrived when `last` has; over several connections it may overtake others."""
+    """Return all messages up to `last`; over several connections it may overtake others."""
     messages: list[bytes] = []
     for _ in range(ROUNDS):
         messages += received()
@@ -64,7 +64,7 @@ def drain_until(received: Callable[[], list[bytes]], wait: Callable[[float], boo
 
 
 def drain_all(received: Callable[[], list[bytes]], wait: Callable[[float], bool], expected: list[bytes]) -> None:
-    """Until each of `expected` has arrived, in whatever order, and nothing else."""
+    """Wait until each of `expected` has arrived, in any order, and nothing else."""
     messages: list[bytes] = []
     for _ in range(ROUNDS):
         messages += received()

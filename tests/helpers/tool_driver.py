@@ -1,4 +1,4 @@
-"""Drive a simulated arm's tool in the tests as the robot side does: from encoder readings, tick by tick."""
+"""Drive a simulated arm's tool as the robot side does: from encoder readings, tick by tick."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +20,7 @@ VALID_S = 0.05
 
 @dataclass
 class ToolDriver:
-    """An arm in its scene and the time that its commands were last given at."""
+    """Arm in its scene, and the time of its last commands."""
 
     scene: Scene
     arm: MujocoArm
@@ -40,17 +40,17 @@ class ToolDriver:
         return self.kinematics.pose(state)
 
     def tool_m(self) -> FloatArray:
-        """Where the tool truly is."""
+        """Return the tool's true position (3,)."""
         position: FloatArray = self.scene.data.site_xpos[self.scene.robot.site].copy()
         return position
 
     def wait(self, duration_s: float) -> ArmState:
-        """Let the arm alone."""
+        """Let time pass without commands."""
         self.now_s += duration_s
         return self.arm.state(self.now_s)
 
     def move(self, twist: FloatArray, duration_s: float) -> FloatArray:
-        """Command `twist` (6,) and give the true path of the tool, one row a tick."""
+        """Command `twist` (6,) and return the true path of the tool, one row a tick."""
         path = [self.tool_m()]
         for _ in range(round(duration_s / PERIOD_S)):
             self._command(self.pose(self.wait(PERIOD_S)), twist)

@@ -1,4 +1,4 @@
-"""Bad input gives one clear line that names the value and what would be valid, and exit code 2: each command."""
+"""Bad input of each command gives one clear line with the value and the valid ones, and exit code 2."""
 
 import shlex
 import socket

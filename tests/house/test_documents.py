@@ -27,7 +27,7 @@ from tests.two_hosts.guide import steps
 
 README = "README.md"
 TO_BE_TYPED = [README, "docs/two-machines.md", "docs/systemd/README.md"]
-"""Each indented line of these is a command."""
+"""Documents whose indented lines are all commands."""
 DOCUMENTS = [
     README,
     "CONTRIBUTING.md",
@@ -40,7 +40,7 @@ COMMANDS = {
 }
 OTHERS = re.compile("cd|cp|echo|git|install|journalctl|mkdir|nft|python3|systemctl|systemd-sysusers|ufw")
 NOT_TYPED = ("advancing  L2/R2 pull", "FEELAHEAD_")
-"""Prefixes of lines that a program prints, or that stand in a file."""
+"""Prefixes of lines that a program prints, or that are in a file."""
 KEY = "5a" * 32
 PLACEHOLDERS = {
     r"\bROBOT-KEY\b|\bOPERATOR-KEY\b": KEY,
@@ -56,12 +56,12 @@ TAILS = {"allow": ["anna", KEY], "revoke": ["anna"], "make": ["robot"], "show": 
 
 
 class ParsedError(Exception):
-    """The arguments are good: nothing more is to happen."""
+    """Signal that the arguments are valid: stop here."""
 
 
 @pytest.fixture
 def parse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every command ends as soon as its own parser has taken its arguments."""
+    """Every command ends as soon as its own parser has accepted its arguments."""
     cli, parse_args = tyro.cli, keys._Parser.parse_args
 
     def only_tyro(*arguments: Any, **options: Any) -> None:
@@ -78,7 +78,7 @@ def parse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def indented(name: str) -> list[str]:
-    """The commands of a document's indented blocks; of a block that is a file's content, nothing."""
+    """Return the commands of a document's indented blocks, without blocks that are a file's content."""
     names: dict[str, str] = {}
     blocks = [one for one in Document.read(ROOT / name).blocks() if not one.startswith(("from ", "import ", "<"))]
     lines = [line for block in blocks if not is_toml(block) for line in typed(block, names)]
@@ -94,7 +94,7 @@ def is_toml(block: str) -> bool:
 
 
 def filled(command: str) -> list[str]:
-    """A command's words, without sudo and with values for what stands in capitals."""
+    """Return a command's words, without sudo and with values for the placeholders in capitals."""
     for pattern, value in PLACEHOLDERS.items():
         command = re.sub(pattern, value, command)
     split = words(command)
@@ -106,7 +106,7 @@ def filled(command: str) -> list[str]:
 
 
 def require_known(split: Sequence[str]) -> None:
-    """AssertionError or ConfigurationError for a command that does not exist, or would not take its arguments."""
+    """Raise AssertionError or ConfigurationError for a missing command, or one that would refuse its arguments."""
     if list(split[:2]) == ["make", "demo"]:
         split = ["feelahead", "demo", *words(" ".join(word.removeprefix("ARGS=") for word in split[2:]))]
     program, *arguments = split
@@ -173,7 +173,7 @@ def test_the_python_in_the_readme_runs() -> None:
 
 
 def test_the_guide_for_two_machines_is_in_order_and_the_readme_says_the_same() -> None:
-    """`make test-two-hosts` follows it."""
+    """`make test-two-hosts` follows the guide."""
     said = [(step.where, step.command.split(maxsplit=3)[:3]) for step in steps()]
     made = [(where, split[2]) for where, split in said if split[:2] == ["feelahead", "keys"]]
     assert made == [("robot", "make"), ("operator", "make"), ("robot", "allow")]
@@ -192,29 +192,29 @@ _AN_OPTION = re.compile(r"\[--[^\]]*\]")
 
 @dataclass(frozen=True)
 class Document:
-    """The Markdown of one file."""
+    """Markdown of one file."""
 
     text: str
 
     @classmethod
     def read(cls, path: Path) -> "Document":
-        """The file's."""
+        """Read the file."""
         return cls(path.read_text(encoding="utf-8"))
 
     def blocks(self) -> list[str]:
-        """Every indented block, without its indentation."""
+        """Return every indented block, without its indentation."""
         return [block for found in _BLOCK.finditer(self.text) if (block := textwrap.dedent(found[1]).strip("\n"))]
 
     def spans(self) -> list[str]:
-        """Every command between backticks, on one line."""
+        """Return every command between backticks, on one line."""
         return [" ".join(found[1].split()) for found in _SPAN.finditer(self.text)]
 
 
 def typed(block: str, names: dict[str, str]) -> list[str]:
-    """The lines of a block that are typed: those after `$ ` where there are any, else all; one for each command.
+    """Return the typed lines of a block, one a command: those after `$ ` if there are any, else all.
 
-    `names` of one capital letter, which stand for something long, are replaced, and taken in where they are given.
-    Options in brackets are left out.
+    `names` of one capital letter are variables: they are replaced, and stored where they are assigned. Options in
+    brackets are left out.
     """
     lines = [line for line in block.replace("\\\n", " ").splitlines() if line.strip()]
     if any(line.startswith("$ ") for line in lines):
@@ -235,7 +235,7 @@ def typed(block: str, names: dict[str, str]) -> list[str]:
 
 
 def words(command: str) -> list[str]:
-    """A command line as a shell splits it, without what becomes of its output, and without sudo and folders."""
+    """Split a command line as a shell does, without output redirection, sudo and folders."""
     split = shlex.split(command, comments=True)
     if ">" in split:
         split = split[: split.index(">")]

@@ -1,4 +1,4 @@
-"""No function changes what stands at a module's top: state has an owner. Caches of pure functions are none."""
+"""No function changes a module's top-level state: state has an owner. Caches of pure functions are exempt."""
 
 import ast
 from collections.abc import Iterator
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from tests.helpers.repository import ROOT
 
 REGISTRIES = {
-    ("robot_side/compiled/kernel.py", "_kernels"),  # filled while modules are imported
+    ("robot_side/compiled/kernel.py", "_kernels"),  # Filled while modules are imported.
 }
 PACKAGES = ("common", "robot_side", "operator_side", "feelahead")
 CHANGES = {
@@ -16,7 +16,7 @@ CHANGES = {
 
 
 def changed(tree: ast.Module) -> set[str]:
-    """Names of a module's top that its functions change."""
+    """Return the names at a module's top that its functions change."""
     top = {name for line in tree.body for name in _named(line)}
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
     return {name for function in functions for name in _changed_by(function) if name in top}

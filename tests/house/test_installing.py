@@ -1,4 +1,4 @@
-"""The wheel, each extra alone, and what works without any: in environments of their own."""
+"""The wheel, each extra alone, and the commands without any, in separate environments."""
 
 import json
 import re
@@ -36,7 +36,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def constraints(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The lock's versions. Its hashes cannot stay: a wheel that was built just now has none in it."""
+    """Versions of the lock, without its hashes: a wheel built just now has none in it."""
     pins = re.findall(r"^[a-z0-9][^\s\\]*==[^\\]*", (ROOT / "requirements.lock").read_text(), flags=re.MULTILINE)
     assert len(pins) > 50
     path = tmp_path_factory.mktemp("constraints") / "constraints.txt"
@@ -46,14 +46,14 @@ def constraints(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def base(wheel: Path, constraints: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The bin folder of an environment with no extra."""
+    """Bin folder of an environment without extras."""
     bin_folder = installed("", wheel, constraints, tmp_path_factory.mktemp("base"))
     absent(bin_folder, "mujoco", "numba", "hid", "hidraw", "viser", "mcap", "matplotlib", "pyarrow")
     return bin_folder
 
 
 def built(source: Path, folder: Path) -> Path:
-    """The wheel of a checkout or an sdist."""
+    """Build and return the wheel of a checkout or an sdist."""
     made = run(sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "-w", folder, source)
     assert made.returncode == 0, made.stderr
     return next(folder.glob("*.whl"))
@@ -136,7 +136,7 @@ def test_the_operator_side_alone(wheel: Path, constraints: Path, tmp_path: Path)
 
 @pytest.mark.parametrize("extra", EXTRAS)
 def test_an_extra_can_be_had_alone(base: Path, wheel: Path, constraints: Path, tmp_path: Path, extra: str) -> None:
-    """In the locked versions, and with nothing that only a side needs."""
+    """In the locked versions, and without packages that only a side needs."""
     report = tmp_path / "report.json"
     install = (base / "python", "-m", "pip", "install", "-q", "-c", constraints)
     tried = run(*install, "--dry-run", "--report", report, wanted(wheel, extra))
@@ -144,7 +144,7 @@ def test_an_extra_can_be_had_alone(base: Path, wheel: Path, constraints: Path, t
     names = normalised(one["metadata"]["name"] for one in json.loads(report.read_text())["install"])
     assert names >= EXTRAS[extra]
     assert not names & OF_THE_SIDES
-    if extra == "record":  # small enough for a real installation, beside the base
+    if extra == "record":  # Small enough for a real installation, beside the base.
         beside = tmp_path / "record"
         put = run(*install, "--no-deps", "--target", beside, *names - {"feelahead"})
         assert put.returncode == 0, put.stderr

@@ -1,6 +1,6 @@
-"""The architecture, executable: which room may import which, and where the world outside may be touched.
+"""The architecture, executable: the imports allowed to each room, and the places that may touch the outside world.
 
-The tree is read as text, so that lazy imports count, too. docs/architecture.md says what each room is for.
+The tree is read as text, so that lazy imports count, too. docs/architecture.md explains each room.
 """
 
 import ast
@@ -129,10 +129,10 @@ ARROWS = """
         feelahead/lab feelahead/both_sides feelahead/recordings
     feelahead: common/* feelahead/commands/*
 """
-"""Each room with the rooms that it may import: `X` is the files directly in folder X, or file X where that has a row of
-its own, `X/*` also those further down.
+"""Each room with the rooms that it may import: `X` is the files directly in folder X, or file X if it has its own row,
+`X/*` also those further down.
 
-What has no row of its own counts to the room around it.
+A file or folder without a row belongs to the room around it.
 """
 
 LIBRARIES = {
@@ -148,7 +148,7 @@ LIBRARIES = {
     "av": ("common/video", "robot_side/viewing"),
     "foxglove": ("common/recording",),
     "mcap": ("common/recording",),
-    # A wall clock that jumps by an hour must not be there to trip over; a recording's stamps are that clock's.
+    # A wall clock may jump by an hour, so it must not be available; a recording's stamps use that clock.
     "datetime": ("feelahead/recordings",),
     "calendar": (),
     "common.clock.wall_clock_offset_s": ("common/recording",),
@@ -185,7 +185,7 @@ ALLOWED = _read_arrows()
 
 @cache
 def modules() -> Mapping[str, Path]:
-    """Every module of ours with its file."""
+    """Return every module of ours with its file."""
     found = {}
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
@@ -195,7 +195,7 @@ def modules() -> Mapping[str, Path]:
 
 
 def imports(path: Path) -> Iterator[str]:
-    """Read whatever `path` imports; a text that is the name of a module of ours counts, as it may be imported by it."""
+    """Yield the imports of `path`; a text that is a module's name counts, as the module may be imported by it."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -209,7 +209,7 @@ def imports(path: Path) -> Iterator[str]:
 
 
 def room_of(path: Path) -> str:
-    """Name the room of ARROWS in which `path` lies: the innermost one; without a row, the package."""
+    """Return the innermost room of ARROWS in which `path` is; without a row, the package."""
     name = path.relative_to(ROOT)
     return next((room.as_posix() for room in (name, *name.parents) if room.as_posix() in ALLOWED), name.parts[0])
 
@@ -249,7 +249,7 @@ def test_the_world_outside_is_touched_in_its_rooms_alone(path: Path) -> None:
 
 
 def test_no_arrow_is_allowed_that_nobody_takes() -> None:
-    # A permission that has outlived its use would let the next one in unseen.
+    # An unused permission would let the next import in unseen.
     taken: dict[str, set[str]] = {}
     for path in modules().values():
         folders = {modules()[m].parent.relative_to(ROOT).as_posix() for m in imports(path) if m in modules()}

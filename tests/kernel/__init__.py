@@ -1,1 +1,1 @@
-"""A stock Debian kernel in QEMU, whose own hid-playstation drives our virtual controller: `make test-kernel`."""
+"""Stock Debian kernel in QEMU, whose own hid-playstation drives our virtual controller: `make test-kernel`."""

@@ -1,4 +1,4 @@
-"""The virtual machine: QEMU in software, the host's root over 9p, and two serial lines."""
+"""Virtual machine: QEMU in software, the host's root over 9p, and two serial lines."""
 
 import os
 import selectors
@@ -12,7 +12,7 @@ from tests.kernel.ramdisk import RESULT_MARK
 
 
 class MachineError(AssertionError):
-    """The machine did not come to a result; the text says how far it came."""
+    """Failure of the machine to give a result; the text says how far it came."""
 
 
 def run_machine(parts: Parts, ramdisk: Path, console: Path, limit_s: float) -> int:
@@ -45,7 +45,7 @@ def run_machine(parts: Parts, ramdisk: Path, console: Path, limit_s: float) -> i
 
 
 def follow(machine: "subprocess.Popen[bytes]", limit_s: float, say: Callable[[str], None]) -> int:
-    """Pass each line to `say` until the one with the exit code, and return that."""
+    """Pass each line to `say` until the one with the exit code; return that code."""
     stream = machine.stdout
     assert stream is not None
     end_s = time.monotonic() + limit_s

@@ -17,26 +17,26 @@ _KERNEL_PACKAGE: Final = "linux-image-amd64"
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """The parts of the virtual machine."""
+    """Parts of the virtual machine."""
 
     qemu: Path
     qemu_environment: dict[str, str]
-    """QEMU's environment, for its libraries."""
+    """Environment in which QEMU finds its libraries."""
     firmware: Path | None
-    """The folder of QEMU's firmware; None where QEMU knows it by itself."""
+    """Folder of QEMU's firmware; None if QEMU finds it itself."""
     kernel: Path
     modules: Path
-    """The kernel's own folder under lib/modules."""
+    """Kernel's own folder under lib/modules."""
     busybox: Path
 
 
 def provide() -> Parts:
-    """Find the parts, or download and unpack them; skips the test where they cannot be had."""
+    """Find the parts, or download and unpack them; skip the test if unavailable."""
     return unpacked("kernel", _packages, _found)
 
 
 def _found(root: Path) -> Parts:
-    """The parts in `root`; FileNotFoundError when one is missing or QEMU does not start."""
+    """Find the parts in `root`; FileNotFoundError if one is missing or QEMU does not start."""
     kernel = only(root / "boot", "vmlinuz-*")
     modules = only(root / "lib/modules", "*") if (root / "lib/modules").exists() else only(root, "usr/lib/modules/*")
     busybox = next((path for path in (root / "bin/busybox", root / "usr/bin/busybox") if path.exists()), None)
@@ -53,7 +53,7 @@ def _found(root: Path) -> Parts:
 
 def _packages(apt: Apt) -> list[str]:
     depends = apt.run("apt-cache", "depends", _KERNEL_PACKAGE).split()
-    # The package of no version depends on the newest stock kernel.
+    # The package without a version depends on the newest stock kernel.
     kernels = [name for name in depends if name.startswith("linux-image-") and name != _KERNEL_PACKAGE]
     if not kernels:
         pytest.skip(f"{_KERNEL_PACKAGE} depends on no linux-image here: the kernel comes from Debian")

@@ -1,4 +1,4 @@
-"""The initial ramdisk: busybox, the modules that the test needs, and a script that goes over to the host's files."""
+"""Initial ramdisk: busybox, the needed modules, and a script that switches to the host's files."""
 
 import gzip
 import lzma
@@ -11,13 +11,13 @@ from typing import Final
 WANTED: Final = ("virtio_pci", "9pnet_virtio", "9p", "hid_generic", "hid_playstation", "uhid", "evdev")
 """Modules; their dependencies are added."""
 RESULT_MARK: Final = "kernel test: exit code "
-"""The prefix of the line with the test program's exit code."""
+"""Prefix of the line with the test program's exit code."""
 WRITABLE: Final = "/dev/shm"  # noqa: S108  # the guest's own, in memory
-"""The guest's writable folder."""
+"""Writable folder of the guest."""
 
 _FOLDER, _EXECUTABLE = 0o040755, 0o100755
 
-# The host's root is mounted read-only: whatever the test does, it does to the guest alone.
+# The host's root is mounted read-only: the test can only change the guest.
 _INIT = """\
 #!/bin/busybox sh
 /bin/busybox --install -s /bin
@@ -42,9 +42,9 @@ poweroff -f
 
 
 def module_order(folder: Path, wanted: Iterable[str] = WANTED) -> dict[str, Path]:
-    """The files of the modules in `folder` that `wanted` needs, by name, each after what it depends on.
+    """Return the files of the modules in `folder` that `wanted` needs, by name, each after its dependencies.
 
-    What is built into the kernel is left out; FileNotFoundError for a module that is neither there nor built in.
+    Built-in modules are left out; FileNotFoundError for a module that is neither there nor built in.
     """
     files = {_name(path.name): path for path in folder.rglob("*.ko*")}
     built_in = {_name(line.rsplit("/", 1)[-1]) for line in (folder / "modules.builtin").read_text().splitlines()}
@@ -65,7 +65,7 @@ def module_order(folder: Path, wanted: Iterable[str] = WANTED) -> dict[str, Path
 
 
 def read_module(path: Path) -> bytes:
-    """The module's bytes, unpacked where Debian packs them."""
+    """Return the module's bytes, unpacked where Debian packs them."""
     content = path.read_bytes()
     return lzma.decompress(content) if path.suffix == ".xz" else content
 
@@ -75,13 +75,13 @@ def _name(file: str) -> str:
 
 
 def _depends(module: bytes) -> list[str]:
-    """The names that a module itself says it needs."""
+    """Return the dependencies that a module lists."""
     found = re.search(rb"(?:^|\0)depends=([^\0]*)\0", module)
     return [name.replace("-", "_") for name in found[1].decode().split(",") if name] if found else []
 
 
 def make_ramdisk(busybox: Path, modules: Mapping[str, Path], command: list[str]) -> bytes:
-    """A compressed archive whose /init runs `command` in the host's root and then switches the machine off."""
+    """Return a compressed archive whose /init runs `command` in the host's root and then switches the machine off."""
     script = _INIT.format(modules=" ".join(modules), command=shlex.join(command), mark=RESULT_MARK, writable=WRITABLE)
     entries = [(folder, _FOLDER, b"") for folder in ("bin", "dev", "host", "modules", "proc", "sys")]
     entries.append(("bin/busybox", _EXECUTABLE, busybox.read_bytes()))
@@ -94,7 +94,7 @@ def make_ramdisk(busybox: Path, modules: Mapping[str, Path], command: list[str])
 
 
 def _entry(number: int, name: str, mode: int, content: bytes) -> bytes:
-    """One file in the format "newc" of cpio (Linux, initramfs buffer format)."""
+    """Encode one file in cpio's format "newc" (Linux, initramfs buffer format)."""
     encoded = name.encode() + b"\0"
     # Number, mode, owner, group, links, time, size, four device numbers, length of the name, checksum.
     fields = (number, mode, 0, 0, 1, 0, len(content), 0, 0, 0, 0, len(encoded), 0)

@@ -1,4 +1,4 @@
-"""A stock Debian kernel in QEMU, in which pytest runs the tests of `inside/`: `make test-kernel`."""
+"""Stock Debian kernel in QEMU, in which pytest runs the tests of `inside/`: `make test-kernel`."""
 
 import compileall
 import os
@@ -17,16 +17,16 @@ pytestmark = [pytest.mark.kernel, pytest.mark.processes]
 
 _INSIDE = Path(__file__).parent / "inside"
 _FILES = ("operator_side.py", "command.py", "gamepad.py", "driver.py", "device.py")
-"""The last two leave a controller plugged in."""
+"""Files of tests; the last two leave a controller plugged in."""
 _LIMIT_S = 1500.0
 _LAST_WORDS = 25
 
 
 def test_its_own_driver_and_ours_drive_a_controller(tmp_path: Path) -> None:
-    """INSIDE in the environment: arguments for the pytest inside, as -k; its report is printed."""
+    """INSIDE in the environment: arguments for the pytest inside, such as -k; its report is printed."""
     parts = provide()
     command = [
-        # An operator side that went before all else would leave an emulated processor to nobody else.
+        # An operator side with raised priority would leave an emulated processor to nobody else.
         *("/usr/bin/setpriv", "--bounding-set=-sys_nice"),
         *("/usr/bin/env", "-i", f"PATH={Path(sys.executable).parent}:/usr/bin:/bin"),
         *(f"HOME={WRITABLE}", f"TMPDIR={WRITABLE}", "PYTEST_DISABLE_PLUGIN_AUTOLOAD=1"),

@@ -7,25 +7,25 @@ from common.emulation.clauses import LinkModel
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One link, in words that netem and we both read."""
+    """One link, in words for netem and for us."""
 
     name: str
     netem: str
     model: LinkModel = "datagram"
     messages: int = 6000
     judged: bool = True
-    """False: shown alone, because the model is known to differ."""
+    """Whether a difference fails; False: shown alone, as the model is known to differ."""
 
     @property
     def file(self) -> str:
-        """The recording of it."""
+        """File of its recording."""
         return f"{self.name}.csv"
 
 
 _NORMAL = "delay 20ms 5ms distribution normal"
 
 PATH_CASE = Case("path", "delay 20ms", messages=2000)
-"""Measures the path's own time, which is none of netem's."""
+"""Case that measures the path's own delay, which is not netem's."""
 CASES = (
     Case("normal", _NORMAL),
     Case("uniform", "delay 20ms 5ms"),

@@ -11,7 +11,7 @@ from tests.netem.cases import PAYLOAD_BYTES, PERIOD_NS
 from tests.netem.namespaces import RECEIVER, enter
 
 Recording = list[tuple[int, int | None]]
-"""When each message was sent and arrived, in nanoseconds; None: lost."""
+"""Times of sending and arrival of each message, in nanoseconds; None: lost."""
 
 _PORT = 5555
 _SO_TIMESTAMPNS = 35
@@ -21,12 +21,12 @@ _NUMBER = struct.Struct("<q")
 _STAMP = struct.Struct("<qq")
 _PADDING = bytes(PAYLOAD_BYTES - _NUMBER.size)
 _WARM_UP = 1000
-"""Messages at a stream's start that do not count: TCP opens its window with them."""
+"""Number of messages at a stream's start that do not count: TCP opens its window with them."""
 _LAST_MS = 5000
 
 
 def exchange_datagrams(count: int) -> Recording:
-    """UDP one way; the kernel itself says when each came, so that nobody need be awake for it."""
+    """Send UDP one way; the kernel stamps arrivals, so that no process need wake for them."""
     enter("receiver")
     receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     receiver.bind((RECEIVER, _PORT))
@@ -58,7 +58,7 @@ def exchange_datagrams(count: int) -> Recording:
 
 
 def exchange_stream(count: int) -> Recording:
-    """DEALER to ROUTER over TCP, whose acknowledgements come back through the router."""
+    """Send from DEALER to ROUTER over TCP, whose acknowledgements return through the router."""
     enter("receiver")
     there: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     router = _unbounded(there.socket(zmq.ROUTER))

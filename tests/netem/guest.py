@@ -1,4 +1,4 @@
-"""The program inside the machine: it records what netem does to messages."""
+"""Program inside the machine that records netem's effect on messages."""
 
 import csv
 import ctypes
@@ -12,7 +12,7 @@ from tests.netem.exchanges import Recording, exchange_datagrams, exchange_stream
 from tests.netem.namespaces import join_namespaces, set_netem
 
 _FINIT_MODULE = 313
-"""The system call's number on x86_64; insmod need not be installed."""
+"""Number of the system call on x86_64; insmod need not be installed."""
 
 
 def main(folder: Path, modules: Sequence[str], names: Sequence[str]) -> int:

@@ -1,4 +1,4 @@
-"""A sender, a router and a receiver, each in a network namespace of its own, joined by veth pairs."""
+"""Sender, router and receiver, each in a separate network namespace, joined by veth pairs."""
 
 import ctypes
 import os
@@ -13,7 +13,7 @@ _CLONE_NEWNET: Final = 0x40000000
 
 
 def join_namespaces() -> None:
-    """Make the three namespaces; needs root in a machine of our own."""
+    """Make the three namespaces; needs root in a private machine."""
     for name in ("router", *_ENDS):
         _ip(f"netns add {name}")
         _ip(f"-n {name} link set dev lo up")
@@ -30,15 +30,15 @@ def join_namespaces() -> None:
 
 
 def set_netem(words: str) -> None:
-    """Let the router do that to what it sends, both ways."""
+    """Set netem on both directions of the router's output."""
     for name in _ENDS:
-        # Another kind first: netem replaced by netem would keep its table.
+        # Another qdisc first: netem replaced by netem would keep its table.
         _run(["tc", "-n", "router", "qdisc", "replace", "dev", f"to-{name}", "root", "pfifo"])
         _run(["tc", "-n", "router", "qdisc", "replace", "dev", f"to-{name}", "root", "netem", *words.split()])
 
 
 def enter(name: str) -> None:
-    """Take this thread, and those that it will start, into a namespace: sockets belong where they were made."""
+    """Move this thread, and those that it starts, into a namespace: sockets belong where they were made."""
     libc = ctypes.CDLL(None, use_errno=True)
     descriptor = os.open(f"/run/netns/{name}", os.O_RDONLY)
     try:

@@ -1,7 +1,7 @@
-"""Which messages of a recording the host held up: the machine's only processor was not running.
+"""Messages of a recording that the host delayed, while the machine's only processor was not running.
 
-It shows in the sending, which is planned for every millisecond. What arrives while a sending is overdue may have been
-due earlier. Leaving that out favours no delay: when the host stalls has nothing to do with what netem drew.
+Stalls show in the sending, planned for every millisecond. Messages that arrive while a sending is overdue may have been
+due earlier. Leaving them out favours no delay: the host's stalls are independent of netem's draws.
 """
 
 import numpy as np
@@ -10,11 +10,11 @@ from common.arrays import BoolArray
 from feelahead.lab.link.samples import LinkSample
 
 LATE_S = 0.5e-3
-"""An idle machine sends within 0.2 ms."""
+"""Lateness in seconds from which a sending is overdue: an idle machine sends within 0.2 ms."""
 
 
 def stalled(sample: LinkSample, period_s: float) -> BoolArray:
-    """(n,) whether a message was sent just before the machine stood still, or arrived while it did."""
+    """Return whether (n,) each message was sent just before the machine stalled, or arrived while it did."""
     numbers = np.arange(sample.sent_s.size)
     planned_s = numbers * period_s + float(np.min(sample.sent_s - numbers * period_s))
     overdue = sample.sent_s - planned_s > LATE_S

@@ -25,11 +25,11 @@ from tests.netem.uml import provide, run_machine
 pytestmark = [pytest.mark.netem, pytest.mark.processes]
 
 ATTEMPTS = 3
-"""A miss is recorded again: one run in a hundred lies beyond a band of 99 %, and a busy host spoils some."""
+"""Number of recordings after a miss: one run in a hundred is beyond a band of 99 %, and a busy host spoils some."""
 SEEDS, PAIRS = 20, 100
 STREAM_MEAN_MS, STREAM_SD_MS = 2.0, 1.0
 QUIET_SHARE = 0.05
-"""The share of messages that the host held up, beyond which a miss says nothing."""
+"""Share of messages delayed by the host above which a miss says nothing."""
 HEADERS_BYTES = 42
 
 
@@ -55,16 +55,16 @@ def test_ours_is_like_the_kernels(case: Case, tmp_path: Path) -> None:
 
 
 def missed_goals(case: Case, sample: LinkSample, path_s: float) -> tuple[list[str], int]:
-    """In what the model is unlike the recording, and how many messages were left out because the host stalled.
+    """Return the differences of model and recording, and the number of messages left out for stalls of the host.
 
-    Datagrams took `path_s` besides what netem did.
+    Datagrams took `path_s` besides netem's delay.
     """
     profile = LinkProfile.parse(case.netem, 0, case.model)
     size_bytes = PAYLOAD_BYTES + HEADERS_BYTES
     own_s = path_s if case.model == "datagram" and profile.delay_s > 0.0 else 0.0
     delay_s, held_up = np.maximum(0.0, sample.delay_s - own_s), 0
     kept = LinkSample(sample.sent_s, delay_s)
-    if profile.loss is None:  # whether a message is lost does not depend on when the machine runs
+    if profile.loss is None:  # The loss of a message does not depend on when the machine runs.
         late = stalled(sample, 1e-9 * PERIOD_NS)
         kept, beyond = LinkSample(sample.sent_s, np.where(late, np.nan, delay_s)).without_stalls(profile)
         held_up = int(late.sum()) + beyond
@@ -89,5 +89,5 @@ def missed_goals(case: Case, sample: LinkSample, path_s: float) -> tuple[list[st
 
 
 def _figures_ms(sample: LinkSample) -> FloatArray:
-    """Mean, standard deviation and 99 % quantile of the delays."""
+    """Return mean, standard deviation and 99 % quantile of the delays, in ms."""
     return 1e3 * np.array([sample.mean_s, sample.sd_s, np.quantile(sample.arrived_s, 0.99)])

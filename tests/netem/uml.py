@@ -40,17 +40,17 @@ sleep 10
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """The parts of the machine."""
+    """Parts of the machine."""
 
     kernel: Path
     modules: Path
-    """The kernel's own folder of modules."""
+    """Folder of the kernel's modules."""
     environment: dict[str, str]
-    """The environment in which `ip` and `tc`, their libraries and tables are found."""
+    """Environment in which `ip` and `tc`, their libraries and tables are found."""
 
 
 def provide() -> Parts:
-    """The installed parts, or downloaded ones; skips the test where they cannot be had."""
+    """Return the installed parts, or downloaded ones; skip the test if unavailable."""
     try:
         return _found(Path("/"))
     except FileNotFoundError:
@@ -62,7 +62,7 @@ def _packages(apt: Apt) -> list[str]:
 
 
 def _found(root: Path) -> Parts:
-    """The parts in `root`, or on the system; FileNotFoundError when one is in neither."""
+    """Find the parts in `root`, or on the system; FileNotFoundError if one is in neither."""
     kernel = _first(root, "usr/bin/linux.uml")
     modules = only(kernel.parents[1] / "lib/uml/modules", "*")
     places = ("usr/sbin", "sbin", "usr/bin", "bin")
@@ -83,9 +83,9 @@ def _first(root: Path, *places: str) -> Path:
 
 @contextlib.contextmanager
 def _alone() -> Iterator[None]:
-    """Keep children to one processor, with real-time priority where that is permitted.
+    """Keep children to one processor, with real-time priority if permitted.
 
-    The machine's parts wake each other all the time: on two processors it takes three times as long.
+    The machine's parts wake each other all the time: on two processors a run takes three times as long.
     """
     processors = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {max(processors)})
@@ -99,7 +99,7 @@ def _alone() -> Iterator[None]:
 
 
 def run_machine(parts: Parts, folder: Path, cases: Sequence[Case]) -> None:
-    """Boot and record `cases` into `folder`; skips the test where it does not boot here."""
+    """Boot and record `cases` into `folder`; skip the test if it does not boot here."""
     said: list[str] = []
     modules = [str(path) for path in module_order(parts.modules, _MODULES).values()]
     variables = parts.environment | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1", "LANG": "C.UTF-8"}

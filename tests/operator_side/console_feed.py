@@ -1,4 +1,4 @@
-"""Something to see in a console: an arm that sways before a table, as both sides would tell of it."""
+"""Content for a console: an arm that sways before a table, as both sides would report it."""
 
 import math
 from typing import Literal
@@ -26,12 +26,12 @@ from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts import FACTS_PERIOD_S, DelayFacts, OperatorFacts, TriggerFacts
 
 OFFSET_S = 1000.0
-"""The robot side's clock is so far ahead."""
+"""Lead of the robot side's clock, in seconds."""
 STILL = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 OBJECTS = ("table", "mug", "bottle", "box", "lamp")
 WAYS = (0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09)
 ADVANCES_ALONG_X = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
-"""The tool's z axis is the world's x."""
+"""Orientation with the tool's z axis along the world's x."""
 
 
 def header(now_s: float, sequence: int = 1) -> Header:
@@ -72,7 +72,7 @@ def facts(now_s: float, state: MotionState = "armed", advancing: Literal["L2", "
 
 
 class Pictures:
-    """Pictures of 640 x 480 and about 25 kB, that change."""
+    """Changing pictures of 640 x 480 and about 25 kB."""
 
     def __init__(self) -> None:
         generator = np.random.default_rng(0)
@@ -87,7 +87,7 @@ class Pictures:
                 self._jpegs[view, step] = simplejpeg.encode_jpeg(np.ascontiguousarray(pixels), quality=75)
 
     def frame(self, view: ViewName, now_s: float, step: int, captured_s: float | None = None) -> bytes:
-        """`captured_s`, on this machine's clock: now unless given."""
+        """Encode the next picture; `captured_s`: on this machine's clock, now unless given."""
         taken_s = (now_s if captured_s is None else captured_s) + OFFSET_S
         jpeg = self._jpegs[view, step % 8]
         return encode(VideoFrame(header(now_s), view=view, captured_s=taken_s, width=640, height=480, jpeg=jpeg))
@@ -157,7 +157,7 @@ def state(now_s: float, version: int = 1) -> bytes:
 
 
 class Feed:
-    """Feeds a console with all of it at 30 Hz, by `step`."""
+    """Feed of a console with everything at 30 Hz, by `step`."""
 
     def __init__(self, console: Console) -> None:
         self._console = console

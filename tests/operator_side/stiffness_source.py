@@ -1,4 +1,4 @@
-"""The robot side's end of the link without a robot: it grants the lease, and its fields are as stiff as it is told."""
+"""Robot side's end of the link without a robot: it grants the lease, and its fields have the given strength."""
 
 from common.clock import MonotonicClock, clock_domain
 from common.errors import RemoteProtocolError
@@ -11,21 +11,21 @@ from common.sockets.robot import RobotSockets
 from tests.helpers.felt import felt
 
 TICK_PERIOD_S = 1e-3
-"""The robot side's own."""
+"""Period of the robot side, in seconds."""
 _NOTICE_PERIOD_S = 0.05
 
 
 class StiffnessSource:
-    """One operator side's counterpart on loopback, in real time."""
+    """Counterpart of one operator side on loopback, in real time."""
 
     def __init__(self) -> None:
         self.l2 = 0
-        """The strength in every zone of L2, 0 to 8."""
+        """Strength in every zone of L2, 0 to 8."""
         self.r2 = 0
-        """And of R2."""
+        """Strength in every zone of R2, 0 to 8."""
         self.state: MotionState = "armed"
         self.commands = 0
-        """Motion commands that came."""
+        """Number of motion commands received."""
         self.hellos = 0
         self._clock = MonotonicClock()
         self._sockets = RobotSockets("tcp://127.0.0.1:0")
@@ -42,21 +42,21 @@ class StiffnessSource:
 
     @property
     def address(self) -> str:
-        """Where to connect."""
+        """Endpoint of the control port."""
         return self._sockets.control_endpoint
 
     @property
     def view_address(self) -> str:
-        """Where it would publish."""
+        """Endpoint of the view port; nothing is published."""
         return self._sockets.view_endpoint
 
     @property
     def connected(self) -> bool:
-        """Whether an operator side has said Hello."""
+        """Return whether an operator side has said Hello."""
         return self._peer is not None
 
     def run(self, duration_s: float) -> None:
-        """Answer, and send a stiffness every millisecond, for so long."""
+        """Answer, and send a stiffness every millisecond, for `duration_s`."""
         self._pacer.restart(self._clock.now())
         end_s = self._clock.now() + duration_s
         while (now_s := self._clock.now()) < end_s:

@@ -1,4 +1,4 @@
-"""The real operator process with a controller that is plugged in, unplugged, and left with stiff triggers."""
+"""Real operator process with a controller that is plugged in, unplugged, and left with stiff triggers."""
 
 import json
 import os
@@ -27,7 +27,7 @@ ATTEMPTS = 20
 
 
 class World:
-    """An operator process, its controller, and the robot side's end of its link."""
+    """Operator process, its controller, and the robot side's end of its link."""
 
     def __init__(self, folder: Path, *flags: str, plugged_in: bool = True) -> None:
         self._folder = folder
@@ -62,11 +62,11 @@ class World:
             marker.unlink(missing_ok=True)
 
     def until(self, condition: Callable[[], bool]) -> None:
-        """Go on as the robot side until that is so."""
+        """Run the robot side until `condition` holds."""
         self._until(condition, lambda: self.source.run(0.02))
 
     def until_in_silence(self, condition: Callable[[], bool]) -> None:
-        """Wait until that is so, without a word from the robot side."""
+        """Wait until `condition` holds, without a message from the robot side."""
         self._until(condition, lambda: select.select([self._controller], [], [], 0.02))
 
     def _until(self, condition: Callable[[], bool], go_on: Callable[[], object]) -> None:
@@ -85,18 +85,18 @@ class World:
         return shown[-1] if shown else "unknown"
 
     def stiffen(self) -> None:
-        """Until the triggers are stiff."""
+        """Wait until the triggers are stiff."""
         self.until(lambda: self.controller() == "connected" and self.source.connected)
         self.source.state, self.source.r2 = "armed", 7
         self.until(self.is_stiff)
 
     def is_stiff(self) -> bool:
-        """What R2 was told last."""
+        """Return whether R2's last command was stiff."""
         told = [report.r2 for report in self.written if report.r2 is not None]
         return bool(told) and told[-1] != FREE_TRIGGER
 
     def hang(self) -> None:
-        """Stop it while the triggers are stiff; anew when a busy machine had it let go of them just before."""
+        """Stop it while the triggers are stiff; retry if a busy machine had it release them just before."""
         for _ in range(ATTEMPTS):
             self.stiffen()
             self.process.send_signal(signal.SIGSTOP)
@@ -108,18 +108,18 @@ class World:
         raise AssertionError(f"let go of by itself {ATTEMPTS} times; {self.written[-3:]}")
 
     def end(self) -> tuple[int, str]:
-        """Its exit code and what it complained of, once it has ended."""
+        """Wait for its end; return its exit code and its errors."""
         code = self.process.wait(LIMIT_S)
         self._reader.join(LIMIT_S)
         assert self.process.stderr is not None
         return code, self.process.stderr.read()
 
     def until_released(self) -> None:
-        """Until a release of everything is what was written last."""
+        """Wait until the last write is a full release."""
         self.until_in_silence(self.is_released)
 
     def is_released(self) -> bool:
-        """Whether a release of everything is what was written last, if perhaps with the usual light."""
+        """Return whether the last write is a full release, perhaps with the usual light."""
         return bool(self.written) and replace(self.written[-1], light=None) == RELEASED
 
     def _look(self) -> None:
@@ -156,7 +156,7 @@ def stiff(report: Feel) -> bool:
 
 
 def tells_all(report: Feel) -> bool:
-    """It is RELEASED, or what followed so soon that both went out as one."""
+    """Return whether the report is RELEASED, or RELEASED merged with the next write."""
     return report.l2 == FREE_TRIGGER and report.r2 is not None and report.rumble is not None
 
 
@@ -182,7 +182,7 @@ def test_an_exception_releases_them_too(world: World, tmp_path: Path) -> None:
     assert code == 1
     assert "as no driver should" in complaint
     (tmp_path / "broken").unlink()
-    # The loop's last write fails with the driver; the watchdog has the device open by itself.
+    # The loop's last write fails with the driver; the watchdog opens the device separately.
     world.until_released()
 
 
@@ -206,7 +206,7 @@ def test_without_a_controller_it_says_so_and_commands_nothing_until_one_appears(
         assert world.notes()[1] == "controller: DualSense on USB (a4:5e:60:01:02:03)"
         assert "feelahead calibrate" in world.notes()[2]
         assert world.written[0] == RELEASED
-        # On a machine that stalls a field may expire, which the light tells and nothing else.
+        # On a machine that stalls a field may expire, which only the light shows.
         assert {(report.l2, report.r2) for report in world.written[1:]} <= {(None, None)}
 
 
@@ -222,7 +222,7 @@ def test_hung_its_triggers_are_released_and_told_anew_when_it_runs_on(world: Wor
 def test_released_while_a_write_does_not_return_and_told_anew_when_it_does(world: World, tmp_path: Path) -> None:
     world.stiffen()
     (tmp_path / "hangs").touch()
-    world.source.r2 = 8  # what to write
+    world.source.r2 = 8  # Content of the next write.
     world.until(world.is_released)
     world.until(lambda: any("does not return" in note for note in world.notes()))
     written = len(world.written)

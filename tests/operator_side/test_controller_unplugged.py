@@ -1,4 +1,4 @@
-"""The controller unplugged in mid-run, both sides in virtual time: the arm stops, and moves again only on purpose."""
+"""Controller unplugged in mid-run, both sides in virtual time: the arm stops, and moves again only on purpose."""
 
 from collections.abc import Callable
 
@@ -18,11 +18,11 @@ pytestmark = pytest.mark.long
 PLACE = b"usb"
 GAP_S = 0.1
 RAMP_S = 0.3
-"""Long enough for the arm to come to rest from any speed of this run."""
+"""Time in seconds in which the arm comes to rest from any speed of this run."""
 
 
 class Run:
-    """A run with the person's hands on a controller with a plug."""
+    """Run with the person's hands on a controller with a plug."""
 
     def __init__(self, link: str = "") -> None:
         self.both = Loopback(LoopbackSettings(RobotSettings(link=link), OperatorSettings(link=link)))
@@ -38,7 +38,7 @@ class Run:
         self.system.devices[PLACE] = self.both.device
 
     def let_go_of_the_person(self) -> None:
-        """From now on the hands stay as they are, unless the test moves them."""
+        """Freeze the person's hands, so that only the test moves them."""
         self.both.person.tick = lambda *_: None  # type: ignore[method-assign]
 
     def wait(self, duration_s: float) -> None:
@@ -65,7 +65,7 @@ class Run:
 
 
 def advancing(link: str = "") -> Run:
-    """Until the arm moves and something is felt."""
+    """Run until the arm moves and something is felt."""
     run = Run(link)
     run.until(lambda: not run.both.device.released, 12.0)
     assert run.state == "armed"
@@ -78,7 +78,7 @@ def test_unplugged_the_arm_stops_and_stays(delay_ms: int) -> None:
     run = advancing(f"delay {delay_ms}ms" if delay_ms else "")
     assert run.speed_m_s > 0.01
     run.unplug()
-    run.wait(1e-3 * delay_ms + 0.01)  # what was on its way still arrives
+    run.wait(1e-3 * delay_ms + 0.01)  # Messages under way still arrive.
     commands = run.commands
     run.wait(GAP_S)
     assert run.state == "disarmed"
@@ -112,7 +112,7 @@ def test_plugged_in_again_it_resumes_disarmed_and_is_armed_on_purpose() -> None:
     run.until(lambda: run.state == "armed", 0.1)
 
 
-def test_whoever_holds_the_arming_button_through_it_all_arms_nothing_before_a_healthy_second() -> None:
+def test_a_held_arming_button_arms_nothing_before_a_healthy_second() -> None:
     run = advancing()
     run.both.device.set_buttons(frozenset({Button.L1, Button.OPTIONS}))
     run.unplug()

@@ -1,4 +1,4 @@
-"""The table of --device."""
+"""Table of --device."""
 
 from pathlib import Path
 from typing import get_args
@@ -16,7 +16,7 @@ def test_every_name_that_may_be_given_is_opened() -> None:
 
 
 def test_where_there_is_no_gamepad_it_says_what_would_be_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "event0").touch()  # opens, and is no node
+    (tmp_path / "event0").touch()  # Can be opened, but is no event node.
     monkeypatch.setattr(pad, "NODES", tmp_path)
     with pytest.raises(NoDeviceError, match=f"no gamepad with two sticks, two triggers and rumble in {tmp_path}$"):
         pad.find_pad(None)

@@ -1,4 +1,4 @@
-"""The operator side by examples: what is written, sent, shown and counted; test_core_states.py holds its states."""
+"""Operator side by examples: writes, messages, views and counts; test_core_states.py covers its states."""
 
 from collections.abc import Callable
 from typing import Any
@@ -25,7 +25,7 @@ def bench() -> Bench:
 
 
 def sent(bench: Bench, kind: type[AnyMessage], for_s: float = 0.0) -> list[Any]:
-    """Messages of this kind over so many turns; the robot side says nothing."""
+    """Return messages of this kind over `for_s`; the robot side is silent."""
     found = []
     for _ in range(1 + round(for_s / 0.004)):
         found += [message for message in map(decode, bench.payloads()) if isinstance(message, kind)]
@@ -107,7 +107,7 @@ def test_a_controller_that_comes_while_blind_is_released_then_told(bench: Bench)
 
 def test_hello_is_repeated_until_the_robot_answers_and_while_nothing_else_is_sent(bench: Bench) -> None:
     assert len(sent(bench, Hello, 1.0)) == pytest.approx(5, abs=1)
-    for session in (SessionState.DISARMED, SessionState.OBSERVING):  # without a controller, and as who only looks
+    for session in (SessionState.DISARMED, SessionState.OBSERVING):  # Without a controller, and as an observer.
         hellos = 0
         for _ in range(250):
             bench.notice(session)
@@ -125,7 +125,7 @@ def epoch_of(bench: Bench) -> int:
     return epoch
 
 
-def test_an_epoch_that_ended_is_followed_by_another_and_not_by_a_third_for_what_was_under_way(bench: Bench) -> None:
+def test_an_ended_epoch_is_followed_by_one_epoch_despite_messages_under_way(bench: Bench) -> None:
     epochs = [epoch_of(bench)]
     for after_s in (0.3, 0.3, 2.0, 2.0, 1.0):
         bench.now_s += after_s

@@ -1,6 +1,6 @@
-"""Whatever happens in whatever order: triggers free without a field, and motion only by who drives and sees.
+"""In any order of events: triggers free without a field, and motion only by the armed driver.
 
-`Core` keeps the rules in a few lines, with the limits as numbers, and compares them with the operator side each turn.
+`Core` states the rules in a few lines, with the limits as numbers, and compares them with the operator side each turn.
 """
 
 import math
@@ -38,7 +38,7 @@ STATES: tuple[MotionState, ...] = ("armed", "armed", "disarmed", "stopped")
 
 
 def meant(l2: float, r2: float, deflected: bool, held: frozenset[Button]) -> dict[str, Any]:
-    """The command that these hands give."""
+    """Return the command of these hands."""
     stop = Button.CIRCLE in held
     lateral, turning = ((1.0, 0.0), (0.0, 1.0)) if deflected else ((0.0, 0.0), (0.0, 0.0))
     return {
@@ -53,7 +53,7 @@ def meant(l2: float, r2: float, deflected: bool, held: frozenset[Button]) -> dic
 
 
 class Core(RuleBasedStateMachine):
-    """An operator side, a controller, and a robot side that says anything."""
+    """Operator side, controller, and a robot side that says anything."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -76,7 +76,7 @@ class Core(RuleBasedStateMachine):
         goes_on=st.sampled_from(GOES_ON),
     )
     def pass_time(self, seconds: float, hung: bool, goes_on: str) -> None:
-        """What goes on is said again after the pause. `hung`: the loop takes no turn before something else happens."""
+        """Advance time; `goes_on` is sent again afterwards. `hung`: the loop takes no turn before the next event."""
         self.bench.now_s += seconds
         self.hung, self.waited = hung, True
         if "lease" in goes_on and self.lease is not None:
@@ -106,7 +106,7 @@ class Core(RuleBasedStateMachine):
         if session is SessionState.ENDED:
             anew = self.bench.now_s - self.anew_s < 5.0
             if anew and self.lease is not None and self.lease.session is not SessionState.ENDED:
-                return  # of the epoch before
+                return  # of the last epoch
             self.anew_s = self.anew_s if anew else self.bench.now_s
         self.lease, self.heard_s = notice, self.bench.now_s
         if not self.owns:
@@ -116,7 +116,7 @@ class Core(RuleBasedStateMachine):
 
     @rule(data=st.data())
     def hear_something_old(self, data: st.DataObject) -> None:
-        """A message that has been heard, or overtaken, changes nothing."""
+        """Receive a message again, or an overtaken one: nothing changes."""
         if self.older:
             self.bench.side.receive(data.draw(st.sampled_from(self.older)), self.bench.now_s)
 
@@ -135,7 +135,7 @@ class Core(RuleBasedStateMachine):
 
     @rule(event=st.sampled_from(["unplugged", "stop pressed on a page", "robot side restarted"]))
     def happen(self, event: str) -> None:
-        """Something rare."""
+        """Run a rare event."""
         if event == "unplugged":
             self.bench.side.controller_lost(self.bench.now_s)
             self.hands, self.held, self.lost_s = None, None, self.bench.now_s
@@ -194,7 +194,7 @@ class Core(RuleBasedStateMachine):
         pulses = self.sight == "blind" and since_s < 3.0 and (since_s % 1.0 < 0.12 or 0.24 <= since_s % 1.0 < 0.36)
         if not pulses:
             assert device.rumble == Rumble()
-        elif self.waited:  # else the bound on writes may keep it back for a twentieth of a second
+        elif self.waited:  # Otherwise the bound on writes may delay it by a twentieth of a second.
             assert device.rumble != Rumble()
             assert device.told.light == WARNING_LIGHT
         self.waited = False

@@ -1,4 +1,4 @@
-"""What is felt by our own commands under way, and by the robot side's reckoning where they are not known."""
+"""Triggers with our own commands under way, and with the robot side's prediction where these are unknown."""
 
 from typing import Any
 
@@ -16,11 +16,11 @@ from tests.operator_side.operator_bench import Bench
 PERIOD_S = 0.004
 FREE = (0,) * 10
 LEFT_M = 0.1
-"""Too far for a hand that has commanded nothing yet: at full speed it needs 85 mm."""
+"""Distance too long for a hand without earlier commands: at full speed it needs 85 mm."""
 
 
 class Driving(Bench):
-    """R2 is pulled all the way in a moment; nothing has been commanded before."""
+    """R2 pulled all the way in a moment, without earlier commands."""
 
     def __init__(self, compensation: Compensation = "operator") -> None:
         super().__init__(compensation=compensation)
@@ -39,7 +39,7 @@ class Driving(Bench):
             self.send(1.0, *(buttons or (Button.L1,)))
 
     def report(self, **changes: Any) -> StiffnessUpdate:
-        """What a robot that has not heard of anything later than `echo_s` says of a wall ahead of R2."""
+        """Return the report of a wall ahead of R2, by a robot side that heard nothing after `echo_s`."""
         wall = field(ways(LEFT_M), displacement_m=changes.pop("displacement_m", 0.0))
         header = msgspec.structs.replace(
             self.robot.stamp(self.now_s), echo_sent_s=self.echo_s, echo_held_s=0.0, last_sent_s=None, last_held_s=None
@@ -62,21 +62,21 @@ def test_commands_under_way_bring_it_nearer() -> None:
     assert bench.r2 == FREE
     bench.drive(0.2)
     bench.feel_field(bench.report())
-    # δ = 0.25 * 0.2 - 0.25²/6 = 40 mm, w = 0.25 m/s: a zone of 0.184 m/s needs 40 + 55 + 5.6 + 0.7 = 101 mm.
+    # δ = 0.25 * 0.2 - 0.25²/6 = 40 mm, w = 0.25 m/s. A zone of 0.184 m/s needs 40 + 55 + 5.6 + 0.7 = 101 mm.
     assert bench.r2 == (0,) * 5 + (8,) * 5
     assert bench.device.strengths[0] == FREE
     assert bench.without_history == 0
 
 
-def test_who_stops_commanding_has_said_stop() -> None:
+def test_ending_commands_means_stop() -> None:
     bench = Driving()
     bench.drive(0.1)
-    for _ in range(2):  # without a report of the controller nothing is sent
+    for _ in range(2):  # Without a report of the controller nothing is sent.
         bench.now_s += 0.2
         bench.notice(SessionState.ARMED)
         assert bench.commands() == []
     bench.feel_field(bench.report())
-    # Its last command counted until it was seen to stop, 0.2 s later: δ = 0.25 * 0.296 = 74 mm, w = 0.
+    # Its last command counted until its stop was seen, 0.2 s later: δ = 0.25 * 0.296 = 74 mm, w = 0.
     assert bench.r2 == (0,) * 3 + (8,) * 7
     assert bench.without_history == 0
 
@@ -94,7 +94,7 @@ def test_without_history_the_robot_sides_counts_and_is_counted(echo_s: float | N
     assert bench.without_history == 1
 
 
-def test_who_observes_does_not_know_what_others_command() -> None:
+def test_an_observer_does_not_know_others_commands() -> None:
     bench = Driving()
     bench.drive(0.2)
     bench.notice(SessionState.OBSERVING)

@@ -1,4 +1,4 @@
-"""The operator side's settings: from a file and from flags, and every refusal in one line."""
+"""Operator side's settings: from a file and from flags, and every refusal in one line."""
 
 import math
 from pathlib import Path

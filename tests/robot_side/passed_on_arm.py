@@ -1,11 +1,11 @@
-"""An arm that passes everything on to another one; what is to be different is overridden."""
+"""Arm that delegates to another one, as a base for overrides."""
 
 from common.arrays import FloatArray
 from robot_side.arm.port import Arm, ArmState
 
 
 class PassedOnArm(Arm):
-    """Behaves as `arm`."""
+    """Arm that behaves as `arm`."""
 
     joint_count = 0
 

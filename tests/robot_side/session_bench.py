@@ -1,4 +1,4 @@
-"""A robot side in virtual time with operators in our hands; every message arrives at once."""
+"""Robot side in virtual time with operators in our hands; every message arrives at once."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -31,19 +31,19 @@ TICK_S = 0.001
 COMMAND_PERIOD_TICKS = 4
 _HELLO_PERIOD_TICKS = 200
 QUICK = RobotSettings(safety=SafetySettings(healthy_s=0.1))
-"""Arms after a tenth of a second, because nobody learns anything from a longer one."""
+"""Settings that arm after a tenth of a second; a longer time would test nothing more."""
 CRUISE = 0.4
 """Travel of R2 at which the built-in arm advances at 0.1 m/s."""
 
 
 class ArmWatch(Listener):
-    """Remembers commands to the arm and its measured speed."""
+    """Record of the commands to the arm and its measured speed."""
 
     def __init__(self) -> None:
         self.speeds_rad_s: list[tuple[float, float]] = []
-        """(when, the largest joint speed) of each state."""
+        """(time, largest joint speed) of each state."""
         self.told_to_move = 0
-        """Commands that were not to stand still."""
+        """Number of commands that were not to stand still."""
 
     def on_tick(self, tick: Tick) -> None:
         """Note a tick's state, and then its command."""
@@ -69,17 +69,17 @@ class Operator:
 
     @property
     def token(self) -> int:
-        """The lease's token as last heard; 0 before."""
+        """Token of the lease as last heard; 0 before."""
         return 0 if self.notice is None else self.notice.token
 
     @property
     def state(self) -> SessionState:
-        """The session's state as last heard."""
+        """State of the session as last heard."""
         return SessionState.UNKNOWN if self.notice is None else self.notice.session
 
     @property
     def felt(self) -> list[StiffnessUpdate]:
-        """Every stiffness that came."""
+        """Every stiffness received."""
         return [message for message in self.inbox if isinstance(message, StiffnessUpdate)]
 
     def take(self, message: StiffnessUpdate | Hello | LeaseNotice, now_s: float) -> None:
@@ -90,18 +90,18 @@ class Operator:
             self.notice = message
 
     def command(self, now_s: float, header: Header | None = None, **fields: Any) -> bytes:
-        """A motion command with the triggers released and the run button down, but for `fields`."""
+        """Return a motion command with the triggers released and the run button down, except for `fields`."""
         content: dict[str, Any] = {"l2": 0.0, "r2": 0.0, "run": True, "token": self.token} | fields
         return encode(MotionCommand(header or self.link.stamp(now_s), **content))
 
 
 class Bench:
-    """The robot side, messages to each operator, and the arm's motion."""
+    """Robot side, messages to each operator, and the arm's motion."""
 
     def __init__(
         self, settings: RobotSettings = QUICK, parts: RobotParts | None = None, listeners: Sequence[Listener] = ()
     ) -> None:
-        """parts: instead of those that the settings name."""
+        """parts: in place of those from the settings."""
         self.watch = ArmWatch()
         parts = parts or build_parts(settings, 1, "clock")
         self.arm, self.robot = parts.arm, RobotSide(parts, [self.watch, *listeners])
@@ -111,32 +111,32 @@ class Bench:
 
     @property
     def now_s(self) -> float:
-        """The virtual time."""
+        """Virtual time, in seconds."""
         return self.ticks * TICK_S
 
     @property
     def state(self) -> str:
-        """The robot's state."""
+        """State of the robot side."""
         return self.robot.session.safety.state
 
     @property
     def speed_rad_s(self) -> float:
-        """The speed of the fastest joint, now."""
+        """Present speed of the fastest joint."""
         return self.watch.speeds_rad_s[-1][1]
 
     @property
     def tool_m(self) -> FloatArray:
-        """(3,) where telemetry shows the tool, 25 ticks from now."""
+        """Tool's position (3,) in telemetry, 25 ticks from now."""
         self.tick(25)
         return np.array(self.views[-1].tool_position_m)
 
     def operator(self, epoch: int, peer: bytes = b"operator") -> Operator:
-        """Another operator that has not said anything yet; it receives what goes to `peer`."""
+        """Return another, silent operator; it receives what goes to `peer`."""
         operator = self.operators[peer] = Operator(epoch, peer)
         return operator
 
     def join(self, epoch: int, peer: bytes = b"operator") -> Operator:
-        """Another operator that says Hello, and hears where it stands."""
+        """Return another operator that says Hello, and hears its state."""
         operator = self.operator(epoch, peer)
         self.say_hello(operator)
         self.tick()
@@ -167,11 +167,11 @@ class Bench:
             self.robot.observe(self.now_s)
 
     def silence(self, duration_s: float) -> None:
-        """Tick while nobody says anything."""
+        """Tick without messages from operators."""
         self.tick(round(duration_s / TICK_S))
 
     def drive(self, duration_s: float, operator: Operator, **fields: Any) -> None:
-        """A command each 4 ms, of which the first comes after a tick; those who wait say Hello each 200 ms."""
+        """Send a command each 4 ms, the first after a tick; waiting participants say Hello each 200 ms."""
         for step in range(round(duration_s / TICK_S)):
             self.tick()
             if step % COMMAND_PERIOD_TICKS == 0:
@@ -182,7 +182,7 @@ class Bench:
                         self.say_hello(other)
 
     def arm_it(self, operator: Operator) -> None:
-        """A healthy while with released triggers, then the button; RuntimeError when that does not arm."""
+        """Send released triggers for the healthy time, then the button; RuntimeError if that does not arm."""
         self.drive(self.robot.session.safety.settings.healthy_s + 0.05, operator)
         self.drive(0.02, operator, arm=True)
         if self.state != "armed":

@@ -1,4 +1,4 @@
-"""The robot side as its peers see it, with the simulated arm in virtual time."""
+"""Robot side as its peers see it, with the simulated arm in virtual time."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ def test_an_armed_robot_moves_as_asked_and_stops_when_commands_stop(bench: Bench
     start = bench.tool_m
     bench.drive(0.5, operator, r2=0.4)
     moved = bench.tool_m - start
-    assert 0.03 < moved[0] < 0.07  # 0.1 m/s for half a second, and the gap that it holds
+    assert 0.03 < moved[0] < 0.07  # 0.1 m/s for half a second, and for the gap that a command holds.
     assert np.abs(moved[1:]).max() < 0.01
     bench.tick(400)
     assert bench.state == "disarmed"
@@ -40,7 +40,7 @@ def test_an_armed_robot_moves_as_asked_and_stops_when_commands_stop(bench: Bench
 def test_an_unarmed_robot_lets_no_load_sink_however_unevenly_it_ticks() -> None:
     scene = load_scene()
     robot = RobotSide(build_parts(RobotSettings(), epoch=1, clock_domain="test", scene=scene))
-    scene.data.xfrc_applied[scene.model.site_bodyid[scene.robot.site], 2] = -3.0  # what a held thing weighs
+    scene.data.xfrc_applied[scene.model.site_bodyid[scene.robot.site], 2] = -3.0  # The weight of a held object.
     generator = np.random.default_rng(0)
     now_s, height_m = 0.0, []
     for _ in range(2):
@@ -93,7 +93,7 @@ def test_the_status_says_who_pulls_how_far_everything_is_and_why_it_stopped(benc
 
 
 class Listening(Listener):
-    """Keeps what the law was told."""
+    """Listener that keeps the law's situations."""
 
     def __init__(self) -> None:
         self.heard: list[Situation] = []
@@ -142,7 +142,7 @@ def test_what_the_law_finds_is_what_is_sent(bench: Bench, listening: Listening) 
 
 
 def told_m_s(operator: Operator) -> float:
-    """What the newest command gets, as last heard."""
+    """Return the speed given to the newest command, as last heard."""
     told = operator.felt[-1].told_m_s
     assert told is not None
     return told
@@ -152,7 +152,7 @@ def test_an_operator_hears_what_its_command_gets_and_0_where_it_gets_nothing(ben
     operator = bench.join(2)
     start = bench.tool_m
     bench.drive(0.5, operator, r2=0.4)
-    assert told_m_s(operator) == 0.0  # not armed
+    assert told_m_s(operator) == 0.0  # Not armed.
     assert np.linalg.norm(bench.tool_m - start) < 2e-3
     bench.cruise(operator, 0.1)
     assert told_m_s(operator) == pytest.approx(0.1, rel=0.01)

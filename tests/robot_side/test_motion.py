@@ -1,4 +1,4 @@
-"""What is said of a command is what the arm is told."""
+"""Reported motion of a command equals the arm's command."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ PARTS = build_parts(RobotSettings(), 1, "clock")
 
 
 class ToldArm(Arm):
-    """Keeps what it is told."""
+    """Arm that keeps its commands."""
 
     joint_count = PARTS.arm.joint_count
 

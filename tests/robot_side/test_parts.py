@@ -1,4 +1,4 @@
-"""Settings to a robot side: which law and which table, how the gripper is covered, and what a person is told."""
+"""From settings to a robot side: the law and its table, the gripper's cover, and the notes to a person."""
 
 import subprocess
 import sys
@@ -154,7 +154,7 @@ def test_a_scene_needs_no_kernels_for_primitives_that_it_lacks(
     needed = {kernel.name.rpartition(".")[2] for kernel in parts.kernels}
     assert needed >= {"look", "sense", "drive"}
     assert ("overlap_one_box" in needed, "overlap_one_tetrahedron" in needed) == (boxes, tetrahedra)
-    # Those of the library of overlaps are not for ticks.
+    # The library's own kernels are not for ticks.
     assert not needed & {"overlap_boxes", "precise_boxes", "overlap_tetrahedra", "precise_tetrahedra"}
 
 

@@ -1,4 +1,4 @@
-"""A held object comes to stand, with the simulated arm: motion downwards ends, and its release moves nothing."""
+"""A held object makes contact, with the simulated arm: downward motion ends, and its release moves nothing."""
 
 from dataclasses import replace
 from typing import Any
@@ -17,14 +17,14 @@ SETTINGS = replace(QUICK, model=DATA / "place_held.xml", site="tool")
 
 
 class Forgetful(PassedOnArm):
-    """An arm that does not measure loads."""
+    """Arm that does not measure loads."""
 
     def state(self, now_s: float) -> ArmState:
         return replace(self.arm.state(now_s), joint_loads_nm=None)
 
 
 class Placing(Bench):
-    """The tool points down, and holds a box 10 mm above a table."""
+    """Tool that points down and holds a box 10 mm above a table."""
 
     def __init__(self, *, measures: bool = True) -> None:
         parts = build_parts(SETTINGS, 1, "clock")
@@ -50,7 +50,7 @@ class Placing(Bench):
 
     @property
     def pressed_n(self) -> float:
-        """Force on the table."""
+        """Return the force on the table in newtons."""
         assert self.robot.newest is not None
         carried = carried_n(self.robot.newest[1].pose.tool_jacobian, self.simulated.state(self.now_s).joint_loads_nm)
         assert carried is not None

@@ -1,4 +1,4 @@
-"""The first moments of the robot side's process: strangers at its ports, a port that is taken."""
+"""First moments of the robot side's process: strangers at its ports, a port in use."""
 
 import contextlib
 import json
@@ -29,7 +29,7 @@ def free_port() -> int:
 
 
 class Crowd(threading.Thread):
-    """Connects as soon and as often as it can, and holds what it has."""
+    """Client that connects as early and often as possible, and keeps its connections."""
 
     def __init__(self, port: int) -> None:
         super().__init__(daemon=True)

@@ -1,4 +1,4 @@
-"""A core whose steps are timed does what a plain one does, and counts physics and sensing."""
+"""A core with timed steps acts as a plain one, and counts physics and sensing."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_each_stage_has_its_help() -> None:
 
 
 class Ticking:
-    """A processor's clock that has gone on by a microsecond whenever it is read."""
+    """Processor clock that advances by a microsecond at each reading."""
 
     def __init__(self) -> None:
         self._reads = 0

@@ -1,4 +1,4 @@
-"""A real robot side that somebody looks at: pictures, a companion that is killed, and a slow link for video."""
+"""Real robot side with a viewer: pictures, a killed companion, and a slow link for video."""
 
 import os
 import signal
@@ -32,7 +32,7 @@ def viewed(*arguments: str) -> Iterator[tuple[SideProcess, Viewer]]:
 
 
 def look_until(viewer: Viewer, enough: Callable[[Seen], bool], **what: Any) -> Seen:
-    """Look in short stretches until one of them shows enough."""
+    """Look in short stretches until one shows enough."""
     for _ in range(round(PATIENCE_S)):
         seen = look([viewer], 1.0, **what)
         if enough(seen):
@@ -45,13 +45,13 @@ def frames(seen: Seen) -> list[VideoFrame]:
 
 
 def said_of_cameras(robot: SideProcess) -> list[str]:
-    """What a person was told, since this was last asked."""
+    """Return the notes to a person about cameras since the last call."""
     texts = [str(event.get("text")) for event in robot.events()]
     return [text for text in texts if text.startswith("cameras: ")]
 
 
 def works_here(robot: SideProcess, viewer: Viewer) -> None:
-    """Skip where nothing can be rendered, with the reason that the robot side gives."""
+    """Skip the test if nothing can be rendered, with the robot side's reason."""
     for _ in range(round(PATIENCE_S)):
         if frames(look([viewer], 1.0, overview=True, first_person=True)):
             return
@@ -81,7 +81,7 @@ def test_pictures_and_scene_come_while_somebody_looks_and_a_killed_companion_com
         assert companion is not None
         os.kill(companion, signal.SIGKILL)
         gone = look([viewer], 1.0, overview=True)
-        # Ticks go on: the owner's stiffness comes as before.
+        # Ticks continue: the owner's stiffness comes as before.
         assert len(gone.stiffness_ages_s) > 30
         again = look_until(viewer, lambda seen: bool(frames(seen)), overview=True)
         assert again.began_s - gone.began_s > RETRY_S - 2.0
@@ -94,7 +94,7 @@ def test_pictures_and_scene_come_while_somebody_looks_and_a_killed_companion_com
     assert summary["looked_at"]["overview"]["nobody_looks"] > 0
 
 
-def test_steps_go_to_who_shows_them_and_one_that_is_lacking_brings_a_whole_one() -> None:
+def test_steps_go_to_viewers_that_show_them_and_a_missing_one_brings_a_whole_picture() -> None:
     pytest.importorskip("av", reason="needs the extra `video`")
     from common.video.steps import Steps  # noqa: PLC0415  # only now it is known to work
 
@@ -121,7 +121,7 @@ def test_steps_go_to_who_shows_them_and_one_that_is_lacking_brings_a_whole_one()
 
 
 def test_a_machine_that_cannot_render_is_told_what_helps(monkeypatch: pytest.MonkeyPatch) -> None:
-    # PyOpenGL takes no other way than this one, which nobody has.
+    # PyOpenGL accepts only this platform, which no machine has.
     monkeypatch.setenv("EGL_PLATFORM", "none")
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
     with viewed() as (robot, viewer):

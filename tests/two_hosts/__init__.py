@@ -1,1 +1,1 @@
-"""The guide docs/two-machines.md, followed on two machines in network namespaces, and what goes wrong on a LAN."""
+"""The guide docs/two-machines.md, followed on two machines in network namespaces, and the faults of a LAN."""

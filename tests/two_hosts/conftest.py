@@ -14,7 +14,7 @@ from tests.two_hosts.lan import Lan, is_armed
 
 @pytest.fixture(scope="session")
 def guided() -> Iterator[Lan]:
-    """The guide, followed by its own lines to where both sides are armed."""
+    """Both sides armed, after following the guide by its own lines."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with two_machines() as machines, tempfile.TemporaryDirectory(prefix="feelahead-hosts-") as folder:
         lan = Lan(*machines, Path(folder))
@@ -32,7 +32,7 @@ def guided() -> Iterator[Lan]:
 
 @pytest.fixture
 def lan(guided: Lan, request: pytest.FixtureRequest) -> Lan:
-    """After a test that has failed, the network as it was and both sides again."""
+    """The guided LAN; after a failed test, the network is restored and both sides restart."""
     if request.session.testsfailed > guided.mended:
         guided.mended = request.session.testsfailed
         guided.mend()

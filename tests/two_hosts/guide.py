@@ -1,4 +1,4 @@
-"""docs/two-machines.md as a program: indented lines are commands, the paragraph before says on which machine."""
+"""docs/two-machines.md as a program: indented lines are commands; the paragraph before names the machine."""
 
 import re
 import shlex
@@ -37,7 +37,7 @@ class Step:
 
 
 def steps(path: Path = GUIDE) -> list[Step]:
-    """Read its commands, in order; AssertionError for one without a machine."""
+    """Return the guide's commands, in order; AssertionError for one without a machine."""
     found: list[Step] = []
     named: list[str] = []
     paragraph = ""
@@ -57,7 +57,7 @@ def steps(path: Path = GUIDE) -> list[Step]:
 
 
 def follow(lan: Lan) -> None:
-    """Do all that the guide says up to the starts, which are kept for `lan.start`."""
+    """Follow the guide up to the starts, which are kept for `lan.start`."""
     hosts = {"robot": lan.robot_host, "operator": lan.operator_host}
     if shutil.which("nft") is not None:
         lan.robot_host.run(_USUAL_FIREWALL)
@@ -68,7 +68,7 @@ def follow(lan: Lan) -> None:
 
 
 def _do(lan: Lan, host: Host, step: Step) -> None:
-    """Run the command on its host, or check it otherwise where it would change this machine."""
+    """Run the command on its host, or only check it if it would change this machine."""
     match shlex.split(step.command):
         case ["pip", "install", wanted]:
             assert wanted == f".[{step.where}]"
@@ -86,7 +86,7 @@ def _do(lan: Lan, host: Host, step: Step) -> None:
             assert all(port in step.command for port in PORTS)
             if shutil.which("nft") is not None:
                 host.run(step.command.removeprefix("sudo "))
-        case ["sudo", "ufw", *_]:  # for the whole machine
+        case ["sudo", "ufw", *_]:  # Would change the whole machine.
             assert step.command == f"sudo ufw allow {':'.join(PORTS)}/tcp"
         case ["feelahead", "doctor"]:
             said = host.run(step.command, codes=(0, 1))

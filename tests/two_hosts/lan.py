@@ -1,4 +1,4 @@
-"""Two hosts on a cable, each with a home, a clock and names of its own, and the sides that run on them."""
+"""Two hosts on a cable, each with a separate home, clock and names, and the sides that run on them."""
 
 import contextlib
 import os
@@ -25,9 +25,9 @@ PATIENCE_S = 60.0
 ATTEMPTS = 3
 MOST_GAP_MS = 1000.0
 NAME = "robot.lan"
-"""The robot's name on the operator's host."""
+"""Robot's name on the operator's host."""
 NOBODY = "198.18.0.99"
-"""An address without a machine."""
+"""Address without a machine."""
 _CLOCK_AHEAD_S = 100_000
 _MODULES = {"feelahead-robot": "robot_side", "feelahead-operator": "operator_side"}
 
@@ -36,34 +36,34 @@ Status = dict[str, Any]
 
 @dataclass(frozen=True)
 class Host:
-    """A user's account on one of the machines."""
+    """User's account on one of the machines."""
 
     machine: Machine
     home: Path
     clock: tuple[str, ...] = ()
-    """The command that gives programs there a monotonic clock of their own."""
+    """Command prefix that gives programs there a separate monotonic clock."""
     also: dict[str, str] = field(default_factory=dict)
-    """More of the environment."""
+    """Additional environment variables."""
 
     def surroundings(self) -> list[str]:
-        """The command that runs a program there."""
+        """Return the command prefix that runs a program there."""
         self.home.mkdir(exist_ok=True)
         folders = {f"XDG_{kind}_HOME": f"{self.home}/{place}" for kind, place in _FOLDERS}
         variables = {
             "HOME": str(self.home),
             "PATH": f"{Path(sys.executable).parent}:{os.environ.get('PATH', '')}",
             "PYTHONPATH": str(ROOT),
-            "NUMBA_CACHE_DIR": str(machine_code_folder()),  # each would compile for half a minute
+            "NUMBA_CACHE_DIR": str(machine_code_folder()),  # Each would compile for half a minute.
         }
         given = folders | variables | self.also
         return [*self.machine.surroundings, *self.clock, "env", *(f"{name}={value}" for name, value in given.items())]
 
     def user(self, name: str) -> "Host":
-        """Somebody else on the same machine."""
+        """Return another user on the same machine."""
         return replace(self, home=self.home.with_name(f"{self.home.name}-{name}"))
 
     def run(self, command: str, *, codes: tuple[int, ...] = (0,)) -> str:
-        """Run a shell command there; AssertionError when it ends with another code."""
+        """Run a shell command there; AssertionError if it ends with another code."""
         done = subprocess.run(
             [*self.surroundings(), "sh", "-c", command],
             capture_output=True,
@@ -80,24 +80,24 @@ _FOLDERS = (("CONFIG", ".config"), ("CACHE", ".cache"), ("DATA", ".local/share")
 
 
 class Side:
-    """One side that runs, and what it has said."""
+    """One running side, and its events."""
 
     def __init__(self, command: str, host: Host, more: tuple[str, ...] = ()) -> None:
-        """`command` is a line of the guide that starts a side; `more`: what the test adds."""
+        """`command` is a line of the guide that starts a side; `more`: the test's additional arguments."""
         program, *arguments = shlex.split(command.replace("~/", f"{host.home}/"))
         self.name = program.removeprefix("feelahead-")
         self.process = SideProcess(_MODULES[program], self.name, [*arguments, *more], host.surroundings())
         self.said: list[Status] = []
-        """Every status, the newest last."""
+        """All statuses, the newest last."""
         self.notes: list[str] = []
 
     @property
     def status(self) -> Status:
-        """The newest one."""
+        """Newest status."""
         return self.said[-1] if self.said else {}
 
     def listen(self) -> None:
-        """Take note of what it has said; SideFailedError when it has failed."""
+        """Read its new events; SideFailedError if it has failed."""
         for event in self.process.events():
             if event["event"] == "status":
                 self.said.append(event)
@@ -117,15 +117,15 @@ class Lan:
         self.robot_host = Host(robot, folder / "robot", clock if self.own_clocks else ())
         self.operator_host = Host(operator, folder / "operator")
         self.starts: dict[str, str] = {}
-        """The guide's command lines that start the sides."""
+        """Command lines of the guide that start the sides."""
         self.doctor: str | None = None
-        """The guide's command line that looks at the way."""
+        """Command line of the guide that checks the path."""
         self.words: dict[str, str] = {"ROBOT": NAME}
         """Values of the guide's words in capitals."""
         self._addresses = (robot.address, operator.address)
         self._sides: dict[str, Side] = {}
         self.mended = 0
-        """The session's failures at the last `mend`."""
+        """Number of the session's failures at the last `mend`."""
         operator.own_files.mkdir(parents=True)
         (operator.own_files / "resolv.conf").write_text(f"nameserver {NOBODY}\n")
         self.tell_name(robot.address)
@@ -133,12 +133,12 @@ class Lan:
     def tell_name(self, address: str | None) -> None:
         """Set the robot's address on the operator's host; None: unknown, and no name server answers."""
         names = "127.0.0.1 localhost\n" + (f"{address} {NAME}\n" if address else "")
-        # In its place: the running programs have this very file for /etc/hosts.
+        # In place: the running programs have this very file as /etc/hosts.
         with (self.operator_host.machine.own_files / "hosts").open("w", encoding="ascii") as hosts:
             hosts.write(names)
 
     def ask_doctor(self, code: int, words: str) -> None:
-        """AssertionError unless the doctor ends with this code and says these words."""
+        """Assert that the doctor ends with this code and prints these words."""
         assert self.doctor is not None
         assert words in self.operator_host.run(self.doctor, codes=(code,))
 
@@ -146,16 +146,16 @@ class Lan:
 
     @property
     def robot(self) -> Side:
-        """The robot side that runs."""
+        """Running robot side."""
         return self._sides["robot"]
 
     @property
     def operator(self) -> Side:
-        """The operator side that runs."""
+        """Running operator side."""
         return self._sides["operator"]
 
     def start(self, name: str, host: Host | None = None, *more: str, called: str | None = None) -> Side:
-        """Start a side as the guide does, `called` something else where there is one already."""
+        """Start a side as the guide does, named `called` if one exists already."""
         ours = self.robot_host if name == "robot" else self.operator_host
         flags = () if name == "robot" else ("--device=simulated",)
         side = Side(self.starts[name], host or ours, (*flags, *more))
@@ -174,21 +174,21 @@ class Lan:
             os.kill(process.process_id, signal.SIGKILL)
 
     def restart(self, host: Callable[[Host], Host] = lambda host: host) -> None:
-        """Both sides again, the robot side first, with a fresh scene; `host` may change their surroundings."""
+        """Restart both sides, the robot side first, with a fresh scene; `host` may change their surroundings."""
         self.end_all()
         self.start("robot", host(self.robot_host))
         self.until("robot", "it listens", bool)
         self.start("operator", host(self.operator_host))
 
     def end_all(self) -> None:
-        """End every side, however."""
+        """End every side, by force if necessary."""
         with contextlib.ExitStack() as stack:
             for side in self._sides.values():
                 stack.enter_context(side.process)
         self._sides.clear()
 
     def mend(self) -> None:
-        """The network as it was, after a row that has failed, and both sides again."""
+        """Restore the network after a failed row, and restart both sides."""
         for host, address in zip((self.robot_host, self.operator_host), self._addresses, strict=True):
             host.machine.plug_in()
             host.machine.set_link("mtu", "1500")
@@ -199,7 +199,7 @@ class Lan:
         self.until("operator", "the link is up", lambda status: status["link"] == "up")
 
     def swallow(self, everything: bool) -> None:
-        """Let the robot's host drop all that comes, without a word; or no more."""
+        """Let the robot's host drop all incoming packets silently, or accept them again."""
         run = self.robot_host.run
         if everything:
             run("nft add table inet swallow")
@@ -210,12 +210,12 @@ class Lan:
     # Waiting
 
     def listen(self) -> None:
-        """Take note of what all of them have said."""
+        """Read the new events of all sides."""
         for side in list(self._sides.values()):
             side.listen()
 
     def until(self, called: str, what: str, condition: Callable[[Status], bool], limit_s: float = PATIENCE_S) -> Status:
-        """The first status from now on for which `condition` holds; AssertionError when none comes."""
+        """Return the first status from now on for which `condition` holds; AssertionError if none comes."""
         self.listen()
         side = self._sides[called]
         seen = len(side.said)
@@ -229,7 +229,7 @@ class Lan:
         return wait_until(f"{called}: {what}", found, limit_s, instead=lambda: _short(side.status))
 
     def watch(self, for_s: float) -> Iterator[None]:
-        """Let time pass, listening; the caller looks in between."""
+        """Let time pass and read events; the caller checks in between."""
         end_s = time.monotonic() + for_s
         while time.monotonic() < end_s:
             time.sleep(0.1)
@@ -237,7 +237,7 @@ class Lan:
             yield
 
     def moving(self) -> None:
-        """Wait until the person has the arm armed and moves it; who is done begins again."""
+        """Wait until the person has the arm armed and moves it; a person who is done starts again."""
         for attempt in range(4):
             status = self.until("operator", "armed and moving", lambda status: is_done(status) or is_moving(status))
             if is_moving(status):
@@ -256,12 +256,12 @@ class Lan:
         print(f"back after {time.monotonic() - began_s:.1f} s")
         assert status["state"] == "disarmed"
         fresh = self.until("operator", "armed again", lambda status: is_done(status) or _is_armed_and_shown(status))
-        if is_done(fresh):  # they were at the end of the task
+        if is_done(fresh):  # They were at the end of the task.
             self.moving()
         self.until("robot", "armed again", is_armed)
 
     def _first_after_the_loss(self) -> Status | None:
-        """The first status since the link came back, however late it is read: a second later the arm may be armed."""
+        """Return the first status after the link's return, even if read late: a second later the arm may be armed."""
         self.listen()
         said = self.operator.said
         lost = max((place for place, status in enumerate(said) if status["link"] != "up"), default=-1)
@@ -269,7 +269,7 @@ class Lan:
 
 
 def is_armed(status: Status) -> bool:
-    """Whether the arm may move, as this side knows."""
+    """Return whether the arm may move, by this side's knowledge."""
     return bool(status["state"] == "armed")
 
 
@@ -278,9 +278,9 @@ def _is_armed_and_shown(status: Status) -> bool:
 
 
 def gap_ms(stop: Status) -> float:
-    """The silence after which the robot side stopped the arm; AssertionError for another reason, and beyond a second.
+    """Return the silence after which the robot side stopped the arm; fail for another reason, and beyond a second.
 
-    100 ms are promised, and 20 more in the worst case; only a quiet machine can be held to that.
+    100 ms are promised, and 20 more at worst, but only a quiet machine keeps them.
     """
     said = re.fullmatch(r"no command for (\d+) ms", str(stop["stopped_because"]))
     assert said is not None, stop["stopped_because"]
@@ -289,12 +289,12 @@ def gap_ms(stop: Status) -> float:
 
 
 def is_moving(status: Status) -> bool:
-    """Whether the arm is told to."""
+    """Return whether the arm is commanded to move."""
     return is_armed(status) and max(status["L2_pulled"] or 0.0, status["R2_pulled"] or 0.0) > 0.05
 
 
 def is_done(status: Status) -> bool:
-    """Whether the scripted person will not do anything any more."""
+    """Return whether the scripted person has finished."""
     return status.get("person") in (Doing.DONE, Doing.NO_TARGET)
 
 

@@ -101,7 +101,7 @@ def test_a_wall_clock_stepped_by_an_hour_and_back(lan: Lan) -> None:
         return replace(host, also=faked)
 
     def step(offset_s: int) -> int:
-        """Set it; what a program there takes for the time."""
+        """Set the offset; return the time that a program there sees."""
         partial = offset.with_suffix(".new")
         partial.write_text(f"+{offset_s}\n", encoding="ascii")
         partial.replace(offset)

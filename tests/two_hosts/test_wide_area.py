@@ -1,4 +1,4 @@
-"""Both sides over the kernel's own TCP with delay, rate and queue: no delay of their own making, and nobody's stop."""
+"""Both sides over the kernel's TCP with delay, rate and queue: no queueing of their own, and no stops."""
 
 import subprocess
 import sys
@@ -33,12 +33,12 @@ _RESTING_KBIT_S = 200.0
     ],
 )
 def test_armed_without_a_stop_and_without_a_queue(trial: Trial) -> None:
-    """In the best of three: other programs and the machine's host add to ages, and can stop the arm by themselves."""
+    """In the best of three: other programs and the machine's host add to ages, and can stop the arm."""
     faults = []
     for _ in range(ATTEMPTS):
         outcome = run_trial(trial)
         print({name: round(value, 2) if isinstance(value, float) else value for name, value in outcome.items()})
-        # Ages hold what a busy machine adds, too: of a link with a rate its own queue is known.
+        # Ages include a busy machine's share; with a rate, the link's own queue is known.
         kept = outcome["link_queue_p95_ms" if trial.rate else "queueing_p95_ms"] <= _QUEUEING_MS
         if trial.loss:
             kept &= outcome["to_operator_p99_ms"] <= trial.delay + _QUEUEING_MS

@@ -1,1 +1,1 @@
-"""A hand that pulls and a gripper that approaches: runs, recordings, and their judgement, for several questions."""
+"""Approaches for several questions: a hand that pulls, runs of both sides, recordings and their judgement."""

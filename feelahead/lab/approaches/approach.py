@@ -29,15 +29,15 @@ _FULL: Final = Feel(l2=(MAX_STRENGTH,) * ZONE_COUNT, r2=(MAX_STRENGTH,) * ZONE_C
 
 
 class FullDualSense(SimulatedDualSense):
-    """A controller that always resists with full strength."""
+    """Controller that resists with full strength from its first state on."""
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Do something else than it is told."""
+        """Write full strength, whatever the command."""
         del feel
         super().write(_FULL, now_s)
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Read the state; it resists from the first time on."""
+        """Read the state; free triggers resist with full strength from then on."""
         if self.released:
             super().write(_FULL, now_s)
         return super().read(now_s)
@@ -57,18 +57,18 @@ class Approach:
     law: Law = "swept"
     probability: float = 0.99
     duration_s: float = 8.0
-    """From the beginning of the pull."""
+    """Time from the beginning of the pull to the end of the run, in seconds."""
     seed: int = 0
     grip: bool = False
     stick: Vector2 = (0.0, 0.0)
-    """The left stick, as it counts: across."""
+    """Deflection (2,) of the left stick, beyond its dead zone: moves across."""
     turn: Vector2 = (0.0, 0.0)
-    """The right stick, as it counts."""
+    """Deflection (2,) of the right stick, beyond its dead zone: turns."""
     assist: Assist = "none"
     full_rate: bool = False
-    """Both sides send everything (RunOptions.full_rate)."""
+    """Whether both sides send every message (RunOptions.full_rate)."""
     camera_sd_m: float | None = None
-    """σ_c; None for the settings' own."""
+    """σ_c, in metres; None: the settings' default."""
 
 
 class PullRun(Listener):
@@ -119,21 +119,21 @@ class PullRun(Listener):
         return None if safety.state == "armed" or not safety.stops else safety.stops[-1][1]
 
     def arm(self) -> float:
-        """Go on until the pull begins, and return that time; FeelaheadError where the robot is not armed in time."""
+        """Run until the pull begins, and return that time; FeelaheadError if the robot is not armed in time."""
         began_s = wait_for_pull(self.loopback, self.hands, self.approach.link)
         if self.truth.touched:
             raise FeelaheadError(f"the gripper touches {', '.join(sorted(self.truth.touched))} before the pull begins")
         return began_s
 
     def go_on(self, until_s: float) -> Iterator[float]:
-        """Go on until a contact, a stop or `until_s`; yield the time every 10 ms."""
+        """Run until a contact, a stop or `until_s`; yield the time every 10 ms."""
         clock = self.loopback.clock
         while self.onset is None and self.disarmed_because is None and clock.now() < until_s:
             self.loopback.run_until(min(clock.now() + SAMPLE_S, until_s))
             yield clock.now()
 
     def on_sent(self, now_s: float) -> None:
-        """See what is true."""
+        """Sample the true contact, the speed and the zones."""
         if self.onset is not None:
             return
         run, hands = self.loopback, self.hands
@@ -149,12 +149,12 @@ class PullRun(Listener):
 
 
 def compile_kernels() -> None:
-    """Compile every kernel that is not compiled yet, so that workers need not do it at the same time."""
+    """Compile every missing kernel, so that parallel workers do not compile the same ones."""
     warm_up(kernels=import_kernels())
 
 
 def robot_settings(approach: Approach) -> RobotSettings:
-    """Make the robot side's settings; ConfigurationError for a model or a link that cannot be used."""
+    """Make the robot side's settings; ConfigurationError for an unusable model or link."""
     return RobotSettings(
         model=approach.model,
         site=approach.site,
@@ -170,10 +170,10 @@ def robot_settings(approach: Approach) -> RobotSettings:
 
 
 def run_approach(approach: Approach) -> Outcome:
-    """Run it to its contact, or to its end; the same settings give the same outcome.
+    """Run one approach to its contact or end. The same settings give the same outcome.
 
-    ConfigurationError for a model or a link that cannot be used; a robot that is not armed in time, or that touches
-    before the pull, is an outcome that `failed`.
+    Raises ConfigurationError for an unusable model or link. The outcome is `failed` if the robot is not armed in time
+    or touches before the pull.
     """
     run = PullRun(approach)
     try:

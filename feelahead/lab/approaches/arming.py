@@ -9,7 +9,7 @@ _LOOK_S = 0.01
 
 
 def wait_for_pull(run: Loopback, hands: PullingHands, link: str) -> float:
-    """Run until the pull begins, and return that time; FeelaheadError where the robot is not armed in time."""
+    """Run until the pull begins, and return that time; FeelaheadError if the robot is not armed in time."""
     while hands.pull_began_s is None:
         run.run_until(run.clock.now() + _LOOK_S)
         if run.clock.now() > LONGEST_ARMING_S:

@@ -1,6 +1,6 @@
-"""Coverage and false alarms of one motion: approaches are recorded once, and judged for every cell, law and P.
+"""Coverage and false alarms of one motion: recorded once, and judged for every cell, law and P.
 
-Covered: 0.25 s before the last moment to let go, full strength stood in the zone that the finger reaches until then.
+Covered: 0.25 s before the last release that avoids the contact, full strength was in the farthest zone reached by then.
 """
 
 import math
@@ -38,32 +38,32 @@ LINKS: Final = {
     "400 ms": "delay 400ms 10ms distribution normal",
     "200 ms, 5 % lost": "delay 200ms 10ms distribution normal loss 5%",
 }
-"""Each way."""
+"""Links by name; each holds in both directions."""
 _RESAMPLED: Final = 2000
 _LEAST_APPROACHES: Final = 10
-"""A bootstrap over fewer says nothing: two that agree would make an interval of no width."""
+"""Least number of approaches for `holds`: a bootstrap over two that agree has an interval of width 0."""
 
 
 @dataclass(frozen=True)
 class Placed:
-    """One cell: a scene, and how its objects and the arm are drawn."""
+    """One cell: a scene, the errors of camera and encoders, and the objects' speed."""
 
     scene: str
     camera_mm: float = 3.0
     encoder_factor: float = 1.0
-    """The encoders' errors, over those of the settings."""
+    """Factor on the encoder errors of the settings."""
     speed_m_s: float = 0.0
-    """Speed of the objects, along the approach: below 0 they come nearer."""
+    """Speed of the objects along the approach, in m/s; below 0 they come nearer."""
 
     @property
     def shown(self) -> str:
-        """The scene, and how it moves."""
+        """Name of the scene and its motion."""
         if self.speed_m_s == 0.0:
             return self.scene
         return f"{self.scene} {'fleeing' if self.speed_m_s > 0.0 else 'coming'} {1e3 * abs(self.speed_m_s):g} mm/s"
 
     def key(self, pull: str, link: str) -> str:
-        """Name the cell, for --only."""
+        """Name the cell for --only."""
         drawn = f"camera {self.camera_mm:g} mm", f"encoders x{self.encoder_factor:g}"
         return "/".join((self.shown, pull, link, *drawn))
 
@@ -76,19 +76,19 @@ class Pulls:
     link: str
     """A key of LINKS."""
     home: str
-    """The scene whose home pose the approaches start from."""
+    """Scene whose home pose starts the approaches."""
     cells: tuple[Placed, ...]
     sizes: tuple[int, int]
-    """Number of approaches, and of places of the objects for each."""
+    """Number of approaches, and of object placements for each."""
     probabilities: tuple[float, ...]
     laws: tuple[Law, ...]
     judged_s: float = 60.0
-    """Time in which R2 is pulled, of each cell, that is judged for false alarms at least."""
+    """Least judged time of R2 pulled, in seconds, for the false alarms of each cell."""
 
 
 @dataclass
 class _Counts:
-    """Counts of one law at one P; `hits` and `draws` have an entry for each approach."""
+    """Counts of one law at one P; `hits` and `draws` hold an entry for each approach."""
 
     hits: list[int] = field(default_factory=list)
     draws: list[int] = field(default_factory=list)
@@ -101,28 +101,28 @@ class _Counts:
 
 @dataclass(frozen=True)
 class _Staged:
-    """One approach among the objects of one cell, in every place."""
+    """One approach in one cell, with every placement of the objects."""
 
     replay: Replay
     posed: PosedScene
     collisions: tuple[Collision, ...]
-    """Empty where nothing collides: the objects then stand where the scene has them."""
+    """Collisions found; empty where nothing collides, and the objects stay where the scene has them."""
     sought: int
-    """Number of places that were looked for."""
+    """Number of placements that were tried."""
 
     @property
     def avoidable(self) -> tuple[tuple[Collision, float], ...]:
-        """Collisions that some release avoids, with the last moment for it."""
+        """Collisions that a release can avoid, each with the last moment for it."""
         return tuple((one, one.last_release_s) for one in self.collisions if one.last_release_s is not None)
 
     @property
     def knowable(self) -> tuple[tuple[Collision, float], ...]:
-        """Those of them whose sticks stay from when they are judged to the last release: nobody can know the others."""
+        """Avoidable collisions whose sticks stay between judgement and last release; others cannot be predicted."""
         moves = self.replay.moves_sticks
         return tuple((one, last_s) for one, last_s in self.avoidable if not moves(last_s - REACTION_S, last_s))
 
     def draw(self, shift_m: FloatArray, cell: Placed, number: int) -> Draw:
-        """Move the objects by shift_m (3,), seen with the camera's `number`-th error."""
+        """Move the objects by shift_m (3,), perceived with the camera's `number`-th error."""
         record, names = self.replay.record, tuple(thing.name for thing in self.posed.scene.objects)
         sd_m = 1e-3 * cell.camera_mm
         errors_m = CameraError(names, 0.0, sd_m, 0.0, seed_of(record.seed, number)).next_frame()
@@ -131,7 +131,7 @@ class _Staged:
 
 
 def evaluate(pulls: Pulls, seed: int) -> Iterator[Row]:
-    """Make a row for each cell, law and P; the same seed gives the same rows."""
+    """Yield a row for each cell, law and P; the same seed gives the same rows."""
     approaches, places = pulls.sizes
     records = [
         record_approach(pulls.pull, LINKS[pulls.link], seed_of(seed, number), scene_name=pulls.home)
@@ -175,7 +175,7 @@ def _count_covered(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[
     useful = [one for one in staged if one.knowable]
     least = math.ceil(draws_needed(law.probability) / max(1, len(useful)))
     for one in useful:
-        # Every place as often as any other, at each P.
+        # The same number of draws for each placement, at every P.
         each = len(one.knowable) * math.ceil(least / len(one.knowable))
         hits = 0
         for number in range(each):
@@ -191,7 +191,7 @@ def _count_covered(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[
 
 
 def _count_alarms(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[_Staged], least_s: float) -> None:
-    """Judge a draw of each approach in turn, then of each in its next place, until `least_s` are judged."""
+    """Judge a draw of each approach in turn, then of each in its next placement, until `least_s` are judged."""
     places = [(one, found) for one in staged if (found := _places(cell, one))]
     for number in count():
         before_s = counts.judged_s
@@ -207,21 +207,21 @@ def _count_alarms(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[_
 
 
 def _places(cell: Placed, one: _Staged) -> list[tuple[FloatArray, float]]:
-    """List where the objects stand (3,) in one approach, and when it touches them or ends."""
+    """Return each placement's shift (3,), and the time of contact or the end of the approach."""
     if cell.scene not in PASSED:
         return [(at.shift_m, at.touch_s) for at in one.collisions]
-    # A drift or a turn may touch what a straight approach passes.
+    # A drift or a turn may touch objects that a straight approach passes.
     touch_s = first_touch_s(one.replay, one.posed, np.zeros(3))
     return [(np.zeros(3), one.replay.end_s if touch_s is None else touch_s)]
 
 
 def draws_needed(probability: float) -> int:
-    """Return n >= 10 / (1 - P), which lets ten failures be expected."""
+    """Return the least n >= 10 / (1 - P), so that ten failures are expected."""
     return int(np.ceil(10.0 / (1.0 - probability) - 1e-9))
 
 
 def interval(hits: Sequence[int], draws: Sequence[int]) -> tuple[float, float]:
-    """Bootstrap the share of `draws` that are `hits` over the approaches, at 95 %: draws of one are not independent."""
+    """Bootstrap the 95 % interval of hits / draws over approaches: draws of one approach are not independent."""
     counts = np.asarray(hits, dtype=np.float64), np.asarray(draws, dtype=np.float64)
     if len(hits) < 2:
         return hits[0] / draws[0], hits[0] / draws[0]
@@ -236,12 +236,12 @@ def interval(hits: Sequence[int], draws: Sequence[int]) -> tuple[float, float]:
 
 
 def _figures(counts: _Counts, staged: Sequence[_Staged], probability: float) -> Row:
-    """Turn counts into figures; None for a coverage where nothing collides, or no release avoids it.
+    """Compute the figures from the counts; coverage is None if nothing collides or no release avoids it.
 
-    holds: the interval's lower end is at least P - 0.1 (1 - P), over 10 approaches or more. reported: draws in which
-    the operator side has a report of the drift or turn, if any, 0.25 s before the last moment; reported_coverage is of
-    these alone. Places without draws: unavoidable, as no release avoids the contact, and unknowable, as the sticks are
-    moved after that. alarm_share: of the time in which R2 was pulled, judged_s.
+    holds: the interval's lower end is at least P - 0.1 (1 - P), over 10 approaches or more.
+    reported: draws whose drift or turn, if any, is in the operator side's newest report 0.25 s before the last moment.
+    reported_coverage: coverage of these draws. unavoidable: placements in which no release avoids the contact.
+    unknowable: placements whose sticks move after judgement. alarm_share: share of judged_s, in which R2 was pulled.
     """
     draws, covered = sum(counts.draws), len(counts.hits) > 0
     low, high = interval(counts.hits, counts.draws) if covered else (None, None)

@@ -37,14 +37,14 @@ class Draw:
 
     replay: Replay
     objects: PerceivedObjects
-    """The objects when the pull begins"""
+    """Perceived objects when the pull begins."""
     camera_sd_m: float
-    """The camera's deviation that the robot side assumes, which is the true one here."""
+    """σ_c that the robot side assumes, in metres; equal to the true one here."""
     speed_m_s: float = 0.0
-    """Speed of the objects, along the approach axis as the pull begins"""
+    """Speed of the objects along the approach axis at the pull's beginning, in m/s."""
 
     def objects_at(self, time_s: float) -> PerceivedObjects:
-        """Return the newest frame of a camera at `time_s`; the same one for objects that stand still."""
+        """Return the newest camera frame at `time_s`; the same one for objects at rest."""
         if self.speed_m_s == 0.0:
             return self.objects
         since_s = math.floor(max(time_s - self.replay.record.began_s, 0.0) / _FRAME_S) * _FRAME_S
@@ -52,7 +52,7 @@ class Draw:
 
 
 def _moved(objects: PerceivedObjects, velocity_m_s: FloatArray, after_s: float) -> PerceivedObjects:
-    """Move all objects with this velocity (3,), which the camera knows."""
+    """Move all objects with this velocity (3,); the camera reports it."""
     way_m = velocity_m_s * after_s
     return replace(
         objects,
@@ -68,17 +68,17 @@ def _moved(objects: PerceivedObjects, velocity_m_s: FloatArray, after_s: float) 
 
 @dataclass(frozen=True)
 class Judged:
-    """One law at one P, in the shipped pipeline; but each message brings a map, of the age that it has on average.
+    """One law at one P in the shipped pipeline, except that each message brings a map, of average age.
 
-    The field is by the pose before the message left, the zones by the time they are felt. Nothing is rendered between
-    these times, so that a strength falls as from one to the next.
+    The field uses the pose before the message left; the zones use the time at which they are felt. Nothing is rendered
+    in between, so a strength falls from one of these times to the next.
     """
 
     law: Law
     probability: float
 
     def felt(self, draw: Draw, times_s: FloatArray) -> IntArray:
-        """Compute strengths (t, 2, 10), 0 to 8, of L2's and R2's zones at rising times (t,) of the operator side."""
+        """Compute the strengths (t, 2, 10), 0 to 8, of L2's and R2's zones at increasing operator-side times (t,)."""
         always = MAX_STRENGTH if self.law == "full" else 0
         strengths = np.full((len(times_s), 2, ZONE_COUNT), always, dtype=np.int64)
         if self.law in ("none", "full"):
@@ -103,7 +103,7 @@ class Judged:
         return strengths
 
     def _look_around(self, law: SweptLaw, draw: Draw, now_s: float) -> None:
-        """Look from around, where that is older than it ever gets, as long ago as it is on average."""
+        """Refresh the map from around if it is older than the period; it gets the average age, half the period."""
         row = draw.replay.record.pose_row(now_s - 0.5 * PERIOD_S)
         law.forget_around(now_s - PERIOD_S)
         if np.isneginf(law.memory.around["at"]).any():
@@ -137,7 +137,7 @@ class Judged:
     def _under_way(
         self, replay: Replay, law: RobotLaw, sensed: Sensed, row: int, now_s: float
     ) -> tuple[Displacement | None, Aside | None]:
-        """Work out what commands under way since the pose in `row` do, trigger's and sticks'; None for the robot's."""
+        """Predict trigger's and sticks' displacement since the pose in `row`; None if the robot side compensates."""
         if compensation_of(self.law) == "robot":
             return None, None
         record, then_s = replay.record, float(replay.record.pose_time_s[row])

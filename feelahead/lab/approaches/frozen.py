@@ -1,6 +1,6 @@
-"""Scenes, forces and limits that must not change, lest the figures of two laws could not be compared.
+"""Scenes, forces and limits that must not change, so that figures of two laws stay comparable.
 
-The scenes lie in tests/data; the forces of the simulated finger and the limits of the arm are those of commit 92ca53a.
+The scenes are in tests/data. The simulated finger's forces and the arm's limits are those of commit 92ca53a.
 """
 
 import hashlib
@@ -31,22 +31,21 @@ AHEAD: Final = (
     *("wall_45", "slot", "shelf_edge", "moving", "fleeing", "place_held", "u_mesh", "mug"),
     "terrain_ahead",
 )
-"""Scenes in which a pull that goes on ends in a contact."""
+"""Scenes in which a continued pull ends in a contact."""
 PASSED: Final = (
     *("wall_beside", "table_1_box", "table_2_boxes", "table_12_tetrahedra", "table_mesh"),
     *("cluttered", "terrain", "empty"),
 )
-"""Scenes in which it does not; any strength there is a false alarm."""
+"""Scenes in which a straight pull touches nothing: any strength is a false alarm."""
 ASIDE: Final[dict[str, tuple[Vector2, Vector2]]] = {"edge": ((1.0, 0.0), (0.0, 0.0)), "turn": ((0.0, 0.0), (1.0, 0.0))}
-"""Scenes that a straight pull passes, and how far the sticks that move across and turn are deflected to end in a
-contact."""
+"""Scenes that a straight pull passes, with the deflections across and turning that end in a contact."""
 GRIPPED: Final = ("place_held",)
-"""Scenes in which the gripper closes on something before the pull."""
+"""Scenes in which the gripper grips an object before the pull."""
 _HASH_DIGITS = 12
 
 
 def frozen_scene(name: str) -> Path:
-    """Return the MJCF file of a frozen scene; ConfigurationError where the scenes are not there, as beside a wheel."""
+    """Return the MJCF file of a frozen scene; ConfigurationError if it is missing, as in an installed wheel."""
     path = SCENES / f"{name}.xml"
     if not path.is_file():
         names = ", ".join((*AHEAD, *ASIDE, *PASSED)) if SCENES.is_dir() else "to run in a clone of the repository"
@@ -55,14 +54,14 @@ def frozen_scene(name: str) -> Path:
 
 
 def scene_names(models: Iterable[Path]) -> dict[Path, str]:
-    """Name each scene by its file; by the whole path where several files have that name."""
+    """Name each scene by its file's stem; by the whole path if several files share the stem."""
     known = list(dict.fromkeys(models))
     stems = [model.stem for model in known]
     return {model: model.stem if stems.count(model.stem) == 1 else str(model) for model in known}
 
 
 def frozen_values() -> dict[str, Any]:
-    """Collect the forces of the simulated finger and the limits of finger and arm, as the code has them now."""
+    """Collect the simulated finger's forces and the limits of finger and arm from the code."""
     return {
         "finger": {
             "preload_n": SPRING_PRELOAD_N,

@@ -21,16 +21,16 @@ from robot_side.enlargement.kinematic_error import directional_variance, positio
 
 ALARM_STRENGTH: Final = 4
 CLEAR_M: Final = 0.015
-"""The clearance beyond D_σ from which on strength is a false alarm."""
+"""Clearance beyond D_σ, in metres, from which strength is a false alarm."""
 ALARM_STEP_S: Final = 0.02
 _R2 = 1
 _TRAVEL = TriggerTravel()
 
 
 def stood(law: Judged, draw: Draw, last_release_s: float) -> int:
-    """Return the strength, 0 to 8, in the zone that the finger reaches, 0.25 s before the last moment to let go.
+    """Return the strength, 0 to 8, in the farthest zone reached before the last release, 0.25 s before that release.
 
-    Full strength is what covers the draw.
+    Full strength covers the draw.
     """
     at_s = last_release_s - REACTION_S
     record = draw.replay.record
@@ -39,26 +39,26 @@ def stood(law: Judged, draw: Draw, last_release_s: float) -> int:
 
 
 def zone_speed_m_s(zone: int) -> float:
-    """Work out the speed that a zone's middle commands: the calibrated travel there times the full speed."""
+    """Compute the speed that a zone's middle commands: calibrated travel times full speed."""
     raw = min((zone + 0.5) / ZONE_COUNT / SENSED_TRAVEL, 1.0)
     return _TRAVEL.travel(raw) * ToolMotionSettings().trigger_speed_m_s
 
 
 class Alarms(NamedTuple):
-    """Strength of 4 or more under the finger without a cause."""
+    """Strengths of 4 or more under the finger without a cause."""
 
     number: int
     """Number of unbroken stretches."""
     alarm_s: float
     judged_s: float
-    """Time in which R2 was pulled."""
+    """Time for which R2 was pulled, in seconds."""
 
 
 def false_alarms(law: Judged, draw: Draw, posed: PosedScene, shift_m: FloatArray, until_s: float) -> Alarms:
-    """Judge every 20 ms from the pull's beginning until `until_s`, before the contact if there is one.
+    """Judge every 20 ms from the pull's beginning until `until_s`, or the end of the record.
 
-    An alarm is false while the zone's stopping path from the true pose stays D_σ(P) + 15 mm clear. It must do so
-    whether the sticks that are commanded, and the objects' own motion, go on meanwhile, by half, or end.
+    An alarm is false if the zone's stopping path from the true pose stays D_σ(P) + 15 mm clear. The path must be clear
+    for commanded sticks and moving objects that continue, continue by half, or end.
     """
     replay = draw.replay
     record = replay.record
@@ -83,7 +83,7 @@ def false_alarms(law: Judged, draw: Draw, posed: PosedScene, shift_m: FloatArray
 
 
 def _paths(draw: Draw, time_s: float, zone: int) -> Iterator[ToolPath]:
-    """Lay out the stopping paths, in the objects' own frame: what moves aside ends, goes on by half, or goes on."""
+    """Yield the stopping paths in the objects' frame, for motion aside that ends, continues by half, or continues."""
     replay = draw.replay
     moves = draw.speed_m_s != 0.0 or replay.sticks_at(time_s).any()
     for share in (0.0, 0.5, 1.0) if moves else (0.0,):

@@ -1,4 +1,4 @@
-"""The laws that are compared: from what is ahead to what the fingers feel."""
+"""Laws that are compared: from the situation to the strengths that the fingers feel."""
 
 from typing import Final, Literal, get_args
 
@@ -6,10 +6,10 @@ from common.protocol.messages import Compensation
 from robot_side.laws.named import LawName
 
 Law = Literal["swept", "swept_robot", "paper", "none", "full"]
-"""swept: ways along each trigger, rendered over its travel (docs/feel.md), with the operator side's commands under way.
-swept_robot: the same with v t_d by the robot side (--compensation robot). paper: the plain law (§4.2),
-the total overlap over a fixed share of the enlarged gripper. none: no haptics. full: always the strongest effect on
-both triggers, whatever is ahead."""
+"""swept: contact distances along each trigger, rendered over its travel (docs/feel.md); compensation by the operator.
+swept_robot: the same with v t_d by the robot side (--compensation robot). paper: the printed law (§4.2), the total
+overlap over a fixed share of the enlarged gripper. none: no haptics. full: always the strongest effect on both
+triggers."""
 LAWS: Final[tuple[Law, ...]] = get_args(Law)
 
 
@@ -19,12 +19,12 @@ def with_compensation(law: Law, compensation: Compensation) -> Law:
 
 
 def without_compensation(law: Law) -> str:
-    """Return the name that --law has for it."""
+    """Return the law's name in --law."""
     return "swept" if law == "swept_robot" else law
 
 
 def in_words(law: Law) -> str:
-    """Name the law for people."""
+    """Return the law's name for people."""
     return "swept, delay by the robot" if law == "swept_robot" else law
 
 
@@ -34,5 +34,5 @@ def compensation_of(law: Law) -> Compensation:
 
 
 def law_of_robot(law: Law) -> LawName:
-    """Return the law that the robot side is set to."""
+    """Return the law for the robot side's settings."""
     return "paper" if law == "paper" else "swept"

@@ -1,4 +1,4 @@
-"""Places of the objects in which a recorded approach meets them, and the last moment at which a release avoids that."""
+"""Placements of the objects in which a recorded approach collides, and the last release that avoids the contact."""
 
 from dataclasses import dataclass
 
@@ -13,27 +13,27 @@ _FASTEST_M_S = 0.45
 _LEAST_STEP_S = 0.002
 _LEAST_START_GAP_M = 0.015
 _ACROSS_M = 0.01
-"""The farthest that objects are moved across the approach, to each side and up or down."""
+"""Largest shift of the objects across the approach, in metres, to each side and up or down."""
 _FARTHEST_M = 1.0
 _ALONG_M = 0.1
-"""The farthest that they are moved along the approach, where nothing is straight ahead."""
+"""Largest shift along the approach, in metres, where nothing is straight ahead."""
 _TRIES = 40
 
 
 @dataclass(frozen=True)
 class Collision:
-    """One place of the objects."""
+    """One placement of the objects, and its contact."""
 
     shift_m: FloatArray
-    """(3,) from where the scene has them, when the pull begins"""
+    """(3,) shift from the scene's placement when the pull begins"""
     touch_s: float
-    """Time at which the true gripper would touch, if the pull went on"""
+    """Time at which the true gripper touches if the pull continues"""
     last_release_s: float | None
-    """The last moment, on the operator side, at which a release avoids it; None where no release does."""
+    """Last operator-side time at which a release avoids the contact; None if no release does."""
 
 
 def shifted(shift_m: FloatArray, replay: Replay, speed_m_s: float, time_s: float) -> FloatArray:
-    """Add to `shift_m` (3,) the way of objects of that speed since the pull began."""
+    """Add to `shift_m` (3,) the displacement of objects of that speed since the pull began."""
     moved: FloatArray = shift_m + speed_m_s * max(time_s - replay.record.began_s, 0.0) * replay.axis
     return moved
 
@@ -41,10 +41,10 @@ def shifted(shift_m: FloatArray, replay: Replay, speed_m_s: float, time_s: float
 def place(
     replay: Replay, posed: PosedScene, generator: np.random.Generator, speed_m_s: float = 0.0
 ) -> Collision | None:
-    """Draw a place of the objects in which the approach collides, at an even chance for each part of the way.
+    """Draw a placement of the objects in which the approach collides, uniformly over its length.
 
-    The place lies on the tool's way, drift and turning included. speed_m_s: of the objects, along the approach axis
-    as the pull begins; below 0 they come nearer. None where 40 draws found none, or the approach goes nowhere.
+    The placement lies on the tool's path, drift and turning included. speed_m_s: speed of the objects along the
+    approach axis as the pull begins; below 0 they come nearer. None if 40 draws found none, or for too short a pull.
     """
     record = replay.record
     posed.put(*_pose(replay, record.began_s), np.zeros(3))
@@ -59,7 +59,7 @@ def place(
         if home_way_m < _FARTHEST_M:
             shift_m = replay.moved_m[row] - home_way_m * replay.axis + aside
         else:
-            # Nothing is straight ahead: drift or turning lead to where things stand.
+            # Nothing is straight ahead: drift or turning leads to the objects.
             shift_m = generator.uniform(-_ALONG_M, _ALONG_M) * replay.axis + aside
         posed.put(*_pose(replay, record.began_s), shift_m)
         if posed.gap_m() < _LEAST_START_GAP_M:
@@ -72,7 +72,7 @@ def place(
 
 
 def first_touch_s(replay: Replay, posed: PosedScene, shift_m: FloatArray, speed_m_s: float = 0.0) -> float | None:
-    """Find when the true gripper first touches the objects moved by `shift_m` (3,); None within the record."""
+    """Find when the true gripper first touches the objects moved by `shift_m` (3,); None if never in the record."""
     time_s = replay.record.began_s
     while time_s <= replay.end_s:
         posed.put(*_pose(replay, time_s), shifted(shift_m, replay, speed_m_s, time_s))
@@ -86,7 +86,7 @@ def first_touch_s(replay: Replay, posed: PosedScene, shift_m: FloatArray, speed_
 def last_release_s(
     replay: Replay, posed: PosedScene, shift_m: FloatArray, touch_s: float, speed_m_s: float = 0.0
 ) -> float | None:
-    """Find the last moment, to 2 ms, at which a release avoids the contact; None where none since the pull began does.
+    """Find the last release that avoids the contact, to 2 ms; None if no release since the pull began does.
 
     Bisection: a later release never stops the arm earlier, as no pull here moves back.
     """
@@ -105,7 +105,7 @@ def last_release_s(
 def avoids(
     replay: Replay, posed: PosedScene, shift_m: FloatArray, touch_s: float, released_s: float, speed_m_s: float = 0.0
 ) -> bool:
-    """Tell whether a release at `released_s` leaves a gap when the arm rests."""
+    """Return whether a release at `released_s` leaves a gap when the arm rests."""
     stopped = replay.stopped_joints(released_s)
     if stopped is None or stopped[0] >= touch_s:
         return False

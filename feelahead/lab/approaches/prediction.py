@@ -1,4 +1,4 @@
-"""The gripper's way until a command takes effect, as predicted and in truth (eq. 8 and the commands under way)."""
+"""Displacement of the gripper until a command takes effect: predicted and true (eq. 8 and the commands under way)."""
 
 import math
 from collections.abc import Callable
@@ -19,20 +19,19 @@ from robot_side.drivers.mujoco.joint_reference import MotionLimits
 
 Compensation = Literal["operator", "robot", "momentary"]
 COMPENSATIONS: Final[tuple[Compensation, ...]] = get_args(Compensation)
-"""operator: the commands under way, as their sender knows them. robot: v t_d, t_d the robot's high quantile of the
-loop age (eq. 8). momentary: v times the loop age of this very moment."""
+"""operator: the commands under way, known by their sender. robot: v t_d with the robot's high quantile of the loop age
+(eq. 8). momentary: v times the present loop age."""
 _STEP_S: Final = 0.01
 _LEAST_SPEED: Final = 1e-9
 AGE_BINS_S: Final = tuple(pairwise((0.0, 0.02, 0.06, 0.13, 0.28, 0.58, 1.2)))
-"""Approaches are pooled in these bins, by the median of their loop age. The single moment's does not choose:
-where it is short by chance the command sent now takes longer than the last one heard of, which would pass for an
-error."""
+"""Bins of the loop age in seconds; approaches are pooled by the median of theirs. A moment's own age does not choose:
+where it is short by chance, the next command takes longer than the last, which would look like an error."""
 PoseAt = Callable[[FloatArray], GripperPose]
-"""The gripper with its joints (n,) there."""
+"""Pose of the gripper for joints (n,)."""
 
 
 class ToolPath:
-    """The tool's point over time, between the recorded poses, in the world frame."""
+    """Position of the tool over time, interpolated between the recorded poses, in the world frame."""
 
     def __init__(self, record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_speed_m_s: float) -> None:
         """Follow `record` by the true joints; `limits` and v_max decide on reach."""
@@ -49,11 +48,11 @@ class ToolPath:
             (speed, one.full_speed_m_s, one.acceleration_m_s2) for speed, one in zip(speeds_m_s, able, strict=True)
         ]
         self.ability = make_interp_spline(self.time_s, ability, k=1)
-        """At times (k,): the speed along the approach axis, v_max and the least acceleration there (k, 3)."""
+        """At times (k,): speed along the approach axis, v_max and least acceleration (k, 3)."""
         self._within_reach: BoolArray = np.array([one.within_reach for one in able])
 
     def within_reach(self, from_s: FloatArray, to_s: FloatArray) -> BoolArray:
-        """Tell (k,) whether full speed was within the arm's reach throughout each of these times."""
+        """Return whether (k,) full speed was within the arm's reach throughout each interval."""
         outside = np.concatenate([[0], np.cumsum(~self._within_reach)])
         first = np.maximum(np.searchsorted(self.time_s, from_s, side="right") - 1, 0)
         behind = np.minimum(np.searchsorted(self.time_s, to_s, side="left") + 1, len(self.time_s))
@@ -61,7 +60,7 @@ class ToolPath:
         return clear
 
     def ways_m(self, from_s: FloatArray, to_s: FloatArray) -> FloatArray:
-        """Measure ways (k,) of the tool along the axis that it had at the beginning."""
+        """Return the tool's displacements (k,) along its approach axis at each beginning."""
         axes = self._axes(from_s)
         axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), _LEAST_SPEED)
         ways: FloatArray = np.einsum("ki,ki->k", self._positions_m(to_s) - self._positions_m(from_s), axes)
@@ -70,20 +69,20 @@ class ToolPath:
 
 @dataclass(frozen=True)
 class Moments:
-    """Knowledge of the operator side at moments of one approach, and the arrivals."""
+    """Knowledge of the operator side at moments of one approach, and the arrivals of its commands."""
 
     now_s: FloatArray
-    """(k,) when a command was sent, for which the prediction is made"""
+    """(k,) when the command was sent for which the prediction is made"""
     reported_s: FloatArray
-    """(k,) T: when the robot sent the newest stiffness that the operator side had"""
+    """(k,) T: when the robot side sent the newest stiffness that the operator side had"""
     arrives_s: FloatArray
-    """(k,) when the arm began to follow the command that was sent at `now_s`, or a newer one"""
+    """(k,) when the arm began to follow the command sent at `now_s`, or a newer one"""
     echo_sent_s: FloatArray
     """(k,) when the command was sent that the arm followed at T"""
     echo_held_s: FloatArray
-    """(k,) the time for which it had, at T"""
+    """(k,) time for which the robot side had that command, at T"""
     loop_age_quantile_s: FloatArray
-    """(k,) t_d at the robot, at T"""
+    """(k,) t_d at the robot side, at T"""
 
     def __len__(self) -> int:
         return len(self.now_s)
@@ -95,7 +94,7 @@ class Moments:
 
 
 def moments(record: RecordedApproach) -> Moments:
-    """Take the newest command every 10 ms of the pull, where the robot was heard and the command arrived."""
+    """Take the newest command every 10 ms of the pull, if the robot was heard and the command arrived."""
     rows = []
     # Times beyond the recorded poses cannot be compared.
     last_s = min(record.tick_time_s[-1], record.pose_time_s[-1])
@@ -125,7 +124,7 @@ def predicted(
     full_speeds_m_s: FloatArray,
     accelerations_m_s2: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Predict δ and w (k,) by the operator side's commands, from v, v_max and a (k,) in the reports; NaN for none."""
+    """Predict δ and w (k,) from the operator side's commands and the reports' v, v_max and a (k,); NaN for none."""
     commands, sent = CommandsUnderWay(), 0
     ways_m, speeds = np.full(len(at), np.nan), np.full(len(at), np.nan)
     for row, now_s in enumerate(at.now_s):
@@ -140,11 +139,11 @@ def predicted(
 
 
 def judge(record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_speed_m_s: float) -> Row:
-    """Compare every prediction with the arm's true way; full_speed_m_s is v_max as it is set.
+    """Compare every prediction with the arm's true displacement; full_speed_m_s is the v_max of the settings.
 
-    Lists (k,) with an entry for each moment: `loop_age_s`, `within_reach` (False: at the edge of its reach the arm
-    cannot do as commanded), `way_m` (true, along the direction in which R2 advances), and truth less prediction
-    by COMPENSATIONS; NaN where there is no prediction.
+    Return lists (k,) with an entry for each moment: `loop_age_s`, `within_reach`, `way_m` and the errors.
+    within_reach: False at the edge of the arm's reach, where it cannot follow the command. way_m: true displacement
+    along the direction in which R2 advances. Errors: truth less prediction, by COMPENSATIONS; NaN without a prediction.
     """
     path = ToolPath(record, pose_at, limits, full_speed_m_s)
     at = moments(record)
@@ -163,7 +162,7 @@ def judge(record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_
 
 
 class Spread(NamedTuple):
-    """The distribution of errors; 99 % and greatest are of the magnitudes."""
+    """Distribution of errors; 99 % quantile and maximum are of the magnitudes."""
 
     moments: int
     loop_age_ms: float
@@ -176,7 +175,7 @@ class Spread(NamedTuple):
 def over(judged: Table, name: str, ages_s: tuple[float, float] = (0.0, np.inf), *, within_reach: bool = True) -> Spread:
     """Pool the errors called `name` of approaches with loop ages from the first to below the second.
 
-    within_reach: take the moments in which the arm could do as commanded; else the others.
+    within_reach: take the moments in which the arm could follow the command; else the others.
     """
     errors_mm, ages_ms = [np.empty(0)], [np.empty(0)]
     for row in judged:
@@ -196,7 +195,7 @@ def over(judged: Table, name: str, ages_s: tuple[float, float] = (0.0, np.inf), 
 def error_table(judged: Table, arm: str, frozen: str, full_speed_m_s: float) -> str:
     """Write μ_δ and σ_δ of eq. 10 over loop age and kind of compensation as TOML; empty bins are left out.
 
-    arm: the fingerprint of the one that they were measured on.
+    arm: fingerprint of the measured arm.
     """
     pulls, links = (", ".join(f'"{name}"' for name in dict.fromkeys(judged.values(key))) for key in ("pull", "link"))
     lines = [

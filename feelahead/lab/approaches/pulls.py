@@ -1,6 +1,6 @@
 """Motions of a hand on triggers and sticks over time: forces in newtons, seeded.
 
-A pull is open loop: it does not depend on the objects in the way.
+A pull is open loop: it does not depend on the objects ahead.
 """
 
 import math
@@ -31,10 +31,10 @@ def force_for(travel: float) -> float:
 def make_pull(kind: PullKind, seed: int) -> Pull:
     """Draw a pull of this kind from `seed`.
 
-    steady: one travel between 0.25 and 1. bell: bell-shaped pulls of 0.7 to 1.4 s (minimum jerk), rests between.
-    on_off: pressed for 0.3 to 0.7 s, let go for 0.2 to 0.5 s. random: travel that wanders between 0 and 1.
+    steady: one travel between 0.25 and 1. bell: bell-shaped pulls of 0.7 to 1.4 s (minimum jerk), with rests between.
+    on_off: pressed for 0.3 to 0.7 s, released for 0.2 to 0.5 s. random: travel that wanders between 0 and 1.
     drift, yaw: steady, while a stick moves across at 0.1 m/s, or turns at 0.5 rad/s, to one side. swerve: steady, while
-    either stick, 0.4 to 0.8 deflected, is swapped to the other side each 0.3 to 0.7 s.
+    one stick, 0.4 to 0.8 deflected, changes sides every 0.3 to 0.7 s.
     """
     generator = np.random.default_rng([seed, PULL_KINDS.index(kind)])
     if kind == "bell":
@@ -56,7 +56,7 @@ def make_pull(kind: PullKind, seed: int) -> Pull:
 
 
 def _bells(generator: np.random.Generator) -> Pull:
-    """Speeds like those of a hand that aims: v(t) = peak · 16 x² (1 - x)², x from 0 to 1 (Flash and Hogan 1985)."""
+    """Speeds of an aiming hand: v(t) = peak · 16 x² (1 - x)², x from 0 to 1 (Flash and Hogan 1985)."""
     bells, end_s = [], 0.0
     while end_s < _LONGEST_S:
         duration_s = float(generator.uniform(0.7, 1.4))
@@ -99,7 +99,7 @@ def _swerving(generator: np.random.Generator) -> Pull:
 
 
 def _wandering(generator: np.random.Generator) -> Pull:
-    """A travel of mean 0.5 and standard deviation 0.35, correlated over 0.4 s, within 0 and 1."""
+    """Travel of mean 0.5 and standard deviation 0.35, correlated over 0.4 s, within 0 and 1."""
     keep = math.exp(-_NOISE_STEP_S / 0.4)
     value, travels = float(generator.standard_normal()), []
     for _ in range(round(_LONGEST_S / _NOISE_STEP_S) + 2):

@@ -1,4 +1,4 @@
-"""The time that a law costs: to a goal in the free, in closed loop, over the time without haptics."""
+"""Time that a law costs: to a goal in free space, in closed loop, over the time without haptics."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -21,10 +21,9 @@ _PROBABILITY: Final = 0.99
 
 
 def race(scene: str, law: Law, seeds: Sequence[int]) -> Row:
-    """Compare the time to a goal with that without haptics, for the same hands and seeds.
+    """Return the ratio of the times to a goal with the law and without haptics, for the same hands and seeds.
 
-    The ratio is the median over the seeds, half of them with bells and half with steady pulls; None where most never
-    arrive.
+    The ratio is the median over the seeds, half with bells and half with steady pulls; None if at most half arrive.
     """
     ratios = []
     for seed in seeds:
@@ -38,7 +37,7 @@ def race(scene: str, law: Law, seeds: Sequence[int]) -> Row:
 
 @cache
 def _time_s(scene: str, law: Law, seed: int) -> float | None:
-    """Bring the tool to the goal; None where it touches or is late."""
+    """Return the time until the tool reaches the goal; None if it touches or is late."""
     approach = Approach(
         model=frozen_scene(scene),
         force_n=0.0,

@@ -1,7 +1,7 @@
-"""A pull in free space, open loop and without haptics, recorded once: it serves every law, P, scene and camera draw.
+"""Recorded pull in free space, open loop and without haptics, for every law, P, scene and camera draw.
 
-The whole loopback runs, so that jitter, loss and the arm's own limits are in it. Commands leave at full rate: where a
-finger lets go is asked later, at any time, and a command that says so would leave at once.
+The whole loopback runs, so that jitter, loss and the arm's limits are in it. Commands leave at full rate: releases are
+examined later, at any time, and a command for a release would leave at once.
 """
 
 import math
@@ -26,19 +26,19 @@ from robot_side.events import Listener
 from robot_side.settings import RobotSettings
 
 POSE_S = 0.01
-"""The period at which the true pose is noted."""
+"""Sampling period of the true pose, in seconds."""
 TICK_S = 0.001
-"""The period at which the newest messages of both sides are noted."""
+"""Sampling period of both sides' newest messages, in seconds."""
 
 
 @dataclass(frozen=True)
 class RecordedApproach:
-    """A pull on both sides, on their one virtual clock; it begins at `began_s`."""
+    """One pull on both sides, on their shared virtual clock; it begins at `began_s`."""
 
     seed: int
     began_s: float
     pose_time_s: FloatArray
-    """(k,) every 10 ms, from a second before the pull on"""
+    """(k,) every 10 ms, from a second before the pull"""
     joint_positions_rad: FloatArray
     """(k, n) true"""
     joint_velocities_rad_s: FloatArray
@@ -54,29 +54,29 @@ class RecordedApproach:
     applied_at_s: FloatArray
     """(l,) when that command arrived"""
     seen_sent_s: FloatArray
-    """(l,) when the robot side sent the stiffness that the operator side has; NaN for none"""
+    """(l,) when the robot side sent the operator side's newest stiffness; NaN for none"""
     travel: FloatArray
     """(l, 2) mechanical travel of L2 and R2, 0 to 1"""
     command_time_s: FloatArray
-    """(c,) every 4 ms: when a command was sent"""
+    """(c,) when each command was sent, every 4 ms"""
     command: FloatArray
-    """(c,) calibrated travel of R2 less that of L2, in that command"""
+    """(c,) calibrated travel of R2 less that of L2"""
     lateral: FloatArray
-    """(c, 2) the stick that moves across, right and up, in that command"""
+    """(c, 2) stick that moves across, right and up"""
     turning: FloatArray
-    """(c, 2) the stick that turns"""
+    """(c, 2) stick that turns"""
 
     def pose_row(self, time_s: float) -> int:
-        """Find the newest row of the poses at `time_s`; the first row before that."""
+        """Return the newest row of the poses at `time_s`; the first row before that."""
         return int(np.clip(np.searchsorted(self.pose_time_s, time_s + 1e-9) - 1, 0, len(self.pose_time_s) - 1))
 
     def tick_row(self, time_s: float) -> int:
-        """Find the newest row of the ticks at `time_s`; the first row before that."""
+        """Return the newest row of the ticks at `time_s`; the first row before that."""
         return int(np.clip(np.searchsorted(self.tick_time_s, time_s + 1e-9) - 1, 0, len(self.tick_time_s) - 1))
 
     def arrives_s(self, sent_s: float) -> float:
-        """Find when a command sent at `sent_s`, or a newer one, reached the arm; infinite beyond the record."""
-        # The newest command never gets older, but for a gap in which none is followed.
+        """Return when a command sent at `sent_s`, or a newer one, reached the arm; infinite beyond the record."""
+        # The newest command never gets older, except for gaps in which none is followed.
         newest = np.fmax.accumulate(np.where(np.isnan(self.applied_sent_s), -np.inf, self.applied_sent_s))
         row = int(np.searchsorted(newest, sent_s - 1e-9))
         return float(self.tick_time_s[row]) if row < len(newest) else float("inf")
@@ -89,9 +89,9 @@ def record_approach(
     duration_s: float = 4.0,
     scene_name: str = "empty",
 ) -> RecordedApproach:
-    """Record the pull of this kind and seed from the home pose of a frozen scene, whose objects let it through.
+    """Record the pull of this kind and seed from the home pose of a frozen scene, without contact with its objects.
 
-    FeelaheadError where the robot is not armed in time, or its arm is stopped on the way.
+    FeelaheadError if the robot is not armed in time, or its arm is stopped during the pull.
     """
     robot = RobotSettings(model=frozen_scene(scene_name), site=SITE, link=link, seed=seed, full_rate=True)
     operator = OperatorSettings(link=link, seed=seed, haptics=False, full_rate=True)
@@ -116,7 +116,7 @@ def record_approach(
 
 
 class _Notes(Listener):
-    """Notes taken after each turn of the robot side: rows by the names of the record's columns."""
+    """Samples after each turn of the robot side: rows by the names of the record's columns."""
 
     def __init__(self, scene: Scene) -> None:
         self.run: Loopback | None = None
@@ -127,7 +127,7 @@ class _Notes(Listener):
         self._applied = (math.nan, math.nan)
 
     def on_sent(self, now_s: float) -> None:
-        """Note one turn."""
+        """Sample one turn."""
         if (run := self.run) is None:
             return
         data, robot = self._scene.data, self._scene.robot
@@ -150,7 +150,7 @@ class _Notes(Listener):
             self._poses.append(row | {"finger_positions": data.qpos[robot.finger_positions].copy()})
 
     def record(self, seed: int, began_s: float) -> RecordedApproach:
-        """Return the record from a second before the pull on; of commands also the earlier ones."""
+        """Return the record from a second before the pull; commands from the start."""
         from_s = began_s - 1.0
         poses = [row for row in self._poses if row["pose_time_s"] >= from_s]
         ticks = [row for row in self._ticks if row["tick_time_s"] >= from_s]

@@ -1,4 +1,4 @@
-"""A recorded approach as both sides saw it: true motion, estimated poses, and where a release would have stopped it."""
+"""Recorded approach as both sides saw it: true motion, estimated poses, and where a release would have stopped it."""
 
 import math
 from functools import cached_property
@@ -22,23 +22,23 @@ from robot_side.drivers.mujoco.scene import Scene
 from robot_side.settings import EncoderSettings
 
 _WHOLE_S = 1000.0
-"""A window longer than any record."""
+"""Window of the commands, in seconds: longer than any record."""
 _ASKED_M_S = 0.05
 _STALLED_ROWS = 25
-"""An arm below half of the commanded speed for longer than this, 0.25 s, has reached its limits."""
+"""Number of rows, 0.25 s, below half of the commanded speed after which the arm is at its limits."""
 _TRAVEL = TriggerTravel()
 _LONGEST_RETURN = 4.0
-"""Upper bound in the finger's time constants; from full travel to the dead zone it takes 3."""
+"""Upper bound of the finger's return in its time constants; from full travel to the dead zone takes 3."""
 _COASTING_STEPS = 100
 _LOOKED_S = 0.04
-"""Time within which ways from every place aside are computed: each at least every 30 ms."""
+"""Time in seconds until contact distances from every place aside are computed: each at least every 30 ms."""
 
 
 class Replay:
-    """One record with new errors of the encoders; times are those of the one virtual clock."""
+    """One record with new errors of the encoders, on the one virtual clock."""
 
     def __init__(self, record: RecordedApproach, scene: Scene, encoder: EncoderSettings, seed: int) -> None:
-        """Take the kinematics from `scene`, any with the arm that was recorded."""
+        """Take the kinematics from `scene`: any scene with the recorded arm."""
         self.record = record
         self.encoder = encoder
         self._kinematics = MujocoKinematics(scene)
@@ -48,11 +48,11 @@ class Replay:
         axis = true[record.pose_row(record.began_s)].tool_rotation[:, 2]
         start_m = true[record.pose_row(record.began_s)].tool_position_m
         self.axis = axis
-        """(3,) the approach axis when the pull begins, in the world frame"""
+        """(3,) approach axis when the pull begins, in the world frame"""
         self.moved_m: FloatArray = np.array([pose.tool_position_m - start_m for pose in true])
         """(k, 3) displacement of the true tool since the pull began, in the world frame"""
         self.along_m: FloatArray = self.moved_m @ axis
-        """(k,) the same along that axis"""
+        """(k,) that displacement along `axis`"""
         self.approach_speed_m_s: FloatArray = np.array(
             [
                 pose.tool_rotation[:, 2] @ (pose.tool_jacobian[:3] @ record.joint_velocities_rad_s[row])
@@ -61,9 +61,9 @@ class Replay:
         )
         """(k,) û·v of the true tool"""
         self.true = true
-        """The true gripper, for each row of the poses"""
+        """True gripper, for each row of the poses"""
         self.end_s = self._end_s()
-        """The end of the record, or the time at which the arm reaches the edge of its reach."""
+        """End of the record, or the time at which the arm reaches the edge of its reach."""
 
     @property
     def joints(self) -> int:
@@ -72,7 +72,7 @@ class Replay:
 
     @cached_property
     def commands(self) -> CommandsUnderWay:
-        """All commands of the record, in the operator side's memory."""
+        """Memory of all commands of the record, as the operator side has it."""
         commands = CommandsUnderWay(window_s=_WHOLE_S)
         sticks = np.hstack([self.record.lateral, self.record.turning]).tolist()
         for time_s, travel, stick in zip(self.record.command_time_s, self.record.command, sticks, strict=True):
@@ -81,13 +81,13 @@ class Replay:
 
     @cached_property
     def encoder_sigma_rad(self) -> FloatArray:
-        """(n,) standard deviations of the encoders that the robot side assumes (eq. 3)"""
+        """(n,) standard deviations of the encoder errors that the robot side assumes (eq. 3)"""
         encoder = Encoder(self.encoder.sigma_rad, self.encoder.resolution_rad)
         return np.full(self.record.joint_positions_rad.shape[1], encoder.standard_deviation_rad())
 
     @cached_property
     def estimated(self) -> list[GripperPose]:
-        """The gripper estimated from noisy encoders that are read every millisecond, for each row of the poses."""
+        """Gripper estimated from noisy encoders, read every millisecond, for each row of the poses."""
         encoder = Encoder(self.encoder.sigma_rad, self.encoder.resolution_rad, self._seed)
         estimate, found = JointEstimate(), []
         for row, until_s in enumerate(self.record.pose_time_s.tolist()):
@@ -126,9 +126,9 @@ class Replay:
         )
 
     def stopped_joints(self, released_s: float) -> tuple[float, float, FloatArray] | None:
-        """Work out how the arm stops after a release at `released_s` on the operator side.
+        """Compute how the arm stops after a release at `released_s` on the operator side.
 
-        Returns the time at which the release reaches the arm, the time at which it rests and the joints (n,) there;
+        Return the time at which the release reaches the arm, the time at which the arm rests and its joints (n,) there;
         None beyond the record. All joints slow down in proportion (`JointReference`), along their present velocity.
         """
         arrives_s = self.record.arrives_s(released_s)
@@ -141,20 +141,20 @@ class Replay:
         return arrives_s, rests_s, joints_rad + velocities_rad_s * coasting_s(braking_s, travel)
 
     def aside(self, time_s: float) -> tuple[FloatArray, FloatArray]:
-        """Return the true tool's velocity (3,) across its approach axis and its turning (3,); world frame."""
+        """Return the true tool's velocity (3,) across its approach axis, and its angular velocity (3,); world frame."""
         row = self.record.pose_row(time_s)
         twist = self.true[row].tool_jacobian @ self.record.joint_velocities_rad_s[row]
         axis = self.true[row].tool_rotation[:, 2]
         return twist[:3] - (twist[:3] @ axis) * axis, twist[3:]
 
     def knows_aside(self, time_s: float) -> bool:
-        """Tell whether the operator side's newest report at `time_s` knows of a motion aside, if there is one."""
+        """Return whether the operator side's newest report at `time_s` knows of a motion aside, if there is one."""
         seen_s = float(self.record.seen_sent_s[self.record.tick_row(time_s)])
         return seen_s >= self._aside_seen_s
 
     @cached_property
     def _aside_seen_s(self) -> float:
-        """Time at which the tool first went aside at half of full sticks' speed, and all places were covered."""
+        """Time at which the tool first moved aside at half of full speed, and all places aside were computed."""
         motion = self.motion
         for time_s in self.record.pose_time_s[self.record.pose_row(self.record.began_s) :].tolist():
             across, turning = (float(np.linalg.norm(part)) for part in self.aside(time_s))
@@ -176,7 +176,7 @@ class Replay:
         return np.concatenate(tool_motion(command, self.motion))
 
     def moves_sticks(self, from_s: float, until_s: float) -> bool:
-        """Tell whether sticks are commanded otherwise at any time up to `until_s` than at `from_s`."""
+        """Return whether the commanded sticks change between `from_s` and `until_s`."""
         record = self.record
         first, last = (max(int(np.searchsorted(record.command_time_s, at + 1e-9)) - 1, 0) for at in (from_s, until_s))
         sticks = np.hstack([record.lateral, record.turning])[first : last + 1]
@@ -198,10 +198,10 @@ class Replay:
 
 
 def coasting_s(braking_s: float, travel: float, finger_s: float = FINGER_TIME_CONSTANT_S) -> float:
-    """Work out how long, at its present speed, an arm goes on after a finger at `travel`, 0 to 1, has let go.
+    """Compute for how long, at its present speed, an arm coasts after a release at travel 0 to 1.
 
-    The mechanical travel falls as exp(-t / finger_s), and its command ends with the dead zone. The arm's speed falls
-    by at most 1 / braking_s of the present one in a second, and is the greater of the two.
+    The mechanical travel falls as exp(-t / finger_s), and the command ends with the dead zone. The arm's relative speed
+    falls by at most 1 / braking_s per second. The greater of the two relative speeds counts.
     """
     times = np.linspace(0.0, max(braking_s, _LONGEST_RETURN * finger_s), _COASTING_STEPS)
     commanded = np.array([_TRAVEL.travel(min(travel * math.exp(-t / finger_s) / SENSED_TRAVEL, 1.0)) for t in times])

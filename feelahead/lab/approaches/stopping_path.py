@@ -1,4 +1,4 @@
-"""The true gripper's path until it stands, if the finger stays in a zone for a horizon and then lets go."""
+"""Path of the true gripper until it stops, if the finger stays in a zone for a horizon and then releases."""
 
 import math
 from typing import Final
@@ -17,11 +17,11 @@ _STEP_S: Final = 0.005
 
 
 def stopping_path(replay: Replay, time_s: float, speed_m_s: float, share: float = 1.0) -> tuple[FloatArray, ToolPath]:
-    """Follow the gripper from `time_s` on; return the times since then (k,) and its path.
+    """Follow the gripper from `time_s`; return the times since then (k,) and its path.
 
-    Until a command sent at `time_s` arrives this is the record. Then the arm goes towards `speed_m_s` along its
-    approach axis for 0.3 s, and brakes. Of the sticks commanded at `time_s` that `share` goes on from the arrival until
-    the arm stands. The joints' acceleration bounds each change, in proportion to what is still to change.
+    The path is the record until a command sent at `time_s` arrives. Then the arm moves towards `speed_m_s` along its
+    approach axis for 0.3 s, and brakes. `share` of the sticks commanded at `time_s` continues from the arrival until
+    the arm stops. The joints' acceleration bounds each change, in proportion to the remaining change.
     """
     record, arrives_s = replay.record, min(replay.record.arrives_s(time_s), replay.end_s)
     between = slice(record.pose_row(time_s) + 1, record.pose_row(arrives_s) + 1)
@@ -48,6 +48,6 @@ def stopping_path(replay: Replay, time_s: float, speed_m_s: float, share: float 
 
 
 def _changing_s(jacobian: FloatArray, change: FloatArray) -> float:
-    """Work out how long the joints take for a change (6,) of the tool's twist, all in proportion."""
+    """Return the time in seconds in which the joints change the tool's twist by `change` (6,), all in proportion."""
     unlimited = np.full(jacobian.shape[1], np.inf)
     return float(np.abs(joint_velocities(jacobian, change, unlimited)).max()) / MotionLimits().acceleration_rad_s2

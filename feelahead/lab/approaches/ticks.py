@@ -1,4 +1,4 @@
-"""Ticks of real runs, noted once in virtual time: what a law was asked, to ask any law the same again."""
+"""Ticks of real runs, recorded once in virtual time: the law's inputs, to ask any law the same."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -27,12 +27,12 @@ FORCE_N: Final = 2.0
 _STRONGEST_N: Final = 2.0
 _STRAIGHT: Final[tuple[Vector2, Vector2]] = (0.0, 0.0), (0.0, 0.0)
 _BEFORE_S: Final = 0.5
-"""This much before the pull of an approach is kept, too."""
+"""Time before the pull that is kept, in seconds."""
 
 
 @dataclass(frozen=True)
 class Tick:
-    """One tick's question to the law, and the state that the pose in it came from."""
+    """Input of the law in one tick, and the arm's state of its pose."""
 
     now_s: float
     situation: Situation
@@ -41,30 +41,30 @@ class Tick:
 
 @dataclass(frozen=True)
 class Recorded:
-    """A run."""
+    """Ticks of one run, with its settings."""
 
     name: str
     ticks: tuple[Tick, ...]
     settings: RobotSettings
 
     def new_law(self) -> SweptLaw:
-        """Make a law as that of the run was at its start."""
+        """Make the run's law as it was at its start."""
         law = robot_parts(self.settings, scene_of(self.name)).law
         if not isinstance(law, SweptLaw):
             raise TypeError(f"a {type(law).__name__}; valid: SweptLaw")
-        # Its fields alone, with those from the path that it measures.
+        # Fields along the triggers alone; contact distances from around are not computed.
         law.ask_around(asked=False)
         return law
 
 
 class _Noting(Listener):
-    """Keeps what the law was asked, and the state before it."""
+    """Listener that keeps the law's inputs and the state behind them."""
 
     def __init__(self) -> None:
         self.ticks: list[Tick] = []
 
     def on_tick(self, tick: events.Tick) -> None:
-        """Keep one."""
+        """Keep one tick."""
         if tick.found is not None:
             self.ticks.append(Tick(tick.now_s, tick.found.situation, tick.found.state))
 
@@ -72,7 +72,7 @@ class _Noting(Listener):
 def record(name: str, duration_s: float, seed: int = 0, sticks: tuple[Vector2, Vector2] | None = None) -> Recorded:
     """Run the demo, or a pull of 2 N in the frozen scene of this name, for `duration_s`; the same for the same seed.
 
-    sticks: how far those that move across and turn are deflected in a pull; None: as the scene wants it.
+    sticks: deflections of the stick that moves across and the one that turns; None: those of the scene.
     """
     model = None if name == DEMO else frozen_scene(name)
     robot = RobotSettings(model=model, site=None if model is None else SITE, seed=seed, full_rate=True)
@@ -92,12 +92,12 @@ def record(name: str, duration_s: float, seed: int = 0, sticks: tuple[Vector2, V
 
 
 def scene_of(name: str) -> Scene:
-    """Load where the run of this name takes place, at its start."""
+    """Load the scene of the run of this name, at its start."""
     return load_scene(None) if name == DEMO else load_scene(frozen_scene(name), SITE)
 
 
 def with_cover(recorded: Recorded, cover_m: float) -> tuple[Tick, ...]:
-    """Return the ticks, had the gripper been covered by spheres that stand out that far; held things stay."""
+    """Return the ticks with the gripper covered by spheres that stand out by `cover_m`; held objects keep theirs."""
     scene = scene_of(recorded.name)
     own, other = MujocoKinematics(scene), MujocoKinematics(scene, cover_m)
     first = len(own.cover.radii_m)
@@ -105,7 +105,7 @@ def with_cover(recorded: Recorded, cover_m: float) -> tuple[Tick, ...]:
 
 
 def _covered(tick: Tick, kinematics: MujocoKinematics, first: int) -> Tick:
-    """Cover one tick; after the `first` spheres those of what is held follow."""
+    """Cover one tick; after the `first` spheres follow those of the held object."""
     before, pose = tick.situation.pose, kinematics.pose(tick.state)
 
     def joined(name: str) -> Any:

@@ -1,1 +1,1 @@
-"""The parts of `bench link`: samples of delays, sockets and ends of real processes, traffic between two clocks."""
+"""Parts of `bench link`: samples of delays, sockets and ends of real processes, traffic between two clocks."""

@@ -1,4 +1,4 @@
-"""An end of ZeroMQ's sockets with nothing around them, which shows what waking and Python cost by themselves."""
+"""End with bare ZeroMQ sockets, which shows the cost of waking and of Python alone."""
 
 import math
 import select
@@ -10,7 +10,7 @@ from common.clock import MonotonicClock
 
 
 class BareEnd:
-    """A ROUTER that binds over TCP on loopback, or a DEALER that connects to `address`."""
+    """ROUTER that binds over TCP on loopback, or DEALER that connects to `address`."""
 
     def __init__(self, size_bytes: int, address: str | None = None) -> None:
         self.sent = 0
@@ -28,17 +28,17 @@ class BareEnd:
         self._peer: bytes | None = None
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the sockets."""
         self._context.destroy(linger=0)
 
     def run(self, start_s: float, end_s: float, period_s: float) -> Iterator[float]:
-        """Send at start_s + k period_s and take what comes, until `end_s`; yield the time of each turn."""
+        """Send at start_s + k period_s and receive until `end_s`; yield the time of each turn."""
         clock, due_s = MonotonicClock(), start_s
         while (now_s := clock.now()) < end_s:
             yield now_s
             if now_s >= due_s:
                 self.sent += self._send()
-                # A late end makes up for nothing, as the sides do.
+                # A late end catches up on nothing, as the sides do.
                 due_s += period_s * max(1, math.floor((now_s - due_s) / period_s))
             if not self._readable():
                 select.select([self._descriptor], [], [], max(0.0, due_s - clock.now()))
@@ -52,7 +52,7 @@ class BareEnd:
             self._socket.recv(zmq.NOBLOCK)
 
     def _send(self) -> bool:
-        """Send at once; False when that cannot be done, or the peer is unknown."""
+        """Send at once; False if the send would block or the peer is unknown."""
         try:
             if self._routes:
                 if self._peer is None:
@@ -64,5 +64,5 @@ class BareEnd:
         return True
 
     def _readable(self) -> bool:
-        # The descriptor tells of changes only, and a send may have taken notice of one.
+        # The descriptor signals changes only, and a send may have consumed one.
         return bool(int(self._socket.getsockopt(zmq.EVENTS)) & int(zmq.POLLIN))

@@ -27,13 +27,13 @@ from robot_side.operators.safety import Safety, SafetySettings
 from robot_side.reporting.outgoing_messages import Outgoing, stiffness_message
 
 BYTES: Final = (169, 138)
-"""Sizes of a stiffness update and of a motion command: bare ends send as much, the robot's first. All leave."""
+"""Sizes in bytes of a stiffness update and of a motion command: bare ends send the same, the robot's first."""
 _REPORT_PERIOD_S: Final = 0.05
-"""A controller that rests is read this often: commands are made of what was read last."""
+"""Reading period of a controller at rest, in seconds; commands use the newest reading."""
 
 
 class _Side(ABC):
-    """One of the two sides: it takes what came, ticks, and sends by way of a delay line."""
+    """One of the two sides: it receives, ticks, and sends through a delay line."""
 
     def __init__(self, sockets: RobotSockets | OperatorSockets, direction: Direction) -> None:
         self.sent = 0
@@ -41,7 +41,7 @@ class _Side(ABC):
         self._line: DelayLine[Any] = DelayLine(LinkSpec().profile(direction))
 
     def run(self, start_s: float, end_s: float, period_s: float) -> Iterator[float]:
-        """Take what came, tick each `period_s` and send, until `end_s`; yield the time of each turn."""
+        """Receive, tick each `period_s` and send, until `end_s`; yield the time of each turn."""
         line, clock, pacer = self._line, MonotonicClock(), Pacer(period_s, start_s)
         while True:
             received = self._received()
@@ -71,7 +71,7 @@ class _Side(ABC):
 
 
 class RobotEnd(_Side):
-    """The robot side without arm, law and scene."""
+    """Robot side without arm, law and scene."""
 
     def __init__(self, sockets: RobotSockets) -> None:
         super().__init__(sockets, "to_operator")
@@ -107,7 +107,7 @@ class RobotEnd(_Side):
 
 
 class OperatorEnd(_Side):
-    """The operator side without a controller and without people who look."""
+    """Operator side without a controller and without viewers."""
 
     def __init__(self, sockets: OperatorSockets) -> None:
         super().__init__(sockets, "to_robot")

@@ -18,22 +18,22 @@ from feelahead.lab.link.ends import BYTES, OperatorEnd, RobotEnd
 
 Kind = Literal["whole ends", "bare ZeroMQ"]
 Take = Callable[[float, float], list[dict[str, float]]]
-"""Have both ends take a turn of this length and period (s); return the robot's figures, then the operator's."""
+"""Run both ends for a turn of this length and period (s); return the robot's figures, then the operator's."""
 _SETTLING_S: Final = 0.4
-"""Sessions that fell asleep are there again after this time; a turn is measured from then on."""
+"""Time in seconds in which idle sessions resume; a turn is measured from then on."""
 _PATIENCE_S: Final = 120.0
 
 
 @contextmanager
 def pair(kind: Kind) -> Iterator[Take]:
-    """Start both processes; yield what has them take a turn. FeelaheadError when an end does not report."""
+    """Start both processes; yield the function that runs a turn. FeelaheadError if an end does not report."""
     context = multiprocessing.get_context("spawn")
     with ExitStack() as stack:
         pipes: list[Connection] = []
         address: Any = None
         for place in range(2):
             ours, theirs = context.Pipe()
-            stack.callback(ours.close)  # which ends the process
+            stack.callback(ours.close)  # Closing the pipe ends the process.
             context.Process(target=_serve, args=(kind, place, address, theirs), daemon=True).start()
             theirs.close()
             pipes.append(ours)
@@ -42,7 +42,7 @@ def pair(kind: Kind) -> Iterator[Take]:
         def take(seconds: float, period_s: float) -> list[dict[str, float]]:
             start_s = MonotonicClock().now()
             for place, pipe in enumerate(pipes):
-                # Half a period apart, so that no kind finds deadlines and messages at the same instant by chance.
+                # Half a period apart, so that deadlines and messages never coincide by chance.
                 pipe.send((start_s + 0.5 * place * period_s, seconds, period_s))
             return [_heard(pipe, seconds) for pipe in pipes]
 
@@ -83,7 +83,7 @@ def _serve(kind: Kind, place: int, address: Any, orders: Connection) -> None:
 
 
 def _turn(end: BareEnd | RobotEnd | OperatorEnd, start_s: float, seconds: float, period_s: float) -> dict[str, float]:
-    """Run from `start_s` on; measure after settling."""
+    """Run from `start_s`; measure after settling."""
     began: tuple[float, float, int] | None = None
     now_s = start_s
     for now_s in end.run(start_s, start_s + _SETTLING_S + seconds, period_s):

@@ -1,4 +1,4 @@
-"""Delays of a link as arrays, of the model in virtual time and of a recording, and how far two of them differ."""
+"""Delays of a link as arrays, from the model in virtual time or a recording, and the difference of two."""
 
 import dataclasses
 import math
@@ -19,7 +19,7 @@ from feelahead.lab.goals import Goal
 from feelahead.lab.table import Row
 
 STALL_S = 1e-3
-"""A delay that exceeds the model's greatest by more than this is the host's doing, not the link's."""
+"""Excess in seconds over the model's greatest delay, above which the host and not the link caused it."""
 LARGEST_DISTANCE = 0.03
 LARGEST_MOMENT_ERROR_MS = 0.3
 LARGEST_LATE_ERROR = 0.02
@@ -32,52 +32,52 @@ class LinkSample:
     """Messages in order of sending."""
 
     sent_s: FloatArray
-    """(n,) when each was sent."""
+    """(n,) when each was sent"""
     delay_s: FloatArray
-    """(n,) how long its first copy took; NaN: lost."""
+    """(n,) delay of its first copy; NaN: lost"""
 
     @property
     def arrived_s(self) -> FloatArray:
-        """(m,) the delays of those that arrived."""
+        """(m,) delays of the messages that arrived"""
         return self.delay_s[~np.isnan(self.delay_s)]
 
     @property
     def mean_s(self) -> float:
-        """The mean delay of those that arrived."""
+        """Mean delay of the messages that arrived."""
         return float(self.arrived_s.mean())
 
     @property
     def sd_s(self) -> float:
-        """The standard deviation of those delays."""
+        """Standard deviation of these delays."""
         return float(self.arrived_s.std())
 
     @property
     def loss_share(self) -> float:
-        """The share of messages lost."""
+        """Share of messages lost."""
         return float(np.isnan(self.delay_s).mean())
 
     @property
     def mean_burst(self) -> float:
-        """The mean number of messages lost in a row; 0 without loss."""
+        """Mean number of messages lost in a row; 0 without loss."""
         lost = np.isnan(self.delay_s).astype(np.int8)
         bursts = int((np.diff(lost, prepend=0) == 1).sum())
         return float(lost.sum()) / bursts if bursts else 0.0
 
     @property
     def late_share(self) -> float:
-        """The share of arrivals overtaken by a later message (RFC 4737, type-P-reordered)."""
+        """Share of arrivals overtaken by a later message (RFC 4737, type-P-reordered)."""
         arrived = np.flatnonzero(~np.isnan(self.delay_s))
         order = arrived[np.argsort(self.sent_s[arrived] + self.delay_s[arrived], kind="stable")]
         return float(np.mean(order < np.maximum.accumulate(order))) if order.size else 0.0
 
     def without_stalls(self, profile: LinkProfile) -> tuple["LinkSample", int]:
-        """Leave out the delays that the model cannot give; also return how many these were."""
+        """Leave out the delays above the model's greatest; also return their number."""
         stalled = self.delay_s > greatest_delay_s(profile) + STALL_S
         return LinkSample(self.sent_s[~stalled], self.delay_s[~stalled]), int(stalled.sum())
 
 
 def greatest_delay_s(profile: LinkProfile) -> float:
-    """Return the longest delay of a datagram; infinity where there is no such limit or it is not known."""
+    """Return the longest delay of a datagram; infinity if it is unlimited or unknown."""
     if profile.model == "stream":
         return math.inf
     if profile.trace is not None:
@@ -86,7 +86,7 @@ def greatest_delay_s(profile: LinkProfile) -> float:
 
 
 def read_link_sample(path: Path, flag: str) -> LinkSample:
-    """Read a recording with send times; ConfigurationError, in one line that names `flag`, for anything else."""
+    """Read a recording with send times; otherwise ConfigurationError, in one line that names `flag`."""
     samples = read_samples(path, flag)
     if len(samples) < 2 or any(sample.sent_s is None for sample in samples):
         raise ConfigurationError(f"{flag}: {path} lacks send times; valid: two messages or more with sent_ns")
@@ -104,7 +104,7 @@ def play(profile: LinkProfile, sent_s: Sequence[float], size_bytes: int) -> tupl
     def deliver(until_s: float) -> None:
         while (due_s := line.next_due()) is not None and due_s <= until_s:
             for number in line.pop(due_s):
-                # Of two copies the first counts.
+                # The first of two copies counts.
                 if math.isnan(delay_s[number]):
                     delay_s[number] = due_s - sent_s[number]
 
@@ -116,7 +116,7 @@ def play(profile: LinkProfile, sent_s: Sequence[float], size_bytes: int) -> tupl
 
 
 def distance(one: LinkSample, other: LinkSample) -> float:
-    """Return the Kolmogorov-Smirnov statistic D of their delays; 1 where nothing arrives of one of them."""
+    """Return the Kolmogorov-Smirnov statistic D of their delays; 1 if nothing arrives of one of them."""
     if one.arrived_s.size == 0 or other.arrived_s.size == 0:
         return 1.0
     return float(stats.ks_2samp(one.arrived_s, other.arrived_s, method="asymp").statistic)
@@ -124,13 +124,13 @@ def distance(one: LinkSample, other: LinkSample) -> float:
 
 @dataclass(frozen=True)
 class Band:
-    """The range in which the model's own runs differ."""
+    """Range in which the model's own runs differ."""
 
     pairs: int
     distance: float
-    """99 % of pairs of runs are closer than this."""
+    """D below which 99 % of pairs of runs are."""
     figures: dict[str, tuple[float, float]]
-    """The range in which 99 % of runs lie, by name."""
+    """Range of 99 % of runs, by figure."""
 
 
 FIGURES: dict[str, Callable[[LinkSample], float]] = {
@@ -142,7 +142,7 @@ FIGURES: dict[str, Callable[[LinkSample], float]] = {
 
 
 def independent_delays(profile: LinkProfile) -> bool:
-    """Say whether each delay is drawn by itself, so that a run has the model's distribution.
+    """Return whether each delay is drawn by itself, so that a run has the model's distribution.
 
     netem's correlation of delays does not count: it leaves them independent.
     """
@@ -150,12 +150,12 @@ def independent_delays(profile: LinkProfile) -> bool:
 
 
 def needs_band(profile: LinkProfile) -> bool:
-    """Say whether delays or losses depend on the past, so that only the model's own band can judge a recording."""
+    """Return whether delays or losses depend on the past: then only the model's own band can judge a recording."""
     return profile.loss is not None or not independent_delays(profile)
 
 
 def compare_one(profile: LinkProfile, reference: LinkSample, seed: int, size_bytes: int) -> Row:
-    """Run the model with the recording's send times and this seed; distance: D, None where nothing varies."""
+    """Run the model with the recording's send times and this seed; distance: D, None without variation."""
     run = _run(profile, reference, seed, size_bytes)
     varies = profile.jitter_s > 0.0 or profile.trace is not None
     return {
@@ -171,23 +171,23 @@ def compare_one(profile: LinkProfile, reference: LinkSample, seed: int, size_byt
 def pair_of_runs(
     profile: LinkProfile, reference: LinkSample, pair: int, size_bytes: int
 ) -> tuple[float, list[list[float]]]:
-    """Run the model twice, with seeds of the pair's own; return D between the runs, and the figures of each."""
+    """Run the model twice, with the pair's own seeds; return D between the runs, and the figures of each."""
     first = _FIRST_SEED_OF_BAND + 2 * pair
     runs = [_run(profile, reference, seed, size_bytes) for seed in (first, first + 1)]
     return distance(*runs), [[measure(run) for measure in FIGURES.values()] for run in runs]
 
 
 def band_of(pairs: Sequence[tuple[float, Sequence[Sequence[float]]]]) -> Band:
-    """Make the band of many pairs of runs."""
+    """Compute the band from many pairs of runs."""
     low, high = np.quantile([figures for _, both in pairs for figures in both], _BAND, axis=0)
     ranges = {name: (float(low[place]), float(high[place])) for place, name in enumerate(FIGURES)}
     return Band(len(pairs), float(np.quantile([apart for apart, _ in pairs], 0.99)), ranges)
 
 
 def judge(profile: LinkProfile, reference: LinkSample, results: Sequence[Row], band: Band | None) -> list[Goal]:
-    """Hold independent delays against fixed limits, and those that depend on the past against the model's own band.
+    """Judge independent delays by fixed limits, and those that depend on the past by the model's own band.
 
-    results: of `compare_one`.
+    results: rows of `compare_one`.
     """
 
     def median(name: str) -> float:

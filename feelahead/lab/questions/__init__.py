@@ -1,1 +1,1 @@
-"""One question a file: what is asked, the cells to try, how one cell is run, what is shown, drawn and aimed at."""
+"""One question a file: the cells to try, the run of one cell, and the tables, figures and goals."""

@@ -1,4 +1,4 @@
-"""Does a finger of constant force hit what is ahead, and how fast; or where does the gripper stop?
+"""Does a finger of constant force hit the objects ahead, and how fast; or where does the gripper stop?
 
 feelahead try approach --model tests/data/wall.xml --force 2 3 --law swept none --link "" "delay 200ms"
 """
@@ -33,58 +33,58 @@ from robot_side.settings import Assist
 
 _QUICK: Final = ("wall", "edge")
 _FARTHEST_MM: Final = 1000.0
-"""Distances beyond this are not measured."""
+"""Largest distance that is measured, in mm."""
 _APART_MS: Final = 6.0
-"""Between the laws in the figure, so that no line hides another."""
+"""Offset between the laws in the figure, so that no line hides another."""
 _MARKS: Final = ("o", "s", "^", "D", "v", "P", "X")
 _Force = Annotated[float, Meta(ge=0.0, le=20.0)]
 
 
 @dataclass(frozen=True)
 class ApproachSettings(Sweep):
-    """A finger that presses R2 with a constant force, until the gripper touches something or comes to rest.
+    """Press R2 with a finger of constant force until the gripper touches something or comes to rest.
 
     Both sides run in virtual time with the real messages, link, trigger effects and physics. Without --model, every
-    frozen scene of tests/data that ends in a contact is tried; with --quick two of them. Options that take several
-    values are combined with each other; with one of each, the summary is that run's own.
+    frozen scene of tests/data that ends in a contact is tried; with --quick two of them. Options with several values
+    are combined with each other; of a single run, --summary holds the run's figures.
     """
 
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
     """MJCF scenes with an arm; it may hit the objects ahead of the tool."""
     site: Annotated[str, tyro.conf.arg(metavar="NAME")] = SITE
-    """The site between the fingertips, z along the approach."""
+    """Site between the fingertips, z along the approach."""
     force: Annotated[tuple[_Force, ...], tyro.conf.arg(metavar="N...")] = (3.0,)
-    """Newtons on R2, 0 to 20: 2 is a light pull, 3.7 a normal one."""
+    """Force on R2 in newtons, 0 to 20: 2 is a light pull, 3.7 a normal one."""
     strongest_effect: Annotated[tuple[_Force, ...], tyro.conf.arg(metavar="N...")] = (2.0,)
-    """Newtons that the strongest effect adds (nobody has measured it): 1.5, 2 and 3 span what is likely."""
+    """Newtons that the strongest effect adds (never measured): 1.5, 2 and 3 span the likely range."""
     link: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SPEC...")] = ("",)
-    """Emulated links, both ways, in netem's words: "delay 200ms 10ms distribution normal"."""
+    """Emulated links, in both directions, in netem's syntax: "delay 200ms 10ms distribution normal"."""
     link_model: LinkModel = "datagram"
     """datagram lets jitter reorder messages, stream keeps them in order."""
     law: tuple[Literal["swept", "paper", "none", "full"], ...] = ("swept",)
-    """The law that is felt: the objects ahead along the trigger, the paper's plain law, nothing, or always the
-    strongest effect. Several are set side by side."""
+    """Law that is felt: the objects ahead along the trigger, the paper's printed law, nothing, or always the
+    strongest effect. Several are compared."""
     compensation: tuple[Compensation, ...] = ("operator",)
-    """The side that compensates the delay: the operator side by the commands under way, or the robot side by v t_d
-    (eq. 8). The paper's law has eq. 8."""
+    """Side that compensates the delay: the operator side by the commands under way, or the robot side by v t_d
+    (eq. 8). The paper's law always uses eq. 8."""
     haptics: bool = True
     """--no-haptics: the same as --law none."""
     probability: Annotated[float, Meta(gt=0.0, lt=1.0), tyro.conf.arg(metavar="P")] = 0.99
-    """The laws' own P (eq. 10)."""
+    """P of the laws (eq. 10)."""
     duration: Annotated[float, Meta(ge=0.05, le=1000.0), tyro.conf.arg(metavar="SECONDS")] = 8.0
-    """From the beginning of the pull, in virtual time; a contact ends the run."""
+    """Duration from the beginning of the pull, in virtual time; a contact ends the run."""
     grip: bool = False
-    """Close the gripper on what stands between its fingers first."""
+    """Grip the object between the fingers first."""
     stick: Annotated[tuple[float, float], tyro.conf.arg(metavar="RIGHT UP")] = (0.0, 0.0)
     """Deflection, at most 1 long, of the stick that moves across, for the first 1.5 s: up to 0.1 m/s."""
     turn: Annotated[tuple[float, float], tyro.conf.arg(metavar="RIGHT UP")] = (0.0, 0.0)
     """Deflection, at most 1 long, of the stick that turns, for the first 1.5 s: up to 0.5 rad/s."""
     assist: Assist = "none"
-    """speed: the robot side caps the speed along the triggers itself."""
+    """speed: the robot side also limits the speed along the triggers."""
     full_rate: bool = False
-    """Both sides send everything, whatever can be felt of it."""
+    """Send every message on both sides, even if its change cannot be felt."""
     camera_mm: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MM")] = 3.0
-    """Standard deviation of the camera's error, which the law knows."""
+    """Standard deviation of the camera's error; the law knows it."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -100,11 +100,11 @@ class ApproachSettings(Sweep):
             require_input_file("--model", model, "an MJCF file")
 
     def models(self) -> tuple[Path, ...]:
-        """Find the scenes to try; ConfigurationError where the frozen ones are not there."""
+        """Return the scenes to try; ConfigurationError if the frozen ones are missing."""
         return self.model or tuple(frozen_scene(name) for name in (_QUICK if self.quick else (*AHEAD, *ASIDE)))
 
     def laws(self) -> tuple[Law, ...]:
-        """List the laws that are set side by side, each once."""
+        """Return the compared laws, each once."""
         if not self.haptics:
             return ("none",)
         return tuple(dict.fromkeys(with_compensation(law, side) for law in self.law for side in self.compensation))
@@ -138,12 +138,12 @@ def cells(settings: ApproachSettings) -> Iterator[Approach]:
 
 
 def run(cell: Approach, seed: int) -> Iterator[Row]:
-    """Run one approach, and name its law as the flags do."""
+    """Run one approach."""
     yield figures(cell, run_approach(replace(cell, seed=seed)))
 
 
 def figures(approach: Approach, outcome: Outcome) -> Row:
-    """Turn an outcome into a row; the trace goes to --summary alone."""
+    """Return an outcome as a row; the trace goes to --summary alone."""
     gap_mm = outcome.least_gap_mm
     return {
         "law": without_compensation(approach.law),
@@ -163,7 +163,7 @@ def show(_: ApproachSettings, table: Table) -> Iterator[RenderableType]:
 
 
 def sentence(row: Row) -> str:
-    """Say in a line or two how one run ended."""
+    """Describe in a line or two how one run ended."""
     what = f"{row['force_n']:g} N in {Path(row['model']).stem}, law {in_words(_law(row))}: "
     if row["why"] is not None:
         return f"{what}{row['end']}: {row['why']}"
@@ -178,7 +178,7 @@ def sentence(row: Row) -> str:
 
 
 def comparison(table: Table) -> Shown:
-    """Make a row for each scene, link and force, and a column for each law; each entry is over the seeds."""
+    """Return a row for each scene, link and force, and a column for each law; each entry is over the seeds."""
     laws = list(dict.fromkeys(_law(row) for row in table))
     names = scene_names(map(Path, table.values("model")))
     entries = [
@@ -222,9 +222,9 @@ def _draw_run(table: Table, frozen: str, path: Path) -> None:
 
 
 def _draw_comparison(table: Table, frozen: str, path: Path) -> None:
-    """Make a panel for each force, with a line for each law and scene.
+    """Draw a panel for each force, with a line for each law and scene.
 
-    A run that stops before the contact counts as 0 mm/s; one that ends otherwise is left out.
+    A run that stops before the contact counts as 0 mm/s; other runs without a contact are left out.
     """
     forces = sorted(set(table.values("force_n")))
     names = scene_names(map(Path, table.values("model")))
@@ -263,7 +263,7 @@ def _gap(gap_mm: float) -> str:
 
 
 def _ends(rows: Sequence[Row]) -> str:
-    """Say in a few words how runs of one kind ended."""
+    """Describe in a few words how runs of one kind ended."""
     if not rows:
         return ""
     speeds, stops = Table(rows).values("contact_speed_mm_s"), Table(rows).values("stops_at_mm")

@@ -1,4 +1,4 @@
-"""How often does full stiffness stand in time, and how often without need, for each law?
+"""How often is full strength there in time, and how often needlessly, for each law?
 
 feelahead bench coverage --quick --laws swept none
 """
@@ -26,32 +26,32 @@ from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 
 HOMES: Final = {"u_mesh": "mug", "mug": "mug"}
-"""Scenes that start from another home pose than `empty`, where their approaches are recorded."""
+"""Scenes with another home pose than `empty`, by the scene in which their approaches are recorded."""
 _NOT_STILL: Final = ("moving", "fleeing", "place_held", "terrain_ahead")
-"""Left to `try approach`: objects that move by themselves or with the gripper, and a hill."""
+"""Scenes left to `try approach`: objects that move by themselves or with the gripper, and a hill."""
 QUICK_SIZES: Final = (10, 4)
-"""Approaches of each motion, and places of the objects for each."""
+"""Approaches of each motion, and placements of the objects for each."""
 QUICK_JUDGED_S, JUDGED_S = 60.0, 600.0
-"""Time that is judged for false alarms at least, over all cells of one kind of motion."""
+"""Least time judged for false alarms, in seconds, over all cells of one kind of motion."""
 _MARKS: Final = ("o", "s", "^", "D")
 _CELL: Final = ("scene", "pull", "link", "camera_mm", "encoder_factor", "probability")
 _Probability = Annotated[float, Meta(gt=0.0, le=0.9999)]
-"""The greatest takes 100 000 draws a cell."""
+"""P; the greatest takes 100 000 draws a cell."""
 
 
 @dataclass(frozen=True)
 class CoverageSettings(Sweep):
-    """The share of approaches in which full strength stands in time, and false alarms, for each law.
+    """Measure the share of approaches with full strength in time, and false alarms, for each law.
 
-    Covered: 0.25 s before the last moment at which letting go avoids the contact, full strength stood in the zone that
-    the finger reaches until then. False alarm: strength of 4 or more under the finger, while that zone's stopping path
-    from the true pose stays D_σ(P) + 15 mm clear, whether sticks go on or end. Slowdown: the time to a goal in the free
-    over that without haptics. Pulls are recorded open loop over the emulated link, and judged for every scene, camera
-    draw, law and P. --quick: a few cells in three minutes, instead of all in two hours.
+    Covered: 0.25 s before the last release that avoids the contact, full strength was in the farthest zone reached by
+    then. False alarm: strength of 4 or more under the finger, while that zone's stopping path from the true pose stays
+    D_σ(P) + 15 mm clear, whether sticks continue or end. Slowdown: time to a goal in free space over that without
+    haptics. Pulls are recorded open loop over the emulated link, and judged for every scene, camera draw, law and P.
+    --quick: a few cells in three minutes, instead of all in two hours.
     """
 
     laws: tuple[Law, ...] = LAWS
-    """The laws that are set side by side."""
+    """Laws that are compared."""
     probabilities: Annotated[tuple[_Probability, ...], tyro.conf.arg(metavar="P...")] = ()
     """Only these P, instead of the plan's own; n >= 10/(1 - P) draws a cell each."""
     raced: Annotated[Annotated[int, Meta(ge=0)] | None, tyro.conf.arg(metavar="N")] = None
@@ -67,7 +67,7 @@ class CoverageSettings(Sweep):
             raise ValueError(f"--only {' '.join(self.only)}: no cell's name contains it; valid: as wall/bell/200 ms")
 
     def pulls(self) -> list[Pulls]:
-        """List the motions with the cells that are wanted, the longest first."""
+        """Return the motions with their chosen cells, most cells first."""
         found: dict[tuple[PullKind, str, str], list[Placed]] = {}
         for pull, link, cell in quick_cells() if self.quick else full_cells():
             if not self.only or any(text in cell.key(pull, link) for text in self.only):
@@ -90,7 +90,7 @@ class CoverageSettings(Sweep):
 
 @dataclass(frozen=True)
 class Race:
-    """The time to a goal in one scene under one law."""
+    """Time to a goal in one scene under one law."""
 
     scene: str
     law: Law
@@ -98,14 +98,14 @@ class Race:
 
 
 def cells(settings: CoverageSettings) -> Iterator[Pulls | Race]:
-    """Lay out motions and races."""
+    """Yield motions and races."""
     yield from settings.pulls()
     if count := settings.raced if settings.raced is not None else (2 if settings.quick else 10):
         yield from (Race(scene, law, count) for scene in RACED for law in settings.laws)
 
 
 def full_cells() -> Iterator[tuple[PullKind, str, Placed]]:
-    """Lay out every scene with a steady pull over four links, every pull over two, then one factor at a time.
+    """Yield every scene with a steady pull over four links, every pull over two, then one factor at a time.
 
     Drift and turning come in more scenes, and objects come nearer or go away.
     """
@@ -127,14 +127,14 @@ def full_cells() -> Iterator[tuple[PullKind, str, Placed]]:
 
 
 def quick_cells() -> Iterator[tuple[PullKind, str, Placed]]:
-    """Choose some of them, to see whether anything is wrong."""
+    """Yield a few cells, to see whether anything is wrong."""
     for name in ("wall", "rod_5mm", "wall_beside", "table_1_box"):
         yield "steady", "50 ms", Placed(name)
         yield "bell", "200 ms", Placed(name)
 
 
 def run(cell: Pulls | Race, seed: int) -> Iterator[Row]:
-    """Record one motion, and judge its cells; or race."""
+    """Record one motion and judge its cells, or race."""
     if isinstance(cell, Pulls):
         yield from evaluate(cell, seed)
     else:
@@ -143,7 +143,7 @@ def run(cell: Pulls | Race, seed: int) -> Iterator[Row]:
 
 
 def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
-    """Make tables by cell, by pull and by law."""
+    """Yield tables by cell, by pull and by law."""
     found = judged(table)
     yield _by_cell(
         found, settings.laws, "covered: full strength stood in time, share [95 %], * where it holds", _covered
@@ -157,7 +157,7 @@ def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
 
 
 def judged(table: Table) -> Table:
-    """Choose the rows of cells, in their order."""
+    """Return the rows of cells, sorted by cell."""
     return Table(sorted((row for row in table if "cell" in row), key=lambda row: row["cell"]))
 
 
@@ -187,7 +187,7 @@ def _alarms(row: Row) -> str:
 
 
 def by_pull(found: Table, law: str) -> Shown:
-    """Make a row for each pull, link and P, over scenes, cameras and encoders; Markdown, for docs/feel.md."""
+    """Return a row for each pull, link and P, over scenes, cameras and encoders; Markdown, for docs/feel.md."""
     order = PULL_KINDS.index, list(LINKS).index
     mine = sorted(found.where(law=law), key=lambda row: (order[0](row["pull"]), order[1](row["link"])))
     entries = []
@@ -208,7 +208,7 @@ def _where(rows: Table, name: str, value: float, form: str) -> str:
 
 
 def by_law(table: Table, laws: Sequence[str]) -> Shown:
-    """Make a row for each law and P, over all cells, with the cost in time."""
+    """Return a row for each law and P, over all cells, with the slowdown."""
     found, raced = judged(table), Table(row for row in table if "slowdown" in row)
     entries = [
         (
@@ -231,13 +231,13 @@ def _slowdown(row: Row) -> str:
 
 
 def mean(rows: Table, name: str, form: str = ".3f") -> str:
-    """Average the figures that there are; empty without any."""
+    """Return the mean of the figures in a column; empty without any."""
     values = rows.values(name)
     return format(sum(values) / len(values), form) if values else ""
 
 
 def pooled_alarms(rows: Table) -> tuple[str, str]:
-    """Return false alarms a minute, and their share of the time, over all that was judged; empty without any."""
+    """Return false alarms a minute, and their share of the judged time; empty without any."""
     number, alarm_s, judged_s = (sum(rows.values(name)) for name in ("alarms", "alarm_s", "judged_s"))
     return (f"{60.0 * number / judged_s:.2f}", f"{alarm_s / judged_s:.2%}") if judged_s else ("", "")
 

@@ -1,4 +1,4 @@
-"""Does the demo's person grasp, lift and place, and feel what they set down before it touches?
+"""Does the demo's person grasp, lift and place, and feel the place before the object touches it?
 
 feelahead try demo --seeds 10 --link "" "delay 200ms 10ms distribution normal"
 """
@@ -37,18 +37,18 @@ _COLUMNS: Final = {
 
 @dataclass(frozen=True)
 class DemoSettings(Sweep):
-    """The demo, seed by seed: the same two sides and the same person in virtual time, and what is true of the end."""
+    """Run the demo, seed by seed: both sides and the person in virtual time, judged by the true end."""
 
     seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 10
     """Number of seeds."""
     scene: SceneName = "table"
-    """The scene, one of the demo's."""
+    """One of the demo's scenes."""
     link: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SPEC...")] = ("", "delay 200ms 10ms distribution normal")
-    """Emulated links, both ways, in netem's words."""
+    """Emulated links, in both directions, in netem's syntax."""
     link_model: LinkModel = "datagram"
     """datagram lets jitter reorder messages, stream keeps them in order."""
     duration: Annotated[float, Meta(gt=0.0, lt=1e4), tyro.conf.arg(metavar="SECONDS")] = 40.0
-    """The limit of each run, in virtual time."""
+    """Limit of each run, in virtual time."""
     person: PersonSettings = field(default_factory=PersonSettings)
 
     def __post_init__(self) -> None:
@@ -62,7 +62,7 @@ class DemoSettings(Sweep):
 
 
 def cells(settings: DemoSettings) -> Iterator[Trial]:
-    """Lay out one cell for each link."""
+    """Yield one cell for each link."""
     for link in settings.link[: 1 if settings.quick else None]:
         yield Trial(settings.scene, link, "reacting", settings.person, settings.duration, settings.link_model)
 
@@ -73,7 +73,7 @@ def run(cell: Trial, seed: int) -> Iterator[Row]:
 
 
 def show(_: DemoSettings, table: Table) -> Iterator[Shown]:
-    """Make a table for each link: a row for each seed, and how many of them did it."""
+    """Yield a table for each link: a row for each seed, and the number of successes."""
     for (link,), runs in table.groups("link"):
         lines = [[_said(one[name], digits) for name, (_, digits) in _COLUMNS.items()] for one in runs]
         total = {name: str(sum(runs.values(name))) for name in ("grasped", "placed", "hits")} | {

@@ -1,4 +1,4 @@
-"""How far off are the error propagation and the prediction of the gripper's way, and how long does each take?
+"""How large are the errors of the error propagation and of the predicted displacement, and what does each cost?
 
 feelahead bench error --quick
 """
@@ -39,7 +39,7 @@ from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.scene import load_scene
 
 DELAYS_MS: Final = (0, 25, 50, 100, 200, 400)
-"""Each way."""
+"""Delays in each direction."""
 QUICK_DELAYS_MS: Final = (0, 50, 200, 400)
 QUICK_PULLS: Final[tuple[PullKind, ...]] = ("bell", "on_off", "random")
 QUICK_TURNS: Final = 4
@@ -57,14 +57,14 @@ _Draws = Annotated[int, Meta(ge=100 * BATCHES, le=10_000_000)]
 
 @dataclass(frozen=True)
 class ErrorSettings(Sweep):
-    """Run time against error of the error propagation (eq. 5), and the error of predicting the gripper's way.
+    """Measure run time and error of the error propagation (eq. 5), and the error of the predicted displacement.
 
     First: the joints of the built-in arm are off by 1e-5 to 1e-1 rad. The gripper's error is estimated by eq. 5 in each
     configuration, once for all as in the paper, and by the unscented transform; Monte Carlo is the truth. Second: hands
-    pull R2 over links of 0 to 400 ms each way, in virtual time. The gripper's way from the robot's newest report until
-    a command sent now takes effect is predicted by the commands under way, and as v t_d (eq. 8). --table writes the
-    means and standard deviations of the errors, for eq. 10. The same seed gives the same figures, but for run times.
-    Five minutes on a free core. --quick: a minute, with fewer draws, configurations, pulls and links, and one seed.
+    pull R2 over links of 0 to 400 ms in each direction, in virtual time. The gripper's displacement from the robot's
+    newest report until a command sent now takes effect is predicted by the commands under way, and as v t_d (eq. 8).
+    --table writes mean and standard deviation of the errors, for eq. 10. A seed always gives the same figures, except
+    run times. Five minutes on a free core. --quick: a minute; fewer draws, configurations, pulls and links; one seed.
     """
 
     seeds: Annotated[int, Meta(ge=1, le=10_000), tyro.conf.arg(metavar="N")] = 3
@@ -72,7 +72,7 @@ class ErrorSettings(Sweep):
     draws: Annotated[_Draws | None, tyro.conf.arg(metavar="N")] = None
     """Draws of the Monte Carlo in each configuration, in twenties; 400000 unless given, 100000 with --quick."""
     table: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """Write mean and standard deviation of the predictions' errors over loop age and kind of compensation there."""
+    """Write mean and standard deviation of the prediction errors, by loop age and kind of compensation."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -113,13 +113,13 @@ Cell = Propagation | RunTimes | Prediction
 
 
 def link_spec(delay_ms: int) -> str:
-    """Write a link with this delay each way, and normal jitter of 10 ms or a quarter of the delay if that is less."""
+    """Return a link with this delay each way, and normal jitter of 10 ms or a quarter of the delay if less."""
     jitter_ms = min(10, delay_ms // 4)
     return f"delay {delay_ms}ms {jitter_ms}ms distribution normal" if jitter_ms > 0 else ""
 
 
 def cells(settings: ErrorSettings) -> Iterator[Cell]:
-    """Lay out configurations, the run times, and each pull over each link; only pulls have several seeds."""
+    """Yield configurations, the run times, and each pull over each link; only pulls have several seeds."""
     quick, second = settings.quick, settings.seed + 1
     configurations = 4 if quick else 12
     draws = settings.draws or (100_000 if quick else 400_000)
@@ -132,7 +132,7 @@ def cells(settings: ErrorSettings) -> Iterator[Cell]:
 
 
 def run(cell: Cell, seed: int) -> Iterator[Row]:
-    """Make rows of kind `propagation`, `run time` or `prediction`."""
+    """Yield rows of kind `propagation`, `run time` or `prediction`."""
     if seed >= cell.before_seed:
         return
     if isinstance(cell, Propagation):
@@ -161,7 +161,7 @@ def _gripper() -> PosedGripper:
 
 
 def write_table(settings: ErrorSettings, table: Table) -> None:
-    """Write what --table asks for."""
+    """Write the table of --table, if given."""
     if settings.table is not None:
         arm, speed_m_s = load_scene().robot.fingerprint, ToolMotionSettings().trigger_speed_m_s
         with output_file("--table", settings.table) as file:
@@ -169,7 +169,7 @@ def write_table(settings: ErrorSettings, table: Table) -> None:
 
 
 def show(_: ErrorSettings, table: Table) -> Iterator[RenderableType]:
-    """Make tables of the propagation by joint noise, and of the prediction by loop age and pull."""
+    """Yield tables of the propagation by joint noise, and of the prediction by loop age and pull."""
     judged = table.where(kind="prediction")
     yield _by_noise(table.where(kind="propagation"))
     times = ((row["method"], row["run_time_us"]) for row in table.where(kind="run time"))
@@ -182,7 +182,7 @@ def show(_: ErrorSettings, table: Table) -> Iterator[RenderableType]:
 
 
 def _by_noise(propagated: Table) -> Shown:
-    """Show the median and the worst error over all configurations but the singular one, then the worst in that."""
+    """Show median and worst error over all configurations except the singular one, then the worst in that one."""
     rows = []
     for noise_rad in NOISE_RAD:
         here = propagated.where(noise_rad=noise_rad)
@@ -197,7 +197,7 @@ def _by_noise(propagated: Table) -> Shown:
 
 
 def _spreads(judged: Table, names: Sequence[str], *, within_reach: bool) -> Iterator[Sequence[str]]:
-    """Make a row for each loop age, over all pulls and for each."""
+    """Yield a row for each loop age and pull, and for all pulls together."""
     for ages_s in AGE_BINS_S:
         for pull in ("all", *PULL_KINDS):
             mine = judged if pull == "all" else judged.where(pull=pull)
@@ -207,12 +207,12 @@ def _spreads(judged: Table, names: Sequence[str], *, within_reach: bool) -> Iter
 
 
 def cell_of(found: Spread) -> str:
-    """Write mean, standard deviation, 99 % and greatest, in mm."""
+    """Return mean, standard deviation, 99 % quantile and maximum as text, in mm."""
     return "-" if not found.moments else f"{found.mean_mm:+.2f} {found.sd_mm:.2f} {found.p99_mm:.2f} {found.max_mm:.2f}"
 
 
 def draw(_: ErrorSettings, table: Table, path: Path) -> None:
-    """Draw run time against error of the propagation, and the predictions' errors against the loop age."""
+    """Draw run time against error of the propagation, and the prediction errors against the loop age."""
     with figure(path, 1, 2, f"frozen {frozen_hash()}", figsize=(11.0, 4.4)) as (_, (left, right)):
         times_us = {row["method"]: row["run_time_us"] for row in table.where(kind="run time")}
         _draw_propagation(left, table.where(kind="propagation"), times_us)

@@ -1,4 +1,4 @@
-"""What does the look ahead cost, and how well is it felt, by the number of the gripper's spheres?
+"""What does a look ahead cost, and how exact is it, by the number of the gripper's spheres?
 
 feelahead bench felt --quick --picture felt.png
 feelahead bench felt --ways
@@ -34,31 +34,31 @@ _QUICK_POINTS: Final = 10_000
 _QUICK_SCENES: Final = 2
 _PULLED_ASIDE: Final = ("rod_5mm", "ball", "slot", "mug", "u_mesh", "terrain_ahead", "cluttered")
 _LEAST_MM: Final = 1e-3
-"""Errors below are drawn here: the axis is logarithmic."""
+"""Smallest error that is drawn, in mm: the axis is logarithmic."""
 
 
 @dataclass(frozen=True)
 class FeltSweep(Sweep):
-    """Run time against error of what is felt, by how many spheres cover the gripper.
+    """Measure run time and error of the law's contact distances, by the number of spheres that cover the gripper.
 
-    Each cover is asked the same recorded ticks, in turns, and compared with the finest.
+    Each cover gets the same recorded ticks, in turns, and is compared with the finest.
     """
 
     ways: bool = False
-    """Instead: looks of the demo and of all frozen scenes; how far off their ways are from the definition's."""
+    """Instead: compare the contact distances of looks in the demo and in all frozen scenes with their definition."""
     cover: bool = False
-    """Instead: how closely spheres cover grippers: the built-in one, and those of --model."""
+    """Instead: measure how closely spheres cover grippers: the built-in one, and those of --model."""
     field: bool = False
-    """Instead: how far before things R2's strengths begin, without camera error. The frozen scenes with one convex
-    thing ahead, or those of --model, are moved along the approach."""
+    """Instead: measure how far before objects R2's strengths begin, without camera error. The frozen scenes with one
+    convex object ahead, or those of --model, are moved along the approach."""
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
     """--cover, --field: MJCF files with an arm."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """--cover, --field: the site between the fingertips, z along the approach."""
+    """--cover, --field: site between the fingertips, z along the approach."""
     points: Annotated[int, Meta(ge=100, le=10_000_000), tyro.conf.arg(metavar="N")] = 200_000
     """--cover: points of either surface, shared among a gripper's links."""
     step_mm: Annotated[float, Meta(ge=1.0, le=150.0), tyro.conf.arg(metavar="MM")] = 10.0
-    """--field: free ways from 0 to 150 mm in such steps."""
+    """--field: step of the free distances, 0 to 150 mm."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -75,7 +75,7 @@ class FeltSweep(Sweep):
             require_input_file("--model", model, "an MJCF file")
 
     def scenes(self) -> dict[Path, str]:
-        """Name the scenes that --field looks at."""
+        """Return the names of --field's scenes."""
         frozen = CONVEX[:_QUICK_SCENES] if self.quick else CONVEX
         return scene_names(self.model or tuple(frozen_scene(name) for name in frozen))
 
@@ -87,22 +87,22 @@ class Run:
     run: str
     duration_s: float
     times: int = 2
-    """Each tick is gone through this often; the least time counts."""
+    """Number of passes over the ticks; the least time counts."""
 
 
 @dataclass(frozen=True)
 class Looked:
-    """Looks of a recorded run, to be held against the definition."""
+    """Looks of a recorded run, to compare with the definition."""
 
     scene: str
     duration_s: float
     most: int
     sticks_of: str = ""
-    """The scene whose sticks are deflected instead of its own."""
+    """Scene whose deflected sticks are used instead of its own."""
 
 
 def cells(settings: FeltSweep) -> Iterator[Run | Looked | Gripper | Facing]:
-    """Lay out the recorded runs, the grippers, or the scenes."""
+    """Yield the recorded runs, the grippers, or the scenes."""
     if settings.cover:
         points = min(settings.points, _QUICK_POINTS) if settings.quick else settings.points
         yield Gripper("built-in", None, None, points)
@@ -124,7 +124,7 @@ def cells(settings: FeltSweep) -> Iterator[Run | Looked | Gripper | Facing]:
 
 
 def run(cell: Run | Looked | Gripper | Facing, seed: int) -> Iterator[Row]:
-    """Record one run, and ask the law its ticks with each cover: a row for each. Or measure a cover, or look ahead."""
+    """Yield a row for each cover in one recorded run; or rows of a cover, of looks ahead, or of the definition."""
     if isinstance(cell, Looked):
         asked, encoder_sigma_rad = looks_of(
             record(cell.scene, cell.duration_s, seed, ASIDE.get(cell.sticks_of)), cell.most
@@ -143,7 +143,7 @@ def run(cell: Run | Looked | Gripper | Facing, seed: int) -> Iterator[Row]:
 
 
 def show(settings: FeltSweep, table: Table) -> Iterator[Shown]:
-    """Make a table for each run: a row for each cover; or one of the largest differences, the links, or the scenes."""
+    """Yield a table of covers for each run; or one of differences from the definition, of links, or of scenes."""
     if settings.cover:
         measures = ("geoms", "spheres", "sticks_out_mm", *STANDS_OUT, "gap_mm", "gap_kept_mm", "made_s")
         links = ((f"{row['gripper']}: {row['part']}", *map(row.get, measures)) for row in table)
@@ -173,7 +173,7 @@ def _apart(row: Row, kind: str) -> str | None:
 
 
 def goals(settings: FeltSweep, table: Table) -> Iterator[Goal]:
-    """Hold ways to their definition, and spheres to what they cover."""
+    """Yield the limits of contact distances beside their definition, and of spheres beside their geoms."""
     for (name,), rows in table.groups("gripper") if settings.cover else ():
         yield Goal(f"{name}: sticks out of its spheres, mm", max(rows.values("sticks_out_mm")), 0.0)
         yield Goal(f"{name}: spheres stand out, mm", max(rows.values("stands_out_mm")), _LIMIT_COVER_MM)
@@ -201,7 +201,7 @@ def draw(settings: FeltSweep, table: Table, path: Path) -> None:
 
 
 def frozen(settings: FeltSweep) -> str:
-    """Hash the frozen scenes that --ways and --field look at."""
+    """Hash the frozen scenes of --ways and --field."""
     if settings.ways:
         return frozen_hash()
     return frozen_hash(tuple(settings.scenes())) if settings.field else ""

@@ -1,4 +1,4 @@
-"""Does the same simulated person hit less with haptics than without, where there is something to hit?
+"""Does the same simulated person hit less with haptics than without, near obstacles?
 
     feelahead try haptics --scenes wall slot shelf --delays 0 100 200 400 --seeds 30 --csv FILE
 
@@ -33,28 +33,28 @@ _Delay = Annotated[float, Meta(ge=0.0, lt=1000.0)]
 
 @dataclass(frozen=True)
 class HapticsSettings(Sweep):
-    """Trials of a person who sees distances wrongly and no obstacle: without haptics, with, and with and noticing.
+    """Compare trials without haptics, with haptics, and with haptics and a reacting person, who misjudges distances.
 
-    They reach for the target in single moves, grasp it, lift it and set it down again. Trials with the same seed differ
-    in nothing but what is felt: the same scene, errors of camera and link, misjudged distances.
+    The person sees no obstacle. They reach for the target in single moves, grasp it, lift it and set it down again.
+    Trials with the same seed have the same scene, errors of camera and link, and misjudged distances.
     """
 
     seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 30
     """Number of pairs."""
     scenes: tuple[SceneName, ...] = ("wall", "slot", "shelf")
-    """wall: behind the target. slot: between two posts. shelf: over an edge. table: clutter beside the way."""
+    """wall: behind the target. slot: between two posts. shelf: over an edge. table: clutter beside the path."""
     delays: Annotated[tuple[_Delay, ...], tyro.conf.arg(metavar="MS...")] = (0.0, 100.0, 200.0, 400.0)
-    """Each way, in milliseconds."""
+    """Delays in each direction, in milliseconds."""
     jitter: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MS")] = 10.0
     """Standard deviation of each delay above 0, in milliseconds."""
     camera_mm: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MM")] = 3.0
-    """Standard deviation of the camera's error along each axis, which the law knows."""
+    """Standard deviation of the camera's error along each axis; the law knows it."""
     probability: Annotated[float, Meta(gt=0.0, lt=1.0), tyro.conf.arg(metavar="P")] = 0.99
-    """The robot side's own P (eq. 10)."""
+    """P of the robot side (eq. 10)."""
     link_model: LinkModel = "datagram"
     """datagram lets jitter reorder messages, stream keeps them in order."""
     duration: Annotated[float, Meta(gt=0.0, lt=1e4), tyro.conf.arg(metavar="SECONDS")] = 45.0
-    """The limit of each trial, in virtual time."""
+    """Limit of each trial, in virtual time."""
     tick: Annotated[float, Meta(ge=1.0, le=10.0), tyro.conf.arg(metavar="MS")] = 4.0
     """Period of the robot side's ticks, in milliseconds; 1 is the real one, and takes more than twice the time."""
     person: PersonSettings = field(
@@ -82,7 +82,7 @@ class Cell:
 
 
 def cells(settings: HapticsSettings) -> Iterator[Cell]:
-    """Lay out scenes by delays by arms."""
+    """Yield each combination of scene, delay and arm."""
     few = 1 if settings.quick else None
     for scene, delay_ms, arm in product(settings.scenes[:few], settings.delays[:few], _ARMS):
         yield Cell(
@@ -109,7 +109,7 @@ def run(cell: Cell, seed: int) -> Iterator[Row]:
 
 
 def show(settings: HapticsSettings, table: Table) -> Iterator[Shown]:
-    """Make a table for each scene and delay, with a row for each arm."""
+    """Yield a table for each scene and delay, with a row for each arm."""
     for (scene, delay_ms), pairs in table.groups("scene", "delay_ms"):
         title = f"{scene}, {delay_ms:g} ms each way, {settings.seeds} pairs"
         hits = "trials with a hit [95 %]", "p", "hits", "mm/s, median (most)", "grasped", "placed"
@@ -152,7 +152,7 @@ def _figures(pairs: Table, arm: Arm, limit_s: float) -> list[str]:
 
 
 def restricted(times_s: Sequence[float | None], limit_s: float) -> list[float]:
-    """Cut times at the limit, which also stands for missing ones: their mean is the restricted mean."""
+    """Cap the times at the limit, also used for missing times: their mean is the restricted mean."""
     return [limit_s if time_s is None else min(time_s, limit_s) for time_s in times_s]
 
 

@@ -1,4 +1,4 @@
-"""What do links as they are do to a constant finger, and do the emulations of a link agree?
+"""What do realistic links do to a finger of constant force, and do the emulations of a link agree?
 
 feelahead try latency --links lan wifi lte --seeds 5 --csv latency.csv --picture latency.png
 """
@@ -41,37 +41,37 @@ Medium = Literal["virtual", "loopback", "containers"]
 _DIRECTIONS: Final = ("to_robot", "to_operator")
 _LOOK_S: Final = 0.01
 _COMPARED: Final = (("mean_ms", "mean", "ms", 2.0), ("sd_ms", "sd", "ms", 1.0), ("lost_percent", "lost", "%", 0.1))
-"""Figures on which the media should agree, each with its name, unit and margin."""
+"""Figures in which the media should agree, each with name, unit and margin."""
 _COLOURS: Final[Mapping[str, str]] = {"virtual": "#0072b2", "loopback": "#d55e00", "containers": "#009e73"}
 _WIDE: Final = 0.7
-"""The share of a link's room in the figure that its media take."""
+"""Share of a link's width in the figure for its media."""
 
 
 @dataclass(frozen=True)
 class LatencySettings(Sweep):
-    """A finger that pulls R2 with a constant force towards a wall, over links as they are: what the delay does.
+    """Pull R2 with a constant force towards a wall, over realistic links: the effect of the delay.
 
-    Each link with and without haptics, over the same seeds, and in several media: virtual time, two processes whose
-    messages are held back by themselves, and containers with the kernel's netem between them. Then, whether the media
-    agree on what the link does. Trials that run in real time take turns.
+    Each link runs with and without haptics, over the same seeds, in several media: virtual time, two processes that
+    delay their own messages, and containers with the kernel's netem between them. A second table shows whether the
+    media agree on the link's figures. Trials in real time take turns.
     """
 
     seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 5
     """Number of trials of each kind."""
     links: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME|SPEC...")] = tuple(NAMED_LINKS)
-    """Links by name, or in netem's words, both ways."""
+    """Links by name, or in netem's syntax, in both directions."""
     haptics: tuple[Literal["on", "off"], ...] = ("on", "off")
-    """Whether triggers are stiffened."""
+    """Whether the triggers resist."""
     media: tuple[Literal["virtual", "loopback"], ...] = ("virtual", "loopback")
-    """virtual: in this process, as fast as it goes. loopback: two processes on 127.0.0.1, in real time."""
+    """virtual: in this process, as fast as possible. loopback: two processes on 127.0.0.1, in real time."""
     compose: bool = False
-    """Run it in containers, too, with the kernel's netem between them."""
+    """Also run in containers, with the kernel's netem between them."""
     model: LinkModel = "stream"
     """stream keeps the order and loses nothing, as TCP does; datagram loses and reorders."""
     force: Annotated[float, Meta(ge=0.0, le=20.0), tyro.conf.arg(metavar="N")] = 3.0
-    """Newtons on R2: 2 is a light pull, 3.7 a normal one."""
+    """Force on R2 in newtons: 2 is a light pull, 3.7 a normal one."""
     duration: Annotated[float, Meta(ge=2.0, le=1000.0), tyro.conf.arg(metavar="SECONDS")] = 8.0
-    """Length of each trial from when the link is up; the pull begins after 1.3 s and a round trip or two."""
+    """Length of each trial once the link is up; the pull begins after 1.3 s and a round trip or two."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -94,7 +94,7 @@ class Cell:
 
 
 def cells(settings: LatencySettings) -> Iterator[Cell]:
-    """Lay out links by haptics by media."""
+    """Yield each combination of link, haptics and medium."""
     containers: tuple[Medium, ...] = ("containers",) if settings.compose else ()
     links = settings.links[: 1 if settings.quick else None]
     for link, haptics, medium in product(links, settings.haptics, (*settings.media, *containers)):
@@ -108,7 +108,7 @@ def run(cell: Cell, seed: int) -> Iterator[Row]:
 
 
 def in_virtual_time(trial: Trial) -> Row:
-    """Run both cores and the emulated link in this process, as fast as it goes."""
+    """Run both cores and the emulated link in this process, as fast as possible."""
     link = trial.link_arguments()
     robot = parse_settings(RobotSettings, "feelahead-robot", [*trial.robot_arguments(), *link])
     operator = parse_settings(OperatorSettings, "feelahead-operator", [*trial.operator_arguments(), *link])
@@ -131,7 +131,7 @@ def on_loopback(trial: Trial) -> Row:
 
 @functools.cache
 def _containers() -> ContainerMedium:
-    """Open the containers once, and leave nothing of them at the end of the process."""
+    """Open the containers once, and remove them at the end of the process."""
     stack = ExitStack()
     atexit.register(stack.close)
     return ContainerMedium(stack, os.getpid())
@@ -145,7 +145,7 @@ _MEDIA: Final[Mapping[Medium, Callable[[Trial], Row]]] = {
 
 
 def show(_: LatencySettings, table: Table) -> Iterator[Shown]:
-    """Make a table of figures, and one of how far the media agree."""
+    """Yield a table of figures, and one of the media's agreement."""
     headings = (
         *("link", "haptics", "medium", "trials", "to robot, ms", "sd", "p50", "p99", "lost, %"),
         *("to operator, ms", "sd", "p50", "p99", "lost, %"),
@@ -200,13 +200,13 @@ def agreement(table: Table) -> Shown:
 
 
 def by_seed(group: Table, name: str) -> list[float]:
-    """Average each seed's trials with and without haptics: an emulated link draws the same in both."""
+    """Return each seed's mean with and without haptics: an emulated link draws the same in both."""
     found = (trials.values(name) for _, trials in group.groups("seed"))
     return [fmean(values) for values in found if values]
 
 
 def verdict(first: list[float], second: list[float], margin: float, unit: str) -> str:
-    """Say whether two media are equivalent within a margin, different beyond it, or neither can be told."""
+    """Describe whether two media are equivalent within a margin, different beyond it, or undecided."""
     if not first or not second:
         return "-"
     interval = welch_interval(first, second)
@@ -237,7 +237,7 @@ def draw(_: LatencySettings, table: Table, path: Path) -> None:
                 panel.errorbar(place, fmean(means), (high - low) / 2.0, fmt="o", capsize=4, markersize=4, **options)
                 panel.set(yscale="log", ylabel="ms", title=f"mean delay {direction.replace('_', ' ')}")
             for row in group:
-                # A stop by the robot side has kept the arm from the wall, and not what was felt.
+                # Such a run ended by the robot side's stop, not by what was felt.
                 mark, filled = "x" if row["stops"] else "o", row["haptics"] == "on"
                 face = _COLOURS[medium] if filled else "none"
                 panels[2].plot(

@@ -1,4 +1,4 @@
-"""How near is the emulated link to the kernel's netem, and what do both ends cost?
+"""How close is the emulated link to the kernel's netem, and what do both ends cost?
 
 feelahead bench link
 feelahead bench link --virtual --against tests/data/netem/normal.csv.gz --seeds 20
@@ -32,7 +32,7 @@ _BARE_LIMIT: Final = 1.3
 _KINDS: Final[tuple[Kind, ...]] = ("whole ends", "bare ZeroMQ")
 _TURNS: Final = 7
 _PAIRS: Final = 10
-"""Pairs of the model's own runs, for each seed."""
+"""Number of pairs of the model's own runs, for each seed."""
 _COMPARED: Final = (
     *("seed", "distance", "mean_error_ms", "sd_error_ms"),
     *("late_share", "loss_share", "mean_burst", "stalls"),
@@ -44,17 +44,17 @@ class Played:
     """One link in virtual time."""
 
     link: Annotated[str, tyro.conf.arg(metavar="SPEC")] = "delay 50ms 10ms distribution normal"
-    """With --virtual: the link, in netem's words; of two directions the one to the operator."""
+    """With --virtual: the link, in netem's syntax; of two directions the one to the operator."""
     link_model: LinkModel = "datagram"
     """datagram loses and reorders, stream keeps the order and turns loss into delay."""
     rate: Annotated[float, Meta(ge=1.0, le=1e5), tyro.conf.arg(metavar="HZ")] = 1000.0
     """Messages a second."""
     count: Annotated[int, Meta(ge=2, le=1_000_000), tyro.conf.arg(metavar="N")] = 6000
-    """Messages."""
+    """Number of messages."""
     bytes: Annotated[int, Meta(ge=1, le=60_000), tyro.conf.arg(metavar="N")] = 142
     """Size of a message, which `rate` in the link counts: 100 bytes with their UDP, IPv4 and Ethernet headers."""
     against: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
-    """With --virtual: a recording to compare with (seq, sent_ns, delay_ns), whose send times replace --rate and
+    """With --virtual: a recording to compare with (seq, sent_ns, delay_ns); its send times replace --rate and
     --count."""
 
     def profile(self, seed: int) -> LinkProfile:
@@ -64,13 +64,13 @@ class Played:
 
 @dataclass(frozen=True)
 class LinkSweep(Played, Sweep):
-    """Both ends at 1 kHz each way, between law and controller, beside bare ZeroMQ, in turns.
+    """Measure both ends at 1 kHz each, between law and controller, beside bare ZeroMQ, in turns.
 
-    With --virtual: the model of the link beside its words, and beside a recording of the kernel's netem.
+    With --virtual: the model of the link beside its specification, and beside a recording of the kernel's netem.
     """
 
     virtual: bool = False
-    """The emulated link alone, in virtual time."""
+    """Run the emulated link alone, in virtual time."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -88,12 +88,12 @@ class Turns:
 
 
 def cells(settings: LinkSweep) -> Iterator[Turns | Played]:
-    """Lay out what the flags choose."""
+    """Yield the cell that the flags choose."""
     yield cell_of(Played, settings) if settings.virtual else Turns(settings.rate, 2 if settings.quick else _TURNS)
 
 
 def run(cell: Turns | Played, seed: int) -> Iterator[Row]:
-    """Run one of them."""
+    """Run one cell."""
     if isinstance(cell, Played):
         yield _play(cell, seed)
     else:
@@ -130,7 +130,7 @@ def _play(cell: Played, seed: int) -> Row:
 
 
 def show(settings: LinkSweep, table: Table) -> Iterator[RenderableType]:
-    """Say what was asked and achieved; show the figures."""
+    """Yield the link's settings and figures in words, and the tables."""
     if settings.virtual:
         yield from map(Text, report_lines({"in virtual time": table.rows[0]["line"]}))
         us = float(np.median(table.values("us_a_message")))
@@ -148,13 +148,13 @@ def show(settings: LinkSweep, table: Table) -> Iterator[RenderableType]:
 
 
 def ratio(turns: Table) -> float:
-    """Return the median over the turns, each beside the peer's of the same turn: the machine's speed varies."""
+    """Return the median over turns of both ends' share over bare ZeroMQ's in the same turn: machine speed varies."""
     ours, bare = ([row["robot"] + row["operator"] for row in turns.where(kind=kind)] for kind in _KINDS)
     return float(np.median(np.divide(ours, bare)))
 
 
 def goals(settings: LinkSweep, table: Table) -> Iterator[Goal]:
-    """Hold the figures against their limits."""
+    """Yield the limits of the figures."""
     if settings.against is not None:
         profile = settings.profile(0)
         reference, _ = read_link_sample(settings.against, "--against").without_stalls(profile)

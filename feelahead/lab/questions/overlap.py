@@ -1,4 +1,4 @@
-"""How fast and how exact are the overlaps, beside everything that is used in their place?
+"""How fast and how exact are the overlaps, compared with the methods used in their place?
 
 feelahead bench overlap --quick --peer-header overlap-0.2.0/include/overlap/overlap.hpp
 """
@@ -47,11 +47,11 @@ _COUNTS = ("pairs", "undefined", "negative", "false_zeros", "false_positives")
 
 @dataclass(frozen=True)
 class OverlapSweep(Sweep):
-    """Run time and error of the overlaps and of what is used in their place, on the same pairs in the same run.
+    """Measure run time and error of the overlaps and of their alternatives, on the same pairs in the same run.
 
-    Beside our kernels: the published package `overlap` 0.2.0 from Python and in C++, 29 satellite points and Monte
-    Carlo. What is missing on this machine is named: pip install 'feelahead[bench]' brings the package; the C++ row
-    needs a compiler, Eigen (apt-get install libeigen3-dev) and the package's header:
+    The alternatives: the published package `overlap` 0.2.0 from Python and in C++, 29 satellite points and Monte Carlo.
+    Alternatives missing on this machine are named: pip install 'feelahead[bench]' brings the package; the C++ row needs
+    a compiler, Eigen (apt-get install libeigen3-dev) and the package's header:
 
         pip download --no-deps --no-binary overlap overlap==0.2.0 && tar xzf overlap-0.2.0.tar.gz
     """
@@ -61,9 +61,9 @@ class OverlapSweep(Sweep):
     adversarial: Annotated[Annotated[int, Meta(ge=1, le=10**8)] | None, tyro.conf.arg(metavar="PAIRS")] = None
     """Number of adversarial pairs; 100000 unless given, 20000 with --quick."""
     truths: Annotated[Annotated[int, Meta(ge=2, le=10**6)] | None, tyro.conf.arg(metavar="PAIRS")] = None
-    """Pairs of each class that are compared with the truth; 40 unless given, 6 with --quick."""
+    """Number of pairs of each class that are compared with the truth; 40 unless given, 6 with --quick."""
     timed: Annotated[int, Meta(ge=10, le=10**7), tyro.conf.arg(metavar="PAIRS")] = 5 * _BATCH
-    """Pairs that are timed, in batches of 4096."""
+    """Number of timed pairs, in batches of 4096."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -85,7 +85,7 @@ class Piece:
 
 
 def cells(settings: OverlapSweep) -> Iterator[Piece]:
-    """Lay out what is timed first, then errors and counts by class."""
+    """Yield the timed pieces first, then errors and counts by class."""
     turns, timed = (5 if settings.quick else 20), settings.timed
     header = None if settings.peer_header is None else str(settings.peer_header)
     truths = settings.truths or (6 if settings.quick else 40)
@@ -129,7 +129,7 @@ def _checked(pairs: Pairs) -> object:
 
 
 def _speed(cell: Piece, seed: int) -> Iterator[Row]:
-    """Let all take turns on the same pairs; of each part the least time counts."""
+    """Run all methods in turns on the same pairs; the least time of each batch counts."""
     clock = MonotonicClock()
     pairs = errors.partial_pairs(cell.solid, cell.count, seed + 1) if cell.case == "random" else _pairs(cell, seed + 1)
     batches = [pairs[slice(first, first + _BATCH)] for first in range(0, len(pairs), _BATCH)]
@@ -173,7 +173,7 @@ def _failures(cell: Piece, seed: int) -> Iterator[Row]:
 
 
 def _tradeoff(cell: Piece, seed: int) -> Iterator[Row]:
-    """Time and worst error of every method; of the slow ones on a few pairs that intersect."""
+    """Measure time and worst error of every method; slow ones get a few pairs that intersect."""
     clock, pairs = MonotonicClock(), _pairs(cell, seed)
     truths = true_overlaps(pairs)
     methods: dict[str, tuple[Callable[[Pairs], FloatArray], int]]
@@ -206,7 +206,7 @@ def _mesh(cell: Piece, seed: int) -> Iterator[Row]:
 
 
 def show(_: OverlapSweep, table: Table) -> Iterator[Shown | str]:
-    """Make a table for each part of the question: a row for each method, class, count or radius."""
+    """Yield a table for each part of the question: a row for each method, class, count or radius."""
     parts = ("speed", "tradeoff", "accuracy", "adversarial", "mesh")
     speed, tradeoff, accuracy, adversarial, meshes = (table.where(part=part) for part in parts)
     for rows, name, title in (
@@ -253,7 +253,7 @@ def _most(rows: Table, name: str) -> float | None:
 
 
 def goals(_: OverlapSweep, table: Table) -> Iterator[Goal]:
-    """Hold the figures against what the kernels are to reach."""
+    """Yield the limits of the kernels' figures."""
     ours = table.where(method="ours")
     accuracy, counted, meshes = (ours.where(part=part) for part in ("accuracy", "adversarial", "mesh"))
     deep = Table(row for row in accuracy if not row["case"].endswith("1e-9"))
@@ -281,7 +281,7 @@ def goals(_: OverlapSweep, table: Table) -> Iterator[Goal]:
 
 
 def draw(_: OverlapSweep, table: Table, path: Path) -> None:
-    """Draw run time against error, and what a mesh query costs by its triangles."""
+    """Draw run time against error, and the cost of a mesh query by its triangles."""
     with figure(path, 1, 2, figsize=(13.0, 4.6)) as (_, (left, right)):
         for number, ((method,), rows) in enumerate(table.where(part="tradeoff").groups("method")):
             errors = np.maximum(rows.values("volume"), 1e-18)

@@ -27,23 +27,23 @@ from feelahead.lab.tick.mixed import as_ratios
 from feelahead.lab.tick.timed_robot import COLUMNS, PROGRAM, STAGES
 
 _SETTLING_S: Final = 1.0
-"""Both sides have met and each kernel has run by then."""
+"""Time in seconds after which both sides are connected and each kernel has run."""
 _LEAST_TICKS: Final = 300
 _QUICK_S: Final = 4.0
 _FIELDS: Final = ("mug", "u_mesh", "terrain_ahead")
-"""Frozen scenes with concave things ahead"""
+"""Frozen scenes with concave objects ahead."""
 _MOST_FIELD_MS: Final = 0.3
 _LOOK: Final = "look to message"
 
 
 @dataclass(frozen=True)
 class TickSweep(Sweep):
-    """Both sides as in the demo, for some seconds each, with a scripted person: the robot side's processor time.
+    """Measure the robot side's processor time, with both sides as in the demo and a scripted person.
 
-    Each figure stands beside its ratio to "mixed", a fixed piece of work that takes turns with the ticks
-    (feelahead/lab/tick): p50 to p50, p99 to p99. look to message: from the arm's readings to what leaves, without
-    physics. without physics: with the camera frame that is taken in afterwards. whole look: the law in ticks that
-    looked ahead.
+    Each figure is shown with its ratio to "mixed", a fixed workload in turns with the ticks (feelahead/lab/tick):
+    p50 to p50, p99 to p99. look to message: from the arm's readings to the sent messages, without physics. without
+    physics: the same with the camera frame, which is read in afterwards. whole look: the law in ticks that looked
+    ahead.
     """
 
     seconds: Annotated[float, Meta(ge=3.0, le=600.0)] = 10.0
@@ -54,7 +54,7 @@ class TickSweep(Sweep):
 
 @dataclass(frozen=True)
 class Case:
-    """One run: with stages timed or not, further objects, and the scene's own or none."""
+    """One run: with stages timed or not, further objects, and the scene's own objects or none."""
 
     case: str
     seconds: float
@@ -65,14 +65,14 @@ class Case:
 
 @dataclass(frozen=True)
 class Concave:
-    """Looks at the concave thing of a frozen scene."""
+    """Looks at the concave object of a frozen scene."""
 
     case: str
     seconds: float
 
 
 def cells(settings: TickSweep) -> Iterator[Case | Concave]:
-    """Lay out the demo, an empty scene, the numbers of objects, and what is concave."""
+    """Yield the demo, an empty scene, the numbers of objects, and the concave objects."""
     seconds = _QUICK_S if settings.quick else settings.seconds
     yield Case("demo, each stage timed", seconds, stages=True)
     yield Case("demo", seconds)
@@ -85,7 +85,7 @@ def cells(settings: TickSweep) -> Iterator[Case | Concave]:
 
 
 def run(cell: Case | Concave, seed: int) -> Iterator[Row]:
-    """Run one case; a row for each stage, and for the sums."""
+    """Run one case: a row for each stage, and for the sums."""
     if isinstance(cell, Concave):
         looks_s, mixed_s = time_looks(frozen_scene(cell.case), cell.seconds)
         for stage, spent_s in ((f"field of {cell.case}", looks_s), ("mixed", mixed_s)):
@@ -106,7 +106,7 @@ def run(cell: Case | Concave, seed: int) -> Iterator[Row]:
 
 
 def rows(turns: FloatArray, stages: bool, overruns: int | None) -> Iterator[Row]:
-    """Give quantiles of processor time of each stage, of sums of them, of "mixed", and of the tick's wall time."""
+    """Yield quantiles of the processor time of stages, their sums and "mixed", and of the tick's wall time."""
     of_mixed = turns[:, COLUMNS.index("run")] % 2 == 1
     ticks, mixed_s = turns[~of_mixed], turns[of_mixed, COLUMNS.index("spent_s")]
     spent = dict(zip(COLUMNS, ticks.T, strict=True))
@@ -143,7 +143,7 @@ def show(_: TickSweep, table: Table) -> Iterator[RenderableType]:
 
 
 def goals(_: TickSweep, table: Table) -> Iterator[Goal]:
-    """Hold the ratios against their limits."""
+    """Yield the limits of the ratios."""
 
     def figure(name: str, **where: str) -> float | None:
         found = table.where(**where).values(name)

@@ -1,1 +1,1 @@
-"""References that all else is held against: exact overlaps, classes that break algorithms, the ways by definition."""
+"""References for comparison: exact overlaps, classes on which algorithms fail, contact distances by definition."""

@@ -1,7 +1,7 @@
-"""Approximations that people use instead of exact overlaps: the share of points of the ball within the solid.
+"""Common approximations of exact overlaps: the share of the ball's points within the solid.
 
-Each takes `Pairs` of tetrahedra or boxes and returns volumes (p,) in m³. They see a solid as the half-spaces of
-the faces, so that all are given the same.
+Each takes `Pairs` of tetrahedra or boxes and returns volumes (p,) in m³. All get the solid as the half-spaces of its
+faces.
 """
 
 import math
@@ -15,15 +15,15 @@ from common.arrays import FloatArray
 from feelahead.lab.reference.pairs import BOX_QUADRILATERALS, TETRAHEDRON_TRIANGLES, Pairs
 
 _CHUNK = 1 << 16
-"""Points at a time, so that they stay within the processor's cache."""
+"""Number of points at a time, so that they stay in the processor's cache."""
 
 
 def satellite_points() -> FloatArray:
-    """Return points (29, 3) in radii: the centre and two shells of 14 points, each standing for the same volume.
+    """Return points (29, 3) in radii: the centre and two shells of 14 points, each with the same share of the volume.
 
-    The divided void fraction of CFDEMcoupling (Goniva et al. 2012) has them. The shells end at the radii that hold
-    1, 15 and 29 parts of 29 of the ball. The points lie at a shell's mean radius, along the axes and diagonals of a
-    cube.
+    They are those of the divided void fraction in CFDEMcoupling (Goniva et al. 2012). The shells end at the radii that
+    hold 1, 15 and 29 parts of 29 of the ball. The points lie at a shell's mean radius, along the axes and diagonals of
+    a cube.
     """
     axes = [sign * row for row in np.eye(3) for sign in (1.0, -1.0)]
     diagonals = [np.array(signs) / math.sqrt(3.0) for signs in product((1.0, -1.0), repeat=3)]
@@ -33,12 +33,12 @@ def satellite_points() -> FloatArray:
 
 
 def satellites(pairs: Pairs) -> FloatArray:
-    """Take the share of 29 satellite points that lie within the solid."""
+    """Approximate by the share of 29 satellite points within the solid."""
     return _shares(pairs, satellite_points()) * pairs.sphere_volumes
 
 
 def monte_carlo(pairs: Pairs, points: int) -> FloatArray:
-    """Take the share of `points` uniform random points of the ball that lie within the solid."""
+    """Approximate by the share of `points` uniform random points of the ball within the solid."""
     rng = np.random.default_rng(points)
     directions = rng.normal(size=(points, 3))
     directions *= (np.cbrt(rng.random(points)) / np.linalg.norm(directions, axis=1))[:, None]
@@ -48,7 +48,7 @@ def monte_carlo(pairs: Pairs, points: int) -> FloatArray:
 SLOW: dict[str, Callable[[Pairs], FloatArray]] = {
     f"Monte Carlo 1e{power}": partial(monte_carlo, points=10**power) for power in (3, 4, 5)
 }
-"""Methods that take long for each pair, by name."""
+"""Slow methods, by name."""
 
 
 def _face_planes(pairs: Pairs) -> tuple[FloatArray, FloatArray]:

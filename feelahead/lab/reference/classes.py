@@ -1,7 +1,7 @@
-"""One family of frozen, seeded classes of pairs on which overlap algorithms are known to fail.
+"""Frozen, seeded classes of pairs on which overlap algorithms are known to fail.
 
 Each class comes twice: general doubles, and grid-aligned ones whose every coordinate is a short binary number,
-so that contacts are exact. The same seed and count give the same pairs again.
+so that contacts are exact. The same seed and count give the same pairs.
 """
 
 import zlib
@@ -23,14 +23,14 @@ from feelahead.lab.reference.features import (
 from feelahead.lab.reference.pairs import Pairs
 
 Maker = Callable[[Rng, int, bool], Pairs]
-"""(generator, how many, whether grid-aligned) -> pairs."""
+"""Function (generator, count, whether grid-aligned) -> pairs."""
 
 DEPTHS = {"1e-3": 2.0**-10, "1e-6": 2.0**-20, "1e-9": 2.0**-30}
 """Depths of tiny overlaps in radii, as powers of two so that the grid holds them exactly."""
 THIN = {"1e-3": 2.0**-10, "1e-8": 2.0**-27, "1e-14": 2.0**-46}
 """Thicknesses of flat and needle-like solids."""
 RATIOS = {f"1e{power}": 2.0 ** round(power * np.log2(10.0)) for power in (-6, -4, -2, -1, 1, 2, 4, 6)}
-"""Radii in units of the solid's size."""
+"""Sphere radii in units of the solid's size."""
 SOLIDS = ("tetrahedron", "box", "half-space", "sphere")
 FAR = 2.0**20
 """Offset of the whole pair from the origin, about 1e6 m."""
@@ -56,18 +56,18 @@ _FAMILIES = {
 
 
 def family(name: str) -> str:
-    """The group of classes that a class, by its name in `frozen_classes`, is shown with."""
+    """Return the group in which a class is shown, from its name in `frozen_classes`."""
     return next((shown for part, shown in _FAMILIES.items() if part in name), "random")
 
 
 def frozen_class(solid: str, name: str, count: int, *, grid: bool = False, seed: int = 0) -> tuple[str, Pairs]:
-    """Make `count` pairs of one class; its full name is `solid, class, general or grid`."""
+    """Make `count` pairs of one class; the full name is `solid, class, general or grid`."""
     rng = np.random.default_rng([seed, grid, zlib.crc32(f"{solid} {name}".encode())])
     return f"{solid}, {name}, {'grid' if grid else 'general'}", MAKERS[solid][name](rng, count, grid)
 
 
 def frozen_classes(count: int, seed: int = 0, solids: Iterable[str] = SOLIDS) -> dict[str, Pairs]:
-    """Make `count` pairs of each class of these solids, by their full names."""
+    """Make `count` pairs of each class of these solids, by full name."""
     return dict(
         frozen_class(solid, name, count, grid=grid, seed=seed)
         for solid in solids
@@ -81,7 +81,7 @@ def _tetrahedron(centers: FloatArray, sizes: FloatArray, vertices: FloatArray) -
 
 
 def touching(solid: str, feature: str, depth: float, *, swell: float = 1.0) -> Maker:
-    """Spheres that reach `depth` radii into a face, edge or vertex; `swell` scales their radii.
+    """Make spheres that reach `depth` radii into a face, edge or vertex; `swell` scales their radii.
 
     A depth of 1 puts the centre on the feature, 2 the whole sphere on its inner side.
     """
@@ -99,7 +99,7 @@ def touching(solid: str, feature: str, depth: float, *, swell: float = 1.0) -> M
 
 
 def _large_or_small(solid: str, ratio: float) -> Maker:
-    """Radii of `ratio` times the solid's size, the surface within the smaller of both sizes of a feature."""
+    """Make radii of `ratio` times the solid's size, with the surface within the smaller size of a feature."""
 
     def make(rng: Rng, count: int, grid: bool) -> Pairs:
         feature = str(rng.choice(list(FEATURES)))
@@ -149,7 +149,7 @@ def _flat(thickness: float) -> Maker:
 
 
 def _sliver(ratio: float) -> Maker:
-    """Small spheres at slivers: tetrahedra with faces and edges that are much longer than they are apart."""
+    """Make small spheres at slivers: tetrahedra whose faces and edges are much longer than their distances."""
 
     def make(rng: Rng, count: int, grid: bool) -> Pairs:
         thin = 2.0 ** -rng.integers(0, 14, count)
@@ -178,7 +178,7 @@ def _needle(thickness: float, *, spike: bool = False) -> Maker:
 
 
 def _without_volume(rng: Rng, count: int, grid: bool) -> Pairs:
-    """Tetrahedra with a repeated vertex, or on the grid with four vertices in a plane."""
+    """Make tetrahedra with a repeated vertex, or on the grid with four vertices in a plane."""
     pairs = _random_tetrahedra(rng, count, grid)
     vertices = pairs.parameters[0]
     if grid:
@@ -222,7 +222,7 @@ def _thin_boxes(thickness: float, axes: int) -> Maker:
 
 
 def half_spaces(depth: float | None) -> Maker:
-    """Spheres that reach `depth` radii into the half-space, or at random."""
+    """Make spheres that reach `depth` radii into the half-space, or a random depth."""
 
     def make(rng: Rng, count: int, grid: bool) -> Pairs:
         sizes, offsets = radii(rng, count, grid=grid), points(rng, count, grid=grid)[:, 0]
@@ -235,7 +235,7 @@ def half_spaces(depth: float | None) -> Maker:
 
 
 def spheres(depth: float | None, ratio: float = 1.0) -> Maker:
-    """Spheres that reach `depth` of their radii into another of their size divided by `ratio`, or at random."""
+    """Make spheres that reach `depth` radii (random if None) into spheres of 1 / `ratio` of their size."""
 
     def make(rng: Rng, count: int, grid: bool) -> Pairs:
         sizes = ratio * radii(rng, count, grid=grid)
@@ -249,7 +249,7 @@ def spheres(depth: float | None, ratio: float = 1.0) -> Maker:
 
 
 def _features(solid: str) -> dict[str, Maker]:
-    """Make the classes that tetrahedra and boxes have in common."""
+    """Return the classes common to tetrahedra and boxes."""
     return {
         **{f"centre on {feature}": touching(solid, feature, 1.0) for feature in FEATURES},
         **{f"tangent {feature}": touching(solid, feature, 0.0) for feature in FEATURES},

@@ -1,9 +1,9 @@
 """Decide exactly whether an open ball meets a solid's interior, in whole numbers.
 
 Doubles are whole multiples of powers of two. Every coordinate of a pair becomes a Python integer once a common power
-of two is divided out, and no sign below is rounded. A ball meets the interior of a convex solid when the solid is
-nearer to the centre than the radius. Then the centre lies inside, or a vertex, or the foot of the perpendicular on an
-edge or a face, is nearer than that.
+of two is divided out, so no sign below is rounded. A ball meets the interior of a convex solid if the solid is nearer
+to the centre than the radius. Then the centre is inside, or a vertex, or the perpendicular's foot on an edge or a face,
+is nearer than the radius.
 """
 
 from fractions import Fraction
@@ -16,16 +16,16 @@ from common.arrays import BoolArray
 from feelahead.lab.reference.pairs import BOX_QUADRILATERALS, BOX_SIGNS, TETRAHEDRON_TRIANGLES, Pairs
 
 Point = tuple[Any, Any, Any]
-"""Whole numbers here, and mpmath's in the oracle."""
+"""Point of whole numbers here, and of mpmath's in the oracle."""
 
 
 def contacts(pairs: Pairs) -> BoolArray:
-    """Tell for each pair (p,) whether the open ball meets the solid's interior, for the doubles exactly as they are."""
+    """Return for each pair (p,) whether the open ball meets the solid's interior, without rounding the doubles."""
     return np.array([exact_contact(pairs, row) for row in range(len(pairs))])
 
 
 def exact_contact(pairs: Pairs, row: int) -> bool:
-    """Tell whether the open ball of this row meets the interior of the solid."""
+    """Return whether the open ball of this row meets the interior of the solid."""
     center = [Fraction(float(x)) for x in pairs.centers[row]]
     radius = Fraction(float(pairs.radii[row]))
     if radius == 0:
@@ -62,7 +62,7 @@ def _whole(point: list[Fraction], denominator: int) -> Point:
 
 
 def _origin_within(corners: list[Point], faces: tuple[tuple[int, ...], ...], reach_2: int) -> bool:
-    """Tell whether the origin lies nearer than √`reach_2` to the convex solid, which has an interior."""
+    """Return whether the origin is nearer than √`reach_2` to the convex solid, which has an interior."""
     a, b = corners[0], corners[1]
     fourth = corners[3] if len(corners) == 4 else corners[4]
     volume = dot(cross(minus(b, a), minus(corners[2], a)), minus(fourth, a))
@@ -88,7 +88,7 @@ def _origin_within(corners: list[Point], faces: tuple[tuple[int, ...], ...], rea
 
 
 def _face_within(ring: list[Point], normal: Point, reach_2: int) -> bool:
-    """Tell whether the foot of the origin on the face or on an edge of it exists and is nearer than √`reach_2`."""
+    """Return whether the origin's foot on the face or on an edge of it exists and is nearer than √`reach_2`."""
     foot_on_face = True
     for start, end in zip(ring, (*ring[1:], ring[0]), strict=True):
         along = minus(end, start)
@@ -102,15 +102,15 @@ def _face_within(ring: list[Point], normal: Point, reach_2: int) -> bool:
 
 
 def minus(a: Point, b: Point) -> Point:
-    """Subtract, without rounding where the numbers know none."""
+    """Return a - b, exact if the numbers are."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def dot(a: Point, b: Point) -> Any:
-    """Multiply to a number."""
+    """Return the dot product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Point, b: Point) -> Point:
-    """Multiply to a vector."""
+    """Return the cross product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

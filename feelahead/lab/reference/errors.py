@@ -1,4 +1,4 @@
-"""Errors of overlaps beside the truth, and counts of what must not happen even once."""
+"""Errors of overlaps against the truth, and counts of forbidden results."""
 
 from dataclasses import dataclass
 
@@ -14,10 +14,10 @@ from robot_side.overlap import kernels
 Overlaps = tuple[FloatArray, FloatArray, FloatArray]
 
 LEAST_SHARE = 1e-12
-"""Smaller overlaps, as shares of the sphere, are held to no relative error but where they are made so shallow."""
+"""Least share of the sphere with a limit of its relative error, unless a class is made shallower."""
 _SLOPE = 1e-2
 _EXAMINED = 5
-"""The true volumes of about this many false zeros of a class are worked out."""
+"""Number of false zeros of a class, roughly, whose true volumes are computed."""
 
 
 @dataclass(frozen=True)
@@ -30,18 +30,18 @@ class Errors:
     relative: FloatArray
     """The volume's error over the true volume; 0 where both are 0, infinite where only the truth is."""
     direction: FloatArray
-    """The gradient's, in radians; 0 where the ball does not just reach in."""
+    """Error of the gradient's direction in radians; 0 unless the ball just reaches in."""
     shares: FloatArray
-    """The true volume as a share of the sphere's."""
+    """True volume as a share of the sphere's."""
 
 
 def compare(pairs: Pairs, truths: list[Truth], overlaps: Overlaps) -> Errors:
-    """Hold the overlaps of all pairs against their truths."""
+    """Compare the overlaps of all pairs with their truths."""
     volumes, gradients, areas = overlaps
     circles = np.pi * pairs.radii**2
     shares = np.array([float(truth.volume) for truth in truths]) / pairs.sphere_volumes
     slopes = np.array([np.linalg.norm([float(part) for part in truth.gradient]) for truth in truths])
-    # A solid that is swallowed whole has no direction; where a ball just reaches in |∇V| is far above V/R.
+    # A swallowed solid has no direction; where a ball just reaches in, |∇V| is far above V/R.
     reaches_in = (shares >= LEAST_SHARE) & (shares <= _SLOPE) & (slopes > shares * pairs.sphere_volumes / pairs.radii)
     direction = [truth.direction_error(gradient) for truth, gradient in zip(truths, gradients, strict=True)]
     return Errors(
@@ -71,7 +71,7 @@ def relative_errors(truths: list[Truth], volumes: FloatArray) -> FloatArray:
 
 
 def kernel_overlaps(pairs: Pairs, counts: kernels.PairCounts | None = None) -> Overlaps:
-    """Work out volumes, gradients and areas by the kernels that a tick calls, which check nothing, in one thread."""
+    """Compute volumes, gradients and areas by the unchecked kernels of a tick, in one thread."""
     if pairs.solid == "tetrahedron":
         return kernels.tetrahedron_pairs(*pairs.arguments, threads=1, counts=counts)
     if pairs.solid == "box":
@@ -80,7 +80,7 @@ def kernel_overlaps(pairs: Pairs, counts: kernels.PairCounts | None = None) -> O
 
 
 def kernel_volumes(pairs: Pairs) -> FloatArray:
-    """Work out the kernels' volumes; a class that raises is worked out pair by pair, NaN for those that raise."""
+    """Compute the kernels' volumes; if a class raises, pair by pair, with NaN for the pairs that raise."""
     try:
         return kernel_overlaps(pairs)[0]
     except (ArithmeticError, ValueError, RuntimeError):
@@ -90,7 +90,7 @@ def kernel_volumes(pairs: Pairs) -> FloatArray:
 
 
 def partial_pairs(solid: str, count: int, seed: int) -> Pairs:
-    """Draw random pairs whose overlap is neither nothing nor the whole sphere or solid."""
+    """Draw random pairs that overlap in part: neither nothing nor the whole sphere or solid."""
     pairs = MAKERS[solid]["random"](np.random.default_rng(seed), 4 * count + 100, False)
     most, volumes = np.minimum(pairs.sphere_volumes, pairs.solid_volumes), kernel_volumes(pairs)
     return pairs[np.flatnonzero((volumes > 1e-6 * most) & (volumes < (1.0 - 1e-6) * most))[:count]]
@@ -102,19 +102,19 @@ class Failures:
 
     pairs: int
     undefined: int
-    """NaN, or an exception"""
+    """Number of NaN and exceptions."""
     negative: int
     false_zeros: int
     largest_missed: float
-    """Among the false zeros"""
+    """Largest true share among the examined false zeros."""
     false_positives: int
     largest_false_positive: float
     excess: float
-    """Above the smaller volume of sphere and solid"""
+    """Largest excess over the smaller volume of sphere and solid."""
 
 
 def count_failures(pairs: Pairs, volumes: FloatArray, touching: BoolArray | None = None) -> Failures:
-    """Count them; `touching` (p,): whether the pairs have anything in common, decided exactly unless given."""
+    """Count the failures; `touching` (p,): whether the pairs overlap, decided exactly unless given."""
     touching = contacts(pairs) if touching is None else touching
     spheres = np.where(pairs.sphere_volumes > 0.0, pairs.sphere_volumes, 1.0)
     missed, false = touching & (volumes == 0.0), ~touching & (volumes > 0.0)
@@ -142,7 +142,7 @@ def asymmetry(pairs: Pairs, volumes: FloatArray) -> float:
 
 
 def shrinking(pairs: Pairs, volumes: FloatArray) -> float:
-    """Return our largest loss of volume as the radius grows by a last digit, 1e-15, 1e-9 or 1e-3 of itself."""
+    """Return our largest loss of volume as the radius grows by a last digit, or by 1e-15, 1e-9 or 1e-3 of itself."""
     worst = 0.0
     for radii in (np.nextafter(pairs.radii, np.inf), *(pairs.radii * (1.0 + step) for step in (1e-15, 1e-9, 1e-3))):
         grown = kernel_volumes(Pairs(pairs.solid, pairs.centers, radii, pairs.parameters))
@@ -151,7 +151,7 @@ def shrinking(pairs: Pairs, volumes: FloatArray) -> float:
 
 
 def relabelled(pairs: Pairs) -> list[Pairs]:
-    """Give the same sets in other words: vertices in another order, a box's axes permuted and turned round."""
+    """Return the same sets in other descriptions: vertices in another order, a box's axes permuted and turned round."""
     if pairs.solid == "tetrahedron":
         orders = ([1, 0, 2, 3], [3, 2, 1, 0], [2, 0, 3, 1], [1, 2, 3, 0])
         return [Pairs(pairs.solid, pairs.centers, pairs.radii, (pairs.parameters[0][:, order],)) for order in orders]

@@ -1,4 +1,4 @@
-"""The looks of recorded runs: what was asked in them, and how far off the field's ways are from their definition."""
+"""Looks of recorded runs: their inputs, and the errors of the field's contact distances against the definition."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import scene_table
 
 LATE_M = 1e-4
-"""No way may be later than its definition by more."""
+"""Limit in metres by which a contact distance may be later than its definition."""
 
 
 def looks_of(recorded: Recorded, most: int) -> tuple[list[tuple[Asked, PerceivedObjects]], FloatArray]:
-    """Go through the ticks of a run once more; its looks, `most` from all over it, and the encoders' errors (n,)."""
+    """Run the law over the ticks of a run; return up to `most` of its looks, and the encoders' errors (n,)."""
     law, asked = recorded.new_law(), list[tuple[Asked, PerceivedObjects]]()
     for tick in recorded.ticks:
         law.sense(tick.situation, tick.now_s)
@@ -29,17 +29,17 @@ def looks_of(recorded: Recorded, most: int) -> tuple[list[tuple[Asked, Perceived
 
 @dataclass(frozen=True)
 class Apart:
-    """How far off the ways (n,) of looks are."""
+    """Errors of the contact distances (n,) of looks."""
 
     looks: int
     off_m: FloatArray
-    """Later above 0, earlier below"""
+    """(n,) later above 0, earlier below"""
     grazes: BoolArray
     sigma_off_m: float
-    """The most that the largest D_σ of a look is off"""
+    """Largest error of a look's largest D_σ"""
 
     def row(self) -> dict[str, float]:
-        """Sum it up: outside of grazes, and in these by how far a way is out of its band."""
+        """Return the errors as a row: outside grazes, and within them the distance out of the band."""
         plain_m, graze_m = (np.append(self.off_m[which], 0.0) for which in (~self.grazes, self.grazes))
         return {
             "looks": self.looks,
@@ -55,7 +55,7 @@ class Apart:
 
 
 def compare(looks: Iterable[tuple[Asked, PerceivedObjects]], encoder_sigma_rad: FloatArray) -> Apart:
-    """Look, and define what should be found."""
+    """Compare the field's contact distances with the definition's."""
     ahead = Ahead(encoder_sigma_rad)
     off_m, grazes, sigma_off_m = [np.zeros(0)], [np.zeros(0, dtype=np.bool_)], [0.0]
     for (pose, classes, along, widest_m), objects in looks:

@@ -1,4 +1,4 @@
-"""A closed mesh that is not convex, to time the mesh kernels on."""
+"""Closed mesh that is not convex, to time the mesh kernels."""
 
 import numpy as np
 
@@ -24,7 +24,7 @@ def torus(around: int, across: int) -> tuple[FloatArray, IntArray]:
 
 
 def around_torus(rng: np.random.Generator, count: int, radius: float) -> FloatArray:
-    """Place centres (count, 3) of spheres at random depths around the surface of a torus."""
+    """Draw centres (count, 3) of spheres at random depths around the surface of a torus."""
     turn, tilt = rng.uniform(0.0, 2.0 * np.pi, (2, count))
     reach = TORUS[1] + radius * rng.uniform(-0.8, 0.8, count)
     flat = TORUS[0] + reach * np.cos(tilt)

@@ -33,16 +33,16 @@ GOOD_DIGITS = 30
 """Decimal digits that cancellation must leave."""
 _MOST_DIGITS = 2000
 _MOST_DIGITS_OF_MESHES = 120
-"""Contact with a mesh is not decided beforehand: a volume below 1e-90 of the sphere's may be nothing."""
+"""Limit for meshes, whose contact is not decided beforehand: a volume below 1e-90 of the sphere's may be nothing."""
 
 Number = Any
-"""An mpmath number; the library is untyped."""
+"""Number of mpmath; the library is untyped."""
 Face = Sequence[int]
 
 
 @dataclass(frozen=True)
 class Truth:
-    """Volume (m³), dV/dcentre (m²) and dV/dradius (m²) as mpmath numbers, and how many faces the ball cuts."""
+    """Volume (m³), dV/dcentre (m²) and dV/dradius (m²) as mpmath numbers, and the number of faces cut by the ball."""
 
     volume: Number
     gradient: Point
@@ -95,7 +95,7 @@ def true_overlap(pairs: Pairs, row: int) -> Truth:
         return _sphere(mp, center, radius, pairs.parameters[0][row], float(pairs.parameters[1][row]))
     faces: Sequence[Face] = TETRAHEDRON_TRIANGLES if pairs.solid == "tetrahedron" else BOX_QUADRILATERALS
     corners = exact_corners(pairs, row)
-    # An inverted solid gives a negative sum, which is turned round.
+    # An inverted solid gives a negative sum, whose sign is changed.
     return _with_enough_digits(corners, faces, center, radius)
 
 
@@ -216,7 +216,7 @@ def _whole_sphere(mp: Any, radius: Number) -> Truth:
 
 @functools.cache
 def _context(digits: int) -> Any:
-    """Make a context of our own: mpmath's shared one belongs to all who use it."""
+    """Return a private context: mpmath's shared one may be changed by others."""
     mp = MPContext()
     mp.dps = digits
     return mp
@@ -228,7 +228,7 @@ def _relative(mp: Any, corner: Sequence[Any], origin: Sequence[Number]) -> Point
 
 
 def _number(mp: Any, value: Any) -> Number:
-    """Convert a float or a Fraction whose denominator is a power of two, unrounded as far as the digits go."""
+    """Convert a float or a Fraction whose denominator is a power of two, without rounding within the digits."""
     return mp.mpf(value.numerator) / value.denominator if hasattr(value, "denominator") else mp.mpf(value)
 
 

@@ -1,4 +1,4 @@
-"""Spheres with one solid each, in the arrays that every method of the overlap benchmark is given."""
+"""Spheres with one solid each, in the arrays that every method of the overlap benchmark gets."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -11,18 +11,18 @@ from common.arrays import FloatArray, IntArray
 Solid = Literal["tetrahedron", "box", "half-space", "sphere"]
 
 TETRAHEDRON_TRIANGLES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
-"""Anticlockwise from outside when the vertices are right-handed: det(v1 - v0, v2 - v0, v3 - v0) > 0."""
+"""Vertices of each face, anticlockwise from outside if right-handed: det(v1 - v0, v2 - v0, v3 - v0) > 0."""
 
 BOX_SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
-"""(8, 3): the corners in units of the half sizes, the last axis changing first."""
+"""Corners (8, 3) in units of the half sizes, the last axis changing first."""
 
 BOX_QUADRILATERALS = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-"""The corners of each face in `BOX_SIGNS`, anticlockwise from outside for a right-handed box."""
+"""Corners of each face in `BOX_SIGNS`, anticlockwise from outside for a right-handed box."""
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """Spheres `centers` (p, 3), `radii` (p,) in m, and as many solids of one kind.
+    """Spheres `centers` (p, 3), `radii` (p,) in m, and a solid of one kind for each.
 
     `parameters` are the solid's arguments in the order of the public function: vertices (p, 4, 3); box centres
     (p, 3), rotations (p, 3, 3) and half sizes (p, 3); normals (p, 3) and offsets (p,); or other centres (p, 3)
@@ -44,22 +44,22 @@ class Pairs:
         return len(self.radii)
 
     def __getitem__(self, rows: slice | IntArray) -> "Pairs":
-        """The pairs of these rows."""
+        """Return the pairs of these rows."""
         return Pairs(self.solid, self.centers[rows], self.radii[rows], tuple(p[rows] for p in self.parameters))
 
     @property
     def arguments(self) -> tuple[FloatArray, ...]:
-        """The arguments of the public function, and of the kernel."""
+        """Arguments of the public function, and of the kernel."""
         return self.centers, self.radii, *self.parameters
 
     @property
     def sphere_volumes(self) -> FloatArray:
-        """(p,) in m³."""
+        """Volumes (p,) of the spheres in m³."""
         return np.asarray(4.0 / 3.0 * np.pi * self.radii**3)
 
     @property
     def corners(self) -> FloatArray:
-        """(p, 4 or 8, 3) in m: a tetrahedron's or a box's corners, the latter rounded to doubles."""
+        """Corners (p, 4 or 8, 3) of tetrahedra or boxes in m, the latter rounded to doubles."""
         if self.solid == "tetrahedron":
             return self.parameters[0]
         if self.solid == "box":
@@ -70,7 +70,7 @@ class Pairs:
 
     @property
     def solid_volumes(self) -> FloatArray:
-        """(p,) in m³, rounded; infinite for half-spaces."""
+        """Volumes (p,) of the solids in m³, rounded; infinite for half-spaces."""
         if self.solid == "tetrahedron":
             edges = self.parameters[0][:, 1:] - self.parameters[0][:, :1]
             return np.asarray(np.abs(np.linalg.det(edges)) / 6.0)

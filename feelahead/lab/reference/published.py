@@ -1,7 +1,7 @@
 """The published package `overlap` 0.2.0 on the same pairs: from Python, and the C++ header alone.
 
-Both are optional: `missing` names what is not there and how to get it. The package takes one pair a call, wants
-corners in another order, and returns volumes only.
+Both are optional: `missing` names the missing part and how to get it. The package takes one pair a call, has another
+order of corners, and returns volumes only.
 """
 
 import importlib.util
@@ -20,16 +20,16 @@ from feelahead.lab.reference.pairs import Pairs
 SDIST = "pip download --no-deps --no-binary overlap overlap==0.2.0"
 _EIGEN = (Path("/usr/include/eigen3"), Path("/usr/local/include/eigen3"), Path("/opt/homebrew/include/eigen3"))
 _HEXAHEDRON = (0, 4, 6, 2, 1, 5, 7, 3)
-"""The corners of `pairs.BOX_SIGNS` round the bottom and then the top, as the package wants them."""
+"""Corners of `pairs.BOX_SIGNS` round the bottom and then the top: the package's order."""
 _TIMEOUT_S = 180.0
 _REPEATS = "2"
 
 
 def package_corners(pairs: Pairs, *, mend: bool = True) -> FloatArray:
-    """Put the corners (p, 4 or 8, 3) in the package's order; `mend` turns inverted tetrahedra round."""
+    """Return the corners (p, 4 or 8, 3) in the package's order; `mend` turns inverted tetrahedra round."""
     corners = pairs.corners
     if pairs.solid == "box":
-        # A rotation that mirrors turns the box inside out, which the package would take for a negative volume.
+        # A rotation that mirrors turns the box inside out: the package would compute a negative volume.
         mirrored = np.linalg.det(pairs.parameters[1]) < 0.0
         ordered = corners[:, list(_HEXAHEDRON)]
         ordered[mirrored] = ordered[mirrored][:, [4, 5, 6, 7, 0, 1, 2, 3]]
@@ -85,7 +85,7 @@ class CompiledHeader:
             self.missing = f"does not compile: {(errors or ['unknown error'])[0][:200]}" if said.returncode else ""
 
     def turn(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
-        """Work out all pairs twice in another process: the least ns (parts,), and the volumes (p,)."""
+        """Compute all pairs twice in another process: the least ns (parts,), and the volumes (p,)."""
         corners = package_corners(pairs)
         rows = np.concatenate([pairs.centers, pairs.radii[:, None], corners.reshape(len(pairs), -1)], axis=1)
         given, found = (self._driver.with_name(name) for name in ("pairs", "volumes"))

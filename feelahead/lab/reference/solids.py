@@ -1,4 +1,4 @@
-"""The objects of a frame by public functions alone: how much of a sphere overlaps them, and how far off they are."""
+"""Objects of a frame by public functions alone: their overlaps with spheres, and their distances."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,18 +21,18 @@ _ROUNDING_M: Final = 1e-6
 
 @dataclass(frozen=True)
 class _Kind:
-    """All primitives of one kind, those of an object together."""
+    """All primitives of one kind, sorted by object."""
 
     owner: IntArray
     columns: tuple[FloatArray | IntArray, ...]
     volumes_m3: FloatArray
     overlap: Callable[..., tuple[FloatArray, ...]]
-    """From spheres (n, 3), (n,) and columns to V (n,) and gradients (n, 3)."""
+    """Function from spheres (n, 3), (n,) and columns to V (n,) and gradients (n, 3)."""
     distance: Callable[..., FloatArray]
-    """From points (n, 3) and columns to distances (n,) at most, whatever inside."""
+    """Function from points (n, 3) and columns to lower bounds (n,) of the distances; any value inside."""
 
     def of(self, things: IntArray) -> tuple[IntArray, list[FloatArray | IntArray]]:
-        """Return each primitive (q,) of things (n,) with its place among these."""
+        """Return for each primitive (q,) of `things` (n,) its place among them, and its columns."""
         first, end = np.searchsorted(self.owner, things, "left"), np.searchsorted(self.owner, things, "right")
         place = np.repeat(np.arange(len(things)), end - first)
         row = np.arange(len(place)) - np.repeat(np.cumsum(end - first) - end, end - first)
@@ -45,12 +45,12 @@ class Solids:
     def __init__(self, seen: PerceivedObjects) -> None:
         self._kinds = [kind for kind in _kinds_of(seen) if len(kind.owner)]
         self.volumes_m3: FloatArray = np.zeros(len(seen.names))
-        """(k,) V_J"""
+        """(k,) V_J, volume of each object"""
         for kind in self._kinds:
             np.add.at(self.volumes_m3, kind.owner, kind.volumes_m3)
 
     def overlap(self, centers: FloatArray, radii: FloatArray, things: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return V (n,) and gradients (n, 3) of spheres with each its object."""
+        """Return V (n,) and gradients (n, 3) of spheres, each with its object."""
         volumes, gradients = np.zeros(len(radii)), np.zeros((len(radii), 3))
         for kind in self._kinds:
             place, columns = kind.of(things)
@@ -65,7 +65,7 @@ class Solids:
     def first_touch_m(
         self, centers: FloatArray, radii: FloatArray, things: IntArray, direction: FloatArray, end_m: FloatArray
     ) -> FloatArray:
-        """Bound the ways (n,) at which spheres begin to touch each its object; beyond `end_m` somewhere there."""
+        """Return lower bounds (n,) of the distances at which spheres touch their objects, rough beyond `end_m`."""
         moved_m = np.zeros(len(radii))
         going = np.arange(len(radii))
         for _ in range(_STEPS):
@@ -155,14 +155,14 @@ def _to_box(points: FloatArray, centers: FloatArray, rotations: FloatArray, half
 
 
 def _to_ellipsoid(points: FloatArray, centers: FloatArray, rotations: FloatArray, half_axes: FloatArray) -> FloatArray:
-    """Return what a point is away at least: its depth in the unit ball's frame, by the least half axis."""
+    """Return a lower bound of the distance: the depth in the unit ball's frame, by the least half axis."""
     scaled = np.einsum("nij,ni->nj", rotations, points - centers) / half_axes
     distances: FloatArray = (np.linalg.norm(scaled, axis=1) - 1.0) * half_axes.min(axis=1)
     return distances
 
 
 def _to_planes(points: FloatArray, vertices: FloatArray) -> FloatArray:
-    """Return the largest distance to the four planes of tetrahedra, which none is nearer than."""
+    """Return the largest distance to the four planes of tetrahedra: a lower bound of the distance."""
     distances = np.full(len(points), -np.inf)
     for corner in range(4):
         face = vertices[:, [k for k in range(4) if k != corner]]

@@ -1,10 +1,10 @@
-"""The ways of a look straight from their definition (§4.2), with exact overlaps on fine grids of ways.
+"""Contact distances of a look straight from their definition (§4.2), with exact overlaps on fine grids.
 
     W(E) = max over 0 <= E' <= E of (V(E') - V(0))⁺,   d = sup{E >= 0 : W(E) = 0}
     s(D) = min(1, W(D + m) / max(W(d + m), m |∇V(0)|, V_min))
 
-Takes nothing of the compiled field but what it is asked and its constants. Passes over a sphere and an object only
-where their distance alone says that they shorten no way.
+Takes only inputs and constants from the compiled field. Passes over a sphere and an object only if their distance
+alone proves that they shorten no contact distance.
 """
 
 from dataclasses import dataclass
@@ -22,38 +22,38 @@ from robot_side.field.scratch import STRENGTHS, TOUCH_STRENGTH
 from robot_side.surroundings.perceived import PerceivedObjects
 
 SLACK: Final = 0.02
-"""The band of a way reaches over strengths so much weaker and stronger, of 1."""
+"""Half width of a contact distance's band, as a change of strength, of 1."""
 GRAZE_M: Final = 2e-3
-"""Where the band is wider, a millimetre aside decides on the way: any way in the band is right."""
+"""Width of a band, in metres, above which any distance in it is right: a millimetre aside decides."""
 _DUE: Final = (np.arange(STRENGTHS) + 0.5) / STRENGTHS + np.array([[0.0], [-SLACK], [SLACK]])
-"""(3, 8) the shares of full strength at which strengths begin: as defined, early and late in the band."""
+"""Shares (3, 8) of full strength at which strengths begin: as defined, early and late in the band."""
 _STEP_M: Final = MARGIN_M / 20
 _FINEST_M: Final = 5e-6
 _HALVINGS: Final = int(np.ceil(np.log2(_STEP_M / _FINEST_M)))
 _NOTHING: Final = 1e-9
-"""So much of the sphere's volume is rounding where it rises from an overlap;"""
+"""Share of the sphere's volume below which a rise from an overlap is rounding."""
 _LEAST: Final = 1e-14
-"""and so much where it rises from none: a splinter's tip enters long before a larger share does."""
+"""Share for a rise from nothing: a splinter's tip enters long before a larger share does."""
 _FIRST_M: Final = 3.0 * MARGIN_M
-"""So far a pair is followed at first."""
+"""Distance to which a pair is followed at first, in metres."""
 _TOGETHER_M: Final = 0.5 * MARGIN_M
 _BESIDE_M: Final = 1e-3
-"""So far beyond the reach ways are known, too, so that one knows how far off a way is that only one side finds."""
+"""Margin beyond the reach, in metres, for the error of distances that only one side finds."""
 
 
 @dataclass(frozen=True)
 class Defined:
-    """What a look should find."""
+    """Result that a look should have."""
 
     ways_m: FloatArray
-    """(3, 2, 8) fast and slow: as defined, and early and late in the band; a millimetre beyond the reach, too"""
+    """(3, 2, 8) fast and slow: as defined, and early and late in the band; up to a millimetre beyond the reach"""
     sigma_m: float
-    """The largest D_σ"""
+    """Largest D_σ"""
     things: IntArray
-    """(2, 8) the object that binds; -1 for none"""
+    """(2, 8) the object that decides; -1 for none"""
 
     def judge(self, found_m: FloatArray, reach_m: float) -> "Judged":
-        """Judge ways (2, 8) that were found with this reach; what lies beyond counts as at the reach."""
+        """Judge contact distances (2, 8) found with this reach; those beyond count as at the reach."""
         found_m, (ways_m, early_m, late_m) = np.minimum(found_m, reach_m), np.minimum(self.ways_m, reach_m)
         grazes = late_m - early_m > GRAZE_M
         outside_m = np.maximum(found_m - late_m, 0.0) - np.maximum(early_m - found_m, 0.0)
@@ -63,10 +63,10 @@ class Defined:
 
 
 class Judged(NamedTuple):
-    """How far off the ways (n,) within the reach are."""
+    """Errors of the contact distances (n,) within the reach."""
 
     off_m: FloatArray
-    """Later above 0, earlier below: than the way, or in a graze than its band"""
+    """Later above 0, earlier below; in a graze, the distance out of its band"""
     grazes: BoolArray
 
 
@@ -77,33 +77,33 @@ class _Pairs(NamedTuple):
     radii_m: FloatArray
     thing: IntArray
     sooner_m: FloatArray
-    """The ways are shorter by this: errors along û, how far the object comes nearer, the inflation of a bare one."""
+    """Reduction of the distances: errors along û, the object's approach, the inflation of a bare sphere"""
     later_m: FloatArray
-    """They are longer by this in the slow list, where the object is to be touched."""
+    """Increase of the distances in the slow list, for objects to be touched"""
     touchable: BoolArray
     bound_m: FloatArray
-    """Before this way nothing overlaps that does not at first."""
+    """Distance before which no overlap begins"""
     before_m3: FloatArray
     """V(0)"""
     lean_m2: FloatArray
     """|∇V(0)|"""
 
     def rows(self, which: IntArray | BoolArray) -> "_Pairs":
-        """Take some of them."""
+        """Return some of the pairs."""
         return _Pairs._make(column[which] for column in self)
 
     def and_also(self, others: "_Pairs") -> "_Pairs":
-        """Put others behind."""
+        """Append other pairs."""
         return _Pairs._make(np.concatenate(both) for both in zip(self, others, strict=True))
 
     @property
     def first_m(self) -> FloatArray:
-        """Return the least way that each may have."""
+        """Return the least distance that each pair may have."""
         return self.bound_m - MARGIN_M - self.sooner_m
 
 
 def statistical_m(pose: GripperPose, along: Along, encoder_sigma_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return by how much each sphere (m,) is inflated, and D_σ of each along û: eq. 5, 9 and 10."""
+    """Return the inflation (m,) of each sphere, and D_σ of each along û: eq. 5, 9 and 10."""
     leaning = np.einsum("a,man->mn", along.direction, pose.sphere_jacobians)
     variance = leaning**2 @ encoder_sigma_rad**2 + along.variance_m2
     inflated_m = np.maximum(0.0, along.mean_m + along.quantile * np.sqrt(variance))
@@ -119,7 +119,7 @@ def defined_ways(
     widest_m: float,
     encoder_sigma_rad: FloatArray,
 ) -> Defined:
-    """Find what `Ahead.look` should; the arguments are its own."""
+    """Compute the result that `Ahead.look` should have for the same arguments."""
     alone_m, sigma_m = statistical_m(pose, along, encoder_sigma_rad)
     along_m, expected_m = max(0.0, (sigma_m - alone_m).max()), max(0.0, along.mean_m + along.mean_along_m)
     solids = Solids(objects)
@@ -140,7 +140,7 @@ def defined_ways(
     )
     look = _Look(solids, along.direction, along.reach_m + _BESIDE_M)
     near, kept = look.bounded(swollen)
-    # What overlaps already may have swallowed what is ahead of it, and counts uninflated, too.
+    # A sphere that overlaps already may have swallowed objects ahead of it: count it uninflated, too.
     inside, inflated_m = near.before_m3 > 0.0, inflated_m[kept]
     bare = near.rows(inside)
     bare = bare._replace(radii_m=bare.radii_m - inflated_m[inside], sooner_m=bare.sooner_m + inflated_m[inside])
@@ -150,7 +150,7 @@ def defined_ways(
 
 
 class _Look:
-    """The ways so far, (3, 2, 8), and what binds them."""
+    """Contact distances found so far, (3, 2, 8), and the objects that decide them."""
 
     def __init__(self, solids: Solids, direction: FloatArray, reach_m: float) -> None:
         self.ways_m: FloatArray = np.full((len(_DUE), 2, STRENGTHS), np.inf)
@@ -158,7 +158,7 @@ class _Look:
         self._solids, self._direction, self._reach_m = solids, direction, reach_m
 
     def bounded(self, pairs: _Pairs) -> tuple[_Pairs, IntArray]:
-        """Bound where each pair begins to overlap and find V(0); which are within the reach."""
+        """Bound where each pair begins to overlap and compute V(0); return the pairs within reach and their rows."""
         end_m = self._reach_m + MARGIN_M + pairs.sooner_m
         bound_m = self._solids.first_touch_m(pairs.centers_m, pairs.radii_m, pairs.thing, self._direction, end_m)
         kept = np.flatnonzero(bound_m <= end_m)
@@ -172,7 +172,7 @@ class _Look:
         return near._replace(before_m3=before_m3, lean_m2=lean_m2), kept
 
     def follow(self, pairs: _Pairs) -> None:
-        """Follow all pairs that may shorten a way, the nearest first."""
+        """Follow all pairs that may shorten a distance, the nearest first."""
         pairs = pairs.rows(np.argsort(pairs.first_m, kind="stable"))
         while (left := self._may_shorten(pairs, pairs.bound_m)).any():
             pairs = pairs.rows(left)
@@ -184,11 +184,11 @@ class _Look:
                 self._shorten(again, self._end_m(again))
 
     def _end_m(self, pairs: _Pairs) -> FloatArray:
-        """Return where pairs need to be known no farther: W(d + m) of what begins at the reach."""
+        """Return how far pairs must be known: up to W(d + m) of overlaps that begin at the reach."""
         return self._reach_m + 2.0 * MARGIN_M + pairs.sooner_m
 
     def _may_shorten(self, pairs: _Pairs, from_m: FloatArray, known: BoolArray | bool = False) -> BoolArray:
-        """Ask which pairs may shorten a way by what comes after `from_m` (p,), but where it is known (p, 3, 8)."""
+        """Return which pairs may shorten a distance beyond `from_m` (p,), unless known (p, 3, 8)."""
         least_m = (from_m - MARGIN_M - pairs.sooner_m)[:, None, None]
         fast = least_m < self.ways_m[:, 0]
         later_m = np.where(pairs.touchable, pairs.later_m, 0.0)[:, None, None]
@@ -199,7 +199,7 @@ class _Look:
         return shorter
 
     def _overlap(self, pairs: _Pairs, ways_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """V and dV/dE at ways (p, k) of pairs."""
+        """Return V and dV/dE of pairs at distances (p, k)."""
         moved = pairs.centers_m[:, None] + ways_m[..., None] * self._direction
         size = ways_m.shape[1]
         volumes, gradients = self._solids.overlap(
@@ -208,7 +208,7 @@ class _Look:
         return volumes.reshape(ways_m.shape), (gradients @ self._direction).reshape(ways_m.shape)
 
     def _shorten(self, pairs: _Pairs, until_m: FloatArray) -> BoolArray:
-        """Shorten the ways by what pairs overlap until then (p,); which strengths (p, 3, 8) they have by then."""
+        """Shorten the distances by overlaps up to `until_m` (p,); return the strengths (p, 3, 8) known by then."""
         places = np.arange(len(pairs.thing))
         nothing_m3 = np.where(pairs.before_m3 > 0.0, _NOTHING, _LEAST) * 4.0 / 3.0 * np.pi * pairs.radii_m**3
         nodes_m, volumes = self._nodes(pairs, until_m)
@@ -223,7 +223,7 @@ class _Look:
         least_m3 = np.minimum(np.pi * pairs.radii_m * LEAST_DEPTH_M**2, 0.5 * self._solids.volumes_m3[pairs.thing])
         reference_m3 = np.maximum(np.maximum(by_then, MARGIN_M * pairs.lean_m2), least_m3)
         due_m3 = reference_m3[:, None, None] * _DUE
-        # What is not known until d + m is not known at all yet.
+        # A reference is known only if d + m is within `until_m`.
         whole = rises & (full_m <= until_m + 1e-12)
         known: BoolArray = (risen[:, -1][:, None, None] >= due_m3) & whole[:, None, None]
         after = np.stack([(risen[:, :, None] < due_m3[:, None, row]).sum(axis=1) for row in range(len(_DUE))], axis=1)
@@ -248,7 +248,7 @@ class _Look:
         return known
 
     def _nodes(self, pairs: _Pairs, until_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return ways (p, 2k + 1) and V there: evenly, and in between where V peaks, or in the middle."""
+        """Return distances (p, 2k + 1) and V there: evenly, and in between where V peaks, or in the middle."""
         steps = int(np.ceil((until_m - pairs.bound_m).max() / _STEP_M))
         even_m = pairs.bound_m[:, None] + np.linspace(0.0, 1.0, steps + 1) * (until_m - pairs.bound_m)[:, None]
         even, slopes = self._overlap(pairs, even_m)
@@ -262,7 +262,7 @@ class _Look:
         return nodes_m, volumes
 
     def _halve(self, pairs: _Pairs, low_m: FloatArray, high_m: FloatArray, volume_m3: FloatArray) -> FloatArray:
-        """Find where V reaches `volume_m3` (p,) to 5 µm, which it does at `high_m` and not at `low_m`."""
+        """Bisect to 5 µm where V reaches `volume_m3` (p,): reached at `high_m`, not at `low_m`."""
         for _ in range(_HALVINGS):
             middle_m = 0.5 * (low_m + high_m)
             volumes, _ = self._overlap(pairs, middle_m[:, None])

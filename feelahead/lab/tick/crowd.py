@@ -1,4 +1,4 @@
-"""Many objects that a camera perceives, and that no physics knows: around the table, out of the gripper's way."""
+"""Many perceived objects without physics: around the table, out of the gripper's reach."""
 
 from dataclasses import replace
 from typing import Any, Final
@@ -10,13 +10,13 @@ from robot_side.surroundings.movers import OF_OBJECTS, Movers
 from robot_side.surroundings.perceived import KINDS, ObjectSource, PerceivedObjects, SomeObjects
 
 MIDDLE_M: Final = (0.55, 0.0, 0.25)
-"""The middle of the built-in table's things."""
+"""Middle of the built-in table's objects, in metres."""
 NEAREST_M, FARTHEST_M = 0.6, 3.0
 _SIZES_M: Final = (0.005, 0.03)
 
 
 def crowd(count: int, time_s: float, seed: int = 1) -> PerceivedObjects:
-    """Make a frame of random objects of one primitive each, evenly in directions and distances."""
+    """Return a frame of random objects of one primitive each, evenly in directions and distances."""
     generator = np.random.default_rng(seed)
     away = generator.normal(size=(count, 3))
     away /= np.linalg.norm(away, axis=1)[:, None]
@@ -45,10 +45,10 @@ def crowd(count: int, time_s: float, seed: int = 1) -> PerceivedObjects:
 
 
 class CrowdedCamera:
-    """An ObjectSource that sees a crowd of things that stand still, too."""
+    """ObjectSource that adds a crowd of objects at rest."""
 
     def __init__(self, camera: ObjectSource, count: int, *, only: bool = False) -> None:
-        """only: the crowd alone is seen."""
+        """only: perceive the crowd alone."""
         self._camera, self._count, self._only = camera, count, only
         self._own: PerceivedObjects | None = None
         self._shown: PerceivedObjects | None = None
@@ -57,7 +57,7 @@ class CrowdedCamera:
         self._roles: tuple[tuple[Role, ...], tuple[Role, ...]] = ((), ())
 
     def perceive(self, now_s: float) -> PerceivedObjects:
-        """Return the camera's frame with the crowd; the same one until there is a newer one."""
+        """Return the camera's newest frame with the crowd; the same object until a newer frame."""
         own = self._camera.perceive(now_s)
         if self._shown is None or own is not self._own:
             before, self._own = self._own, own
@@ -65,7 +65,7 @@ class CrowdedCamera:
         return self._shown
 
     def set_role(self, name: str, role: Role) -> None:
-        """Set it for one of the camera's own."""
+        """Set the role of one of the camera's own objects."""
         self._camera.set_role(name, role)
 
     def _with_crowd(self, own: PerceivedObjects, before: PerceivedObjects | None) -> PerceivedObjects:
@@ -75,7 +75,7 @@ class CrowdedCamera:
             return joined(own, crowd(self._count, own.time_s))
         movers, numbers = own.since
         if self._movers is None or self._own_movers is not movers:
-            # The frame that was shown whole is the one that has a table, and whose roles are known.
+            # The last complete frame has a table, and its roles are known.
             shown = self._shown if before is movers.first else None
             first = shown or joined(movers.first, crowd(self._count, movers.first.time_s))
             self._own_movers, self._movers = movers, Movers(first, movers.things)

@@ -1,4 +1,4 @@
-"""What this machine takes for a fixed piece of work that is like a tick: figures are told as ratios to it."""
+"""Processor time of a fixed workload like a tick, on this machine; other figures are ratios to it."""
 
 from typing import Final
 
@@ -8,12 +8,12 @@ from common.arrays import FloatArray
 from robot_side.drivers.mujoco.scene import load_scene
 
 _SETTLING_STEPS: Final = 3000
-"""After these, what lies on the table rests or sleeps."""
+"""Number of steps after which the objects on the table rest or sleep."""
 _LOOP_TURNS: Final = 600
 
 
 class Mixed:
-    """A step of the demo's physics in a scene of its own, a Python loop of 600 turns, and six NumPy calls."""
+    """A step of the demo's physics in a separate scene, a Python loop of 600 turns, and six NumPy calls."""
 
     def __init__(self) -> None:
         self._scene = load_scene()
@@ -22,7 +22,7 @@ class Mixed:
             self._scene.step()
 
     def work(self) -> None:
-        """Do all of it once."""
+        """Run the workload once."""
         self._scene.step()
         total, one, other = 0, self._one, self._other
         for k in range(_LOOP_TURNS):
@@ -36,7 +36,7 @@ class Mixed:
 
 
 def as_ratios(spent_s: FloatArray, mixed_s: FloatArray) -> dict[str, float]:
-    """Give p50 and p99 in us, and p50 of p50 and p99 of p99 of "mixed" in the same run."""
+    """Return p50 and p99 in us, and the ratios p50 to p50 and p99 to p99 of "mixed" in the same run."""
     (p50, p99), (p50_mixed, p99_mixed) = (np.quantile(one, (0.5, 0.99)).tolist() for one in (spent_s, mixed_s))
     ratios = {"p50_of_mixed": p50 / p50_mixed, "p99_of_mixed": p99 / p99_mixed}
     return {"p50_us": 1e6 * p50, "p99_us": 1e6 * p99, **ratios}

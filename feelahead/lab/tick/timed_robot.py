@@ -1,11 +1,11 @@
-"""A robot side that writes down the cost of each tick: `python -m ... --log=FILE.npy` and its own flags.
+"""Robot side that logs the cost of each tick: `python -m ... --log=FILE.npy` and the robot side's flags.
 
---objects=N puts N more perceived objects around, which physics knows nothing of; --only takes the scene's own away.
+--objects=N adds N perceived objects without physics; --only removes the scene's own.
 
-The peer "mixed" (see `Mixed`) is measured here, too, at the start of 4 ticks of each 17; these ticks do not count. It
-is as cold as a tick: both begin after the loop's sleep. Run after a tick's messages it was 10 % faster, as MuJoCo's
-code was still warm. The first of the 4 does not count, nor do the 2 ticks after them. 17 is prime to the periods of
-looks and frames.
+The reference "mixed" (see `Mixed`) is measured here, too, at the start of 4 ticks of each 17; these ticks do not
+count. It is as cold as a tick: both begin after the loop's sleep. After a tick's messages it was 10 % faster, as
+MuJoCo's code was still warm. The first of the 4 does not count, nor do the 2 ticks after them. 17 is prime to the
+periods of looks and frames.
 """
 
 import itertools
@@ -29,7 +29,7 @@ from robot_side.laws.law import Law
 PROGRAM: Final = "feelahead.lab.tick.timed_robot"
 STAGES: Final = ("physics", "look", "frame", "law", "motion", "figures", "message")
 OUTSIDE: Final = ("physics", "frame")
-"""No part of the way from look to message: a real arm has no physics, and frames are taken in after the messages."""
+"""Stages outside look to message: a real arm has no physics, and frames are read in after the messages."""
 _OF_STEPS: Final[dict[Step, str]] = {
     "arm": "physics",
     "pose": "look",
@@ -41,7 +41,7 @@ _OF_STEPS: Final[dict[Step, str]] = {
 }
 COLUMNS: Final = ("now_s", "run", "spent_s", "thread_s", "wall_s", "looks", *STAGES)
 """Columns of the log: time; the run of turns that count (even: ticks, odd: "mixed"); processor time of the tick or of
-"mixed"; the thread's until then; wall time; how many looks the tick began; each stage's processor time."""
+"mixed"; the thread's at its end; wall time; number of looks that the tick began; each stage's processor time."""
 _TURNS: Final = 17
 _MIXED: Final = 4
 _UNCOUNTED: Final = (0, _MIXED, _MIXED + 1)
@@ -52,20 +52,20 @@ class TimedSettings:
     """Flags besides the robot side's."""
 
     log: Path = Path("ticks.npy")
-    """The file for the figures: a row a tick, see COLUMNS."""
+    """File for the figures: a row a tick, see COLUMNS."""
     objects: int = 0
-    """Number of further objects."""
+    """Number of additional objects."""
     stages: tyro.conf.FlagConversionOff[bool] = True
-    """Each is timed, which itself takes some microseconds; else those alone that are no part of look to message."""
+    """Time each stage, which itself takes some microseconds; else only the stages outside look to message."""
     only: tyro.conf.FlagConversionOff[bool] = False
-    """Leave out the scene's own."""
+    """Leave out the scene's own objects."""
 
 
 class TimedTicks(Listener):
-    """Times ticks and their stages, does "mixed" before some of them, and keeps a row for each turn that counts."""
+    """Listener that times ticks and stages, runs "mixed" before some ticks, and keeps a row for each counted turn."""
 
     def __init__(self, law: Law, rows: list[tuple[float, ...]], *, all_stages: bool) -> None:
-        """rows: filled, see COLUMNS. all_stages: or else those alone that are no part of look to message."""
+        """rows: filled, see COLUMNS. all_stages: False for only the stages outside look to message."""
         self.steps = get_args(Step) if all_stages else ("arm", "pose", "frame", "end")
         self._rows, self._law, self._mixed, self._turns = rows, law, Mixed(), itertools.count()
         self._stages_s = np.zeros(len(STAGES))
@@ -79,11 +79,11 @@ class TimedTicks(Listener):
         self._now_s = 0.0
 
     def on_tick(self, tick: Tick) -> None:
-        """Note when it began."""
+        """Note the beginning."""
         self._now_s = tick.now_s
 
     def on_step(self, step: Step) -> None:
-        """End the stage before, and begin the step's; a tick is from `arm` to the first `end`."""
+        """End the last stage, and begin the step's; a tick is from `arm` to the first `end`."""
         if step == "arm":
             self._begin()
         place = self._places.get(step)
@@ -124,7 +124,7 @@ class TimedTicks(Listener):
 
 
 def command(arguments: Sequence[str]) -> int:
-    """Run the robot side's own command with a timed core."""
+    """Run the robot side's command with a timed core."""
     ours = tuple(f"--{one.name}=" for one in fields(TimedSettings))
     mine = [argument for argument in arguments if argument.startswith(ours)]
     settings = parse_settings(TimedSettings, PROGRAM, mine)

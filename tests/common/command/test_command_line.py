@@ -25,7 +25,7 @@ class Inner:
 
 @dataclass(frozen=True)
 class Options(RunOptions):
-    """The options that a test runs with."""
+    """Options of the tests."""
 
     probability: float = 0.99
     camera: Inner = field(default_factory=Inner)

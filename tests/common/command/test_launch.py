@@ -1,4 +1,4 @@
-"""The first and last moments of a command: signals, encodings, versions and what is not installed."""
+"""Start and end of a command: signals, encodings, versions and missing packages."""
 
 import contextlib
 import json
@@ -15,7 +15,7 @@ from tests.helpers.python_process import LIMIT_S, ended, start
 from tests.helpers.repository import ROOT
 
 MODULES = ("robot_side", "operator_side", "feelahead")
-# Each stops there, so that the signal always finds it, however fast the machine is.
+# The code stops at this point, so that the signal finds it however fast the machine is.
 STOPPED_AT = """
 import sys, time
 sys.argv = ["command"]
@@ -28,7 +28,7 @@ def stop(*_):
 """
 IMPORT = STOPPED_AT.format('launch("command", stop)')
 START = STOPPED_AT.format('launch("command", lambda: stop)')
-# Past the command's own care, as a signal between two statements would be.
+# Outside the command's own error handling, as for a signal between two statements.
 END = STOPPED_AT.format('common.command.command_line.run_command = stop\nlaunch("command", lambda: None)')
 # An exception could be lost in a compiler's callback.
 CALLBACK = STOPPED_AT.format('launch("command", lambda: __import__("ctypes").CFUNCTYPE(None)(stop)())')
@@ -64,7 +64,7 @@ def test_a_run_that_never_began_has_a_summary(tmp_path: Path, flag: list[str], w
 
 @pytest.mark.processes
 @pytest.mark.parametrize("flag", ["--summary=None", "--summary=", "--summary"])
-def test_where_none_is_asked_for_there_is_none(tmp_path: Path, flag: str) -> None:
+def test_without_a_summary_flag_there_is_no_summary(tmp_path: Path, flag: str) -> None:
     code = IMPORT.replace('["command"]', repr(["command", flag])).replace("stop)", "stop, has_summary=True)")
     with start("-c", f"import os; os.chdir({str(tmp_path)!r})" + code) as process:
         assert process.stdout is not None
@@ -79,7 +79,7 @@ BOTH = (signal.SIGINT, signal.SIGTERM)
 
 @pytest.fixture
 def handlers() -> Iterator[None]:
-    """No signal reaches the runner, whatever a test finds out, and its own handlers come back."""
+    """Keep signals from the test runner, whatever a test finds, and restore its handlers."""
     before = {number: signal.signal(number, lambda *_: None) for number in BOTH}
     yield
     for number, handler in before.items():

@@ -1,4 +1,4 @@
-"""A run in words: the live line, which never says half of something, and the story, which tells each change once."""
+"""A run in words: the live line shows whole facts only, and the story tells each change once."""
 
 import math
 from typing import Any
@@ -30,7 +30,7 @@ OPERATOR = OperatorStatus(
 
 
 def approach(**changes: Any) -> LiveView:
-    """Both sides' statuses of an approach, but for these figures of either."""
+    """Return both sides' statuses of an approach, with these figures of either changed."""
     return LiveView(replaced(ROBOT, **of(ROBOT, changes)), replaced(OPERATOR, **of(OPERATOR, changes)))
 
 
@@ -146,14 +146,14 @@ def test_control_characters_of_a_peer_do_not_reach_the_terminal() -> None:
 def test_it_fits_and_holds_whole_facts_only(view: LiveView, width: int) -> None:
     line = live_line(view, width)
     assert cell_len(line) <= width
-    # What is most important is there as soon as it fits by itself.
+    # The most important fact is there as soon as it fits alone.
     assert line.startswith(view.phase) or cell_len(view.phase) > width
     left = line
-    # Each fact is there as a whole, in its place, or not at all.
+    # Each fact is there as a whole, in order, or not at all.
     for _, text in _facts(view):
         if left == text or left.startswith(f"{text}  "):
             left = left[len(text) + 2 :]
-    # Where it is tight, all facts stand a little closer.
+    # Where space is tight, all facts are a little closer.
     phase, *rest = (text for _, text in _facts(view))
     assert left == "" or line == f"{phase}  {' '.join(rest)}"
 

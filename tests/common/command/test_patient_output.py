@@ -1,4 +1,4 @@
-"""Output that nobody is held up by: in order while it is read, dropped while it is not, and its end told once."""
+"""Output that blocks nobody: in order while it is read, dropped while it is not, its end reported once."""
 
 import contextlib
 import os
@@ -19,7 +19,7 @@ def pipe() -> Iterator[tuple[int, TextIO]]:
 
 
 class Reader(threading.Thread):
-    """Reads until the end, once it is started."""
+    """Reader that reads until the end, once started."""
 
     def __init__(self, descriptor: int) -> None:
         super().__init__(daemon=True)
@@ -40,7 +40,7 @@ def test_a_reader_that_stalls_gets_whole_lines_and_holds_nobody_up() -> None:
                 output.write(line)
         held = os.read(reads, 100_000).decode()
         os.close(reads)
-        output.write("late\n")  # waits for the thread, which would write to whatever has the descriptor next
+        output.write("late\n")  # Waits for the thread, which would otherwise write to the descriptor's next owner.
     assert line * 6 == held[:60_000]
 
 
@@ -51,7 +51,7 @@ def test_a_reader_that_pauses_gets_the_newest_lines_and_every_result() -> None:
         with output:
             for number in range(1000):
                 output.write(f"{number} {9_999 * 'x'}\n")
-        reader.start()  # later than the context's end waits
+        reader.start()  # Later than the context's end waits.
         for number in range(12):
             output.write(f"result {number}\n")
     reader.join(600)

@@ -20,7 +20,7 @@ def events(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
 
 
 def run(mode: StatusMode, seconds: float, start_s: float = 100.0) -> None:
-    """`show` once a millisecond."""
+    """Call `show` once a millisecond."""
     with Status(mode, "robot") as status:
         for tick in range(round(seconds * 1000)):
             status.show(start_s + tick / 1000, robot=RobotStatus(observers=tick))
@@ -114,5 +114,5 @@ def test_on_a_terminal_one_line_is_kept_up_to_date(
     assert "a line that stays" in written
     # Whole facts only: there is no room for the distances.
     assert "starting  L2/R2 pull 0/–% resist –/–%\r" in written
-    # The cursor that was hidden comes back, after an error, too.
+    # The hidden cursor comes back, also after an error.
     assert written.rindex("\x1b[?25h") > written.rindex("\x1b[?25l")

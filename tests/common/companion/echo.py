@@ -1,4 +1,4 @@
-"""A companion that sends back what it is sent, until the other end is gone."""
+"""Companion that echoes all messages until the other end is gone."""
 
 import select
 import sys

@@ -12,7 +12,7 @@ def pair(room_bytes: int = 1 << 23) -> tuple[Channel, Channel]:
 
 
 def everything(channel: Channel, sender: Channel) -> list[bytes]:
-    """What arrives until nothing waits any more."""
+    """Return all messages that arrive until nothing waits at the sender."""
     arrived: list[bytes] = []
     while True:
         more = channel.receive()

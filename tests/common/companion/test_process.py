@@ -23,7 +23,7 @@ def test_it_answers_and_ends_with_the_channel() -> None:
     with Companion(ECHO) as companion:
         companion.channel.send(b"anybody there?")
         assert answer(companion) == b"anybody there?"
-        # Ctrl-C and a terminal that closes are ours to act on, not its.
+        # Ctrl-C and a closed terminal are handled by the parent, not by the companion.
         os.kill(companion.process_id, signal.SIGINT)
         os.kill(companion.process_id, signal.SIGTERM)
         companion.channel.send(b"still?")

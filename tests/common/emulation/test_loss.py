@@ -1,4 +1,4 @@
-"""Losses and delays of a line beside what theory or the kernel's netem says of them."""
+"""Losses and delays of a line compared with theory or the kernel's netem."""
 
 import math
 

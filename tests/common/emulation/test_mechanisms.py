@@ -1,4 +1,4 @@
-"""Each other mechanism of a line beside what theory or the kernel's netem says of it."""
+"""Other mechanisms of a line compared with theory or the kernel's netem."""
 
 import itertools
 import math
@@ -64,17 +64,17 @@ def test_items_that_cannot_be_corrupted_are_refused() -> None:
 def test_reordering_sends_a_share_at_once() -> None:
     run = Run("delay 10ms reorder 25%", 20_000)
     assert np.mean(run.delays_s == 0.0) == pytest.approx(0.25, abs=0.01)
-    # What is sent at once overtakes the ten before it, so that all delayed ones arrive late but for rare runs.
+    # A message sent at once overtakes the ten before it, so that nearly all delayed ones arrive late.
     assert run.line.summary()["achieved"]["late_share"] == pytest.approx(0.75 * (1.0 - 0.75**9), abs=0.02)
 
 
-def test_a_gap_leaves_so_many_in_order() -> None:
+def test_a_gap_leaves_that_number_in_order() -> None:
     delays_s = Run("delay 10ms reorder 100% gap 5", 100).delays_s
     assert [number for number, delay_s in enumerate(delays_s) if delay_s == 0.0] == list(range(4, 100, 5))
     half = Run("delay 10ms reorder 50% gap 5", 20_000).delays_s
     gaps = np.diff(np.flatnonzero(half == 0.0))
     assert gaps.min() >= 5
-    # After the gap, each trial succeeds with a half: one in six on average.
+    # After the gap, each trial succeeds with probability 1/2: one in six on average.
     assert gaps.mean() == pytest.approx(6.0, abs=0.1)
 
 
@@ -82,7 +82,7 @@ def test_a_gap_leaves_so_many_in_order() -> None:
 
 
 def test_a_rate_serves_one_message_after_the_other() -> None:
-    # 100 bytes at 400 kbit/s take 2 ms, and come every millisecond.
+    # 100 bytes at 400 kbit/s take 2 ms, and one message comes every millisecond.
     run = Run("rate 400kbit", 50)
     assert [due_s for due_s, _ in run.deliveries] == pytest.approx([2e-3 * (number + 1) for number in range(50)])
     assert run.line.summary()["achieved"]["rate_bit_s"] == pytest.approx(400e3)
@@ -109,7 +109,7 @@ def test_a_rate_needs_a_size() -> None:
 
 def test_the_limit_drops_from_the_tail() -> None:
     run = Run("rate 400kbit limit 3", 300)
-    # Half as much leaves as comes; the queue of three stays full.
+    # Half of the messages leave; the queue of three stays full.
     assert run.line.figures.dropped == pytest.approx(150, abs=4)
     assert [number for _, number in run.deliveries][:3] == [0, 1, 2]
     waits_s = [due_s - run.sent_s[number] for due_s, number in run.deliveries]
@@ -143,7 +143,7 @@ def test_a_stream_sends_what_was_lost_again() -> None:
     assert not any(run.lost)
     assert [number for _, number in run.deliveries] == list(range(20_000))
     assert run.line.figures.retransmitted == pytest.approx(202, abs=45)
-    # Once lost: everything behind it waits until it is there.
+    # A lost message delays everything behind it until it is there.
     assert np.quantile(run.delays_s, 0.05) == pytest.approx(0.050)
     assert set(np.round(run.delays_s, 6)) <= set(np.round(np.arange(50, 176, 0.5) / 1e3, 6))
 
@@ -166,7 +166,7 @@ def test_a_stream_shows_no_duplicates_and_checks_for_corruption() -> None:
     assert line.figures.corrupted == pytest.approx(200, abs=45)
 
 
-# What holds for every line
+# Invariants of every line
 
 CLAUSES = (
     "",

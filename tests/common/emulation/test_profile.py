@@ -1,4 +1,4 @@
-"""netem's grammar: what it reads, and what it refuses, in one line."""
+"""netem's grammar: accepted profiles, and refusals in one line."""
 
 from pathlib import Path
 

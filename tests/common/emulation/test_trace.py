@@ -24,7 +24,7 @@ def written(folder: Path, content: str, name: str = "trace.csv") -> Path:
         ("delay_ns,note\n1000000,a\n,lost\n2000000,b\n", [1.0, None, 2.0]),
         ("sent_ns,delay_ns\n5,1000000\n3,2000000\n4,\n", [2.0, None, 1.0]),
         ("sent_ns,received_ns\n0,1000000\n1000000,\n2000000,2500000\n", [1.0, None, 0.5]),
-        # In order of arrival, and nothing of number 1: what a receiver can write down.
+        # In order of arrival, and nothing of number 1: all that a receiver can record.
         ("seq,sent_ns,delay_ns\n3,3,5000000\n0,0,9000000\n2,2,7000000\n", [9.0, None, 7.0, 5.0]),
         ("\ufeffdelay_ns\n1000000\n", [1.0]),
     ],
@@ -78,7 +78,7 @@ def test_a_trace_stands_for_delay_and_loss(tmp_path: Path, clause: str) -> None:
 
 
 def deliveries(profile: LinkProfile, count: int) -> dict[int, float]:
-    """The delay in milliseconds of each message that arrives, when they are sent 1 s apart."""
+    """Return the delay in milliseconds of each message that arrives, when sent 1 s apart."""
     line: DelayLine[int] = DelayLine(profile)
     delays_ms = {}
     for number in range(count):
@@ -88,7 +88,7 @@ def deliveries(profile: LinkProfile, count: int) -> dict[int, float]:
     return delays_ms
 
 
-def test_a_trace_is_replayed_by_position_and_begins_anew_at_its_end(tmp_path: Path) -> None:
+def test_a_trace_is_replayed_by_position_and_restarts_at_its_end(tmp_path: Path) -> None:
     path = written(tmp_path, "delay_ns,x\n1000000,\n,\n3000000,\n")
     profile = LinkProfile.parse(f"trace {path}")
     assert deliveries(profile, 7) == pytest.approx({0: 1.0, 2: 3.0, 3: 1.0, 5: 3.0, 6: 1.0})

@@ -1,4 +1,4 @@
-"""What may be changed of a link while a run goes on, and a line that changes."""
+"""Changes of an emulated link during a run, and a line that takes them over."""
 
 import pytest
 from hypothesis import given
@@ -41,12 +41,12 @@ def test_delay_jitter_and_loss_are_tuned(words: str, delay_s: float, jitter_s: f
         "delay -1ms",
     ],
 )
-def test_nothing_else_is(words: str) -> None:
+def test_nothing_else_is_tuned(words: str) -> None:
     refusal(tunable_profile, words)
 
 
 @given(st.text(max_size=50))
-def test_whatever_is_asked_for_is_granted_or_refused_in_words(words: str) -> None:
+def test_any_words_are_granted_or_refused_in_one_line(words: str) -> None:
     try:
         profile = tunable_profile(words)
     except ConfigurationError:

@@ -1,4 +1,4 @@
-"""Files that are written: whole or not at all, and one line where they cannot be."""
+"""Written files: whole or not at all, and one line if they cannot be written."""
 
 import errno
 import json
@@ -15,7 +15,7 @@ from common.files.output_file import output_file, require_output_file, write_jso
 
 
 def fill_up(path: Path) -> None:
-    """Some of it is written before the disk is full."""
+    """Write a part before the disk is full."""
     with output_file("--csv", path) as file:
         file.write("new " * 10_000)
         file.flush()

@@ -1,4 +1,4 @@
-"""A wrong value in a TOML file: its key, itself, and what would be valid."""
+"""A wrong value in a TOML file: the error names its key, the value, and what would be valid."""
 
 from pathlib import Path
 

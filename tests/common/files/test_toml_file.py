@@ -1,4 +1,4 @@
-"""Files that people name: read whole without waiting, or refused."""
+"""Files named by a person: read whole without waiting, or refused."""
 
 from pathlib import Path
 

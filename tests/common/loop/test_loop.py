@@ -1,4 +1,4 @@
-"""The loop of a side on a virtual clock."""
+"""Loop of a side on a virtual clock."""
 
 import pytest
 
@@ -11,7 +11,7 @@ PERIOD_S = 1e-3
 
 
 class Steps:
-    """Notes what it is asked to do, and is stopped for long in its second look at what has arrived."""
+    """Recorder of the loop's calls that stalls for long in its second reception."""
 
     resting = True
 

@@ -1,4 +1,4 @@
-"""A robot side that feels, tells and shows through one bottleneck, in virtual time: everything but the picture."""
+"""Robot side that sends haptics, telemetry and views through a bottleneck, in virtual time; pictures are dummies."""
 
 import itertools
 import math
@@ -25,7 +25,7 @@ Steady = Callable[[float], float]
 
 
 class Way(Protocol):
-    """One direction of a link, as DelayLine is."""
+    """One direction of a link, with DelayLine's interface."""
 
     def push(self, now_s: float, item: Any, size_bytes: int | None = None) -> None: ...
 
@@ -33,10 +33,10 @@ class Way(Protocol):
 
 
 class Bottleneck:
-    """A drop-tail queue before a link of `bit_s` at each moment, then a delay; headers count."""
+    """Drop-tail queue before a link of `bit_s` at each moment, then a delay; headers count."""
 
     def __init__(self, bit_s: Steady, queue_s: float = 0.2, delay_s: float = 0.025) -> None:
-        """queue_s: the longest queue, in seconds at the first rate."""
+        """queue_s: longest queue, in seconds at the first rate."""
         self._bit_s, self._delay_s = bit_s, delay_s
         self._most_bits = queue_s * bit_s(0.0)
         self._free_s = 0.0
@@ -54,30 +54,30 @@ class Bottleneck:
         return due
 
     def waits_s(self, now_s: float) -> float:
-        """Seconds that a message waits that enters now."""
+        """Return the queueing delay of a message that enters now, in seconds."""
         return max(0.0, self._free_s - now_s)
 
 
 @dataclass
 class Ran:
-    """A run, by the moment of sending."""
+    """Results of a run, by the moment of sending."""
 
     delays_s: list[tuple[float, float]] = field(default_factory=list)
-    """(when it was sent, how long it took) of each haptic message"""
+    """(time of sending, delay) of each haptic message, in seconds"""
     rates_bit_s: list[float] = field(default_factory=list)
-    """One for each turn"""
+    """Rate of each turn"""
     pictures: list[tuple[float, float]] = field(default_factory=list)
-    """(when it arrived whole, its age) of each picture"""
+    """(time of complete arrival, age) of each picture, in seconds"""
     budget: Budget[str] = field(default_factory=lambda: Budget(("video", "scene")))
     giving_way: GivingWay = field(default_factory=lambda: GivingWay(30.0, 75))
 
     def delay_s(self, share: float, since_s: float = 0.0, until_s: float = math.inf) -> float:
-        """A quantile of the haptics' delay."""
+        """Return a quantile of the haptics' delay."""
         seen = sorted(delay_s for at_s, delay_s in self.delays_s if since_s <= at_s < until_s)
         return seen[min(len(seen) - 1, int(share * len(seen)))]
 
     def late_until_s(self, limit_s: float, since_s: float) -> float:
-        """When the last message that took longer than this arrived, `since_s` for none."""
+        """Return when the last message above this delay arrived; `since_s` if none did."""
         return max(
             (at_s + delay_s for at_s, delay_s in self.delays_s if at_s + delay_s > since_s and delay_s > limit_s),
             default=since_s,
@@ -85,7 +85,7 @@ class Ran:
 
 
 class _Sides:
-    """Both sides, as far as they send: haptics, telemetry, commands, pictures of two views and the scene."""
+    """Sending halves of both sides: haptics, telemetry, commands, pictures of two views and the scene."""
 
     def __init__(self, out: Way, back: Way, drift: float) -> None:
         self.ran = Ran()
@@ -108,7 +108,7 @@ class _Sides:
         return True
 
     def take(self, now_s: float) -> None:
-        """Take in what arrives at either side."""
+        """Receive the arrivals at both sides."""
         for kind, content in self._out.pop(now_s):
             if kind == "haptics":
                 self.ran.delays_s.append((content.header.sent_s, now_s - content.header.sent_s))
@@ -123,7 +123,7 @@ class _Sides:
         self.ran.budget.hear(self._robot.outgoing, now_s)
 
     def feel(self, now_s: float) -> None:
-        """Send what leaves at once."""
+        """Send haptics, telemetry and commands."""
         budget = self.ran.budget
         if self._due("haptics", max(_HAPTICS_S, budget.haptic_interval_s), now_s):
             budget.spend("haptics", 200, now_s)
@@ -134,7 +134,7 @@ class _Sides:
             self._back.push(now_s, Watch(self._operator.stamp(self._there_s(now_s))), 100)
 
     def show(self, now_s: float) -> None:
-        """Make pictures and the scene where they would not wait."""
+        """Make pictures and the scene unless they would wait."""
         budget, giving_way = self.ran.budget, self.ran.giving_way
         step = giving_way.update(budget.left_bit_s, _VIEWS, now_s, eager=budget.controller.begins)
         for view in range(_VIEWS):
@@ -149,16 +149,16 @@ class _Sides:
             budget.offer("scene", b"s" * 1500, now_s)
 
     def leave(self, now_s: float) -> None:
-        """Send what the budget lets go."""
+        """Send the streams that the budget releases."""
         for stream, payload, is_piece in self.ran.budget.take(now_s):
             self._out.push(now_s, (stream, (is_piece, payload)), len(payload))
         self.ran.rates_bit_s.append(self.ran.budget.controller.rate_bit_s)
 
 
 def run(out: Way, back: Way, seconds: float, *, drift: float = 0.0, others_s: float = 0.0) -> Ran:
-    """Let it run, with pictures from 1 s on.
+    """Run both sides, with pictures from 1 s on.
 
-    drift: of the peer's clock. others_s: a bulk transfer keeps the queue that long, from 5 s on.
+    drift: of the peer's clock. others_s: queueing delay that a bulk transfer keeps up, from 5 s on.
     """
     sides = _Sides(out, back, drift)
     for turn in range(int(seconds / TURN_S)):

@@ -1,4 +1,4 @@
-"""The whole of it in virtual time: controller, budget, pieces and pictures that give way, before a bottleneck."""
+"""Controller, budget, pieces and pictures that give way, together before a bottleneck, in virtual time."""
 
 from itertools import pairwise
 

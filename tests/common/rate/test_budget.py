@@ -1,4 +1,4 @@
-"""The budget: what must go is never held back, what can wait keeps to the rate, and every whole arrives as it was."""
+"""Budget: urgent messages are never delayed, paced ones keep to the rate, and every whole arrives unchanged."""
 
 import numpy as np
 import pytest
@@ -64,7 +64,7 @@ def test_haptics_come_before_telemetry_and_that_before_pictures() -> None:
     for turn in range(400, 800, 20):
         budget.spend("haptics", 9000, 1e-3 * turn)
         told += budget.may_tell(200, 1e-3 * turn)
-    # At least five a second, so that the screen lives.
+    # At least five a second keep the screen alive.
     assert told == 2
 
 
@@ -138,7 +138,7 @@ def test_a_process_that_stood_still_halves_the_rate_at_most_once() -> None:
     for number in range(20):
         controller.sent(100, 0.01 * number, Urgency.MUST)
         controller.heard(Echo(0.01 * number, 50.0 + 0.01 * number, 0.0), 0.02 + 0.01 * number)
-    # All that was sent meanwhile is read at once.
+    # All messages sent meanwhile are read at once.
     for number in range(20, 40):
         controller.heard(Echo(0.01 * number, 50.4, 0.4 - 0.01 * number), 0.42)
     assert controller.rate_bit_s >= 4e6
@@ -150,7 +150,7 @@ def test_a_start_outside_of_the_bounds_is_refused() -> None:
 
 
 @given(st.integers(0, 2**32))
-def test_who_makes_one_only_where_none_waits_never_sees_one_give_way(seed: int) -> None:
+def test_a_picture_made_only_while_none_waits_never_gives_way(seed: int) -> None:
     chance = np.random.default_rng(seed)
     budget, under_way, stands_until_ms = Budget[str](("video", "scene")), dict[int, int](), 0
     for now_ms in range(2000):

@@ -1,4 +1,4 @@
-"""Pieces: whole again in any order, and nothing of what is hostile or incomplete."""
+"""Pieces: joined in any order, and rejected if hostile or incomplete."""
 
 import random
 

@@ -1,4 +1,4 @@
-"""A loop that does not keep its period is told why, once a run: in virtual time, with what a machine would count."""
+"""A loop that misses its period reports the reason, once a run: in virtual time, with a machine's counters."""
 
 import pytest
 
@@ -13,7 +13,7 @@ HELPS = {"physics": "fewer bodies", "sensing": "fewer objects", "": "a faster ma
 
 
 class Loop:
-    """Turns that take what a test says; `waited` and `stolen`: what the machine takes meanwhile, None for unknown."""
+    """Loop with turns of given durations; `waited` and `stolen`: the machine's share meanwhile, None for unknown."""
 
     def __init__(self, *, waited: float | None = 0.0, stolen: float | None = 0.0) -> None:
         self.wall, self.processor = VirtualClock(100.0), VirtualClock(7.0)
@@ -37,7 +37,7 @@ class Loop:
     def run(
         self, for_s: float, computes_s: float, lasts_s: float | None = None, *, physics: float = 0.0, every: int = 1
     ) -> None:
-        """Turns of which each `every`-th computes for so long, `physics` of it in physics, and lasts so long."""
+        """Run turns; each `every`-th computes for `computes_s`, `physics` of it in physics, and lasts `lasts_s`."""
         end_s, turn = self.wall.now() + for_s, 0
         while self.wall.now() < end_s:
             self.wall.advance_to(max(self.wall.now(), self.pacer.deadline_s))

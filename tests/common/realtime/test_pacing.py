@@ -53,7 +53,7 @@ def test_a_restart_begins_a_new_grid_and_keeps_the_counts() -> None:
 
 
 class Waiting:
-    """`wait` of sockets whose sleeps end late, in virtual time, and where a message may come."""
+    """`wait` of sockets in virtual time: sleeps end late, and a message may come."""
 
     def __init__(self, clock: VirtualClock, late_s: float = 0.0, message_s: float = math.inf) -> None:
         self.slept_s: list[float] = []
@@ -81,7 +81,7 @@ def test_a_wait_that_ends_early_is_taken_up_again() -> None:
     clock = VirtualClock()
     waiting = Waiting(clock)
     wait_for_turn(Pacer(PERIOD_S, PERIOD_S), clock, lambda timeout_s: waiting.wait(timeout_s / 2))
-    # Halves of what is left, instead of half a millisecond of a busy loop.
+    # Half of the remaining time each, instead of half a millisecond of a busy loop.
     assert len(waiting.slept_s) > 5
     assert sum(waiting.slept_s) == pytest.approx(PERIOD_S - 200e-6, abs=2e-6)
 

@@ -1,4 +1,4 @@
-"""What a turn's stages took, in virtual time."""
+"""Durations of a turn's stages, in virtual time."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from common.statistics import BLOCK
 
 
 class Both:
-    """A wall clock and a processor's, which a test moves on."""
+    """Wall clock and processor clock, advanced by a test."""
 
     def __init__(self) -> None:
         self.wall, self.processor = VirtualClock(), VirtualClock()
@@ -18,13 +18,13 @@ class Both:
         self.processor.advance_to(self.processor.now() + processor_s)
 
 
-def test_a_stage_adds_up_within_a_turn_and_starts_anew_in_the_next() -> None:
+def test_a_stage_adds_up_within_a_turn_and_restarts_in_the_next() -> None:
     clocks = Both()
     stages = Stages(("sockets", "law"), clocks.wall, clocks.processor, every=1)
     send, think = stages.timed("sockets", clocks.pass_), stages.timed("law", clocks.pass_)
     for _ in range(3):
         send(2e-6, 1e-6)
-    clocks.pass_(1.0, 1.0)  # is nobody's
+    clocks.pass_(1.0, 1.0)  # Belongs to no stage.
     think(10e-6, 8e-6)
     stages.end_turn()
     send(4e-6, 4e-6)
@@ -48,7 +48,7 @@ def test_turns_are_reckoned_with_in_blocks_and_none_is_lost() -> None:
     assert stages.spent_s[0] == pytest.approx((2 * BLOCK + 1) * 1e-6)
 
 
-def test_one_turn_in_so_many_is_looked_at_and_stands_for_them_all() -> None:
+def test_sampled_turns_are_scaled_up_to_all_turns() -> None:
     clocks = Both()
     stages = Stages(("law",), clocks.wall, clocks.processor)
     think = stages.timed("law", clocks.pass_)

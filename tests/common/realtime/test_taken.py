@@ -1,4 +1,4 @@
-"""What Linux counts of a thread that had to wait."""
+"""Linux's counters of a thread that had to wait."""
 
 from pathlib import Path
 

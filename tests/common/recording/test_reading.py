@@ -1,4 +1,4 @@
-"""A recording's bytes: blocks of entries, Foxglove's messages, a file cut anywhere, and a disk that is full."""
+"""Bytes of a recording: blocks of entries, Foxglove's messages, a file cut anywhere, and a full disk."""
 
 import json
 import os
@@ -27,7 +27,7 @@ BLOCKS_A_SECOND = 20
 
 
 def write_short(path: Path) -> list[int]:
-    """A file of five seconds; where each second's chunk ends in it."""
+    """Write a file of five seconds; return the end of each second's chunk."""
     file = RecordingFile(path, 1.7e9)
     content, ends = Content(file), []
     generator = np.random.default_rng(0)
@@ -78,7 +78,7 @@ def test_a_file_cut_at_any_byte_opens_up_to_its_last_complete_second(
     cuts = np.random.default_rng(1).integers(0, len(content), 1000).tolist()
     for cut in (*cuts, *ends, *(end - 1 for end in ends)):
         path.write_bytes(content[:cut])
-        # Indexes follow a chunk; they are no part of what a second needs.
+        # Indexes follow a chunk; no second needs them.
         complete = sum(end <= cut for end in ends)
         try:
             found = blocks(path)
@@ -213,7 +213,7 @@ def test_a_full_disk_is_kept_as_an_error_and_nothing_else_is_said(
     assert file.error is not None
     assert 0 < file.kept_bytes == path.stat().st_size <= room
     assert "".join(capfd.readouterr()) == ""
-    # Outside of a test, who logs with nobody set up to hear it speaks on stderr.
+    # Without a configured handler, logging would write to stderr outside a test.
     assert caplog.records == []
 
 

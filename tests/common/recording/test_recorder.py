@@ -1,4 +1,4 @@
-"""The recorder's process: whoever is killed, and whatever is full, what was complete stays."""
+"""Recorder's process: complete seconds survive a killed process and a full disk."""
 
 import os
 import resource
@@ -22,7 +22,7 @@ LIMIT_S = 30.0
 
 
 class Bytes:
-    """An encoder of notes that are bytes already."""
+    """Encoder of notes that are bytes already."""
 
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
         del views
@@ -30,7 +30,7 @@ class Bytes:
         return now_s, entry(Kind.REPORT, now_s, content)
 
     def begin_anew(self) -> None:
-        """Nothing depends on what came before."""
+        """Do nothing: no note depends on an earlier one."""
 
 
 def recording_to(path: Path, side: str = "robot") -> SideRecording:
@@ -45,7 +45,7 @@ def numbers(path: Path, side: str = "robot") -> list[int]:
 
 
 def note_until(recording: SideRecording, done: Callable[[], bool], size: int = 8) -> tuple[int, list[str]]:
-    """Note numbers, in real time, until `done`; how many, and what was said."""
+    """Note numbers, in real time, until `done`; return their count and the messages."""
     clock = MonotonicClock()
     end_s, count, said = clock.now() + LIMIT_S, 0, []
     while not done():
@@ -81,9 +81,9 @@ def test_a_side_that_is_killed_loses_nothing_that_it_handed_over(tmp_path: Path)
     count, _ = note_until(recording, lambda: kept_s(recording) > 0.0)
     recording.idle(float("inf"))
     assert recording._recorder is not None
-    while recording._channel.waiting:  # what has not left the process dies with it
+    while recording._channel.waiting:  # A message that has not left the process dies with it.
         recording._channel.flush()
-    # All that the system does for a process that is killed is to close what it had open.
+    # For a killed process the system does no more than close its descriptors.
     recording._recorder.close()
     assert open_recording(path).whole
     assert numbers(path) == list(range(count))
@@ -96,7 +96,7 @@ def test_a_recorder_that_is_killed_leaves_all_but_the_last_second(tmp_path: Path
     assert recording._recorder is not None
     kept_before_s = kept_s(recording)
     os.kill(recording._recorder.process_id, signal.SIGKILL)
-    # The side goes on, and says once what has become of the recording.
+    # The side continues, and reports once what became of the recording.
     _, said = note_until(recording, lambda: recording._channel.ended)
     said += recording.idle(0.0)
     assert [text for text in said if "the recorder is gone" in text] == said
@@ -133,7 +133,7 @@ def test_two_sides_share_one_file(tmp_path: Path) -> None:
     robot, operator = recording_to(place), recording_to(place, "operator")
     counts = [note_until(one, lambda one=one: kept_s(one) > 0.0)[0] for one in (robot, operator)]  # type: ignore[misc]
     assert operator.close()["error"] is None
-    # One that is through says nothing about the other.
+    # A finished side is independent of the other.
     more, _ = note_until(robot, lambda: kept_s(robot) > FLUSH_PERIOD_S)
     robot.close()
     figures = recorder.finish()

@@ -1,4 +1,4 @@
-"""Peers that speak, flood, leave and are revoked: a state machine over the robot side's end, and a crowd's limits."""
+"""Peers that speak, flood, leave and are revoked: a state machine over the robot side's end; and a crowd's limits."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -20,28 +20,28 @@ from common.sockets.turns import SILENCE_S, Offered, routing_id
 from tests.helpers.socket_talk import EPHEMERAL
 
 LIMIT = 8
-"""Messages of a key in a second, in the machine, so that floods are short."""
+"""Messages of a key in a second, in the machine; few, so that floods are short."""
 KEYS = ("anna's", "ben's")
 GROUP = b"\x01" + b"a group of ours"
-"""As `new_group` makes them, and the same in each run, as is the order of what follows."""
+"""Group as of `new_group`, but fixed, so that each run has the same order."""
 NAMES = (routing_id(GROUP, 0), routing_id(GROUP, 1), b"raw")
 DESCRIPTORS = (10_000, 10_001, 10_002)
 
 
 @dataclass(eq=False)
 class Line:
-    """A connection, open or not."""
+    """Connection, open or not."""
 
     name: bytes
     key: str
     descriptor: int
     heard_s: float = 0.0
     seen: bool = False
-    """Whether a message of it was read while the gates had told everything."""
+    """Whether a message of the line was read after the gates had reported everything."""
     by_another: bool = True
-    """Whether it came by another descriptor than the one before by its routing id."""
+    """Whether its descriptor differs from that of the last line with its routing id."""
     known: bool = False
-    """Whether it was told then from the one before by its routing id."""
+    """Whether it was then distinguished from the last line with its routing id."""
 
     @property
     def peer(self) -> bytes:
@@ -51,8 +51,8 @@ class Line:
 class Connections(RuleBasedStateMachine):
     """Peers that come, speak, flood, leave and are revoked; a message may be read long after its sender left.
 
-    Who comes by a routing id that is in use takes it over, be it with another key. `unseen` is what ZeroMQ has told
-    and the gates have not heard yet; when they are `late` they hear nothing.
+    A newcomer takes over a routing id in use, even with another key. `unseen`: ZeroMQ's events that the gates have not
+    received yet; while the gates are `late` they receive none.
     """
 
     def __init__(self) -> None:
@@ -108,7 +108,7 @@ class Connections(RuleBasedStateMachine):
         comes=st.booleans(),
     )
     def leave_or_come(self, descriptor: int, name: bytes, key: str, comes: bool) -> None:
-        """The owner of the descriptor leaves; the next one may have it at once."""
+        """End the descriptor's owner; the next connection may have the descriptor at once."""
         if descriptor in self.open:
             self.leave(descriptor)
         if comes:
@@ -125,7 +125,7 @@ class Connections(RuleBasedStateMachine):
         self.second += 1
 
     def speakers(self) -> list[Line]:
-        """ZeroMQ reads from the newest by each routing id, also what it said before it left."""
+        """Return the newest line of each routing id, from which ZeroMQ reads, also after it left."""
         return [line for line in self.newest.values() if self.is_open(line) or line.seen]
 
     def is_open(self, line: Line) -> bool:
@@ -134,7 +134,7 @@ class Connections(RuleBasedStateMachine):
     @precondition(lambda self: self.speakers())
     @rule(data=st.data(), count=st.sampled_from([LIMIT + 1, 3, 1]), late=st.booleans())
     def speak(self, data: st.DataObject, count: int, late: bool) -> None:
-        """Messages of one connection are read."""
+        """Read messages of one connection."""
         self.late = late
         line = data.draw(st.sampled_from(self.speakers()))
         properties = {"User-Id": line.key, int(zmq.SRCFD): line.descriptor}
@@ -148,7 +148,7 @@ class Connections(RuleBasedStateMachine):
         self.spoken[line.key, self.second] += count
         before, self.heard[line.name] = self.heard.get(line.name, line), line
         line.seen |= self.robot._all_seen
-        # Who comes back by the same descriptor is not told from who left messages behind, until they are too many.
+        # A peer back on the same descriptor cannot be told from a sender that left messages, until they are too many.
         line.by_another &= before is line or before.descriptor != line.descriptor
         line.known |= self.robot._all_seen and line.by_another
         line.heard_s = float(self.second) if admitted else before.heard_s if before.key == line.key else 0.0
@@ -166,7 +166,7 @@ class Connections(RuleBasedStateMachine):
             self.tell(name)
 
     def tell(self, peer: bytes) -> None:
-        """It gets its messages by the routing ids that it was heard by last: all of them, or the next one.
+        """Send to the routing ids that a peer was last heard by: all of them, or the next one.
 
         One that has been silent for longer may get a copy.
         """
@@ -191,10 +191,10 @@ TestConnections = Connections.TestCase
 TestConnections.settings = settings(max_examples=200, stateful_step_count=30, phases=[Phase.explicit, Phase.generate])
 
 
-def test_who_has_the_descriptor_of_a_sender_that_was_gone_before_it_was_read_stays(
+def test_the_new_owner_of_a_departed_senders_descriptor_stays(
     robot: RobotSockets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It may be anybody's: of a viewer, say, whom the control port knows nothing of."""
+    """The descriptor may be another's by now, for example a viewer's, unknown to the control port."""
     ended: list[int] = []
     monkeypatch.setattr(robot_sockets, "shut_down", ended.append)
     monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 0)
@@ -222,7 +222,7 @@ def test_a_flooding_stranger_takes_nothing_from_the_operator_or_from_other_stran
         assert seen(admission, *crowd) == [], "however often one receives within the tick"
 
 
-def test_of_a_crowd_the_oldest_newcomer_goes_and_who_was_introduced_stays() -> None:
+def test_a_crowd_loses_its_oldest_newcomer_and_keeps_introduced_peers() -> None:
     crowd = Crowd(limit=3, introduced_s=2.0)
     for descriptor in (0, 1, 2):
         crowd.came(descriptor, 0.0)

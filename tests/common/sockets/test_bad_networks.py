@@ -1,4 +1,4 @@
-"""Networks that swallow what is sent, and names that nobody resolves: neither keeps a link down, or slows the other."""
+"""Networks that swallow packets, and names that do not resolve: neither ends a link or slows the other."""
 
 import socket
 import threading
@@ -18,7 +18,7 @@ _SYN_SENT = "02"
 
 @pytest.fixture
 def deaf_port() -> Iterator[int]:
-    """A port that answers nobody: its queue of one is full, and Linux drops whoever comes after."""
+    """Yield a port that answers nobody: its queue of one is full, and Linux drops newcomers."""
     with ExitStack() as stack:
         listener = stack.enter_context(socket.create_server(("127.0.0.1", 0), backlog=0))
         for _ in range(3):
@@ -29,13 +29,13 @@ def deaf_port() -> Iterator[int]:
 
 
 def attempts(port: int) -> set[str]:
-    """The local ends of the connections to `port` that are being tried now."""
+    """Return the local ends of the connection attempts to `port`."""
     rows = (line.split() for line in Path("/proc/net/tcp").read_text(encoding="ascii").splitlines()[1:])
     return {row[1] for row in rows if row[3] == _SYN_SENT and row[2].endswith(f":{port:04X}")}
 
 
 def test_an_attempt_that_nobody_answers_is_given_up(deaf_port: int) -> None:
-    seen = attempts(deaf_port)  # the last filler's
+    seen = attempts(deaf_port)  # The last filler's attempt.
     with OperatorSockets(f"tcp://127.0.0.1:{deaf_port}", "tcp://127.0.0.1:9") as operator:
         before = len(seen)
         for _ in range(ROUNDS // 2):
@@ -47,7 +47,7 @@ def test_an_attempt_that_nobody_answers_is_given_up(deaf_port: int) -> None:
 
 
 def test_control_and_view_are_served_by_threads_of_their_own() -> None:
-    # Resolving a name holds up the thread that does it, as long as a name server does not answer.
+    # Resolving a name blocks its thread while a name server does not answer.
     with RobotSockets(EPHEMERAL) as robot, OperatorSockets(robot.control_endpoint, robot.view_endpoint) as operator:
         for end, parts in ((robot, [robot._control]), (operator, [way.part for way in operator._connections])):
             assert end._context.get(zmq.IO_THREADS) == 2

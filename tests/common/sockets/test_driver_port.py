@@ -1,4 +1,4 @@
-"""The port for a driver, over real sockets on loopback."""
+"""Port for a driver, over real sockets on loopback."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def driver(context: "zmq.Context[zmq.Socket[bytes]]", port: DriverPort, name: by
 
 
 def heard(port: DriverPort) -> list[tuple[bytes, bytes]]:
-    """What comes next."""
+    """Return the next messages."""
     for _ in range(_ROUNDS):
         port.wait(0.01)
         if found := port.receive():
@@ -74,7 +74,7 @@ def test_beyond_this_machine_it_asks_for_keys_in_the_words_of_the_control_port(f
         DriverPort("here", flag, LIMIT_BYTES)
 
 
-def test_with_keys_only_who_is_allowed_gets_in_and_who_is_revoked_is_not_heard(tmp_path: Path) -> None:
+def test_with_keys_only_allowed_peers_get_in_and_revoked_ones_are_not_heard(tmp_path: Path) -> None:
     folder, (public, secret), (mine, own) = KeyFolder(tmp_path), make_key_pair(), make_key_pair()
     folder.write_pair("robot", public, secret)
     folder.allow("driver", mine)
@@ -121,7 +121,7 @@ def test_a_key_that_is_allowed_while_the_robot_side_waits_gets_in(tmp_path: Path
         assert told == [f"refused an unknown key; to let it in: {folder.command(f'allow NAME {public}')}"]
         folder.allow("driver", public)
         assert port.refresh_keys() == []
-        # ZeroMQ gives up a connection that was refused.
+        # ZeroMQ does not retry a refused connection.
         part.disconnect(port.endpoint)
         part.connect(port.endpoint)
         part.send(b"state")

@@ -1,4 +1,4 @@
-"""What the sockets make of addresses: which are refused, in what words, and what follows from the given ones."""
+"""Addresses of the sockets: refusals and their words, and the ports derived from given addresses."""
 
 import re
 from collections.abc import Callable
@@ -30,7 +30,7 @@ def test_the_view_follows_the_control_port() -> None:
         try:
             robot = RobotSockets(control)
         except ConfigurationError:
-            continue  # another program has one of the two ports
+            continue  # Another program has one of the two ports.
         with robot, OperatorSockets(control) as operator:
             assert port_of(robot.view_endpoint) == port_of(control) + 1
             publish_until_seen(robot, operator, b"telemetry")

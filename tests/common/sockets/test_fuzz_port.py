@@ -1,4 +1,4 @@
-"""Strangers at the open port, by raw TCP: whatever they do, the operator is heard and nothing piles up."""
+"""Strangers at the open port, by raw TCP: the operator is always heard and nothing accumulates."""
 
 import contextlib
 import os
@@ -32,7 +32,7 @@ def operator(robot: RobotSockets) -> Iterator[OperatorSockets]:
 
 
 def is_heard(robot: RobotSockets, operator: OperatorSockets) -> bool:
-    """Whether a message of the operator arrives and one goes back, whatever else is received meanwhile."""
+    """Return whether an operator's message arrives and an answer returns, whatever else is received."""
     for _ in range(ROUNDS):
         operator.send(b"operator")
         robot.wait(0.01)
@@ -49,7 +49,7 @@ def stranger(robot: RobotSockets) -> RawConnection:
 
 
 def drain(robot: RobotSockets, limit_s: float = 0.1) -> list[bytes]:
-    """What comes within `limit_s`, and then until nothing does for a moment."""
+    """Return the messages within `limit_s`, and then until none comes for a moment."""
     received: list[bytes] = []
     while robot.wait(0.1 if received else limit_s):
         received += [payload for _, payload in robot.receive()]
@@ -57,7 +57,7 @@ def drain(robot: RobotSockets, limit_s: float = 0.1) -> list[bytes]:
 
 
 class StandingClock(MonotonicClock):
-    """For what is counted in each second."""
+    """Clock at 0 s, so that everything falls into one second."""
 
     def now(self) -> float:
         return 0.0
@@ -114,7 +114,7 @@ def test_a_connection_that_never_introduces_itself_is_ended(monkeypatch: pytest.
         assert all(connection.ended() for connection in slow)
 
 
-def test_a_crowd_is_hung_up_on_and_who_is_in_stays_in(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_crowd_is_hung_up_on_and_connected_peers_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
     with (
         RobotSockets(EPHEMERAL, heartbeat_timeout_s=PATIENT_S) as robot,
@@ -132,13 +132,13 @@ def test_a_crowd_is_hung_up_on_and_who_is_in_stays_in(monkeypatch: pytest.Monkey
         [told] = robot.news()
         assert "more than 20 connections at once" in told
         assert robot.news() == []
-        # One that is quick still gets in.
+        # A fast newcomer still gets in.
         with OperatorSockets(robot.control_endpoint, robot.view_endpoint, heartbeat_timeout_s=PATIENT_S) as late:
             assert is_heard(robot, late)
 
 
 def come_and_go(robot: RobotSockets, endpoint: str, count: int) -> None:
-    """That many strangers are accepted and leave again while the robot side looks at nothing."""
+    """Let `count` strangers connect and leave while the robot side reads nothing."""
     before = descriptors()
     crowd = [RawConnection(port_of(endpoint)) for _ in range(count)]
     assert any(descriptors() >= before + 2 * count for _ in range(ROUNDS) if not robot.wait(0.01))
@@ -156,7 +156,7 @@ def test_a_crowd_that_has_left_before_anybody_looked_is_nothing(monkeypatch: pyt
         assert robot.crowded == 0
 
 
-def test_nobody_is_hung_up_on_for_a_stranger_whose_descriptor_they_have(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_new_owner_of_a_strangers_descriptor_is_not_hung_up_on(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robot_sockets, "MOST_CONNECTIONS", 20)
     monkeypatch.setattr(robot_sockets, "_EVENTS_PER_CALL", 10)
     hung_up: list[int] = []
@@ -171,7 +171,7 @@ def test_nobody_is_hung_up_on_for_a_stranger_whose_descriptor_they_have(monkeypa
             assert robot._all_seen
 
 
-def test_what_is_no_connection_any_more_is_left_alone() -> None:
+def test_an_ended_connection_is_left_alone() -> None:
     reading, writing = os.pipe()
     shut_down(reading)
     os.close(writing)
@@ -180,7 +180,7 @@ def test_what_is_no_connection_any_more_is_left_alone() -> None:
     shut_down(reading)
 
 
-def test_who_comes_back_by_the_same_name_is_no_stranger(robot: RobotSockets) -> None:
+def test_a_peer_back_under_its_name_is_no_stranger(robot: RobotSockets) -> None:
     before = descriptors()
     for _ in range(2):
         with zmq.Context() as context, context.socket(zmq.DEALER) as dealer:
@@ -230,7 +230,7 @@ def test_a_message_of_too_many_frames_is_dropped_in_bounded_steps(
 
 
 def within_one_second(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let all happen within the same second of its clock, however long it takes."""
+    """Keep everything within the same second of the robot's clock, however long it takes."""
     monkeypatch.setattr(robot, "_second", 0)
     monkeypatch.setattr(robot, "_clock", StandingClock())
 
@@ -253,7 +253,7 @@ def test_a_peer_that_floods_is_cut_off_and_the_operator_is_not(
     assert is_heard(robot, operator)
 
 
-def test_who_sends_more_than_twenty_operators_floods(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sending_more_than_twenty_operators_floods(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
     within_one_second(robot, monkeypatch)
     most = round(20 / MOTION_PERIOD_S)
     with contextlib.closing(stranger(robot)) as connection:

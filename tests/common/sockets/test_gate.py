@@ -1,11 +1,11 @@
-"""A gate that is closed before the socket it watches."""
+"""A gate closed before the socket that it watches."""
 
 import zmq
 
 from common.sockets.gate import Gate
 
 
-def test_who_comes_after_the_gate_was_closed_is_served() -> None:
+def test_a_connection_after_the_gates_closing_is_served() -> None:
     with zmq.Context() as context, context.socket(zmq.REP) as server, context.socket(zmq.REQ) as client:
         gate = Gate(context, server, most=4, introduced_s=1.0, unsent_bytes=1024)
         server.bind("tcp://127.0.0.1:0")

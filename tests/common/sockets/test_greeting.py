@@ -1,4 +1,4 @@
-"""What is taken for a ZeroMQ peer's first words."""
+"""First bytes of a connection that count as a ZeroMQ peer's."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""How seldom a turn asks ZeroMQ, and that nothing is overlooked for it. Nothing here sleeps."""
+"""Queries of ZeroMQ in a turn: few, and nothing is overlooked. Nothing here sleeps."""
 
 import select
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from tests.helpers.socket_talk import PATIENT_S, greet, publish_until_seen
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """Who was asked for EVENTS, in turn."""
+    """List of the sockets that were asked for EVENTS, in order."""
     those: list[Any] = []
     really = readable_now
 
@@ -40,17 +40,17 @@ def pair() -> Iterator[tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"]]:
 
 
 def signal_of(inbox: Inbox) -> bool:
-    """Whether its descriptor signals within a bounded time."""
+    """Return whether the inbox's descriptor signals within a bounded time."""
     return bool(select.select([inbox.descriptor], [], [], PATIENT_S)[0])
 
 
 def settle(inbox: Inbox) -> None:
-    """Until the connection is made, and neither EVENTS nor the descriptor has news."""
+    """Read until the connection is made, and neither EVENTS nor the descriptor has news."""
     while select.select([inbox.descriptor], [], [], 0.0)[0] or inbox.has_some():
         list(inbox.read())
 
 
-def test_who_has_nothing_is_asked_once(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"], asked: list[Any]) -> None:
+def test_an_empty_socket_is_asked_once(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"], asked: list[Any]) -> None:
     inbox = Inbox(pair[0], frames=1)
     pair[1].send(b"hello")
     assert signal_of(inbox)
@@ -83,7 +83,7 @@ def test_a_signal_that_another_use_took_is_no_message_lost(
     list(inbox.read())
     theirs.send(b"second")
     assert signal_of(inbox)
-    while not int(ours.getsockopt(zmq.EVENTS)) & zmq.POLLIN:  # as sending does
+    while not int(ours.getsockopt(zmq.EVENTS)) & zmq.POLLIN:  # As sending does.
         assert signal_of(inbox)
     assert not inbox.has_some(), "nothing signals any more: without `used` it is overlooked"
     inbox.used()
@@ -91,10 +91,10 @@ def test_a_signal_that_another_use_took_is_no_message_lost(
     assert [frame.bytes for message in inbox.read() for frame in message] == [b"second"]
 
 
-def test_what_had_come_before_is_found(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"]) -> None:
+def test_earlier_messages_are_found(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"]) -> None:
     ours, theirs = pair
     theirs.send(b"early")
-    while not int(ours.getsockopt(zmq.EVENTS)) & zmq.POLLIN:  # which takes the signal
+    while not int(ours.getsockopt(zmq.EVENTS)) & zmq.POLLIN:  # Takes the signal.
         assert ours.poll(round(1e3 * PATIENT_S))
     assert Inbox(ours, frames=1).has_some()
 
@@ -102,7 +102,7 @@ def test_what_had_come_before_is_found(pair: tuple["zmq.Socket[bytes]", "zmq.Soc
 def test_a_turn_drains_once_and_asks_each_socket_three_times_at_most(
     robot: RobotSockets, operator: OperatorSockets, asked: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Both ends send and hear a message a turn: EVENTS after sending, for what has come, and for the end of it."""
+    """Both ends send and receive a message a turn: EVENTS after sending, for arrivals, and for their end."""
     peer = greet(robot, operator)
     selects: list[int] = []
     really = select.select
@@ -129,6 +129,6 @@ def test_a_turn_drains_once_and_asks_each_socket_three_times_at_most(
             most, *(asked.count(part) for part in (robot._control, *(way.part for way in operator._connections)))
         )
         assert operator._view not in asked, "whose descriptor says nothing"
-    # ZeroMQ may signal for its own affairs, such as a pipe that has room again: then one is asked once more.
+    # ZeroMQ may signal for its own affairs, such as a pipe with room again: this costs one more query.
     assert most <= 4
     assert len(selects) <= 2 * waits

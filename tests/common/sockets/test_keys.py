@@ -1,4 +1,4 @@
-"""The folder of keys: what is written, who may read it, and what is refused in one line."""
+"""Folder of keys: its content, its readers, and refusals in one line."""
 
 import errno
 import os
@@ -26,7 +26,7 @@ def folder(tmp_path: Path) -> KeyFolder:
 
 @pytest.fixture
 def allowed(folder: KeyFolder) -> AllowList:
-    """It has read that anna is let in."""
+    """Return a list that has read anna's key."""
     folder.allow("anna", KEY)
     found = AllowList(folder)
     found.refresh()
@@ -148,7 +148,7 @@ def test_the_next_command_is_named_where_a_key_is_missing(folder: KeyFolder) -> 
 # The list while it is in use
 
 
-def test_a_running_side_notices_who_came_and_who_went(folder: KeyFolder) -> None:
+def test_a_running_side_notices_added_and_removed_keys(folder: KeyFolder) -> None:
     allowed = AllowList(folder)
     assert allowed.refresh() == set()
     folder.allow("anna", KEY)
@@ -206,7 +206,7 @@ def test_a_file_that_vanishes_while_it_is_looked_at_throws_nobody_else_out(
 ) -> None:
     folder.allow("ben", OTHER)
     allowed.refresh()
-    folder.allow("carl", "ef" * 32)  # so that the list is read anew
+    folder.allow("carl", "ef" * 32)  # So that the list is read again.
 
     def read_late(path: Path, largest_bytes: int) -> bytes:
         folder.peer_path("anna").unlink(missing_ok=True)
@@ -221,7 +221,7 @@ def test_a_file_that_vanishes_while_it_is_looked_at_throws_nobody_else_out(
 
 @pytest.mark.parametrize("number", [errno.EMFILE, errno.ENFILE, errno.ENOMEM])
 @pytest.mark.parametrize("where", ["iterdir", "open"])
-def test_who_was_let_in_stays_in_when_nothing_can_be_opened(
+def test_allowed_keys_stay_allowed_when_no_file_can_be_opened(
     folder: KeyFolder, allowed: AllowList, monkeypatch: pytest.MonkeyPatch, where: str, number: int
 ) -> None:
     folder.allow("ben", OTHER)

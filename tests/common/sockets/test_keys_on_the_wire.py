@@ -1,4 +1,4 @@
-"""CURVE over real sockets on loopback: who gets in, who does not, and who is thrown out while running."""
+"""CURVE over real sockets on loopback: peers that get in, stay out, and are disconnected while running."""
 
 import errno
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ EPHEMERAL = "tcp://127.0.0.1:0"
 PATIENT_S = 20.0
 LIMIT_S = 600.0
 REFUSAL_S = 0.5
-"""Long for a handshake on loopback: who has said nothing by then was not let in."""
+"""Time in seconds after which a silent peer was not let in: long for a handshake on loopback."""
 
 
 @dataclass
@@ -52,7 +52,7 @@ def robot(tmp_path: Path) -> Iterator[Robot]:
 
 @dataclass
 class Seen:
-    """What came through within some time."""
+    """Messages that got through within some time."""
 
     at_robot: list[tuple[bytes, bytes]]
     control: list[bytes]
@@ -60,7 +60,7 @@ class Seen:
 
 
 def exchange(robot: Robot, operator: OperatorSockets, limit_s: float, *, until_both: bool) -> Seen:
-    """Both send and receive for `limit_s`, or until control and view have come through."""
+    """Send and receive on both ends for `limit_s`, or until control and view got through."""
     clock = MonotonicClock()
     end_s = clock.now() + limit_s
     seen = Seen([], [], [])
@@ -87,7 +87,7 @@ def stays_out(robot: Robot, operator: OperatorSockets, limit_s: float = REFUSAL_
 
 
 def stays_out_and_says(robot: Robot, operator: OperatorSockets, text: str) -> bool:
-    """Nothing comes through while the operator side finds out, however long a busy machine takes, and says so."""
+    """Return whether the operator side reports `text` while nothing gets through, however slow the machine."""
     clock = MonotonicClock()
     end_s = clock.now() + LIMIT_S
     while clock.now() < end_s and stays_out(robot, operator, 0.1):
@@ -158,12 +158,12 @@ def test_nobody_gets_in_while_nobody_serves_the_handshakes(robot: Robot) -> None
 
 def test_a_revoked_key_is_cut_off_from_control_and_view_and_others_see_on(robot: Robot) -> None:
     with robot.operator("anna") as anna, robot.operator("ben") as ben:
-        # Anna alone has sent so far, so that the first peer is hers.
+        # Only anna has sent so far, so that the first peer is hers.
         anna_peer = exchange(robot, anna, LIMIT_S, until_both=True).at_robot[0][0]
         assert gets_in(robot, ben)
         robot.folder.revoke("anna")
         robot.sockets.refresh_keys()
-        # What was on its way before the revocation may still stand in her own buffers.
+        # Messages sent before the revocation may still be in her own buffers.
         anna.receive(), anna.receive_view()
         clock = MonotonicClock()
         end_s = clock.now() + LIMIT_S
@@ -197,7 +197,7 @@ def test_an_operator_that_has_left_can_be_revoked(robot: Robot) -> None:
         assert gets_in(robot, ben)
 
 
-def test_a_view_that_cannot_be_opened_anew_is_tried_again(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_view_that_cannot_be_reopened_is_tried_again(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     def short(*_: object) -> None:
         raise zmq.ZMQError(errno.EMFILE)
 
@@ -212,7 +212,7 @@ def test_a_view_that_cannot_be_opened_anew_is_tried_again(robot: Robot, monkeypa
             robot.sockets.publish(b"telemetry", b"state")
         robot.sockets.refresh_keys()
         assert gets_in(robot, ben)
-        exchange(robot, anna, 0.1, until_both=False)  # what was under way
+        exchange(robot, anna, 0.1, until_both=False)  # Messages under way.
         assert stays_out(robot, anna)
 
 

@@ -1,4 +1,4 @@
-"""Several connections of one peer: in turn, everywhere, broken off, taken over, and not read any more."""
+"""Several connections of one peer: used in turn or together, broken, taken over, and no longer read."""
 
 import fcntl
 import socket
@@ -50,7 +50,7 @@ class Fed(Way):
 
 
 @given(answers=st.lists(st.sampled_from([Offered.TAKEN, Offered.FULL]), min_size=1, max_size=16))
-def test_each_takes_its_turn_and_who_is_full_is_passed_over(answers: list[Offered]) -> None:
+def test_connections_take_turns_and_a_full_one_is_passed_over(answers: list[Offered]) -> None:
     turns: Turns[Fed] = Turns(Fed.offered)
     turns.ways.extend(Fed(answer=answer) for answer in answers)
     able = answers.count(Offered.TAKEN)
@@ -62,7 +62,7 @@ def test_each_takes_its_turn_and_who_is_full_is_passed_over(answers: list[Offere
     assert sum(way.taken for way in turns.ways) == 4 * able
 
 
-def test_who_was_full_is_tried_again_before_long() -> None:
+def test_a_full_connection_is_tried_again_soon() -> None:
     turns: Turns[Fed] = Turns(Fed.offered)
     turns.ways.append(only := Fed(answer=Offered.FULL))
     assert not turns.send(b"newest", 1.0, everywhere=False)
@@ -71,8 +71,8 @@ def test_who_was_full_is_tried_again_before_long() -> None:
     assert turns.send(b"newest", 1.0015, everywhere=False)
 
 
-def test_who_is_silent_gets_a_copy_twice_a_second_and_is_back_once_heard() -> None:
-    """Both ends pass over what is silent: without it a connection that came back late would stay so on both."""
+def test_a_silent_connection_gets_a_copy_twice_a_second_and_returns_once_heard() -> None:
+    """Both ends pass over silent connections: without copies, one that came back late would stay silent on both."""
     turns: Turns[Fed] = Turns(Fed.offered)
     lively, silent = Fed(), Fed()
     turns.ways.extend((lively, silent))
@@ -89,7 +89,7 @@ def test_who_is_silent_gets_a_copy_twice_a_second_and_is_back_once_heard() -> No
     assert silent.taken == 5 + 5
 
 
-def test_who_has_long_been_silent_is_passed_over_until_the_others_are_gone() -> None:
+def test_a_long_silent_connection_is_passed_over_until_the_others_are_gone() -> None:
     turns: Turns[Fed] = Turns(Fed.offered)
     turns.ways.extend([silent := Fed(), heard := Fed()])
     turns.heard(silent, 1.0)
@@ -105,7 +105,7 @@ def test_who_has_long_been_silent_is_passed_over_until_the_others_are_gone() -> 
 
 
 @given(name=st.binary(max_size=20))
-def test_only_what_we_name_is_grouped(name: bytes) -> None:
+def test_only_our_own_names_are_grouped(name: bytes) -> None:
     ours = len(name) == 17 and name[0] == 1 and name[16] < MOST_CONNECTIONS_EACH
     assert group_of(name) == (name[:16] if ours else name)
     group = new_group()
@@ -176,7 +176,7 @@ def test_a_taken_over_routing_id_gives_another_key_neither_the_group_nor_its_ans
             )
         )
         peer = greet(robot, anna)
-        # Nobody but anna and the robot side can know it: the handshake hides it.
+        # Only anna and the robot side can know it: the handshake hides it.
         stolen = min(robot._peers.connections)
         context = stack.enter_context(zmq.Context())
         ben = stack.enter_context(context.socket(zmq.DEALER))
@@ -202,7 +202,7 @@ def test_a_taken_over_routing_id_gives_another_key_neither_the_group_nor_its_ans
         assert robot.send(claimed, b"ben's")
         assert ben.poll(round(1e3 * PATIENT_S))
         assert ben.recv() == b"ben's", "nothing of anna's came before"
-        # Anna's connection was ended with it, so that she takes her place again.
+        # Anna's connection was ended, too, so that she takes her place again.
         for _ in range(ROUNDS):
             anna.send(b"anna")
             robot.wait(0.01)
@@ -228,16 +228,16 @@ def test_an_operator_of_sixteen_connections_stays_in_in_a_crowd(monkeypatch: pyt
         assert robot.send(peer, b"and heard")
 
 
-# Who does not read
+# Peers that do not read
 
 
 def unsent_bytes(descriptor: int) -> int:
-    """Bytes of a connection that the kernel holds and has not sent (SIOCOUTQNSD)."""
+    """Return the bytes of a connection that the kernel holds and has not sent (SIOCOUTQNSD)."""
     return int(struct.unpack("i", fcntl.ioctl(descriptor, 0x894B, bytes(4)))[0])
 
 
 def held_back(end: RobotSockets) -> list[int]:
-    """TCP_NOTSENT_LOWAT of this process's ends of the connections to both ports."""
+    """Return TCP_NOTSENT_LOWAT of this process's ends of the connections to both ports."""
     ports, marks = {port_of(end.control_endpoint), port_of(end.view_endpoint)}, []
     for descriptor in Path("/proc/self/fd").iterdir():
         try:
@@ -268,10 +268,10 @@ def test_the_kernel_holds_little_for_any_connection_of_either_side(
     assert held_back(robot) == expected
 
 
-def test_little_waits_for_who_stops_reading_and_others_lose_nothing(
+def test_little_waits_for_a_peer_that_stops_reading_and_others_lose_nothing(
     robot: RobotSockets, operator: OperatorSockets
 ) -> None:
-    """Both sides hold back: some messages and kilobytes for each connection, however long it goes on."""
+    """Both sides limit what waits: some messages and kilobytes for each connection, however long."""
     owner = greet(robot, operator)
     group, receive_bytes = new_group(), 4096
     port = port_of(robot.control_endpoint)

@@ -58,7 +58,7 @@ def test_a_minute_of_symmetric_jitter_averages_out(skew: float) -> None:
     there_s, back_s = np.abs(generator.normal(0.050, 0.010, (2, 15_000)))
     end_s = talk(offset, clock, there_s, back_s)
     assert offset.estimator == "mean"
-    assert abs(error_s(offset, clock, end_s)) < 0.37e-3  # what the mean of all offsets has, without skew
+    assert abs(error_s(offset, clock, end_s)) < 0.37e-3  # The error of the mean of all offsets, without skew.
     assert offset.skew == pytest.approx(skew, abs=15e-6)
 
 
@@ -90,7 +90,7 @@ def test_the_same_echo_many_times_and_in_any_order_is_one_sample() -> None:
         sent_s, slow = 0.01 * k, there_s > 0.055
         received_s = exchange(once, sent_s, there_s, 0.0, back_s, clock)
         exchange(often, sent_s, there_s, 0.0, back_s, clock)
-        # What took long is echoed eight times, by turns with the stamp before it.
+        # A slow message is echoed eight times, alternating with the stamp before it.
         for repeat in range(8 if slow and k else 0):
             later_s, before_s = 1e-4 * repeat, 0.01 * repeat % 0.02
             peer_sent_s = clock(sent_s + there_s + later_s)
@@ -101,7 +101,7 @@ def test_the_same_echo_many_times_and_in_any_order_is_one_sample() -> None:
     assert sampled[0] == pytest.approx(sampled[1], abs=20)
 
 
-# Clocks that are one, and clocks that jump
+# Shared clocks, and clocks that jump
 
 
 def test_a_shared_clock_needs_no_estimate() -> None:
@@ -133,13 +133,13 @@ def test_what_we_sent_before_our_own_clock_jumped_says_nothing_after_it() -> Non
     offset, slept_s = ClockOffset(shared_clock=False), 0.100
 
     def ours(true_s: float) -> float:
-        """Stands still while we sleep."""
+        """Return our clock, which stops while we sleep."""
         return true_s if true_s < 5.0 else max(5.0, true_s - slept_s)
 
     messages = []
     for k in range(1500):
         sent_s = 0.004 * k + (0.0 if k < 1250 else slept_s)
-        # The last ones before the sleep take long to come back.
+        # The last ones before the sleep take long to return.
         back_s = 0.300 if 4.95 < sent_s < 5.0 else 0.020
         messages.append((sent_s + 0.020 + back_s, sent_s))
     for received_s, sent_s in sorted(messages):
@@ -154,13 +154,13 @@ def test_what_we_sent_before_our_own_clock_jumped_says_nothing_after_it() -> Non
 
 
 def delays_of(kind: str, generator: np.random.Generator, count: int) -> np.ndarray:
-    """Delays in seconds of messages 4 ms apart, as real links have them."""
+    """Draw delays in seconds of messages 4 ms apart, as real links have them."""
     exponential_s = generator.exponential(0.001, count)
     if kind == "wireless":
         return 0.002 + exponential_s + (generator.random(count) < 0.02) * generator.exponential(0.030, count)
     if kind == "local":
         return 50e-6 + exponential_s / 50.0
-    if kind == "queue":  # Lindley's recursion: waiting behind all that came before
+    if kind == "queue":  # Lindley's recursion: waiting behind all earlier messages
         waits_s = np.zeros(count)
         for k, served_s in enumerate(generator.exponential(0.0032, count - 1)):
             waits_s[k + 1] = max(0.0, waits_s[k] + served_s - 0.004)
@@ -191,7 +191,7 @@ def test_no_link_looks_like_a_jump_or_breaks_the_bound(kind: str, in_order: bool
         assert bound_s is not None
         assert abs(error_s(offset, clock, now_s)) <= bound_s
     assert (offset.jumps, offset.rejected) == (0, 0)
-    if kind != "wandering":  # that has no floor to speak of
+    if kind != "wandering":  # Wandering delays have no floor to speak of.
         assert abs(error_s(offset, clock, now_s)) < 0.5e-3
 
 
@@ -206,7 +206,7 @@ def test_a_route_that_gets_shorter_or_longer_is_no_jump(before_s: float, there_s
     assert abs(error_s(offset, clock, end_s)) < 0.5e-3
 
 
-# Stamps that are wrong
+# Wrong stamps
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The bound that is published with a clock's offset holds, whatever the delays, the drift and the jitter."""
+"""The published bound of a clock offset holds for all delays, drifts and jitters."""
 
 import numpy as np
 import pytest

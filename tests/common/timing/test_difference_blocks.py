@@ -41,7 +41,7 @@ def test_merged_blocks_are_the_block_of_all(early: list[tuple[float, float]], la
     agrees(block_of(early).merged(block_of(late)), early + late)
 
 
-def test_what_was_chosen_for_being_early_counts_for_the_least_alone() -> None:
+def test_samples_chosen_for_being_early_count_for_the_least_alone() -> None:
     block = block_of([(0.01, 0.30), (0.02, 0.10)], unfair=[(0.03, 0.05), (0.04, 0.20)])
     assert (block.least_s, block.least_at_s) == (0.05, 0.03)
     assert block.count == 2

@@ -1,4 +1,4 @@
-"""Both sides in virtual time, from a scripted person's fingers to a lifted target and back as what they feel."""
+"""Both sides in virtual time, from a scripted person's fingers to a lifted target, and back to the fingers."""
 
 import functools
 import itertools
@@ -33,12 +33,12 @@ def loopback(link: str, *, seed: int = 0, compensation: Compensation = "operator
 
 
 episodes = pytest.mark.xdist_group("episodes")
-"""Runs by one worker, so that each episode is played once."""
+"""Mark for a single worker, so that each episode is run once."""
 
 
 @dataclass(frozen=True)
 class Moment:
-    """The person's doing and feeling."""
+    """Person's phase and feeling."""
 
     phase: Doing
     l2: Strengths
@@ -48,7 +48,7 @@ class Moment:
 
 @dataclass(frozen=True)
 class Episode:
-    """A run of the person from the start, looked at every 50 ms."""
+    """Run of the person from the start, sampled every 50 ms."""
 
     moments: tuple[Moment, ...]
     summary: dict[str, Any]
@@ -61,7 +61,7 @@ class Episode:
 def episode(delay_ms: int, compensation: Compensation = "operator") -> Episode:
     link = f"delay {delay_ms}ms 10ms distribution normal" if delay_ms else ""
     run, moments = loopback(link, compensation=compensation), []
-    end_s = 15.0 if delay_ms else 8.5  # by then the target is lifted
+    end_s = 15.0 if delay_ms else 8.5  # By then the target is lifted.
     while run.clock.now() < end_s:
         run.run_until(run.clock.now() + LOOK_S)
         assert isinstance(run.person, SimulatedOperator)
@@ -109,7 +109,7 @@ def test_the_free_travel_shrinks_as_the_target_comes_nearer(delay_ms: int) -> No
 @episodes
 @pytest.mark.parametrize("delay_ms", [0, 200])
 def test_what_is_to_be_touched_never_stops_the_finger_that_touches_it(delay_ms: int) -> None:
-    # The slowest zone is at most half as stiff as can be, from the advance until the target is held.
+    # The slowest zone has at most half of the strength, from the advance until the target is held.
     before = [moment for moment in episode(delay_ms).moments if not moment.held]
     assert max(moment.r2[0] for moment in before) <= 4
     assert max(moment.r2[9] for moment in before) == 8
@@ -121,8 +121,8 @@ def test_what_is_held_is_felt_no_more_and_the_table_is(delay_ms: int) -> None:
     lifting = episode(delay_ms).during(Doing.LIFTING)
     assert all(moment.held for moment in lifting)
     assert max(max(moment.l2) for moment in lifting) == 0
-    # The table lies ahead of a gripper that points down, within what a full pull would need to stop.
-    # The encoders' noise is in it: one reading in a hundred brings it nearer, and that holds for 0.1 s.
+    # The table is ahead of a gripper that points down, within the stopping distance of a full pull.
+    # Encoder noise: one reading in a hundred brings it nearer, and that holds for 0.1 s.
     free = [moment for moment in lifting if moment.r2[:5] == (0,) * 5]
     assert len(free) >= 0.9 * len(lifting)
     assert all(moment.r2[:2] == (0,) * 2 for moment in lifting)
@@ -136,14 +136,14 @@ def test_each_direction_measures_the_delay_that_was_asked_for(delay_ms: int) -> 
     spread_ms = 10.0 if delay_ms else 0.0
     for direction in ("to_robot", "to_operator"):
         measured = summary["delay_ms"][direction]
-        # The few hundred messages were delayed by so much; what is measured of it is exact, but for a tick's waiting.
+        # The achieved delays of these few hundred messages; the measurement is exact, except for a tick's waiting.
         achieved = summary["link"][direction]["achieved"]["delay_ms"]
         within = 4.0 * spread_ms / math.sqrt(summary["messages"][ARRIVED[direction]])
         assert achieved["mean"] == pytest.approx(delay_ms, abs=within)
         assert achieved["sd"] == pytest.approx(spread_ms, abs=within)
         assert measured["mean"] == pytest.approx(achieved["mean"], abs=0.1)
         assert measured["sd"] == pytest.approx(achieved["sd"], abs=0.1)
-    # Latest wins: what is applied is the quicker part of what arrives.
+    # Latest wins: the applied messages are the quicker part of the arrivals.
     if delay_ms:
         assert summary["applied_age_ms"]["to_operator"]["mean"] < summary["delay_ms"]["to_operator"]["mean"]
 
@@ -173,7 +173,7 @@ def test_time_may_pass_in_any_steps() -> None:
 
 
 def test_a_person_who_is_blind_for_a_moment_lets_go_and_then_goes_on() -> None:
-    # 200 ms after the last field; the commands arrive all the while, so that safety has no cause to stop the arm.
+    # 200 ms after the last field; commands arrive all the while, so that safety has no cause to stop the arm.
     both = loopback("to_operator: outage 400ms at 3.9s")
     both.run_until(4.08)
     assert not both.device.released

@@ -34,7 +34,7 @@ def run_of(does: Does, device: Any = "browser", link: str = "", *, permit_tuning
 
 
 def timetable(*rows: tuple[float, dict[str, Any] | None]) -> Does:
-    """Do each thing until its time, in turn."""
+    """Return hands that do each thing until its time, in turn."""
     return lambda now_s: next((hands for until_s, hands in rows if now_s < until_s), rows[-1][1])
 
 
@@ -68,7 +68,7 @@ def test_a_page_arms_advances_and_a_key_up_stops(link: str) -> None:
 
 
 @pytest.mark.parametrize("after", [(99.0, None), (99.0, {}), (99.0, WATCH)], ids=["silence", "space up", "let go"])
-def test_whichever_way_a_page_lets_go_the_arm_stops_at_once(after: tuple[float, dict[str, Any] | None]) -> None:
+def test_however_a_page_releases_the_arm_stops_at_once(after: tuple[float, dict[str, Any] | None]) -> None:
     run = run_of(advance_until(4.0, after))
     run.run_until(3.99)
     assert speed_m_s(run) > 0.05
@@ -102,7 +102,7 @@ def page_drives() -> Loopback:
 
 
 @pytest.mark.parametrize("start", [person_drives, page_drives])
-def test_escape_stops_whoever_drives_and_nobody_goes_on_by_themselves(start: Callable[[], Loopback]) -> None:
+def test_escape_stops_any_driver_and_nobody_continues_by_themselves(start: Callable[[], Loopback]) -> None:
     run = start()
     run.run_until(4.99)
     assert state(run) == "armed"

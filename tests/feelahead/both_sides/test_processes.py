@@ -1,4 +1,4 @@
-"""The two real processes: clean ends, crashes, and what fails around them, said in one line."""
+"""Two real processes: clean ends, crashes, and failures around them, reported in one line."""
 
 import contextlib
 import json
@@ -65,7 +65,7 @@ def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path, more: t
     assert summary["messages"]["stiffness_received"] > 0
     assert summary["messages"]["motion_received"] > 0
     for direction in ("to_robot", "to_operator"):
-        # The emulated delay is a floor; how much a busy machine adds is for the benchmark to say.
+        # The emulated delay is a floor; a busy machine's excess is for the benchmark.
         assert summary["delay_ms"][direction]["p50"] >= 20.0
     for key in (
         *("duration_s", "ticks", "tick_us", "tick_cpu_us", "skipped", "messages", "delay_ms", "applied_age_ms"),
@@ -75,7 +75,7 @@ def test_the_demo_runs_both_sides_and_writes_one_summary(tmp_path: Path, more: t
     for paced in (summary, summary["pacing"]["robot"], summary["pacing"]["operator"]):
         assert paced["overruns"] >= 0
         assert 0.0 <= paced["wake_error_us"]["p50"] <= paced["wake_error_us"]["p99"] <= paced["wake_error_us"]["max"]
-    # Before the robot side knows its operator, a late tick reads no more of what waits than of anybody's.
+    # Before the robot side knows its operator, a late tick reads as little from it as from anybody.
     assert summary["strangers"].pop("unread") >= 0
     assert summary["strangers"] == {"refused": 0, "revoked": 0, "flooding": 0, "crowded": 0, "malformed": 0}
     # A deadline is met by a tick or counted as an overrun (test_pacing.py: each of them), and none is both.
@@ -108,7 +108,7 @@ def test_a_killed_operator_is_noticed_and_another_one_takes_over() -> None:
 
 @pytest.mark.parametrize("name", ["operator", "robot"])
 def test_a_side_that_stood_still_disarms_and_what_was_held_back_is_discarded(tmp_path: Path, name: str) -> None:
-    """SIGSTOP in full motion, then SIGCONT: armed again only after a healthy second, and by nothing that is old."""
+    """SIGSTOP in full motion, then SIGCONT: armed again only after a healthy second, and by no old message."""
     path = tmp_path / "robot.json"
     with robot(f"--summary={path}") as robot_side:
         with operator(robot_side.wait_for("listening", LIMIT_S)) as operator_side:
@@ -123,13 +123,13 @@ def test_a_side_that_stood_still_disarms_and_what_was_held_back_is_discarded(tmp
             wait_until(robot_side, lambda status: status["state"] == "armed")
             assert time.monotonic() - resumed_s > SafetySettings().healthy_s
         assert robot_side.stop(LIMIT_S) == 0
-    if name == "robot":  # by its age, or because its lease has ended meanwhile
+    if name == "robot":  # By its age, or because its lease has ended meanwhile.
         lease = json.loads(path.read_text())["lease"]
         assert lease["discarded_by_age"] + lease["commands_of_non_owners"] > 0
 
 
 def test_an_unknown_key_moves_nothing_and_a_revoked_one_is_thrown_out(tmp_path: Path) -> None:
-    assert KEYS_PERIOD_S <= 0.5  # out within a second
+    assert KEYS_PERIOD_S <= 0.5  # Out within a second.
     folder, theirs, path = KeyFolder(tmp_path / "robot"), KeyFolder(tmp_path / "anna"), tmp_path / "robot.json"
     (robot_key, robot_secret), (anna_key, anna_secret) = make_key_pair(), make_key_pair()
     folder.write_pair("robot", robot_key, robot_secret)
@@ -169,7 +169,7 @@ def test_a_killed_robot_side_is_an_error_of_the_demo() -> None:
     assert "Traceback" not in complaint
 
 
-# Ends at a signal as the interpreter itself does before any of our handlers stands.
+# Ends at a signal as the interpreter itself does before any of our handlers is installed.
 UNPREPARED = [sys.executable, "-c", "import signal; signal.signal(signal.SIGINT, signal.SIG_DFL); signal.pause()"]
 
 
@@ -179,7 +179,7 @@ def test_our_own_interrupt_of_a_side_that_has_not_begun_is_no_failure() -> None:
         side.check()
 
 
-def test_anothers_interrupt_is_one() -> None:
+def test_another_processs_signal_is_a_failure() -> None:
     with SideProcess("robot_side", "robot", [], before=UNPREPARED) as side:
         os.kill(side.process_id, signal.SIGKILL)
         side.wait(LIMIT_S)
@@ -189,7 +189,7 @@ def test_anothers_interrupt_is_one() -> None:
 
 NOWHERE = ("--connect=tcp://127.0.0.1:9", "--device=simulated")
 ROBOT = ("--bind=tcp://127.0.0.1:0",)
-# Nothing that this process writes gets longer than that, as on a full disk.
+# No file of this process gets longer than that, as on a full disk.
 FULL = """
 import os, resource, sys
 resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
@@ -236,7 +236,7 @@ def test_a_run_that_fails_in_whatever_way_has_its_summary(
 
 @contextlib.contextmanager
 def stalled(kind: str) -> Iterator[int]:
-    """A standard output that is full, and that nobody reads."""
+    """Yield a full standard output that nobody reads."""
     reads, writes = pty.openpty() if kind == "terminal" else os.pipe()
     os.set_blocking(writes, False)
     with contextlib.suppress(BlockingIOError):
@@ -257,11 +257,11 @@ def stalling(module: str, output: int, *arguments: str) -> Iterator["subprocess.
         try:
             yield process
         finally:
-            process.kill()  # where a test has failed
+            process.kill()  # After a failed test.
 
 
 def free_port() -> int:
-    """Find one below those that Linux hands out by itself (32768 and up), lest another process gets it."""
+    """Return a port below those that Linux assigns itself (32768 and up), so that no other process gets it."""
     for port in random.SystemRandom().sample(range(20_000, 30_000), 1000):
         with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
             return port
@@ -270,7 +270,7 @@ def free_port() -> int:
 
 @pytest.mark.parametrize("side", ["robot", "operator"])
 @pytest.mark.parametrize(("kind", "mode"), [("pipe", "json"), ("terminal", "line")])
-def test_a_signal_ends_a_side_whoever_stalls_its_output(side: str, kind: str, mode: str, tmp_path: Path) -> None:
+def test_a_signal_ends_a_side_with_a_stalled_output(side: str, kind: str, mode: str, tmp_path: Path) -> None:
     path = tmp_path / "out.json"
     control, view = (f"tcp://127.0.0.1:{free_port()}" for _ in range(2))
     robot = [f"--bind={control}", f"--view-bind={view}"]
@@ -317,7 +317,7 @@ def test_strangers_who_only_connect_cost_nobody_the_session(tmp_path: Path) -> N
             for endpoint in (listening["control"], listening["view"]):
                 for _ in range(300):
                     crowd.enter_context(contextlib.closing(RawConnection(port_of(endpoint))))
-            # The list of keys is looked at again, and the view is opened again, in the crowd.
+            # The list of keys is read again, and the view is opened again, in the crowd.
             folder.revoke("ben")
             robot.events()
             for _ in range(10):

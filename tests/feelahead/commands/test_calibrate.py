@@ -1,4 +1,4 @@
-"""`feelahead calibrate`, and the operator side that uses what it has stored."""
+"""`feelahead calibrate`, and the operator side that uses its stored result."""
 
 import math
 import signal
@@ -34,7 +34,7 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def willing_hands(now_s: float) -> ControllerState:
-    """Rest, pulls of L2 that end at 0.9, pulls of R2, a turn of the sticks, rest: by the clock."""
+    """Rest, pull L2 up to 0.9, pull R2, turn the sticks, rest: by the clock."""
     pulled = math.sin(math.pi * now_s) ** 2
     if 2.0 <= now_s < 5.0:
         return ControllerState(l2=0.9 * pulled)
@@ -47,7 +47,7 @@ def willing_hands(now_s: float) -> ControllerState:
 
 
 class PlayedHandle(FakeHandle):
-    """A real controller, as far as hidapi can tell, whose state follows a clock of its own."""
+    """Real controller to hidapi, whose state follows a separate clock."""
 
     def play(self, hands: Callable[[float], ControllerState | None]) -> None:
         self.hands, self.now_s = hands, 0.0
@@ -132,7 +132,7 @@ def test_the_operator_side_uses_what_is_given_else_what_is_stored_for_its_contro
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     backend = FakeBackend({0x0CE6: {b"/dev/hidraw3": FakeHandle()}})
-    # It would be this process's, and stay so.
+    # The priority would be this process's, and stay so.
     monkeypatch.setattr(process, "raise_priority", lambda: False)
     taken: list[TravelCalibration] = []
     monkeypatch.setattr(OperatorSide, "calibrate", lambda _, calibration: taken.append(calibration))
@@ -162,7 +162,7 @@ def test_a_file_that_breaks_while_it_runs_is_said_and_the_defaults_hold(
     taken: list[TravelCalibration] = []
 
     def calibrate(_: OperatorSide, calibration: TravelCalibration) -> None:
-        """Each time that it is found, something else is stored and it is unplugged; the third time is the last."""
+        """Store another calibration and unplug each time; the third time is the last."""
         taken.append(calibration)
         if len(taken) == 1:
             calibration_path(ADDRESS).write_text("version = 7")

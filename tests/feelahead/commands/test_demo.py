@@ -1,4 +1,4 @@
-"""The demo: its arguments to the two sides, its page and its words when something ends early."""
+"""The demo: its arguments to the two sides, its page and its messages at an early end."""
 
 import json
 import os
@@ -45,7 +45,7 @@ def test_only_what_was_said_goes_over_the_sides_own_files(tmp_path: Path) -> Non
     assert not [flag for flag in operator if flag.startswith(unsaid)]
 
 
-def test_what_was_said_is_passed_on_even_where_it_is_the_default_to_who_takes_it(tmp_path: Path) -> None:
+def test_given_flags_are_passed_on_to_the_side_that_takes_them_even_if_default(tmp_path: Path) -> None:
     robot, operator = passed_on("--seed", "0", "--link=delay 5ms", "--probability", "0.99", "--haptics", "--realtime")
     assert {"--seed=0", "--link=delay 5ms", "--probability=0.99", "--realtime"} <= set(robot)
     assert {"--seed=0", "--link=delay 5ms", "--haptics", "--realtime"} <= set(operator)
@@ -54,7 +54,7 @@ def test_what_was_said_is_passed_on_even_where_it_is_the_default_to_who_takes_it
     robot, operator = passed_on("--config", str(config))
     assert {"--link=delay 5ms", "--law=paper"} <= set(robot)
     assert {"--no-haptics", "--compensation=robot"} <= set(operator)
-    # Each side takes what it is told, and is not told what the other takes.
+    # Each side accepts its arguments, and gets none of the other's.
     assert parse_settings(RobotSettings, "robot", robot).law == "paper"
     assert parse_settings(OperatorSettings, "operator", operator).compensation == "robot"
 
@@ -132,12 +132,12 @@ def test_ctrl_c_while_a_side_still_starts_ends_the_demo_at_once(tmp_path: Path) 
 def test_the_demo_is_drawn_from_the_facts_of_both_sides_and_gives_the_terminal_back() -> None:
     demo = OnTerminal([sys.executable, "-P", "-m", "feelahead", "demo", "--tui", "--no-console", "--duration", "600"])
     try:
-        # The delay and the zones are the operator side's, the nearest thing and the ticks the robot side's.
+        # The delay and the zones are the operator side's, the nearest object and the ticks the robot side's.
         for said in (b"starting", b"link ", b" mean ", b"R2 advances", b"nearest ", b"tick p99", b"ARMED"):
             demo.read_until(_shows(said))
         assert demo.end(b"contacts with obstacles") == 0
         assert demo.is_put_back()
-        # The report is what stays on the first screen.
+        # The report remains on the first screen.
         assert b"feelahead demo: delay: " in demo.seen.rpartition(b"\x1b[?1049l")[2]
     finally:
         demo.close()
@@ -203,7 +203,7 @@ def test_what_each_side_alone_knows_stands_beside_the_others() -> None:
         "round_trip": {"mean": 70.0},
     }
     assert merged["applied_age_ms"] == {"to_robot": {"mean": 48.0}, "to_operator": {"mean": 19.0}}
-    # Counts that both have are added.
+    # Counts of both are added.
     assert merged["messages"] == {
         "stiffness_sent": 990,
         "stiffness_received": 980,

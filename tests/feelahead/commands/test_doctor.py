@@ -1,4 +1,4 @@
-"""Each check of `feelahead doctor` on facts that a test makes up, and the command on this machine."""
+"""Checks of `feelahead doctor` on invented facts, and the command on this machine."""
 
 import json
 import re
@@ -144,7 +144,7 @@ def test_the_exit_code_says_whether_the_demo_can_run(
     monkeypatch.setattr(doctor_command, "examine", lambda: findings)
     assert command(["doctor"]) == code
     lines = capsys.readouterr().out.splitlines()
-    # What is to be copied is not wrapped, and brackets are no markup.
+    # Lines to be copied are not wrapped, and brackets are no markup.
     assert set(installing_command().splitlines()) <= set(lines)
     assert any("numba [gone]" in line for line in lines)
     assert command(["doctor", "--json"]) == code

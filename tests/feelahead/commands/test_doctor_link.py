@@ -1,4 +1,4 @@
-"""`feelahead doctor --connect`: all that can be wrong on the way, by made-up facts and by sockets on loopback."""
+"""`feelahead doctor --connect`: every fault on the path, by invented facts and by sockets on loopback."""
 
 import contextlib
 import errno
@@ -26,7 +26,7 @@ from feelahead.commands.doctor.port import Opening, Way, WayError, judge_port, j
 from feelahead.main import command
 from tests.helpers.serving_robot import ServingRobot
 
-# By made-up facts
+# By invented facts
 
 
 def greeting(mechanism: bytes) -> Opening:
@@ -76,12 +76,12 @@ def test_a_robot_side_is_as_it_should_be_and_a_closed_port_of_this_machine_has_a
 
 
 LONG_S, SHORT_S = 60.0, 0.3
-"""For what comes in the end, and for what never does."""
+"""Waits for an event that comes in the end, and for one that never comes."""
 
 
 @pytest.fixture(autouse=True)
 def patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """However busy the machine is."""
+    """Long limits, however busy the machine is."""
     limits = ("_ANSWER_LIMIT_S", "_HANDSHAKE_LIMIT_S", "_LARGE_LIMIT_S", "_TELEMETRY_LIMIT_S", "_MEASURE_S")
     for name in limits:
         monkeypatch.setattr(link, name, LONG_S)
@@ -91,7 +91,7 @@ def patience(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Doctor:
-    """Asks the doctor, and keeps what it says."""
+    """Doctor whose output is kept."""
 
     def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
         self._capsys = capsys
@@ -112,7 +112,7 @@ def doctor(capsys: pytest.CaptureFixture[str]) -> Doctor:
 
 @contextlib.contextmanager
 def listening(accept: bool = False) -> Iterator[str]:
-    """A port that takes connections and says nothing, or hangs up at once."""
+    """Yield a port that accepts connections and says nothing, or hangs up at once."""
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def hang_up() -> None:
@@ -128,7 +128,7 @@ def listening(accept: bool = False) -> Iterator[str]:
 
 @contextlib.contextmanager
 def closed() -> Iterator[str]:
-    """A port that is taken, so that nobody else gets it, and on which nobody listens."""
+    """Yield a port on which nobody listens, bound so that no other process gets it."""
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         yield f"tcp://127.0.0.1:{taken.getsockname()[1]}"
@@ -195,7 +195,7 @@ def test_all_is_well_and_nobody_was_let_in(doctor: Doctor) -> None:
         assert robot.session.leases_granted == robot.session.refused == robot.session.motion_received == 0
 
 
-def test_whoever_has_the_arm_keeps_it(doctor: Doctor) -> None:
+def test_the_owner_of_the_arm_keeps_it(doctor: Doctor) -> None:
     with ServingRobot() as robot:
         owner = LinkEnd("operator", 2, "an operator's")
         now_s = robot._clock.now()

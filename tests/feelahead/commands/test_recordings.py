@@ -1,4 +1,4 @@
-"""The commands on recordings: bad input in one line, and a real demo that is computed again to the same bits."""
+"""Commands on recordings: bad input in one line, and a real demo that is replayed to the same bits."""
 
 import json
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""`feelahead virtual-dualsense` towards a kernel in virtual time, and where there is none."""
+"""`feelahead virtual-dualsense` towards a kernel in virtual time, and without one."""
 
 from collections import deque
 
@@ -26,7 +26,7 @@ def lived(kernel: FakeKernel, settings: VirtualDualSenseSettings) -> list[str]:
 
 
 def sent_states(kernel: FakeKernel) -> list[ControllerState]:
-    """The input reports, without the 6 bytes in front of each."""
+    """Return the states of the input reports, without the 6 bytes in front of each."""
     return [parse_input_report(event[6:]) for _, event in kernel.heard_of(INPUT2)]
 
 
@@ -41,7 +41,7 @@ def test_it_says_what_it_is_told(transport: str, edge: bool, first: str) -> None
     by = Transport.USB if transport == "usb" else Transport.BLUETOOTH
     told = [
         Feel(l2=feedback(position=3, strength=6), light=(0, 0, 64)),
-        Feel(l2=feedback(position=3, strength=6), r2=FREE_TRIGGER),  # nothing new
+        Feel(l2=feedback(position=3, strength=6), r2=FREE_TRIGGER),  # Nothing new.
         Feel(l2=FREE_TRIGGER, r2=feedback(position=0, strength=8), rumble=Rumble(left=1.0)),
     ]
     events = [(0.0, get_report(1, 0x09)), (0.01, said(START))]

@@ -1,4 +1,4 @@
-"""The router without any network: the cable that it finds, and its words for the kernel."""
+"""Router without any network: the cable that it finds, and its words for the kernel."""
 
 import re
 from collections.abc import Mapping
@@ -49,7 +49,7 @@ def test_the_robots_end_is_the_one_that_reaches_it(order: int) -> None:
 
 @pytest.mark.parametrize("sides", [[], SIDES[:1], SIDES[1:], [SIDES[1], interface("eth0", 5)]])
 def test_half_a_cable_is_none(sides: list[dict[str, Any]]) -> None:
-    """A network is being taken away, or has no address yet."""
+    """A network is being removed, or has no address yet."""
     assert find_cable([LO, *sides], ROBOT) is None
 
 
@@ -82,7 +82,7 @@ def test_the_rules_pass_on_the_two_ports_only() -> None:
     [
         ("to_robot: delay 20ms; to_operator: delay 50ms loss 1%", "delay 20ms", "delay 50ms loss 1%"),
         ("", "delay 0ms", "delay 0ms"),
-        # Nothing sends video here, and what is not sent needs no netem.
+        # Nothing here sends video, so no netem is needed for it.
         ("delay 5ms; video: rate 2mbit", "delay 5ms", "delay 5ms"),
     ],
 )
@@ -107,7 +107,7 @@ def test_what_netem_cannot_do_is_left_to_the_sides(spec: str, why: str) -> None:
 def test_the_share_that_was_lost_is_of_what_came_since() -> None:
     assert Counted(990, 10).lost_share_since(Counted(0, 0)) == 0.01
     assert Counted(1089, 11).lost_share_since(Counted(990, 10)) == 0.01
-    # Nothing came, or it was set up again meanwhile.
+    # Nothing came, or netem was set up again meanwhile.
     for now, before in (((990, 10), (990, 10)), ((5, 0), (990, 0)), ((2000, 0), (990, 10))):
         assert Counted(*now).lost_share_since(Counted(*before)) is None
 

@@ -1,4 +1,4 @@
-"""A question whose cells cost nothing, for tests of the engine; a file can make them wait, fail or be killed."""
+"""Question with free cells, for tests of the engine; a file can make them wait, fail or be killed."""
 
 import os
 import signal
@@ -19,7 +19,7 @@ class Counting(Sweep):
 
     numbers: tuple[int, ...] = (1, 2, 3)
     folder: str = ""
-    """Each cell leaves a file there, and does what a file named after it says: `kill`, `fail`, `refuse`."""
+    """Folder in which each cell leaves a file; a file named after the cell makes it `kill`, `fail` or `refuse`."""
     wait_s: float = 0.0
 
 

@@ -1,4 +1,4 @@
-"""`feelahead try approach` from its flags to its sentence, table, summary and figure; most runs are made up."""
+"""`feelahead try approach` from its flags to its sentence, table, summary and figure; most runs are invented."""
 
 import csv
 import json
@@ -25,7 +25,7 @@ SEVERAL = ("swept", "swept_robot", "paper", "none", "full")
 
 
 def outcome(end: End = "contact", figure: float = 150.0, turns: int = 1) -> Outcome:
-    """Make up an outcome: a contact at `figure` mm/s, or a stop `figure` mm off."""
+    """Return an outcome: a contact at `figure` mm/s, or a stop `figure` mm off."""
     hits, stops = end == "contact", end == "stopped"
     return Outcome(
         end=end,
@@ -47,7 +47,7 @@ def outcome(end: End = "contact", figure: float = 150.0, turns: int = 1) -> Outc
 
 
 class MadeUp:
-    """Stands in for the runs, and remembers which ones were asked for."""
+    """Stand-in for the runs that remembers their settings."""
 
     def __init__(self) -> None:
         self.asked: list[Approach] = []
@@ -108,7 +108,7 @@ def test_every_flag_reaches_the_run(runs: MadeUp) -> None:
     [
         ("", "swept"),
         ("--compensation operator robot", "swept swept_robot"),
-        # The paper's law has eq. 8 on either side, and without a field there is nothing to compensate.
+        # The paper's law uses eq. 8 on either side, and without a field there is nothing to compensate.
         ("--law paper --compensation operator robot", "paper"),
         ("--law none full --compensation robot", "none full"),
         ("--law none swept paper --compensation robot operator", "none swept_robot swept paper"),

@@ -1,4 +1,4 @@
-"""When a release still avoids a contact, what a false alarm is, and what `bench coverage` makes of them."""
+"""Last releases that avoid a contact, false alarms, and `bench coverage`'s figures of both."""
 
 from dataclasses import replace
 from functools import cache
@@ -36,7 +36,7 @@ from robot_side.settings import EncoderSettings
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("coverage")]
 
 SEED = 1
-"""The steady pull of this seed reaches 0.24 m/s."""
+"""Seed whose steady pull reaches 0.24 m/s."""
 
 
 @cache
@@ -56,7 +56,7 @@ def staged(
 
 @cache
 def approaching(link: str = "0 ms", ahead_m: float = 0.0) -> tuple[Draw, float, float]:
-    """Put a wall ahead; return the draw, the time of the touch and the last moment to let go."""
+    """Put a wall ahead; return the draw, the time of contact and the last release that avoids it."""
     replay, posed, draw = staged("wall", LINKS[link], ahead_m)
     touch_s = first_touch_s(replay, posed, ahead_m * replay.axis)
     assert touch_s is not None
@@ -65,7 +65,7 @@ def approaching(link: str = "0 ms", ahead_m: float = 0.0) -> tuple[Draw, float, 
     return draw, touch_s, last_s
 
 
-# The last moment
+# The last release
 
 
 @given(st.floats(0.0, 0.3), st.floats(0.1, 1.0))
@@ -82,7 +82,7 @@ def test_a_release_at_the_last_moment_leaves_a_gap_and_a_later_one_none() -> Non
     speed = replay.approach_speed_m_s[replay.record.pose_row(touch_s)]
     # 8 rad/s² of the fastest joint, and the finger's own return.
     assert 0.03 < touch_s - last_s < 0.04 + speed / 3.0
-    # 30 mm from the start, a command that takes 200 ms has to be taken back before it arrives.
+    # 30 mm from the start, a command that takes 200 ms must be released before it arrives.
     far, _, last_s = approaching("200 ms", -0.29)
     assert far.replay.record.began_s <= last_s < far.replay.record.began_s + 0.15
 
@@ -152,14 +152,14 @@ def test_a_drift_counts_as_reported_once_a_report_of_it_is_back() -> None:
     drifting = staged("wall", LINKS["50 ms"], pull="drift")[0]
     times = drifting.record.began_s + np.arange(0.0, 0.8, 0.01)
     known = np.array([drifting.knows_aside(float(time_s)) for time_s in times])
-    # There and back, with jitter, and 30 ms to look from all places; and the arm has to start.
+    # There and back, with jitter, and 30 ms to look from all places; the arm must also start.
     assert 0.1 < times[int(np.argmax(known))] - drifting.record.began_s < 0.3
     assert known[int(np.argmax(known)) :].all()
     steady = staged("wall")[0]
     assert steady.knows_aside(steady.record.began_s)
 
 
-# The pipeline that is judged is the one that is shipped
+# The judged pipeline is the shipped one
 
 
 @pytest.mark.parametrize("law", ["swept", "swept_robot", "paper"])
@@ -179,7 +179,7 @@ def test_over_a_whole_pull_it_is_what_both_sides_show_live(law: Law) -> None:
     names = tuple(thing.name for thing in posed.scene.objects)
     draw = Draw(replay, posed.perceived(CameraError(names, 0.0, 0.003, 0.0, int(camera_seed)).next_frame()), 0.003)
     felt = Judged(law, 0.99).felt(draw, began_s + trace.time_s)[:, 1]
-    # Its poses are 10 ms apart and its encoders draw other errors: by so much it may be off for a moment.
+    # Its poses are 10 ms apart and its encoders draw other errors, so it may be off for a moment.
     differs = felt - trace.strengths
     assert np.count_nonzero(differs) < 0.04 * differs.size
     assert abs(differs.mean()) < 0.05
@@ -228,10 +228,10 @@ def test_strengths_on_the_other_trigger_show(monkeypatch: pytest.MonkeyPatch) ->
     assert [row["coverage"] for row in judged("swept")] == [0.0, None]
 
 
-def test_places_after_whose_judging_the_stick_moves_are_counted_apart() -> None:
+def test_placements_whose_stick_moves_after_judgement_are_counted_apart() -> None:
     (row,) = evaluate(Pulls("drift", "200 ms", "empty", (Placed("rod_5mm"),), (1, 8), (0.5,), ("full",)), 0)
     assert (row["places"], row["unavoidable"], row["unknowable"], row["coverage"]) == (8, 0, 1, 1.0)
-    # As many draws in each other place, 20 or more in all.
+    # The same number of draws in each other placement, 20 or more in all.
     assert row["draws"] == 3 * 7
     assert row["reported"] < row["draws"]
 

@@ -1,4 +1,4 @@
-"""The propagation's truth is exact, and predictions are compared with the right piece of the way."""
+"""The propagation's truth is exact, and predictions are compared with the right displacement."""
 
 import math
 import tomllib
@@ -50,7 +50,7 @@ def gripper() -> PosedGripper:
 
 
 def crank(radius_m: float) -> Chain:
-    """Make one hinge about z at the origin, whose point stands on x."""
+    """Return one hinge about z at the origin, whose point is on x."""
     jacobian = np.array([[0.0], [radius_m], [0.0], [0.0], [0.0], [1.0]])
     return Chain(jacobian, radius_m * X, radius_m * X)
 
@@ -94,7 +94,7 @@ def test_little_noise_is_linear_and_once_is_never_below_a_sampled_sphere() -> No
 
 
 def pose_at(joints: FloatArray) -> GripperPose:
-    """Pose an arm of one joint that slides along x, its approach axis."""
+    """Return the pose of an arm of one joint that slides along x, its approach axis."""
     jacobian = np.zeros((6, 1))
     jacobian[0] = 1.0
     return GripperPose(
@@ -108,7 +108,7 @@ def pose_at(joints: FloatArray) -> GripperPose:
 
 
 def recorded(travels: FloatArray, there_ms: int, back_ms: int, quantile_s: float = 0.5) -> RecordedApproach:
-    """Make up an arm that follows to the letter over a steady link: `travels`, one every 4 ms, times full speed.
+    """Return an arm that follows exactly over a steady link: `travels`, one every 4 ms, times full speed.
 
     Its speed changes by at most 8 m/s², in whole steps of a millisecond.
     """
@@ -165,7 +165,7 @@ def test_the_commands_under_way_predict_an_obedient_arm(there_ms: int, back_ms: 
     judged = judge(recorded(bells(), there_ms, back_ms), pose_at, LIMITS, FULL_M_S)
     assert len(judged["way_m"]) > 300
     assert all(judged["within_reach"])
-    # Poses are 10 ms apart, and speeds between them are interpolated: by so much they are off.
+    # Poses are 10 ms apart, and speeds between them are interpolated: hence the error.
     assert greatest_m(judged, "operator") < 0.15e-3
     assert greatest_m(judged, "speed at the end") < 2e-3
     loop_s = 1e-3 * (there_ms + back_ms)
@@ -181,7 +181,7 @@ def test_a_constant_speed_is_speed_times_the_delay_and_a_quantile_of_it_too_far(
     np.testing.assert_allclose(at.arrives_s - at.reported_s, 0.2, atol=1e-9)
     np.testing.assert_allclose(judged["way_m"], speed_m_s * 0.2, atol=1e-9)
     np.testing.assert_allclose(judged["robot"], speed_m_s * (0.2 - 0.25), atol=1e-9)
-    # The age of the newest command that the report knew of has up to a period in it for which it was held.
+    # The age of the newest command known to the report includes up to a period for which it was held.
     np.testing.assert_allclose(judged["momentary"], -speed_m_s * at.echo_held_s, atol=1e-9)
 
 
@@ -222,7 +222,7 @@ def test_spreads_pool_the_moments_within_reach_by_the_loop_age_of_their_link() -
     assert over(judged, "operator", (0.0, 0.02)).moments == 0
     short_by_chance = made_up([100.0, 1.0, 3.0]) | {"loop_age_s": [0.4, 0.01, 0.4]}
     assert over(Table([short_by_chance]), "operator", (0.28, 0.58)).moments == 2
-    # Both ways, less the gain of the fastest messages, and the command's period: each link has a bin.
+    # Both directions, less the gain of the fastest messages, and the command's period: each link has a bin.
     for loop_s, (low_s, high_s) in zip((0.004, 0.044, 0.084, 0.184, 0.384, 0.784), AGE_BINS_S, strict=True):
         assert low_s <= loop_s < high_s
 

@@ -1,4 +1,4 @@
-"""The compiled law and the plain definition agree, and `feelahead bench felt` measures what it says."""
+"""The compiled law agrees with the plain definition, and `feelahead bench felt` measures what it says."""
 
 import csv
 import json
@@ -28,7 +28,7 @@ COVER_MM, RAMP_MM = 3.0, 12.0
 
 
 def replayed(*rows_m: float) -> Replayed:
-    """The same way of every kind in each tick."""
+    """Return the same distance of every kind in each tick."""
     ways = np.repeat(np.array(rows_m)[:, None], len(WAYS), axis=1)
     return Replayed(np.arange(1.0, len(ways) + 1.0), ways, np.full(len(ways), HORIZON_M), 246, 200.0)
 
@@ -129,8 +129,7 @@ def test_strengths_begin_as_far_before_each_thing_however_far_it_is(
         before_mm = np.array([[row["free_mm"] - row[way_name(strength)] for strength in range(1, 9)] for row in far])
         np.testing.assert_allclose(before_mm, np.broadcast_to(before_mm[0], before_mm.shape), atol=0.1)
         assert (np.diff(before_mm, axis=1) <= 0.0).all()
-        # The eighth at D_σ and what the spheres stand out, or a little earlier, as strengths are rounded; the first on
-        # the ramp before.
+        # The eighth at D_σ and the spheres' stand-out, or a little earlier, as strengths are rounded; the first before.
         begins_mm = before_mm[0] - far[0]["sigma_mm"]
         assert 0.0 < begins_mm[7] < COVER_MM + 0.25 * RAMP_MM
         assert begins_mm[7] < begins_mm[0] < COVER_MM + RAMP_MM

@@ -1,4 +1,4 @@
-"""What is frozen stays as it is: figures that were measured at different times are compared with each other."""
+"""Frozen inputs do not change: figures measured at different times are compared with each other."""
 
 from pathlib import Path
 

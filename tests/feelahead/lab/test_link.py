@@ -46,7 +46,7 @@ def recording(name: str) -> LinkSample:
 
 
 def held(name: str, spec: str, seeds: int, pairs: int = 0) -> list[Goal]:
-    """Hold the model to a recording."""
+    """Compare the model with a recording."""
     profile = LinkProfile.parse(spec)
     reference, _ = recording(name).without_stalls(profile)
     results = [compare_one(profile, reference, seed, SIZE_BYTES) for seed in range(seeds)]

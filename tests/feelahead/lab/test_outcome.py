@@ -1,4 +1,4 @@
-"""Approaches whose ends can be worked out by hand, and the definitions of an outcome."""
+"""Approaches whose ends can be computed by hand, and the definitions of an outcome."""
 
 import functools
 import math
@@ -19,7 +19,7 @@ from tests.helpers.repository import DATA
 pytestmark = pytest.mark.long
 
 approaches = pytest.mark.xdist_group("approaches")
-"""Run by one worker, so that each approach is made once."""
+"""Mark for a single worker, so that each approach is made once."""
 WAY_MM = 320.0
 FAR = "delay 200ms"
 JITTER = "delay 20ms 10ms distribution normal"
@@ -31,7 +31,7 @@ def ended(scene: str = "wall", force_n: float = 3.0, **changes: Any) -> Outcome:
 
 
 def free_speed_mm_s(force_n: float) -> float:
-    """Of the trigger's travel against its spring alone, what is sensed, what of that counts, at 250 mm/s when full."""
+    """Return the speed of a finger against the spring alone: sensed travel, calibrated, times 250 mm/s."""
     sensed = min((force_n - 0.5) / 4.0 / 0.75, 1.0)
     return 250.0 * min((sensed - 0.05) / (0.98 - 0.05), 1.0)
 
@@ -57,7 +57,7 @@ def test_a_light_finger_stops_before_the_wall_whatever_the_delay(link: str) -> N
     assert outcome.stops_at_mm is not None
     assert 10.0 < outcome.stops_at_mm < 20.0
     assert outcome.way_left_mm == pytest.approx(outcome.stops_at_mm, abs=0.01)
-    # It comes to rest where it is nearest, and has slowed down once.
+    # It stops where it is nearest, and has slowed down once.
     assert outcome.least_gap_mm == pytest.approx(outcome.stops_at_mm, abs=0.1)
     assert outcome.reversals == 1
     assert 1e3 * outcome.trace.speed_m_s.max() == pytest.approx(free_speed_mm_s(2.0), abs=3.0)
@@ -98,7 +98,7 @@ def test_where_it_stops_depends_on_the_delay_only_by_what_is_known_of_the_predic
     assert far_mm == pytest.approx(near_mm, abs=0.2)
 
     def sigma_mm(mean_m: float, sd_m: float) -> float:
-        """D_σ of eq. 9-10, by a camera that errs by 3 mm and an arm that errs by much less."""
+        """Return D_σ of eq. 9-10, for a camera error of 3 mm and a much smaller arm error."""
         return 1e3 * (mean_m + NormalDist().inv_cdf(0.99) * math.hypot(0.003, sd_m))
 
     wider_mm = sigma_mm(*known.at("operator", 0.404, 0.25)) - sigma_mm(0.0, 0.0)
@@ -132,12 +132,12 @@ def test_the_trace_tells_the_way_to_the_wall() -> None:
     assert trace.time_s[0] == 0.0
     assert trace.time_s[-1] == outcome.ended_s
     np.testing.assert_allclose(np.diff(trace.time_s)[:-1], SAMPLE_S, atol=1e-9)
-    # It begins 320 mm before the wall; the speed, added up, has brought it there.
+    # It begins 320 mm before the wall; the integrated speed leads there.
     assert 1e3 * trace.gap_m[0] == pytest.approx(WAY_MM, abs=0.1)
     assert 1e3 * np.trapezoid(trace.speed_m_s, trace.time_s) == pytest.approx(WAY_MM, abs=1.0)
     assert outcome.least_gap_mm == 1e3 * trace.gap_m.min()
     assert -0.3 < outcome.least_gap_mm <= 0.0
-    # A finger of 3 N, felt by nobody but the spring.
+    # A finger of 3 N against the spring alone.
     assert trace.travel[-1] == pytest.approx((3.0 - 0.5) / 4.0, abs=1e-3)
     assert trace.strengths.max() == 0
 
@@ -150,7 +150,7 @@ def test_what_is_gripped_counts_as_gripper() -> None:
     assert 1e3 * outcome.trace.gap_m[0] == pytest.approx(WAY_MM, abs=1.0)
 
 
-# Onto what a straight pull passes, what goes away, and what rises
+# Objects beside a straight pull, moving away, or rising
 
 
 @approaches
@@ -163,7 +163,7 @@ def test_what_is_gripped_counts_as_gripper() -> None:
         ("terrain_ahead", "terrain", FAR, 4.5),
     ],
 )
-def test_whatever_leads_there_a_light_finger_stops_and_one_that_overcomes_the_effect_touches_slowly(
+def test_a_light_finger_stops_and_a_strong_one_touches_slowly_on_every_path(
     scene: str, thing: str, link: str, stops_in_s: float
 ) -> None:
     stick, turn = ASIDE.get(scene, ((0.0, 0.0), (0.0, 0.0)))
@@ -177,7 +177,7 @@ def test_whatever_leads_there_a_light_finger_stops_and_one_that_overcomes_the_ef
     assert strong.contact_speed_mm_s <= 40.0
 
 
-# The same again
+# Reproducibility
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
@@ -195,7 +195,7 @@ def test_a_seed_gives_the_same_outcome_whatever_ran_before_and_another_one_anoth
     assert numbers(run_approach(asked)) == first
 
 
-# What cannot be
+# Impossible runs
 
 
 def test_a_robot_that_is_not_armed_fails_with_the_link_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -228,7 +228,7 @@ def test_an_arm_that_safety_stops_has_not_been_stopped_by_the_law() -> None:
         ([0, 50, 100, 200, 210], 0),  # monotone
         ([0, 100, 200, 200, 100, 0], 1),  # rises and stops
         ([0, 200, 0, 200, 0, 200, 0], 5),
-        ([100, 86, 100, 86, 100], 0),  # noise
+        ([100, 86, 100, 86, 100], 0),  # Noise.
         ([100, 84, 100, 84, 100], 4),
         ([0, 100, 95, 90, 85, 80], 1),  # little by little
     ],
@@ -237,7 +237,7 @@ def test_reversals_are_swings_of_more_than_15_mm_s(speeds_mm_s: list[float], cou
     assert reversals([1e-3 * one for one in speeds_mm_s]) == count
 
 
-# Standing
+# Standing still
 
 
 @pytest.mark.parametrize(
@@ -245,8 +245,8 @@ def test_reversals_are_swings_of_more_than_15_mm_s(speeds_mm_s: list[float], cou
     [
         ([0.00099] * 102, True),
         ([-0.0011] * 102, False),
-        ([0.0] * 90, False),  # not for long enough
-        ([0.002, *[0.0] * 94], False),  # one twitch
+        ([0.0] * 90, False),  # Too short.
+        ([0.002, *[0.0] * 94], False),  # One twitch.
     ],
 )
 def test_the_gripper_stands_when_it_has_been_slow_for_a_second(last_m_s: list[float], *, standing: bool) -> None:

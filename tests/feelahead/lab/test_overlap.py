@@ -1,4 +1,4 @@
-"""`feelahead bench overlap` at its smallest, and what it compares with."""
+"""`feelahead bench overlap` at its smallest, and the methods that it compares."""
 
 import csv
 import math
@@ -85,12 +85,12 @@ def test_goals_take_the_worst_class_and_the_ratio_to_the_package() -> None:
 
 
 def test_approximations_converge_to_the_overlap() -> None:
-    # A unit sphere whose lower half lies within a large box.
+    # A unit sphere whose lower half is within a large box.
     shape = np.array([[0.0, 0.0, -5.0]]), np.eye(3)[None], np.full((1, 3), 5.0)
     pairs, half = Pairs("box", np.zeros((1, 3)), np.ones(1), shape), 2.0 / 3.0 * math.pi
     assert len(satellite_points()) == 29
     assert np.linalg.norm(satellite_points(), axis=1).max() < 1.0
-    # 11 of 29 points lie below the plane, and 7 on it, where they count as within.
+    # 11 of 29 points are below the plane, and 7 on it, where they count as within.
     assert satellites(pairs)[0] == pytest.approx(2.0 * half * 19.0 / 29.0, rel=1e-12)
     assert monte_carlo(pairs, 10_000)[0] == pytest.approx(half, rel=0.03)
     for solid in ("tetrahedron", "box"):

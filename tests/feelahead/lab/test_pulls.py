@@ -1,4 +1,4 @@
-"""Pulls: the same ones for a seed, within what a finger does, and shaped as their names say."""
+"""Pulls: reproducible by seed, within a finger's limits, and shaped as their names say."""
 
 import itertools
 
@@ -22,7 +22,7 @@ def samples(pull: Pull, end_s: float = 19.0, step_s: float = STEP_S) -> list[Han
 
 
 def settled_travel(force_n: float) -> float:
-    """The calibrated travel of a free trigger that has been pressed for long."""
+    """Return the calibrated travel of a free trigger after a long press."""
     trigger = SimulatedTrigger()
     trigger.set_finger_force(force_n)
     trigger.advance(5.0)
@@ -69,7 +69,7 @@ def test_presses_and_rests_are_as_long_and_strong_as_said_and_the_trigger_comes_
         trigger.advance(STEP_S)
         told.append((hands.r2_n, TriggerTravel().travel(trigger.sensed_travel)))
     phases = [list(run) for _, run in itertools.groupby(told, key=lambda one: one[0] > 0.0)]
-    # A bell's first and last millisecond press with nothing. The last phase is cut off.
+    # A bell's first and last millisecond have no force. The last phase is cut off.
     phases = phases[1 if phases[0][0][0] == 0.0 else 0 : -1]
     assert len(phases) >= 18
     for phase in phases:
@@ -78,12 +78,12 @@ def test_presses_and_rests_are_as_long_and_strong_as_said_and_the_trigger_comes_
         if phase[0][0] > 0.0:
             assert peaks_n[0] - 1e-3 <= max(force_n for force_n, _ in phase) <= peaks_n[1]
         else:
-            # Not the force alone: the robot is told to stand, slow as the finger is.
+            # Not the force alone: the command ends, too, after the finger's return.
             assert phase[-1][1] == 0.0
 
 
 def deflections(hands: Hands) -> list[Vector2]:
-    """How far the left and the right stick count as deflected."""
+    """Return the calibrated deflections of the left and the right stick."""
     device, calibration = SimulatedDualSense(), TravelCalibration()
     device.set_sticks(hands.left_stick, hands.right_stick)
     state = device.read(0.0)

@@ -1,4 +1,4 @@
-"""Recorded approaches: what each side knew when, what the arm did, and what it would have done from then on."""
+"""Recorded approaches: each side's knowledge, the arm's motion, and its motion after a release."""
 
 import functools
 from dataclasses import fields
@@ -21,10 +21,10 @@ from tests.helpers.repository import DATA
 pytestmark = pytest.mark.long
 
 recordings = pytest.mark.xdist_group("recordings")
-"""Run by one worker, so that each pull is recorded once."""
+"""Mark for a single worker, so that each pull is recorded once."""
 DELAY_S, DURATION_S = 0.05, 2.0
 SEED = 1
-"""Its steady pull is a fast one; the tests see to that."""
+"""Seed whose steady pull is a fast one, as the tests check."""
 
 
 @functools.cache
@@ -40,7 +40,7 @@ def test_what_was_sent_arrives_one_delay_later() -> None:
     np.testing.assert_allclose((one.applied_at_s - one.applied_sent_s)[applied], DELAY_S, atol=TICK_S + 1e-9)
     assert (np.diff(one.applied_sent_s[applied]) >= 0.0).all()
     assert (one.applied_at_s[applied] <= one.tick_time_s[applied]).all()
-    # Each of a command every 4 ms is followed until the next one.
+    # Each command, one every 4 ms, is followed until the next one.
     followed_s = (one.tick_time_s - one.applied_sent_s)[applied]
     assert followed_s.min() >= DELAY_S - 1e-9
     assert followed_s.max() < DELAY_S + 0.004 + TICK_S
@@ -63,7 +63,7 @@ def test_the_recorded_pose_moves_on_through_the_wall() -> None:
     resting = one.pose_time_s < one.began_s + DELAY_S
     np.testing.assert_allclose(np.array(gaps_m)[resting], 0.32, atol=1e-3)
     assert gaps_m[-1] < -0.01
-    # It goes on at the speed that its travel means, in the wall as before it, and knows how old the loop is.
+    # It moves at the speed of its travel, in the wall as before it, and knows the loop age.
     pulling = one.pose_time_s > one.began_s + 0.6
     speeds_m_s = -np.diff(np.array(gaps_m)[pulling & (np.array(gaps_m) > 0.01)]) / POSE_S
     np.testing.assert_allclose(speeds_m_s, 0.25 * float(one.command[-1]), rtol=0.03)
@@ -81,15 +81,15 @@ def test_a_seed_gives_the_same_record_and_another_one_another() -> None:
         np.testing.assert_array_equal(getattr(first, one.name), getattr(again, one.name), err_msg=one.name)
     assert not np.array_equal(first.travel, other.travel)
     assert not np.array_equal(first.applied_at_s, other.applied_at_s)
-    # Jitter lets no newer command wait for an older one.
+    # Jitter makes no newer command wait for an older one.
     sent_s = first.applied_sent_s[~np.isnan(first.applied_sent_s)]
     assert (np.diff(sent_s) >= 0.0).all()
 
 
-# From a moment on until the arm stands
+# From a moment until the arm stops
 
 STARTS_S, GOES_S = 0.02, 0.8
-"""Moments of a pull over 200 ms: as the first command arrives, and when the arm goes evenly."""
+"""Moments of a pull over 200 ms, in seconds: as the first command arrives, and when the arm moves evenly."""
 
 
 @functools.cache
@@ -112,7 +112,7 @@ def test_until_it_brakes_it_goes_as_the_arm_went_with_these_commands(pull: PullK
     goes = times_s <= record.arrives_s(time_s) - time_s + HORIZON_S
     true = [replay.pose_at(float(time_s + then_s)) for then_s in times_s[goes]]
     off_m = np.linalg.norm(path.positions_m[goes] - [pose.tool_position_m for pose in true], axis=1)
-    # The finger itself needs 0.1 s until it pulls as it will.
+    # The finger itself needs 0.1 s to reach its force.
     assert off_m.max() < (0.003 if since_s == STARTS_S else 0.0001)
     turned = path.rotations[goes] @ np.swapaxes([pose.tool_rotation for pose in true], 1, 2)
     assert np.arccos(np.clip((np.trace(turned, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)).max() < 0.01
@@ -142,7 +142,7 @@ def test_sticks_end_go_on_by_half_or_go_on_until_it_stands(pull: PullKind, direc
     assert replay.moves_sticks(began_s - 0.1, began_s + 0.01)
     assert not replay.moves_sticks(began_s + 0.01, began_s + 1.0)
     assert not replay.sticks_at(began_s - 0.1).any()
-    # So early no part of the arm has moved, and no report could say so.
+    # So early no part of the arm has moved, and no report could show it.
     time_s = began_s + STARTS_S
     assert np.abs(replay.sticks_at(time_s)) == pytest.approx(fastest * np.eye(6)[direction], abs=1e-3)
     side, aside = np.sign(replay.sticks_at(time_s)[direction]), []
@@ -152,6 +152,6 @@ def test_sticks_end_go_on_by_half_or_go_on_until_it_stands(pull: PullKind, direc
         goes_m = before.T @ (path.positions_m[-1] - path.positions_m[0])
         aside.append(side * (goes_m[0] if pull == "drift" else np.cross(before[:, 2], after[:, 2]) @ before[:, 1]))
     going_on = fastest * (since_s[-1] - (replay.record.arrives_s(time_s) - time_s))
-    # It has to start, and the finger may be let go earlier than the stick.
+    # It must start, and the finger may be released earlier than the stick.
     assert 0.0 <= aside[0] < 0.1 * going_on < 0.45 * going_on < aside[1] < 0.6 * going_on
     assert 0.8 * going_on < aside[2] < 1.05 * going_on

@@ -1,4 +1,4 @@
-"""The oracle of overlaps against the definition (eq. 11), and the classes that others are held to."""
+"""Oracle of overlaps against the definition (eq. 11), and the classes for comparisons."""
 
 import math
 from dataclasses import replace
@@ -22,7 +22,7 @@ Point = list[Any]
 
 
 def crossing(a: Point, b: Point, radius: Any) -> tuple[Any, Any] | None:
-    """The shares of a to b between which the segment runs inside the ball at the origin."""
+    """Return the shares of a to b between which the segment is inside the ball at the origin."""
     step = [y - x for x, y in zip(a, b, strict=True)]
     length_2, half = sum(x * x for x in step), sum(x * y for x, y in zip(a, step, strict=True))
     inside = half**2 - length_2 * (sum(x * x for x in a) - radius**2)
@@ -33,7 +33,7 @@ def crossing(a: Point, b: Point, radius: Any) -> tuple[Any, Any] | None:
 
 
 def slice_area(rings: list[list[Point]], z: Any, radius: Any) -> Any:
-    """The area that the convex solid and the ball have in common at the height z."""
+    """Return the area common to the convex solid and the ball at the height z."""
     disc = mp.sqrt(max(mpf(0), radius**2 - z**2))
 
     def sector(p: Point, q: Point) -> Any:
@@ -139,7 +139,7 @@ def test_a_mesh_of_the_same_surface_has_the_same_truth() -> None:
 
 
 def box_below(gap: float) -> Pairs:
-    """A unit sphere `gap` above the edge (gap 3/5, 4/5 away) of a unit cube, grid-aligned but for the gap."""
+    """Return a unit sphere `gap` above a unit cube's edge (gap 3/5, 4/5 away), on the grid but for the gap."""
     corner = np.array([0.0, 3.0, 4.0]) * (5.0 + gap)
     return Pairs("box", corner[None], np.array([25.0]), (-np.ones((1, 3)), np.eye(3)[None], np.ones((1, 3))))
 
@@ -150,7 +150,7 @@ def test_contact_sees_the_last_digit() -> None:
     assert not exact_contact(box_below(1e-15), 0)
     larger = box_below(0.0)
     assert exact_contact(replace(larger, radii=np.nextafter(larger.radii, 26.0)), 0)
-    # Where there is contact, there is volume: found without the decision beforehand.
+    # A contact has a volume, found without the decision beforehand.
     for name, pairs in frozen_classes(1, seed=3, solids=("tetrahedron",)).items():
         if "without volume" not in name:
             triangles = TETRAHEDRON_TRIANGLES

@@ -1,4 +1,4 @@
-"""The engine: the same table for any workers and after any interruption, and what it says when it cannot go on."""
+"""The engine: the same table for any workers and after any interruption, and its messages when it cannot continue."""
 
 import csv
 import json
@@ -76,7 +76,7 @@ def test_a_journal_cut_anywhere_gives_the_same_table(
     again = sweep(QUESTION, grid)
     assert list(again.table) == list(whole)
     assert (again.failures, again.left, again.ended) == ([], 0, None)
-    # All pieces are there once more, none twice.
+    # All pieces are there again, none twice.
     assert sorted(path.read_bytes().splitlines()) == sorted(content.splitlines())
 
 
@@ -178,7 +178,7 @@ def test_intervals_of_few_and_of_equal_values_are_told_apart() -> None:
     assert mcnemar_p([True, False], [True, False]) == 1.0
     assert mean_interval([2.0, 2.0]) == student_interval([2.0, 2.0]) == (2.0, 2.0)
     assert student_interval([1.0]) is welch_interval([1.0], [1.0, 2.0]) is None
-    # Worked out by hand: sd √2 over √2, and t of one degree, 12.7062.
+    # By hand: sd √2 over √2, and t of one degree of freedom, 12.7062.
     assert student_interval([0.0, 2.0]) == pytest.approx((1.0 - 12.7062, 1.0 + 12.7062), rel=1e-5)
     assert welch_interval([0.0, 0.0], [1.0, 1.0]) == (1.0, 1.0)
     noise = np.random.default_rng(1).normal(size=30)
@@ -209,7 +209,7 @@ def test_in_a_log_a_line_says_how_far_it_is_and_what_is_at_work(
     assert capsys.readouterr().err == "baking: 0 %, rye\nbaking: 25 %, oats\n"
 
 
-# With processes that are killed
+# Killed processes
 
 
 def _drive(arguments: Sequence[str]) -> "subprocess.Popen[str]":
@@ -311,7 +311,7 @@ def test_a_killed_cluster_or_driver_costs_no_row(tmp_path: Path, expected: bytes
 def test_a_file_of_ones_own_runs_on_a_cluster_that_does_not_have_it(tmp_path: Path, expected: bytes) -> None:
     shutil.copy(counting.__file__, tmp_path / "mine_counted.py")
     with _dask(2) as (address, _):
-        for round_s in ("0", "0.01"):  # a cluster takes the same file twice
+        for round_s in ("0", "0.01"):  # A cluster accepts the same file twice.
             call = [
                 "try",
                 "./mine_counted.py",

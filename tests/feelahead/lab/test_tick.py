@@ -1,4 +1,4 @@
-"""`bench tick`: what its figures mean, and the crowd that stands around."""
+"""`bench tick`: the meaning of its figures, and the crowd of objects around."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def test_of_a_crowd_around_a_cameras_objects_a_frame_says_what_moves() -> None:
     own = [thing.name for thing in scene.objects if thing.name not in scene.fixed]
     assert [second.names[thing] for thing in second.since[0].things] == own
     assert len(second.roles) == len(second.names) == len(scene.objects) + 300
-    # As long as nobody changes a role, all frames share one tuple.
+    # While nobody changes a role, all frames share one tuple.
     assert camera.perceive(1.0).roles is second.roles is first.roles
     camera.set_role(own[0], Role.TARGET)
     assert camera.perceive(1.5).roles[second.names.index(own[0])] is Role.TARGET

@@ -1,4 +1,4 @@
-"""One recorded run of both sides in virtual time, for everything that is done with recordings."""
+"""One recorded run of both sides in virtual time, for everything that uses recordings."""
 
 import io
 from collections.abc import Callable
@@ -90,7 +90,7 @@ def jpeg(value: int) -> bytes:
 
 @pytest.fixture
 def with_pictures(run: Recording, tmp_path: Path) -> tuple[Recording, list[bytes]]:
-    """The same run with a camera: its messages once more, and pictures at 10 Hz."""
+    """Return the same run with a camera: its messages again, and pictures at 10 Hz."""
     path = tmp_path / "pictures.mcap"
     file = RecordingFile(path, 0.0)
     content = Content(file)

@@ -1,4 +1,4 @@
-"""Exports hold what the recording holds, in the layouts that other programs ask for."""
+"""Exports hold the recording's content, in the layouts of other programs."""
 
 import csv
 import io
@@ -41,7 +41,7 @@ def test_csv_has_a_file_for_each_topic_and_one_joined(run: Recording, tmp_path: 
     times = np.array([float(row["recording_s"]) for row in joined])
     np.testing.assert_allclose(np.diff(times), 0.01, atol=1e-9)
     assert joined[-1]["stiffness.state"] == "armed"
-    assert joined[0]["command.r2"] == ""  # nothing was sent yet
+    assert joined[0]["command.r2"] == ""  # Nothing was sent yet.
 
 
 def test_a_joined_row_never_knows_what_comes_later(run: Recording) -> None:

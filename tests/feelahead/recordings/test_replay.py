@@ -1,4 +1,4 @@
-"""A recording once more: the cores give the same bits, and each moment looks the same however one came to it."""
+"""Replays: the cores give the same bits, and each moment looks the same, however it was reached."""
 
 import dataclasses
 import math
@@ -45,7 +45,7 @@ def test_the_operator_side_sends_and_writes_the_same(run: Recording) -> None:
     assert compared.made == compared.equal > DURATION_S / KEEP_ALIVE_S
     assert compared.within
     told = [one for one in recorded_entries(run, "operator", []) if one.kind == Kind.TOLD]
-    assert len(told) > 10  # the person felt something, or nothing was compared
+    assert len(told) > 10  # The person felt something, or nothing was compared.
 
 
 def test_a_recording_of_reports_is_made_again_too(run: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -123,7 +123,7 @@ def test_a_cut_file_is_compared_up_to_its_last_complete_second_where_there_is_on
     compared = replay_robot(open_recording(cut))
     assert compared.made == compared.equal > 0.4 * DURATION_S / KEEP_ALIVE_S
     assert compared.notes == ["the file was cut off: compared up to its last complete second"]
-    # Beyond the header, in which every kernel that was imported by then has a digest, and before a second is complete.
+    # After the header, with a digest of every kernel imported by then, and before a second is complete.
     cut.write_bytes(content[: content.index(b"feelahead.robot") + len(repr(kernel_digests())) + 3000])
     assert replay([str(cut), "--check"]) == 1
     assert "nothing was compared" in capsys.readouterr().out
@@ -185,15 +185,15 @@ def test_it_takes_as_long_as_the_speed_says_and_leaves_nothing_out(recording: Re
         passed_s += 0.01
     assert shown == list(seen(recording))
     assert passed_s == pytest.approx(playback.length_s / speed, abs=0.011)
-    # A stiffness leaves at least so often.
+    # A stiffness leaves at least that often.
     assert playback.length_s == pytest.approx(shown[-1].time_s, abs=KEEP_ALIVE_S)
     assert playback.paused
-    playback.wish({"paused": False, "speed": 1.0})  # from its end it begins anew
+    playback.wish({"paused": False, "speed": 1.0})  # From its end it restarts.
     assert playback.state() == {"at_s": 0.0, "length_s": playback.length_s, "speed": 1.0, "paused": False}
 
 
 @pytest.mark.parametrize("moments_s", [(3.0,), (5.0, 3.0), (1.0, 2.0, 3.0), (0.0, 3.0, 3.0)])
-def test_a_moment_looks_the_same_however_one_came_to_it(recording: Recording, moments_s: tuple[float, ...]) -> None:
+def test_a_moment_looks_the_same_however_it_was_reached(recording: Recording, moments_s: tuple[float, ...]) -> None:
     playback = Playback(recording)
     shown: list[Seen] = []
     for moment_s in moments_s:
@@ -213,7 +213,7 @@ def test_what_is_no_wish_changes_nothing(recording: Recording, words: Any) -> No
     assert playback.state() == before
 
 
-def test_who_comes_to_look_later_sees_the_moment_at_which_it_rests(recording: Recording) -> None:
+def test_a_later_viewer_sees_the_moment_of_the_pause(recording: Recording) -> None:
     playback = Playback(recording)
     playback.wish({"at_s": 3.0})
     shown = newest(playback.advance(0.02))

@@ -1,4 +1,4 @@
-"""Fields of small grippers in small scenes, for the tests of what is ahead."""
+"""Fields of small grippers in small scenes, for tests of contact distances."""
 
 from typing import Any
 
@@ -18,14 +18,14 @@ from tests.helpers.gripper_poses import free_pose
 AHEAD = np.array([0.0, 0.0, 1.0])
 REACH_M = 0.15
 RADIUS_M = 0.008
-"""Of a fingertip's sphere."""
+"""Radius of a fingertip's sphere."""
 EQUAL_M = 1e-4
-"""Ways are known this well."""
+"""Tolerance of contact distances."""
 CLASSES = {Role.TARGET: TARGET, Role.IGNORED: PASSED_OVER}
 
 
 def ball_pose(radius_m: float = RADIUS_M, **placed: Any) -> GripperPose:
-    """One sphere, about the tool's own point."""
+    """Return one sphere about the tool's own point."""
     return free_pose([[0.0, 0.0, 0.0]], [radius_m], **placed)
 
 
@@ -37,7 +37,7 @@ def along(
     quantile: float = 0.0,
     reach_m: float = REACH_M,
 ) -> Along:
-    """A direction; `inflated_m` is the D_σ of every sphere where nothing varies."""
+    """Return a direction; `inflated_m` is the D_σ of every sphere if nothing varies."""
     return Along(np.ascontiguousarray(direction), inflated_m, variance_m2, quantile, reach_m)
 
 
@@ -55,18 +55,18 @@ def look(
     widest_m: float = np.inf,
     by: Ahead | None = None,
 ) -> Field:
-    """The field, by tables of its own unless `by` says whose; what objects are follows from their roles."""
+    """Compute the field, by new tables unless `by` gives some; classes follow from the objects' roles."""
     looking = by or Ahead(np.zeros(pose.tool_jacobian.shape[1]))
     return looking.look(pose, scene_table(objects), _classes(objects, classes), ahead, widest_m)
 
 
 def ways_of(pose: GripperPose, objects: PerceivedObjects, ahead: Along) -> FloatArray:
-    """The eight ways (8,) at which the strengths begin."""
+    """Return the distances (8,) at which the strengths begin."""
     return look(pose, objects, ahead).fast_m
 
 
 def judged(pose: GripperPose, objects: PerceivedObjects, ahead: Along, **how: Any) -> Judged:
-    """How far off the ways of such a look are from their definition; `how` as `look` takes it."""
+    """Compare the distances of such a look with their definition; `how` as `look` takes it."""
     looking: Ahead = how.setdefault("by", Ahead(np.zeros(pose.tool_jacobian.shape[1])))
     found = look(pose, objects, ahead, **how)
     classes, widest_m = _classes(objects, how.get("classes")), how.get("widest_m", np.inf)

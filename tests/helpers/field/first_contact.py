@@ -1,4 +1,4 @@
-"""Where a sphere first touches the first primitive of a scene, by the kernel function that a look asks."""
+"""First contact of a sphere with a scene's first primitive, by the kernel function of a look."""
 
 import math
 
@@ -18,8 +18,8 @@ _scene_at = SCENE.at
 def first_contact_m(
     objects: PerceivedObjects, start_m: FloatArray, radius_m: float, direction: FloatArray, reach_m: float
 ) -> float:
-    """The distance along the unit vector (3,); 0 where they overlap, infinite beyond the reach."""
-    # A bundle says where the table's arrays are, and does not keep them.
+    """Return the distance along the unit vector (3,); 0 if they overlap, infinite beyond the reach."""
+    # A bundle holds addresses of the table's arrays, and does not keep them alive.
     from_and_along, table = np.stack([start_m, direction]), scene_table(objects)
     found = float(_first_contact(from_and_along, radius_m, reach_m, table.bundle))
     return found if found <= reach_m else math.inf

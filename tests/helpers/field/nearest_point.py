@@ -1,6 +1,6 @@
-"""The nearest point of a primitive's surface, of many pairs at once: thin faces over what the compiled pass uses.
+"""Nearest points of primitives' surfaces, for many pairs at once: thin wrappers of the compiled pass.
 
-Point i is paired with primitive i throughout. See `robot_side.surroundings.distances.nearest_points` for what is found.
+Point i is paired with primitive i throughout. See `robot_side.surroundings.distances.nearest_points` for the result.
 """
 
 import math
@@ -19,7 +19,7 @@ Nearest = tuple[FloatArray, FloatArray]
 
 
 def distance_to_object(objects: PerceivedObjects, index: int, point_m: FloatArray) -> float:
-    """Signed distance from `point_m` (3,) to an object, negative inside; infinite for one without primitives."""
+    """Return the signed distance from `point_m` (3,) to an object, negative inside; infinite without primitives."""
     scene = scene_table(objects)
     rows = np.arange(scene.first_rows[index], scene.first_rows[index + 1])
     points = np.broadcast_to(np.asarray(point_m, dtype=np.float64), (len(rows), 3))
@@ -27,29 +27,29 @@ def distance_to_object(objects: PerceivedObjects, index: int, point_m: FloatArra
 
 
 def nearest_on_sphere(points_m: FloatArray, centers_m: FloatArray, radii_m: FloatArray) -> Nearest:
-    """From points (p, 3) to spheres (centers (p, 3), radii (p,))."""
+    """Compute from points (p, 3) to spheres (centers (p, 3), radii (p,))."""
     return _each(SPHERE, points_m, centers_m, radii_m)
 
 
 def nearest_on_box(
     points_m: FloatArray, centers_m: FloatArray, rotations: FloatArray, half_sizes_m: FloatArray
 ) -> Nearest:
-    """From points (p, 3) to boxes: centers (p, 3), rotations (p, 3, 3) box to world, half sizes (p, 3)."""
+    """Compute from points (p, 3) to boxes: centers (p, 3), rotations (p, 3, 3) box to world, half sizes (p, 3)."""
     return _each(BOX, points_m, centers_m, rotations, half_sizes_m)
 
 
 def nearest_on_tetrahedron(points_m: FloatArray, vertices_m: FloatArray) -> Nearest:
-    """From points (p, 3) to tetrahedra (p, 4, 3), in any vertex order; one of zero volume is a plate."""
+    """Compute from points (p, 3) to tetrahedra (p, 4, 3), in any vertex order; one of zero volume is a plate."""
     return _each(TETRAHEDRON, points_m, vertices_m)
 
 
 def nearest_on_half_space(points_m: FloatArray, normals: FloatArray, offsets_m: FloatArray) -> Nearest:
-    """From points (p, 3) to half-spaces, solid where normal·x <= offset."""
+    """Compute from points (p, 3) to half-spaces, solid where normal·x <= offset."""
     return _each(HALF_SPACE, points_m, normals, offsets_m)
 
 
 def _each(kind: int, points_m: FloatArray, *columns: FloatArray) -> Nearest:
-    """By a table of these primitives alone, those of no volume among them, which no scene's table keeps."""
+    """Compute by a table of these primitives alone, including those without volume, which no scene's table keeps."""
     count = len(points_m)
     places = np.arange(count)
     nothing = np.empty((0, 4))

@@ -1,4 +1,4 @@
-"""What a scene's table says of each primitive and object, from the definitions, one after another in NumPy."""
+"""Rows of a scene's table for each primitive and object, from the definitions, one by one in NumPy."""
 
 from dataclasses import dataclass
 
@@ -24,13 +24,13 @@ class Row:
 
 
 def rows_of(objects: PerceivedObjects) -> list[Row]:
-    """Those that have a volume, by object and then by kind."""
+    """Return the primitives with a volume, by object and then by kind."""
     found = [*_spheres(objects), *_boxes(objects), *_tetrahedra(objects), *_half_spaces(objects), *_meshes(objects)]
     return sorted((row for row in found if row.volume_m3 > 0.0), key=lambda row: (row.thing, row.kind, row.row_of_kind))
 
 
 def object_bound(rows: list[Row]) -> FloatArray:
-    """A sphere (4,) about the middle of what one object's bounds extend to along the axes."""
+    """Return a sphere (4,) about the middle of the box around one object's bounds."""
     if not rows:
         return np.array([0.0, 0.0, 0.0, -np.inf])
     bounds = np.array([row.bound for row in rows])

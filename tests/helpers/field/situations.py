@@ -1,4 +1,4 @@
-"""Situations of a tool that flies freely, and the laws that sense them, for the tests of what is felt."""
+"""Situations of a freely flying tool, and the laws that sense them, for tests of stiffness."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -21,17 +21,17 @@ from tests.helpers.field.fields import RADIUS_M, ball_pose
 from tests.helpers.perceived_scenes import Scene
 
 EXACT = PredictionErrors({"operator": ((1.0, 0.0, 0.0),), "robot": ((1.0, 0.0, 0.0),)})
-"""A prediction that never errs."""
+"""Prediction without errors."""
 CAMERA_SD_M = 0.003
 SIGMA_M = 2.3263478740408408 * CAMERA_SD_M
-"""D_σ at P = 0.99 where only the camera errs."""
+"""D_σ at P = 0.99 with only camera errors."""
 FULL_SPEED_M_S, STICK_SPEED_M_S, ACCELERATION_M_S2 = 0.25, 0.1, 3.0
 LIMITS = JointLimits(np.full(6, 10.0), np.full(6, ACCELERATION_M_S2))
 MOTION = ToolMotionSettings(FULL_SPEED_M_S, STICK_SPEED_M_S)
 
 
 def uncertain(**changes: Any) -> Uncertainty:
-    """The camera errs by 3 mm, and nothing else does, unless `changes` say so."""
+    """Return camera errors of 3 mm and no others, unless changed."""
     return replace(Uncertainty(0.99, camera_sd_m=CAMERA_SD_M, prediction=EXACT), **changes)
 
 
@@ -44,7 +44,7 @@ def paper(encoder_sigma_rad: float = 0.0, **changes: Any) -> PaperLaw:
 
 
 def situation(pose: GripperPose, objects: PerceivedObjects | None = None, **changes: Any) -> Situation:
-    """At rest, with a loop age of 100 ms that is known, and a stick that rests, unless `changes` say so."""
+    """Return a situation at rest, with a known loop age of 100 ms and a centred stick, unless changed."""
     at_rest = Situation(
         pose=pose,
         joint_velocities_rad_s=np.zeros(6),
@@ -60,12 +60,12 @@ def situation(pose: GripperPose, objects: PerceivedObjects | None = None, **chan
 
 
 def moving(velocity_m_s: FloatArray) -> FloatArray:
-    """The joints' rates (6,) at which the free tool moves so."""
+    """Return the joints' rates (6,) that move the free tool at this velocity (3,)."""
     return np.concatenate([velocity_m_s, np.zeros(3)])
 
 
 def walls(ahead_m: float | None, behind_m: float | None = None, front_m: float = RADIUS_M) -> PerceivedObjects:
-    """Walls so far before and behind what reaches as far as front_m."""
+    """Return walls at these distances before and behind a gripper that reaches to front_m."""
     scene = Scene()
     if ahead_m is not None:
         scene.add().box([0.0, 0.0, front_m + ahead_m + 0.05], [0.5, 0.5, 0.05])
@@ -75,13 +75,13 @@ def walls(ahead_m: float | None, behind_m: float | None = None, front_m: float =
 
 
 def at(way_m: float, across_m: float = 0.0) -> GripperPose:
-    """One sphere, so far along and across."""
+    """Return one sphere at this place along and across."""
     return ball_pose(tool_position_m=[across_m, 0.0, way_m])
 
 
 @dataclass
 class Senses:
-    """A law, and time that passes by so much with each use."""
+    """Law, and a clock that advances by `step_s` with each use."""
 
     law: Law = field(default_factory=swept)
     step_s: float = 10.0

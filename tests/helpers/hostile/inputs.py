@@ -12,11 +12,11 @@ from tests.helpers.hostile.raw_zmtp import GREETING, RawConnection, frame, messa
 
 _STRANGERS = 8
 _HANGING = 128
-"""Connections that never finish their handshake, at any time."""
+"""Number of connections that never finish their handshake, at any time."""
 
 
 def payload(generator: random.Random) -> bytes:
-    """Bytes that look more or less like a message."""
+    """Return bytes that look more or less like a message."""
     kind = generator.randrange(5)
     if kind == 0:
         return generator.randbytes(generator.randrange(MAXIMUM_BYTES))
@@ -28,7 +28,7 @@ def payload(generator: random.Random) -> bytes:
             spoiled[generator.randrange(len(spoiled))] = generator.randrange(256)
         return bytes(spoiled)
     if kind == 3:
-        return b"\x91" * generator.randrange(MAXIMUM_BYTES)  # arrays in arrays in arrays
+        return b"\x91" * generator.randrange(MAXIMUM_BYTES)  # Nested arrays.
     odd: float = generator.choice([float("nan"), float("inf"), 1e308, -1.0, 2**64 - 1])
     content: bytes = msgpack.packb([PROTOCOL_VERSION, ["motion", [1, 2, odd, None, None], odd, odd, [odd, odd]]])
     return content
@@ -42,7 +42,7 @@ def _valid(generator: random.Random) -> bytes:
 
 
 class Attacker:
-    """Sends one hostile input after the other to a robot side's two ports."""
+    """Sender of hostile inputs, one after the other, to a robot side's two ports."""
 
     def __init__(self, control_port: int, view_port: int, seed: int) -> None:
         self._control_port = control_port
@@ -60,13 +60,13 @@ class Attacker:
         }
 
     def send(self) -> None:
-        """One hostile input; the robot side, or the system, may cut it short."""
+        """Send one hostile input; the robot side, or the system, may cut it short."""
         [send] = self._generator.choices(list(self._kinds), list(self._kinds.values()))
         with contextlib.suppress(OSError):
             send()
 
     def close(self) -> None:
-        """Hang up everywhere."""
+        """Close all connections."""
         for connection in (*self._strangers, *self._hanging):
             connection.close()
 

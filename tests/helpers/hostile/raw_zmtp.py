@@ -1,4 +1,4 @@
-"""ZMTP 3.0 by hand over a plain TCP connection (rfc.zeromq.org/spec/23), so that it can be spoken wrongly."""
+"""ZMTP 3.0 by hand over a plain TCP connection (rfc.zeromq.org/spec/23), so that errors can be sent."""
 
 import contextlib
 import socket
@@ -7,13 +7,13 @@ import struct
 from common.sockets.greeting import KNOCK
 
 GREETING = KNOCK + b"NULL".ljust(20, b"\0") + bytes(32)
-"""With mechanism NULL, not a server, filler: 64 bytes."""
+"""Greeting of 64 bytes: mechanism NULL, not a server, filler."""
 _MORE, _LONG, _COMMAND = 1, 2, 4
 _TIMEOUT_S = 5.0
 
 
 def ready(socket_type: bytes, name: bytes = b"") -> bytes:
-    """The command that ends the handshake of the NULL mechanism; `name` is the routing id, empty for any."""
+    """Return the command that ends the handshake of the NULL mechanism; `name` is the routing id, empty for any."""
     body = b"\x05READY"
     for field, value in ((b"Socket-Type", socket_type), (b"Identity", name)):
         body += bytes([len(field)]) + field + struct.pack(">I", len(value)) + value
@@ -21,7 +21,7 @@ def ready(socket_type: bytes, name: bytes = b"") -> bytes:
 
 
 def frame(body: bytes, *, more: bool = False, claimed_bytes: int | None = None) -> bytes:
-    """One frame of a message; `claimed_bytes` lies about its length."""
+    """Return one frame of a message; `claimed_bytes` is a false length."""
     length = len(body) if claimed_bytes is None else claimed_bytes
     flags = _MORE if more else 0
     if length < 256:
@@ -30,20 +30,20 @@ def frame(body: bytes, *, more: bool = False, claimed_bytes: int | None = None) 
 
 
 def message(*bodies: bytes) -> bytes:
-    """One message of these frames."""
+    """Return one message of these frames."""
     return b"".join(frame(body, more=position < len(bodies) - 1) for position, body in enumerate(bodies))
 
 
 def port_of(endpoint: str) -> int:
-    """The port of tcp://HOST:PORT."""
+    """Return the port of tcp://HOST:PORT."""
     return int(endpoint.rsplit(":", 1)[1])
 
 
 class RawConnection:
-    """A TCP connection to a port of this machine that never blocks for long, and that the other side may end."""
+    """TCP connection to a port of this machine that never blocks for long, and that the other side may end."""
 
     def __init__(self, port: int, sends: bytes = b"", buffer_bytes: int | None = None) -> None:
-        """`buffer_bytes` limits what the kernel takes for a peer that does not read."""
+        """buffer_bytes: limit of the kernel's receive buffer, for a peer that does not read."""
         self.open = True
         """False once the other side has ended it."""
         self._socket = socket.socket()
@@ -57,7 +57,7 @@ class RawConnection:
     def introduced(
         cls, port: int, socket_type: bytes = b"DEALER", buffer_bytes: int | None = None, name: bytes = b""
     ) -> "RawConnection":
-        """One that has gone through the handshake as a well-behaved peer would; OSError when it is refused."""
+        """Return a connection that has finished the handshake as a well-behaved peer; OSError if refused."""
         connection = cls(port, GREETING + ready(socket_type, name), buffer_bytes)
         connection._await(b"\x05READY")
         return connection
@@ -73,7 +73,7 @@ class RawConnection:
             self.close()
 
     def read_all(self, silence_s: float = 0.3) -> bytes:
-        """All that comes until nothing does for `silence_s`."""
+        """Return all bytes until a silence of `silence_s`."""
         self._socket.settimeout(silence_s)
         received = b""
         with contextlib.suppress(TimeoutError):
@@ -82,7 +82,7 @@ class RawConnection:
         return received
 
     def ended(self) -> bool:
-        """Whether the other side has ended it by now; waits up to a few seconds for that."""
+        """Return whether the other side has ended the connection; waits up to a few seconds."""
         if not self.open:
             return True
         self._socket.settimeout(_TIMEOUT_S)
@@ -97,12 +97,12 @@ class RawConnection:
         return True
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self.open = False
         self._socket.close()
 
     def _await(self, expected: bytes) -> None:
-        """Read until that has come: a message that overtakes the other side's half of the handshake ends it."""
+        """Read until `expected` has come: a message before the other side's half of the handshake would end it."""
         received = b""
         while self.open and expected not in received:
             content = self._socket.recv(65536)
@@ -111,7 +111,7 @@ class RawConnection:
             received += content
 
     def _read_away(self) -> None:
-        """Discard answers, which must not fill the buffers. An end of the stream closes."""
+        """Discard answers, so that they do not fill the buffers; close at the end of the stream."""
         self._socket.settimeout(0.0)
         try:
             while content := self._socket.recv(65536):

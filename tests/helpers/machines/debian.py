@@ -1,4 +1,4 @@
-"""Debian's packages for the suites that need a machine: installed in CI, or unpacked into a folder of our own."""
+"""Debian's packages for the suites that need a machine: installed in CI, or unpacked into a separate folder."""
 
 import fcntl
 import os
@@ -18,14 +18,14 @@ _LIBRARIES: Final = ("lib/x86_64-linux-gnu", "usr/lib/x86_64-linux-gnu")
 
 
 def cache_folder(name: str) -> Path:
-    """The folder that the suite `name` keeps from one run to the next."""
+    """Return the folder that the suite `name` keeps from one run to the next."""
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "feelahead" / f"{name}-test"
     cache.mkdir(parents=True, exist_ok=True)
     return cache
 
 
 def install(packages: Sequence[str], program: str) -> None:
-    """Install `packages` unless `program` is there; skips the test unless this is CI, root's, and Debian's."""
+    """Install `packages` unless `program` is there; skip the test except in CI, as root, on Debian."""
     if shutil.which(program) is not None:
         return
     if os.environ.get("CI") != "true" or os.geteuid() != 0 or shutil.which("apt-get") is None:
@@ -36,7 +36,7 @@ def install(packages: Sequence[str], program: str) -> None:
 
 
 def run_or_skip(words: Sequence[str], settings: Mapping[str, str] | None = None, folder: Path | None = None) -> str:
-    """Run a command that provides something; skips the test with its last words where it fails."""
+    """Run a command that provides something; skip the test with its last words if it fails."""
     environment = os.environ | dict(settings or {})
     try:
         done = subprocess.run(
@@ -50,7 +50,7 @@ def run_or_skip(words: Sequence[str], settings: Mapping[str, str] | None = None,
 
 
 class Apt:
-    """apt with lists and archives of its own: the system's may be empty or stale, and are not ours to renew."""
+    """apt with separate lists and archives: the system's may be empty or stale, and stay unchanged."""
 
     def __init__(self, folder: Path) -> None:
         options = {
@@ -61,26 +61,26 @@ class Apt:
             "APT::Update::Error-Mode": "any",
         }
         if os.geteuid() == 0:
-            options["APT::Sandbox::User"] = "root"  # another user may not write where we do
+            options["APT::Sandbox::User"] = "root"  # Another user may not write to our folder.
         self._options = [part for name, value in options.items() for part in ("-o", f"{name}={value}")]
         for partial in ("lists/partial", "apt/archives/partial", "archives"):
             (folder / partial).mkdir(parents=True)
         self._archives = folder / "archives"
 
     def run(self, program: str, *words: str) -> str:
-        """Run `apt-get` or `apt-cache`; skips the test where it fails."""
+        """Run `apt-get` or `apt-cache`; skip the test if it fails."""
         return run_or_skip([program, *self._options, *words], {"LC_ALL": "C"}, self._archives)
 
     def missing_for(self, package: str) -> list[str]:
-        """`package=version` of `package` and of everything that it needs and the system lacks."""
+        """Return `package=version` of `package` and of all its dependencies that the system lacks."""
         said = self.run("apt-get", "--simulate", "--no-install-recommends", "install", package)
         words = [line.split() for line in said.splitlines() if line.startswith("Inst ")]
-        # "Inst NAME (VERSION ...)", and "Inst NAME [OLD VERSION] (VERSION ...)" for what would be brought up to date.
+        # "Inst NAME (VERSION ...)", and "Inst NAME [OLD VERSION] (VERSION ...)" for upgrades.
         return [f"{line[1]}={next(word for word in line if word.startswith('('))[1:]}" for line in words]
 
 
 def unpacked(name: str, packages: Callable[[Apt], list[str]], found: Callable[[Path], Parts]) -> Parts:
-    """`found` in the suite's folder of unpacked packages, which are downloaded when need be; skips the test else.
+    """Return `found` in the suite's folder of unpacked packages, downloading them if needed; otherwise skip the test.
 
     `found` raises FileNotFoundError for a missing part. Nothing is installed on the system.
     """
@@ -91,11 +91,11 @@ def unpacked(name: str, packages: Callable[[Apt], list[str]], found: Callable[[P
             pytest.skip(f"no {program}: the machine and its kernel come as Debian packages")
     cache = cache_folder(name)
     with (cache / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # another run may be filling it
+        fcntl.flock(lock, fcntl.LOCK_EX)  # Another run may be filling it.
         try:
             return found(cache / "root")
         except FileNotFoundError:
-            # The first time, and when the system's libraries have changed.
+            # The first time, and after changes of the system's libraries.
             _download(cache, packages)
             return found(cache / "root")
 
@@ -114,13 +114,13 @@ def _download(cache: Path, packages: Callable[[Apt], list[str]]) -> None:
 
 
 def library_path(root: Path) -> dict[str, str]:
-    """The environment in which programs of unpacked packages find their libraries."""
+    """Return the environment in which programs of unpacked packages find their libraries."""
     folders = {str(path.parent) for place in _LIBRARIES for path in (root / place).rglob("*.so*")}
     return {"LD_LIBRARY_PATH": ":".join(sorted(folders))}
 
 
 def only(folder: Path, pattern: str) -> Path:
-    """The one file in `folder` of that pattern; FileNotFoundError for none and for several."""
+    """Return the only file in `folder` of that pattern; FileNotFoundError for none or several."""
     found = sorted(folder.glob(pattern))
     if len(found) != 1:
         raise FileNotFoundError(f"{folder}/{pattern}: {len(found)} found")

@@ -1,6 +1,6 @@
-"""Two machines on a cable, as far as the network goes: a namespace each, and a virtual Ethernet link between them.
+"""Two machines on a cable, for the network: a namespace each, and a virtual Ethernet link between them.
 
-Needs root and iproute2's `ip`: tests are skipped without.
+Needs root and iproute2's `ip`: without them tests are skipped.
 """
 
 import contextlib
@@ -15,34 +15,34 @@ import pytest
 
 _PREFIX_BITS = 24
 _FOLDERS = (Path("/run/netns"), Path("/etc/netns"))
-"""Folders of the namespaces, and of the files that `ip` puts into their places in each."""
+"""Folders of the namespaces, and of the files that `ip` mounts in each."""
 
 
 @dataclass
 class Machine:
-    """One of the two."""
+    """One of the two machines."""
 
     namespace: str
     device: str
-    """The machine's end of the cable."""
+    """Device of the machine's end of the cable."""
     address: str
 
     @property
     def surroundings(self) -> list[str]:
-        """The command that runs a program there."""
+        """Command prefix that runs a program there."""
         return ["ip", "netns", "exec", self.namespace]
 
     @property
     def own_files(self) -> Path:
-        """The folder whose files replace those of /etc for programs that start there afterwards."""
+        """Folder whose files replace those of /etc for programs that start there afterwards."""
         return Path("/etc/netns") / self.namespace
 
     def unplug(self) -> None:
-        """Pull the cable out: neither end has a carrier any more."""
+        """Take the link down: neither end has a carrier."""
         self.set_link("down")
 
     def plug_in(self) -> None:
-        """Plug it in again."""
+        """Take the link up again."""
         self.set_link("up")
 
     def set_link(self, *words: str) -> None:
@@ -50,7 +50,7 @@ class Machine:
         _ip("-n", self.namespace, "link", "set", self.device, *words)
 
     def readdress(self, address: str) -> None:
-        """Another address instead of the present one, as a new lease of DHCP brings it."""
+        """Replace the present address, as a new DHCP lease does."""
         _ip("-n", self.namespace, "address", "flush", "dev", self.device)
         self.address = address
         _ip("-n", self.namespace, "address", "add", f"{address}/{_PREFIX_BITS}", "dev", self.device)
@@ -58,7 +58,7 @@ class Machine:
 
 @contextlib.contextmanager
 def two_machines(robot: str = "198.18.0.1", operator: str = "198.18.0.2") -> Iterator[tuple[Machine, Machine]]:
-    """Yield the robot's and the operator's, with these addresses; skip the test where they cannot be had."""
+    """Yield the robot's and the operator's machine with these addresses; skip the test if unavailable."""
     if shutil.which("ip") is None or os.geteuid() != 0:
         pytest.skip("network namespaces need root and iproute2 (apt install iproute2)")
     machines = one, other = (
@@ -89,7 +89,7 @@ def _connect(one: Machine, other: Machine) -> None:
 
 
 def _delete_left_behind() -> None:
-    """Delete namespaces of runs that were killed: the names end with a process that is no more."""
+    """Delete namespaces of killed runs: the names end with a process that is gone."""
     for folder in _FOLDERS:
         for left in folder.glob("feelahead-*-*"):
             owner = left.name.rpartition("-")[2]
@@ -101,17 +101,17 @@ def _delete(namespace: str) -> None:
     _run_ip("netns", "del", namespace)
     for files in Path("/etc/netns").glob(namespace):
         shutil.rmtree(files, ignore_errors=True)
-        with contextlib.suppress(OSError):  # others have theirs there
+        with contextlib.suppress(OSError):  # Others may have theirs there.
             files.parent.rmdir()
 
 
 def _ip(*arguments: str) -> None:
-    """AssertionError when it fails."""
+    """Assert that `ip` succeeds."""
     failed = _run_ip(*arguments)
     assert failed is None, failed
 
 
 def _run_ip(*arguments: str) -> str | None:
-    """Why it failed; None when it did not."""
+    """Return the reason of a failure; None if `ip` succeeded."""
     done = subprocess.run(["ip", *arguments], capture_output=True, text=True, check=False)  # noqa: S607
     return None if done.returncode == 0 else f"ip {' '.join(arguments)}: {done.stderr.strip()}"

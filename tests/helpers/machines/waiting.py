@@ -1,4 +1,4 @@
-"""Waiting for what happens in its own time."""
+"""Waiting in real time."""
 
 import time
 from collections.abc import Callable
@@ -15,9 +15,9 @@ def wait_until(
     limit_s: float = 60.0,
     instead: Callable[[], object] | None = None,
 ) -> Value:
-    """The first value of `condition` that is not None or False.
+    """Return the first value of `condition` that is not None or False.
 
-    AssertionError after `limit_s` names `what`, and what there was `instead`.
+    AssertionError after `limit_s` names `what` was awaited, and the state `instead`.
     """
     end_s = time.monotonic() + limit_s
     while time.monotonic() < end_s:
@@ -29,7 +29,7 @@ def wait_until(
 
 
 def stays(otherwise: str, condition: Callable[[], bool], for_s: float = 1.0) -> None:
-    """AssertionError with the text `otherwise` unless `condition` holds for `for_s`."""
+    """Assert that `condition` holds for `for_s`; otherwise fail with the text `otherwise`."""
     end_s = time.monotonic() + for_s
     while time.monotonic() < end_s:
         assert condition(), otherwise

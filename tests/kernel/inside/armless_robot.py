@@ -1,4 +1,4 @@
-"""A robot side without an arm: its real sockets, lease and safety, and stiffness as the test says."""
+"""Robot side without an arm: its real sockets, lease and safety, and the test's stiffness."""
 
 from common.protocol.codec import encode
 from common.protocol.uniform_field import STRENGTHS
@@ -7,34 +7,34 @@ from tests.helpers.felt import felt
 from tests.helpers.serving_robot import ServingRobot
 
 SLOW_MACHINE = SafetySettings(gap_s=3.0, age_s=10.0, max_delay_s=20.0, healthy_s=0.3, lease_s=30.0)
-"""A processor emulated in software holds no tenth of a second; what is checked is what follows, not how soon."""
+"""Limits for a processor emulated in software, too slow for 0.1 s: reactions are checked, not their time."""
 _FIELD_PERIOD_S = 0.02
 
 
 class ArmlessRobot(ServingRobot):
-    """One life of it, in a thread."""
+    """One life of the robot side, in a thread."""
 
     def __init__(self) -> None:
         super().__init__(publishes=False, safety=SLOW_MACHINE)
         self.r2_stiffness = 0.0
-        """0 to 1, wherever R2 is."""
+        """Stiffness of R2 everywhere, 0 to 1."""
         self.moving = False
-        """Whether the arm, if there were one, would be told to move now."""
+        """Whether an arm would be commanded to move now."""
         self.state = "disarmed"
         self._next_s = 0.0
 
     @property
     def flags(self) -> list[str]:
-        """The operator side's flags to find it."""
+        """Flags with which the operator side finds it."""
         return [f"--connect={self.control}", f"--view-connect={self.view}"]
 
     @property
     def commands(self) -> int:
-        """Motion commands that have come."""
+        """Number of motion commands received."""
         return self.session.motion_received
 
     def tick(self, now_s: float) -> None:
-        """Decide as a robot side does, and send the owner what is felt."""
+        """Decide as a robot side does, and send the owner a stiffness."""
         self.session.update(now_s)
         permission = self.session.permission(now_s)
         self.state = permission.state

@@ -1,4 +1,4 @@
-"""The command `feelahead virtual-dualsense`, as a process of its own."""
+"""The command `feelahead virtual-dualsense`, as a separate process."""
 
 import signal
 import subprocess
@@ -16,7 +16,7 @@ from tests.helpers.machines.waiting import wait_until
 from tests.kernel.inside.kernel_view import ABS_RZ, ABS_X, InputDevice, seen_device
 
 _START_S = 60.0
-# Not all of `feelahead`, whose other commands an emulated processor would load for long.
+# Not all of `feelahead`: an emulated processor would take long to load the other commands.
 _COMMAND = (
     "import sys; from feelahead.commands.virtual_dualsense import virtual_dualsense as v; sys.exit(v(sys.argv[1:]))"
 )

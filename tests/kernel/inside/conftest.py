@@ -13,6 +13,6 @@ _VARIANTS = [Variant(transport, model) for transport in Transport for model in M
 
 @pytest.fixture(scope="session", params=_VARIANTS, ids=lambda variant: variant.name)
 def plugged(request: pytest.FixtureRequest) -> Iterator[Plugged]:
-    """A controller; tests that need it plug it in."""
+    """Controller; tests that need it plug it in."""
     with Plugged(request.param) as one:
         yield one

@@ -41,7 +41,7 @@ def our_device(plugged: Plugged) -> Iterator[HidDualSense]:
 
 
 def newest_state(device: HidDualSense) -> ControllerState | None:
-    """The newest input report."""
+    """Return the newest input report."""
     return device.read(0.0)
 
 
@@ -91,7 +91,7 @@ def test_it_is_told_exactly_what_is_written_and_released_at_the_end(plugged: Plu
         device.write(Feel(rumble=Rumble(left=1.0, right=0.2)), 0.0)
         wait_until("the motors turn", lambda: plugged.ask(lambda c: c.rumble) == Rumble(left=1.0, right=0.2))
         assert plugged.ask(lambda c: c.strengths) == _EFFECTS[-1], "the rumble changed the triggers"
-        # Forty more, so that Bluetooth's sequence numbers go round; the kernel keeps 32 for a slow reader.
+        # Forty more, so that Bluetooth's sequence numbers wrap; the kernel keeps 32 for a slow reader.
         for number in range(40):
             device.write(Feel(l2=feedback(number % 10, 1 + number % 8)), 0.0)
             if number % 10 == 9:
@@ -143,5 +143,5 @@ def _finds_nothing() -> bool:
     except NoDeviceError:
         return True
     except DeviceError:
-        return False  # seen while it goes
+        return False  # Seen while it goes.
     return False

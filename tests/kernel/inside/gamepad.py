@@ -1,4 +1,4 @@
-"""Our evdev pad on the kernel's own input device, whose force feedback comes back as a controller's rumble."""
+"""Our evdev pad on the kernel's own input device; its force feedback returns as a controller's rumble."""
 
 import os
 import signal
@@ -23,20 +23,20 @@ from tests.kernel.inside.operator_side import Desk, arm_and_move
 from tests.kernel.inside.plugged import ADDRESS, Plugged, Variant
 
 STILL = Rumble()
-# 16 bits of force feedback come as 8 bits of a motor, cut off.
+# 16 bits of force feedback are cut to 8 bits of a motor.
 HALF, FULL = 128 / 255, 1.0
 
 
 @pytest.fixture(scope="module")
 def plugged() -> Iterator[Plugged]:
-    """A controller whose driver offers force feedback."""
+    """Controller whose driver offers force feedback."""
     with Plugged(Variant(Transport.USB)) as one:
         yield one
 
 
 @pytest.fixture
 def pad(plugged: Plugged) -> Iterator[OpenController]:
-    """Our pad on it."""
+    """Our pad on the controller."""
     bound(plugged)
     plugged.hands_off()
     found = find_pad(None)
@@ -51,7 +51,7 @@ def rumble(plugged: Plugged) -> Rumble:
 
 
 def reads(pad: OpenController, *, l2: float | None = None, r2: float | None = None) -> ControllerState | None:
-    """The state, once these triggers are there."""
+    """Return the state once these triggers are read, None before."""
     state = pad.device.read(0.0)
     assert state is not None
     return state if (l2 in (None, state.l2)) and (r2 in (None, state.r2)) else None
@@ -76,7 +76,7 @@ def test_stiffness_at_the_trigger_shakes_its_motor_which_stops_by_itself(plugged
         pad.device.write(feel, clock.now())
 
         def shakes() -> bool:
-            pad.device.read(clock.now())  # which says it again
+            pad.device.read(clock.now())  # Repeats the effect.
             return rumble(plugged) == Rumble(left, right)
 
         wait_until(f"{feel} is felt as {left}, {right}", shakes, instead=lambda: rumble(plugged))

@@ -1,4 +1,4 @@
-"""The kernel's view of a controller: its HID device under /sys, and input devices by the numbers of linux/input.h."""
+"""Kernel's view of a controller: its HID device under /sys, and input devices by the numbers of linux/input.h."""
 
 import fcntl
 import os
@@ -11,19 +11,19 @@ from operator_side.dualsense.uhid.controller import BUS, UhidIdentity
 
 
 class KernelView:
-    """A HID device."""
+    """HID device."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     @property
     def driver(self) -> str | None:
-        """The name of the driver that has bound it."""
+        """Name of the bound driver; None without one."""
         link = self.folder / "driver"
         return link.resolve().name if link.exists() else None
 
     def inputs(self) -> dict[str, Path]:
-        """The device file of each input device, by its name."""
+        """Return the device file of each input device, by its name."""
         found = {}
         for folder in sorted(self.folder.glob("input/input*")):
             events = sorted(folder.glob("event*"))
@@ -32,13 +32,13 @@ class KernelView:
         return found
 
     def hidraw(self) -> Path | None:
-        """The raw device file."""
+        """Return the raw device file."""
         found = sorted(self.folder.glob("hidraw/hidraw*"))
         return Path("/dev") / found[0].name if found else None
 
 
 def seen_device(identity: UhidIdentity) -> KernelView | None:
-    """The HID device with these ids; None when there is none."""
+    """Return the HID device with these ids; None if there is none."""
     ids = f"{BUS[identity.transport]:04X}:{SONY_VENDOR_ID:04X}:{identity.model.value:04X}."
     found = sorted(Path("/sys/bus/hid/devices").glob(f"{ids}*"))
     return KernelView(found[0]) if found else None
@@ -54,7 +54,7 @@ _KEY_BYTES = 96
 
 
 class InputDevice:
-    """An open /dev/input/event file."""
+    """Open /dev/input/event file."""
 
     def __init__(self, path: Path) -> None:
         self._descriptor = os.open(path, os.O_RDWR)
@@ -66,7 +66,7 @@ class InputDevice:
         os.close(self._descriptor)
 
     def axes(self, *codes: int) -> tuple[int, ...]:
-        """The present values of absolute axes."""
+        """Return the present values of absolute axes."""
         return tuple(self._axis(code) for code in codes)
 
     def _axis(self, code: int) -> int:
@@ -75,7 +75,7 @@ class InputDevice:
         return int(_AXIS.unpack(content)[0])
 
     def is_down(self, code: int) -> bool:
-        """Whether a key is pressed."""
+        """Return whether a key is pressed."""
         keys = bytearray(_KEY_BYTES)
         fcntl.ioctl(self._descriptor, _GET_KEYS, keys)
         return bool(keys[code // 8] >> code % 8 & 1)

@@ -1,4 +1,4 @@
-"""The process feelahead-operator with a controller on a real kernel that comes, goes, and must not stay stiff."""
+"""Process feelahead-operator on a real kernel: its controller comes and goes, and must not stay stiff."""
 
 import os
 import signal
@@ -17,16 +17,16 @@ from tests.kernel.inside.plugged import Plugged, Variant
 
 _PATIENCE_S = 90.0
 _START_PATIENCE_S = 400.0
-"""A start imports everything: half a minute on an emulated processor, and minutes on a busy machine."""
+"""Limit of a start in seconds: it imports everything, half a minute on an emulated processor, more if busy."""
 _HEALTHY_S = 0.7
-"""More than the robot side asks for."""
+"""Time in seconds, above the healthy time of the robot side."""
 _PRESSED_S = 0.3
 _HOLD_TO_RUN = Button.L1
 _ARM = Button.OPTIONS
 
 
 class Desk:
-    """A controller, an operator side, and the robot side that it is connected to."""
+    """Controller, operator side, and the robot side that it is connected to."""
 
     def __init__(self, plugged: Plugged, operator: SideProcess, robot: ArmlessRobot) -> None:
         self.plugged = plugged
@@ -45,7 +45,7 @@ class Desk:
         wait_until(f"a note: {part}", said, patience_s, instead=lambda: self.notes)
 
     def controller_lost(self) -> bool:
-        """Whether the operator side's newest status says so."""
+        """Return whether the operator side's newest status reports a lost controller."""
         self._listen()
         return self.controller == "lost"
 
@@ -60,7 +60,7 @@ class Desk:
 
 @pytest.fixture(scope="module", params=Transport, ids=lambda transport: transport.value)
 def desk(request: pytest.FixtureRequest) -> Iterator[Desk]:
-    """The operator side begins before its controller is there. It is the same for the Edge."""
+    """Operator side that starts before its controller is there; it does not depend on the model."""
     with (
         ArmlessRobot() as robot,
         Plugged(Variant(request.param)) as plugged,
@@ -69,7 +69,7 @@ def desk(request: pytest.FixtureRequest) -> Iterator[Desk]:
         yield Desk(plugged, operator, robot)
 
 
-# The tests in this order: each goes on from where the one before left off.
+# The tests in this order: each continues where the last one ended.
 
 
 def hold(plugged: Plugged, *buttons: Button, r2_n: float = 0.0) -> None:
@@ -91,7 +91,7 @@ def arm_and_move(desk: Desk) -> None:
     robot.r2_stiffness = 0.9
 
     def moving() -> bool:
-        # A gap, as a slow machine has them, disarms, or asks for released triggers before motion goes on.
+        # A gap, as a slow machine has them, disarms, or requires released triggers before motion continues.
         hold(plugged, _HOLD_TO_RUN)
         time.sleep(_HEALTHY_S)
         if robot.state != "armed":

@@ -1,4 +1,4 @@
-"""A virtual controller in the machine, and hands on it."""
+"""Virtual controller in the machine, and hands on it."""
 
 import threading
 from collections import deque
@@ -22,21 +22,21 @@ ADDRESS: Final = "01:02:03:04:05:06"
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """Which controller, and how it is connected."""
+    """Model of a controller, and its connection."""
 
     transport: Transport
     model: Model = Model.DUALSENSE
 
     @property
     def name(self) -> str:
-        """Lines for people."""
+        """Name for people."""
         return f"{self.model.title} on {self.transport.value}"
 
 
 class Plugged:
-    """A simulated controller on /dev/uhid, alive in a thread of its own while it is plugged in.
+    """Simulated controller on /dev/uhid, alive in a separate thread while it is plugged in.
 
-    Unplugged, it remembers what it was told, as one would that is back before it loses its power.
+    Unplugged, it keeps its state, like one that is back before it loses power.
     """
 
     def __init__(self, variant: Variant) -> None:
@@ -56,7 +56,7 @@ class Plugged:
         self.unplug()
 
     def plug_in(self) -> None:
-        """Let it appear; nothing happens when it is in."""
+        """Plug it in; no effect if it is plugged in."""
         if self._thread is not None:
             return
         self._ending = False
@@ -64,7 +64,7 @@ class Plugged:
         self._thread.start()
 
     def unplug(self) -> None:
-        """Pull it out; nothing happens when it is out."""
+        """Unplug it; no effect if it is unplugged."""
         self._ending = True
         if self._thread is not None:
             self._thread.join()
@@ -86,7 +86,7 @@ class Plugged:
         return answers[0]
 
     def hands_off(self) -> None:
-        """Let go of everything."""
+        """Release everything."""
 
         def let_go(controller: SimulatedDualSense) -> None:
             controller.set_sticks()

@@ -1,4 +1,4 @@
-"""Writes by a thread: the newest goes out, nobody waits, and what fails is told."""
+"""Writes by a thread: the newest goes out, nobody waits, and failures are reported."""
 
 import threading
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ LIMIT_S = 600.0
 
 
 class SlowDevice:
-    """A device whose writes take until they are let through."""
+    """Device whose writes block until released."""
 
     def __init__(self) -> None:
         self.written: list[Feel] = []

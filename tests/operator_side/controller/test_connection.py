@@ -1,4 +1,4 @@
-"""A controller that comes and goes, in virtual time: notices, looks, and no trigger left stiff."""
+"""Controller that comes and goes, in virtual time: notes, searches, and no trigger left stiff."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ STIFF = Feel(r2=feedback(3, 6))
 
 @dataclass
 class FakeDevice:
-    """A controller that can be unplugged."""
+    """Controller that can be unplugged."""
 
     log: list[str]
     plugged_in: bool = True
@@ -51,7 +51,7 @@ class FakeDevice:
 
 
 class FakeSearch(BackgroundSearch):
-    """A search whose next result is chosen."""
+    """Search with a chosen next result."""
 
     def __init__(self) -> None:
         self.result: OpenController | DeviceError | None = NoDeviceError("no controller found")
@@ -73,7 +73,7 @@ class FakeSearch(BackgroundSearch):
 
 
 class World:
-    """A connection whose search, listener and guard are in the test's hands; `log` is what they were told."""
+    """Connection with fake search, listener and guard; `log` holds their calls."""
 
     def __init__(self) -> None:
         self.log: list[str] = []
@@ -129,7 +129,7 @@ def world() -> World:
     return World()
 
 
-def test_the_first_look_is_at_once_the_others_once_a_second_and_that_there_is_none_is_said_once(world: World) -> None:
+def test_the_first_search_is_at_once_then_once_a_second_and_a_missing_controller_is_noted_once(world: World) -> None:
     world.run(PERIOD_S)
     assert len(world.search.looks) == 1
     world.run(10.0)
@@ -145,7 +145,7 @@ def test_the_first_look_is_at_once_the_others_once_a_second_and_that_there_is_no
     assert len(world.search.looks) == looks
 
 
-def test_the_watchdog_knows_before_anything_is_written_and_hears_of_us_while_an_effect_is_on(world: World) -> None:
+def test_the_watchdog_gets_the_hold_before_any_write_and_beats_while_an_effect_is_on(world: World) -> None:
     device = world.connected()
     world.run(3.0)
     assert world.connection.write(STIFF, world.now_s)
@@ -158,7 +158,7 @@ def test_the_watchdog_knows_before_anything_is_written_and_hears_of_us_while_an_
     world.log.clear()
     world.run(3.0)
     assert world.log == ["rest"]
-    world.now_s += 10.0  # a silence at rest is none
+    world.now_s += 10.0  # A silence at rest does not count.
     world.run(1.0)
     world.connection.write(STIFF, world.now_s)
     assert world.log == ["rest", "beat", "write"]
@@ -206,7 +206,7 @@ def test_unplugged_it_is_lost_at_once_and_looked_for_a_second_later(world: World
         (None, "bb", "controller: DualSense on USB"),
     ],
 )
-def test_who_comes_back_is_told_by_the_address(world: World, before: str | None, after: str | None, note: str) -> None:
+def test_a_return_is_recognised_by_the_address(world: World, before: str | None, after: str | None, note: str) -> None:
     device = world.plug_in(before)
     world.run(2 * PERIOD_S)
     world.unplug(device)
@@ -221,7 +221,7 @@ def test_who_comes_back_is_told_by_the_address(world: World, before: str | None,
 
 
 def test_each_trouble_is_said_once_and_looked_at_again(world: World) -> None:
-    # The system gives permission a moment after a controller appears: once is no trouble yet.
+    # The system gives permission a moment after a controller appears: one refusal is no trouble yet.
     world.search.result = DeviceError("no permission")
     world.run(PERIOD_S + LOOK_PERIOD_S / 2)
     assert world.connection.take_notes() == []
@@ -230,7 +230,7 @@ def test_each_trouble_is_said_once_and_looked_at_again(world: World) -> None:
         world.search.result = result
         world.run(2 * LOOK_PERIOD_S)
     assert [note.partition(";")[0] for note in world.connection.take_notes()] == ["no permission", "in use", "none"]
-    world.search.result = None  # a look that takes its time
+    world.search.result = None  # A search that takes its time.
     world.run(3.0)
     world.plug_in()
     world.run(PERIOD_S)

@@ -1,4 +1,4 @@
-"""A machine with simulated controllers on it, in virtual time: hidapi, the search, background writes, the watchdog."""
+"""Machine with simulated controllers, in virtual time: hidapi, the search, background writes, the watchdog."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,7 +21,7 @@ PERIOD_S = 0.004
 
 
 class SimulatedHandle:
-    """hidapi's handle on a simulated controller: errors as hidapi's, and waiting lets virtual time pass."""
+    """hidapi's handle on a simulated controller: with hidapi's errors; waiting advances virtual time."""
 
     def __init__(self, system: "SimulatedSystem") -> None:
         self._system = system
@@ -70,7 +70,7 @@ class SimulatedHandle:
 
 
 class SimulatedSystem:
-    """hidapi there: a controller is at its path while it is plugged in, and another object when it is back."""
+    """hidapi of the machine: a plugged-in controller is at its path, and another object after its return."""
 
     def __init__(self) -> None:
         self.clock = VirtualClock(1.0)
@@ -79,7 +79,7 @@ class SimulatedSystem:
         """Number of transfers, to any controller, that will fail."""
 
     def unplug(self, path: bytes) -> None:
-        """The controller there is gone; without power it does nothing."""
+        """Remove the controller at `path`; without power it does nothing."""
         self.devices.pop(path).write(RELEASED, self.clock.now())
 
     def transfer(self, device: SimulatedDualSense, report: bytes) -> bool:
@@ -100,7 +100,7 @@ class SimulatedSystem:
 
 
 class StallingWrites:
-    """BackgroundWrites without a thread: what is written while `stalled` goes out when the stall ends."""
+    """BackgroundWrites without a thread: writes while `stalled` go out when the stall ends."""
 
     def __init__(self, device: Controller, stalled: Callable[[], bool]) -> None:
         self._device = device
@@ -117,7 +117,7 @@ class StallingWrites:
         return self._waiting is not None and now_s - self._since_s > STALL_S
 
     def waits_since(self, now_s: float) -> float:
-        """Seconds for which a write has waited; 0 for none."""
+        """Return the seconds for which a write has waited; 0 for none."""
         return 0.0 if self._waiting is None else max(now_s - self._since_s, 1e-9)
 
     def read(self, now_s: float) -> ControllerState | None:
@@ -141,7 +141,7 @@ class StallingWrites:
 
 
 class VirtualSearch(BackgroundSearch):
-    """A look that needs no thread."""
+    """Search without a thread."""
 
     def __init__(self, find: Callable[[str | None], OpenController], stalled: Callable[[], bool]) -> None:
         self.looks = 0
@@ -168,7 +168,7 @@ class VirtualSearch(BackgroundSearch):
 
 
 class VirtualWatchdog(ReleaseGuard):
-    """The release watchdog's law, whose processes have tests of their own."""
+    """Law of the release watchdog; its processes have separate tests."""
 
     def __init__(self, system: SimulatedSystem) -> None:
         self._holds: tuple[SimulatedDualSense, bytes] | None = None

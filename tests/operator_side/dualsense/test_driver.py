@@ -1,4 +1,4 @@
-"""The driver of a real controller against a stand-in for hidapi."""
+"""Driver of a real controller against a stand-in for hidapi."""
 
 import sys
 import types
@@ -38,12 +38,12 @@ def open_fake(handle: FakeHandle) -> HidDualSense:
 
 
 @TRANSPORTS
-def test_what_it_is_is_asked_and_nothing_is_written(transport: Transport) -> None:
-    handle = FakeHandle(transport, garbled=3 if transport is BLUETOOTH else 0)  # asked for again
+def test_its_identity_is_read_and_nothing_is_written(transport: Transport) -> None:
+    handle = FakeHandle(transport, garbled=3 if transport is BLUETOOTH else 0)  # asked again
     identity = open_fake(handle).identity
     assert (handle.opened, handle.nonblocking, handle.written) == (PATH, 1, [])
     assert (identity.transport, identity.address, identity.firmware) == (transport, ADDRESS, FIRMWARE)
-    assert identity.first_report == handle.report()  # over Bluetooth, too: asking switches it to full reports
+    assert identity.first_report == handle.report()  # The question switches Bluetooth to full reports, too.
     identity = open_fake(FakeHandle(transport, answers=False)).identity
     assert (identity.transport, identity.address, identity.firmware) == (transport, None, None)
 

@@ -1,4 +1,4 @@
-"""Which controller is taken when there are several ways to one, or several."""
+"""Choice of a controller among several, or among several paths to one."""
 
 import threading
 
@@ -54,7 +54,7 @@ def test_another_is_taken_only_after_several_looks_for_the_one_from_before() -> 
     same, other = FakeHandle(), FakeHandle(USB, OTHER)
     backend = FakeBackend({0x0CE6: {B: other}})
     look = Finder(backend)
-    for _ in range(2):  # whoever was found is looked for as often again
+    for _ in range(2):  # The one found then is looked for as often again.
         for _ in range(LOOKS_FOR_THE_SAME):
             with pytest.raises(NoDeviceError, match=f"{ADDRESS} is not there, only another: {OTHER}"):
                 look(ADDRESS)
@@ -108,7 +108,7 @@ def test_the_rule_names_every_model_on_usb_and_bluetooth() -> None:
 
 
 class Looks:
-    """A find function that waits until the test lets it go on."""
+    """Find function that waits until the test releases it."""
 
     def __init__(self, result: OpenController | Exception) -> None:
         self.result = result

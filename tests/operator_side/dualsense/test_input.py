@@ -21,19 +21,19 @@ FIRMWARE = Firmware(0x01020304, 0x12345678, 0x0224)
 
 
 def checked(header: bytes, content: bytes) -> bytes:
-    """With the checksum of zlib, over the byte that is not sent, too."""
+    """Append zlib's checksum of `header` and `content`; the header byte is not sent."""
     return content + zlib.crc32(header + content).to_bytes(4, "little")
 
 
 def framed(block: bytes, transport: Transport) -> bytes:
-    """A report by hand, with the common block in its place."""
+    """Build a report by hand, with the common block in its place."""
     if transport is Transport.USB:
         return b"\x01" + block
     return checked(b"\xa1", b"\x31\x01" + block + bytes(9))
 
 
 def report_with(transport: Transport, **fields: int) -> bytes:
-    """The report of an idle controller with bytes of the common block set: `c7=0x28` is byte 7."""
+    """Build the report of an idle controller with bytes of the common block set: `c7=0x28` is byte 7."""
     block = bytearray(63)
     block[0:4] = bytes([128] * 4)
     block[7] = 0x08
@@ -50,7 +50,7 @@ def report_with(transport: Transport, **fields: int) -> bytes:
 def test_exact_bytes_of_an_idle_report(transport: Transport) -> None:
     assert parse_input_report(report_with(transport)) == ControllerState()
     clock = {"c27": 0xC0, "c28": 0xC6, "c29": 0x2D}  # 3 000 000 thirds of a microsecond
-    number = 17 if transport is Transport.USB else 0  # on Bluetooth it is in the framing, too
+    number = 17 if transport is Transport.USB else 0  # On Bluetooth the number is in the framing, too.
     expected = report_with(transport, c6=number, **clock)
     assert build_input_report(ControllerState(), transport, number, sensor_time_s=1.0) == expected
 
@@ -109,7 +109,7 @@ def test_every_input_report_survives_a_round_trip(transport: Transport, block: b
     assert parse_input_report(report) == state
     start = 1 if transport is Transport.USB else 2
     built = report[start : start + 63]
-    # All that has one encoding is the very same bytes: not the hat's null states and the undefined bits.
+    # Fields with a single encoding are the same bytes: all but the hat's null states and the undefined bits.
     assert built[0:7] == block[0:7]
     assert built[7] & 0xF0 == block[7] & 0xF0
     assert built[8] == block[8]

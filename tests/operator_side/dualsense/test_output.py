@@ -42,7 +42,7 @@ CODES = [0xFC, 0xFD, 0xFE]
 
 
 def framings(block: bytes) -> tuple[bytes, bytes, bytes]:
-    """The report by hand: on USB, on Bluetooth as hid-playstation writes it, and as SDL and most libraries do."""
+    """Build the report by hand: on USB, on Bluetooth as in hid-playstation, and as in SDL and most libraries."""
     return (
         b"\x02" + block,
         sealed(Seed.OUTPUT, (b"\x31\xb0\x10" + block).ljust(74, b"\0")),
@@ -59,7 +59,7 @@ def framings(block: bytes) -> tuple[bytes, bytes, bytes]:
         (FREE_TRIGGER, "05 00 00 00 00 00 00 00 00 00 00"),
         # The public test vector.
         (feedback(3, 6), "21 f8 03 00 da b6 2d 00 00 00 00"),
-        # Worked by hand: three bits a zone, strength less one, from bit 3 * zone.
+        # Computed by hand: three bits a zone, strength less one, from bit 3 * zone.
         (feedback(9, 8), "21 00 02 00 00 00 38 00 00 00 00"),
         (feedback(0, 8), "21 ff 03 ff ff ff 3f 00 00 00 00"),
         (feedback(0, 1), "21 ff 03 00 00 00 00 00 00 00 00"),
@@ -75,7 +75,7 @@ def test_exact_bytes_of_effects(effect: Strengths, expected: str) -> None:
 @pytest.mark.parametrize(
     "encoded",
     [
-        "05 00 00 00 00 00 00 00 00 00 01",  # off, and more
+        "05 00 00 00 00 00 00 00 00 00 01",  # Off, with another byte set.
         "21 00 00 00 00 00 00 00 00 00 00",  # feedback in no zone
         "21 00 04 00 00 00 00 00 00 00 00",  # an eleventh zone
         "21 01 00 08 00 00 00 00 00 00 00",  # a strength outside the mask
@@ -172,7 +172,7 @@ def test_nothing_brings_another_code_to_the_wire(
     bytes_of_code, off = bytes([code]), encode_effect(FREE_TRIGGER)
     for encoded in (
         bytes_of_code.ljust(11, b"\0"),
-        off + bytes_of_code * 40,  # longer, so that it comes to lie elsewhere
+        off + bytes_of_code * 40,  # Longer, so that it is at another place.
         b"",
         bytes_of_code * 3,
     ):

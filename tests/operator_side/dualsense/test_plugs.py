@@ -1,4 +1,4 @@
-"""Controllers that are plugged in and pulled out while things go wrong: no trigger is left stiff."""
+"""Controllers that are plugged in and pulled out amid faults: no trigger is left stiff."""
 
 from hypothesis import Phase, settings
 from hypothesis import strategies as st
@@ -32,8 +32,8 @@ from tests.operator_side.dualsense.simulated_system import (
 class Plugs(RuleBasedStateMachine):
     """Two controllers on USB and Bluetooth, faults of the wire and of our process, and the operator side's core.
 
-    The robot side's end grants the lease and sends fields; it arms when it is asked to by released triggers, and
-    disarms when commands stop for 100 ms.
+    The robot side's end grants the lease and sends fields. It arms on request after released triggers, and disarms when
+    commands stop for 100 ms.
     """
 
     def __init__(self) -> None:
@@ -87,7 +87,7 @@ class Plugs(RuleBasedStateMachine):
             self.must_release = False
             self.connection.write(output, now_s)
         self.connection.update(now_s)
-        now_s = self.now_s  # opening one lets time pass
+        now_s = self.now_s  # Opening a controller lets time pass.
         if (state := self.connection.read(now_s)) is not None:
             self.report_s = now_s
             self.core.read_state(state, now_s)
@@ -120,7 +120,7 @@ class Plugs(RuleBasedStateMachine):
         for path, since_s in self.stiff_since_s.items():
             assert self.now_s - since_s < LOOK_PERIOD_S + 0.3, f"{path!r} was left stiff"
 
-    # What happens
+    # Events
 
     @initialize()
     def begin(self) -> None:
@@ -150,9 +150,9 @@ class Plugs(RuleBasedStateMachine):
     @precondition(lambda self: self.system.devices)
     @rule()
     def arm(self) -> None:
-        """Have stiff triggers, if a controller is there to be armed by."""
+        """Make the triggers stiff, if a controller is there."""
         self.stalled, self.system.failing, self.strength = False, 0, 7
-        for _ in range(2000):  # another one than before is taken after three looks
+        for _ in range(2000):  # Another controller is taken after three searches.
             self.turn()
             if self.connection.state is ConnectionState.CONNECTED:
                 break
@@ -190,7 +190,7 @@ class Plugs(RuleBasedStateMachine):
 
     def teardown(self) -> None:
         self.connection.close()
-        self.watchdog.release()  # as when its pipe closes
+        self.watchdog.release()  # As when its pipe closes.
         assert all(device.released for device in self.system.devices.values()), "left stiff at the end"
 
 

@@ -1,4 +1,4 @@
-"""The watchdog as a real process, with a FIFO in the place of the controller's device node."""
+"""Watchdog as a real process, with a FIFO in place of the controller's device node."""
 
 import contextlib
 import os
@@ -22,7 +22,7 @@ REPORT = bytes(range(48))
 
 
 class FakeController:
-    """A device node that remembers what is written to it."""
+    """Device node that remembers its writes."""
 
     def __init__(self, path: Path) -> None:
         self.path = os.fsencode(path)
@@ -30,7 +30,7 @@ class FakeController:
         self._file = os.open(path, os.O_RDWR | os.O_NONBLOCK)
 
     def written(self, within_s: float) -> bytes:
-        """What has been written, after waiting for the first of it; nothing after so long."""
+        """Return the bytes written, after waiting `within_s` for the first; empty for none."""
         readable, _, _ = select.select([self._file], [], [], within_s)
         return os.read(self._file, 65536) if readable else b""
 
@@ -56,7 +56,7 @@ def guard(monkeypatch: pytest.MonkeyPatch) -> Iterator[ReleaseGuard]:
 
 
 def leave(guard: ReleaseGuard) -> None:
-    """As when we end, however that is: its pipe closes. It ends by itself."""
+    """Close the watchdog's pipe, as at any end of ours; it ends by itself."""
     guard.__exit__(None, None, None)
     assert guard._process is not None
     assert guard._process.returncode == 0
@@ -68,7 +68,7 @@ def process_of(guard: ReleaseGuard) -> int:
 
 
 def wait_for_end(process_id: int) -> None:
-    """Until a process that is no child of ours is gone, or is nothing but an entry that its parent has not read."""
+    """Wait until a process that is not our child is gone or a zombie."""
     try:
         watched = os.pidfd_open(process_id)
     except ProcessLookupError:
@@ -120,7 +120,7 @@ def test_what_it_is_told_in_virtual_time(tmp_path: Path) -> None:
     with FakeController(tmp_path / "hidraw3") as controller, (tmp_path / "answers").open("wb", 0) as answers:
         watched = Watch(answers.fileno())
         hold = f"hold {controller.path.hex()} {REPORT.hex()}".encode()
-        watched.follow(b"beat", 1.0)  # of whatever was held before
+        watched.follow(b"beat", 1.0)  # Beat of an earlier hold.
         watched.follow(hold, 1.0)
         assert watched.patience_s(1.0) is None
         watched.follow(b"beat", 2.0)
@@ -137,7 +137,7 @@ def test_what_it_is_told_in_virtual_time(tmp_path: Path) -> None:
         watched.release()
         assert (controller.written(0.0), watched.patience_s(5.0)) == (b"", None)
         watched.follow(b"hold " + bytes(tmp_path / "nothing").hex().encode() + b" 00", 6.0)
-        watched.follow(hold, 7.0)  # the newest is the one that counts
+        watched.follow(hold, 7.0)  # The newest hold counts.
         watched.follow(b"hold " + os.devnull.encode().hex().encode() + b" 00", 7.0)
         watched.release()
         assert controller.written(0.0) == b""
@@ -167,7 +167,7 @@ def wait_until_open(process_id: int, path: bytes) -> None:
     with select.epoll() as pause:
         for _ in range(round(LIMIT_S / 0.01)):
             files = Path(f"/proc/{process_id}/fd").iterdir()
-            # It opens and closes others meanwhile, while it starts.
+            # It opens and closes others while it starts.
             with contextlib.suppress(FileNotFoundError):
                 if any(os.fsencode(file.readlink()) == path for file in files):
                     return
@@ -202,7 +202,7 @@ def test_a_watchdog_that_has_ended_is_replaced_and_told_what_is_held(
     assert guard.running
     assert process_of(guard) != first
     leave(guard)
-    assert controller.written(LIMIT_S) == REPORT  # by the other one: it was still held when we left
+    assert controller.written(LIMIT_S) == REPORT  # By the second watchdog: the trigger was still held when we left.
 
 
 def test_watchdogs_that_end_again_and_again_are_given_up(guard: ReleaseGuard, controller: FakeController) -> None:

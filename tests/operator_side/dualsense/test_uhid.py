@@ -1,4 +1,4 @@
-"""/dev/uhid: its protocol down to the byte, the controller that the kernel is offered, the file and the loop on it."""
+"""/dev/uhid: its protocol to the byte, the controller offered to the kernel, the file and its loop."""
 
 import os
 import struct
@@ -82,7 +82,7 @@ def test_refusals() -> None:
 
 
 def lived(kernel: FakeKernel, until_s: float) -> list[float]:
-    """Offer a controller until then; when it was asked whether to go on."""
+    """Offer a controller until then; return the times at which the loop asked whether to continue."""
     asked: list[float] = []
 
     def going(now_s: float) -> bool:
@@ -94,7 +94,7 @@ def lived(kernel: FakeKernel, until_s: float) -> list[float]:
 
 
 def test_a_life_from_plug_to_unplug() -> None:
-    """Reports from before a driver has it are lost, as on a cable that nobody polls."""
+    """Reports before a driver is bound are lost, as on a cable that nobody polls."""
     kernel = FakeKernel(VirtualClock(100.0), deque([(100.0, get_report(1, 5)), (100.001, said(START))]))
     lived(kernel, until_s=100.02)
     kinds = [event[0] for _, event in kernel.heard]
@@ -139,7 +139,7 @@ def test_the_file_reads_and_writes_without_waiting_and_quotes_a_refusal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "uhid"
-    os.mkfifo(path)  # gives back what was written to it
+    os.mkfifo(path)  # A FIFO returns what was written to it.
     with UhidFile(path) as file:
         assert file.read() is None
         assert not file.wait(0.0)

@@ -1,4 +1,4 @@
-"""A stand-in for an evdev node: events and plays by a pair of sockets, and the ioctls of linux/input.h by hand."""
+"""Stand-in for an evdev node: events and plays over a socket pair, and linux/input.h's ioctls by hand."""
 
 import contextlib
 import os
@@ -16,7 +16,7 @@ def bits(*codes: int) -> bytes:
 
 
 class FakeNode:
-    """The kernel's end; on a machine of 64 bits."""
+    """Kernel's end of the node, on a 64-bit machine."""
 
     def __init__(self, keys: tuple[int, ...] = PAD_KEYS, effects: tuple[int, ...] = (0x50,)) -> None:
         ours, self._theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -54,11 +54,11 @@ class FakeNode:
         return 0
 
     def send(self, *events: tuple[int, int, int]) -> None:
-        """Kinds, codes and values, and the end of a report."""
+        """Send events (kind, code, value), and the end of a report."""
         self._theirs.sendall(b"".join(EVENT.pack(0, 0, *event) for event in (*events, (0, 0, 0))))
 
     def plays(self) -> list[tuple[int, int]]:
-        """Which effects were played, and how often, since the last call."""
+        """Return the played effects (id, count) since the last call."""
         try:
             content = self._theirs.recv(65536)
         except BlockingIOError:

@@ -1,4 +1,4 @@
-"""A gamepad with rumble on a fake node: hands are read as the kernel keeps them, and stiffness becomes rumble."""
+"""Gamepad with rumble on a fake node: hands are read as the kernel holds them, and stiffness becomes rumble."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -68,7 +68,7 @@ def test_a_pulled_trigger_is_felt_where_it_is_and_the_greater_rumble_counts(node
     pad.write(Feel(l2=feedback(0, 4), r2=feedback(3, 8), rumble=Rumble(0.25, 0.0), light=WARNING_LIGHT), 0.0)
     assert node.uploaded.pop() == (3, round(1e3 * LENGTH_S), round(0.25 * 0xFFFF), 0)
     assert not pad.released
-    node.send((ABS, 2, 128), (ABS, 5, 100))  # R2 is before its first stiff zone
+    node.send((ABS, 2, 128), (ABS, 5, 100))  # R2 is before its first stiff zone.
     pad.read(0.01)
     assert node.uploaded.pop()[2:] == (round(0.5 * 0xFFFF), 0)
     node.send((ABS, 5, 110))

@@ -1,4 +1,4 @@
-"""How blindness is signalled; tests/operator_side/test_core_states.py holds every order of events."""
+"""Signal of blindness; tests/operator_side/test_core_states.py covers every order of events."""
 
 import itertools
 
@@ -12,7 +12,7 @@ from operator_side.feel.blindness import Blindness
 def test_two_short_pulses_each_second_for_three_seconds(since_s: float) -> None:
     blindness = Blindness()
     blindness.lose(since_s)
-    blindness.lose(since_s + 1.0)  # still lost, which is no other loss
+    blindness.lose(since_s + 1.0)  # Still lost: not another loss.
     shaken = [blindness.rumble(since_s + 0.01 * step + 0.001) for step in range(1000)]
     runs = [(drive, len(list(steps))) for drive, steps in itertools.groupby(shaken)]
     assert [length for drive, length in runs if drive != Rumble()] == [12] * 6

@@ -1,4 +1,4 @@
-"""Commands under way are followed as a slow stepping of time would follow them, whatever was sent and when."""
+"""Commands under way agree with fine time steps, for all commands and times."""
 
 import itertools
 import math
@@ -22,7 +22,7 @@ COMMANDS = st.lists(TRAVEL, min_size=1, max_size=60)
 
 
 def sent_every(travels: list[float], period_s: float = PERIOD_S) -> CommandsUnderWay:
-    """Command i of these left at i periods."""
+    """Return commands of which number i left after i periods."""
     commands = CommandsUnderWay()
     for index, travel in enumerate(travels):
         commands.sent(index * period_s, travel)
@@ -45,7 +45,7 @@ def displacement(
 
 
 def stepped(travels: list[float], now_s: float, since_s: float, speed_m_s: float, acceleration: float) -> Displacement:
-    """The same by time steps, none across a command; command i holds from i periods on."""
+    """Compute the same by time steps, none across a command; command i holds from i periods on."""
     way_m, commands = 0.0, [index * PERIOD_S for index in range(len(travels)) if since_s < index * PERIOD_S < now_s]
     for began_s, ended_s in itertools.pairwise([since_s, *commands, now_s]):
         target = FULL_M_S * travels[min(int((began_s + ended_s) / 2.0 / PERIOD_S), len(travels) - 1)]
@@ -82,7 +82,7 @@ def test_it_is_what_a_fine_stepping_of_time_gives(
 
 
 @given(COMMANDS, SPEED, TRAVEL, st.data())
-def test_what_the_robot_gives_the_newest_command_takes_the_place_of_what_that_asked_for(
+def test_the_speed_given_to_the_newest_command_replaces_the_speed_asked_for(
     travels: list[float], speed: float, gives: float, data: st.DataObject
 ) -> None:
     echo = data.draw(st.integers(0, len(travels) - 1))
@@ -96,7 +96,7 @@ def test_what_the_robot_gives_the_newest_command_takes_the_place_of_what_that_as
 def test_a_course_beside_a_stick_that_costs_no_time_goes_the_same_way(
     changes: list[float], speed: float, acceleration: float, data: st.DataObject
 ) -> None:
-    """Each 10 ms it goes towards the mean of what a finger commanded that takes 40 ms from end to end."""
+    """Every 10 ms the course approaches the mean of a finger's commands that takes 40 ms from end to end."""
     commands, now_s, travel = CommandsUnderWay(), (len(changes) - 1) * PERIOD_S + 0.01, 0.0
     for index, change in enumerate(changes):
         travel = min(max(travel + change, -1.0), 1.0)
@@ -110,13 +110,13 @@ def test_a_course_beside_a_stick_that_costs_no_time_goes_the_same_way(
 
 
 def test_a_command_that_had_not_come_when_it_should_have_is_still_under_way() -> None:
-    # The robot had nothing newer than 0.0 for 30 ms: what was sent at 4 ms comes at the time of the report or later.
+    # The robot had nothing newer than 0.0 for 30 ms: the command of 4 ms comes at the time of the report or later.
     commands = sent_every([1.0] + [0.0] * 24)
     speed = 0.25
     late = displacement(commands, 0.1, 0.0, 0.030, speed)
     assert late == displacement(commands, 0.1, 0.0, 0.004, speed)
     assert late.way_m == pytest.approx(speed**2 / (2.0 * 3.0))
-    # Without another command after it, `held` is as long as it says.
+    # Without another command after it, `held` is taken as it is.
     alone = sent_every([1.0])
     assert displacement(alone, 0.1, 0.0, 0.030, speed).way_m == pytest.approx(0.07 * speed)
 
@@ -165,7 +165,7 @@ def test_memory_is_bounded_whatever_the_rate() -> None:
     for tick in range(10_000):
         commands.sent(1e-6 * tick, 0.0)
     assert len(commands) == 4096
-    # What was forgotten is not taken for nothing.
+    # Forgotten commands do not count as none.
     assert commands.displacement(0.01, Report(0.001, 0.0, 0.0, FULL_M_S), 3.0) is None
     for tick in range(2000):
         commands.sent(1.0 + PERIOD_S * tick, 0.0)

@@ -1,4 +1,4 @@
-"""Where sticks lead is felt by who moves them, before the robot side can know it."""
+"""Objects where the sticks lead are felt by their mover before the robot side can know."""
 
 from typing import Any
 
@@ -30,14 +30,14 @@ TRAVELS = zone_travels(TriggerTravel())
 RIGHT_ACROSS, RIGHT_TURNED, UP_ACROSS = (1, 2, 3), (4, 5), (6, 7, 8)
 RIGHT: Sticks = (1.0, 0.0, 0.0, 0.0)
 CHANGES_S = np.diag([FIELD.full_speed_m_s / FIELD.acceleration_m_s2, 0.0, 0.0, 0.0, 0.0])
-"""The trigger alone takes time."""
+"""Time constants of changes: only the trigger takes time."""
 REPORT = Report(0.0, 0.0, 0.0, FIELD.full_speed_m_s)
 
 HORIZON_M = 0.4
 
 
 def around(near: dict[int, float], *, advancing: bool = True) -> Around:
-    """Nothing within reach but from these probes."""
+    """Return a map with nothing within reach, except from these probes."""
     ways_m = np.full((LISTS, PROBES), np.inf)
     for probe, way_m in near.items():
         ways_m[slice(0, 2) if advancing else slice(2, 4), probe] = way_m
@@ -45,7 +45,7 @@ def around(near: dict[int, float], *, advancing: bool = True) -> Around:
 
 
 def under_way(now_s: float, sticks: Sticks, travel: float = 0.0, since_s: float = 0.0) -> CommandsUnderWay:
-    """At rest until then, and as commanded from then on, every 4 ms."""
+    """Return commands at rest until `since_s`, and as given from then on, every 4 ms."""
     commands = CommandsUnderWay()
     for number in range(round(now_s / 0.004) + 1):
         moves = number * 0.004 >= since_s - 1e-9
@@ -65,7 +65,7 @@ def first_zone(told: Around, sticks: Sticks, *, now_s: float = 0.4, travel: floa
 
 def test_sticks_that_rest_are_not_traced() -> None:
     assert under_way(0.4, AT_REST).course(0.4, REPORT, CHANGES_S) is None
-    # One that has just come to rest is still under way.
+    # A stick that has just come to rest is still under way.
     commands = under_way(0.4, RIGHT)
     commands.sent(0.404, 0.5, AT_REST)
     assert commands.course(0.41, REPORT, CHANGES_S) is not None
@@ -73,11 +73,11 @@ def test_sticks_that_rest_are_not_traced() -> None:
 
 @pytest.mark.parametrize("forth", [True, False])
 def test_what_stands_where_the_stick_leads_makes_the_zones_full_that_get_so_far(forth: bool) -> None:
-    """By 0.4 s of commands under way and what follows, the stick leads past two thirds and on to the end."""
+    """Within 0.4 s of commands under way and what follows, the stick leads past two thirds and on to the end."""
     told = around(dict.fromkeys(RIGHT_ACROSS, 0.03), advancing=forth)
     found = first_zone(told, RIGHT, forth=forth)
     assert 0 < found < ZONE_COUNT
-    # The zone before gets less far, this one farther: u h + u²/2a, from rest less what the start takes.
+    # The last zone gets less far, this one farther: u h + u²/2a, from rest less what the start takes.
     for zone, reaches in ((found - 1, False), (found, True)):
         u = TRAVELS[zone] * FIELD.full_speed_m_s
         assert (u * HORIZON_S >= 0.03) is reaches
@@ -104,22 +104,22 @@ def test_what_lies_straight_ahead_of_a_turn_or_a_drift_is_not_met() -> None:
     assert first_zone(told, AT_REST) == ZONE_COUNT  # not traced
     for sticks in (RIGHT, (0.0, 0.0, 1.0, 0.0)):
         assert first_zone(told, sticks) == ZONE_COUNT
-        # Who has just begun is still in front of it.
+        # A stick that has just begun is still before the object.
         assert first_zone(told, sticks, now_s=0.0) < ZONE_COUNT
 
 
 def test_a_stick_that_is_let_go_now_leads_to_what_it_would_have_passed() -> None:
-    """Nobody knows whether the stick goes on: it has just begun, and the thing stands where the gripper is."""
+    """Whether the stick continues is unknown: it has just begun, and the object is at the gripper's place."""
     told = around({0: 0.05})
     assert first_zone(told, RIGHT, now_s=0.012) < ZONE_COUNT
-    # By two thirds of the way to the first probe it has led past.
+    # After two thirds of the distance to the first probe it has led past.
     assert first_zone(told, RIGHT, now_s=0.2) == ZONE_COUNT
 
 
 def test_strength_rises_before_full_as_it_does_straight_ahead_and_no_farther() -> None:
     rising = ways(*(0.193 + 0.001 * k for k in range(8)))
     two_things = ways(0.05, 0.06, *(0.195 + 0.001 * k for k in range(6)))
-    # From rest: what the start takes, braking gives back.
+    # From rest: braking gives back what the start takes.
     reaches_m = FIELD.full_speed_m_s * TRAVELS[-1] * HORIZON_S
     for field in (rising, two_things):
         told = around(dict.fromkeys((*RIGHT_ACROSS, 0), reaches_m + 0.003))
@@ -140,7 +140,7 @@ def test_both_sticks_at_once_take_the_shorter_way() -> None:
     turned = first_zone(told, (0.0, 0.0, 1.0, 0.0))
     assert turned < ZONE_COUNT
     assert first_zone(told, (1.0, 0.0, 1.0, 0.0)) == turned
-    # A stick between two directions meets what stands in either.
+    # A stick between two directions meets objects in either.
     assert first_zone(around(dict.fromkeys(RIGHT_ACROSS, 0.02)), (0.7, 0.4, 0.0, 0.0)) < ZONE_COUNT
     assert first_zone(around(dict.fromkeys(UP_ACROSS, 0.02)), (0.9, 0.05, 0.0, 0.0)) == ZONE_COUNT
     diagonal = around(dict.fromkeys((*RIGHT_ACROSS, *UP_ACROSS), 0.02))
@@ -148,7 +148,7 @@ def test_both_sticks_at_once_take_the_shorter_way() -> None:
 
 
 def probes_at() -> FloatArray:
-    """Where the probes are (PROBES, 4), in shares of T of a fully deflected stick."""
+    """Return the probes' places (PROBES, 4), as shares of T of a fully deflected stick."""
     found = [[0.0, 0.0, 0.0, 0.0]]
     for x, y in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)):
         found += [[part * x / 3, part * y / 3, 0.0, 0.0] for part in (1, 2, 3)]
@@ -185,7 +185,7 @@ def test_ways_ahead_are_those_of_the_arms_model(speed: float, was: float, stick:
         np.testing.assert_allclose(aside_s[0, k], passed[1:], atol=1e-9)
 
 
-# Within all that is rendered
+# Within everything that is rendered
 
 
 def message(sent_s: float, told: Around | None, epoch: int = 1, **changes: Any) -> StiffnessUpdate:
@@ -212,7 +212,7 @@ def test_the_newest_map_holds_until_it_is_old_or_another_robot_side_speaks() -> 
     told = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03))
     made = haptics()
     assert strengths(made, message(0.3, told))[-1] == 8
-    assert made.due(message(0.32, None), (0.0, 0.8), Blindness(), 0.41) is None  # nothing changes
+    assert made.due(message(0.32, None), (0.0, 0.8), Blindness(), 0.41) is None  # Nothing changes.
     for later in (message(0.3 + MAP_EXPIRES_S + 0.01, None), message(0.35, None, epoch=2)):
         made = haptics()
         strengths(made, message(0.3, told))
@@ -231,7 +231,7 @@ def test_without_a_map_or_where_the_robot_side_reckons_nothing_is_traced() -> No
 
 
 def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> None:
-    """A thing that the stick reaches is felt 10 ms late at most."""
+    """An object that the stick reaches is felt 10 ms late at most."""
     told, free = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03)), around({})
     made = haptics()
     assert strengths(made, message(0.3, free)) == (0,) * ZONE_COUNT
@@ -244,7 +244,7 @@ def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> Non
 
 
 def test_what_is_to_be_touched_is_felt_beside_a_stick_in_the_zones_that_touch_it() -> None:
-    """A map has ways of full strength alone; the slow ways of a target rise to strength 4, and are full behind it."""
+    """A map has distances of full strength only; a target's slow distances rise to strength 4, with full behind."""
     target = msgspec.structs.replace(FIELD, slow_m=ways(*[0.002] * 4, *[0.3] * 4), fast_m=ways(*[0.002] * 8))
     slow, fast = around({0: 0.002}).ways_m(FAR_M)[:2], around({}).ways_m(FAR_M)[0]
     told = Around.of(FULL_S, np.stack([slow[0], fast, fast, fast]), CHANGES_S)

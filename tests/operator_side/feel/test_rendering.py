@@ -1,4 +1,4 @@
-"""From fields and time to what both triggers and the motors do."""
+"""Rendering of fields over time: both triggers' zones, and the motors."""
 
 import pytest
 from hypothesis import given
@@ -54,7 +54,7 @@ def test_a_release_does_not_fall() -> None:
     assert rendering.render(felt(HEADER), LET_GO, None, 1.0) == RELEASED
 
 
-def test_what_comes_to_stand_is_said_by_one_short_pulse_of_the_right_motor() -> None:
+def test_a_contact_is_signalled_by_one_short_pulse_of_the_right_motor() -> None:
     rendering = TriggerRendering(USUAL, TravelCalibration())
 
     def motors(stands: bool, now_s: float, rumble: float = 0.0) -> Rumble | None:
@@ -66,7 +66,7 @@ def test_what_comes_to_stand_is_said_by_one_short_pulse_of_the_right_motor() -> 
     assert motors(True, 1.082) == motors(True, 9.0) == motors(False, 9.001) == Rumble()
     assert motors(True, 9.002) == Rumble(0.0, 0.7)
     assert rendering.render(None, LET_GO, None, 9.01) == RELEASED
-    # What still stands when the field is back is no news.
+    # An object still in contact when the field is back is no news.
     assert motors(True, 20.0) == Rumble()
 
 
@@ -94,7 +94,7 @@ def test_the_free_travel_is_the_way_that_is_left() -> None:
     assert free == [10, 5, 3, 1, 0]
 
 
-def test_each_trigger_gets_its_own_with_what_is_under_way_and_with_what_the_other_one_is_pulled() -> None:
+def test_each_trigger_gets_its_own_zones_with_the_displacement_and_the_other_triggers_pull() -> None:
     def shown(moving: Displacement | None, pulled: tuple[float, float] = LET_GO) -> tuple[tuple[int, ...], ...]:
         return zones(TriggerRendering(USUAL, TravelCalibration()).render(update(PARTED, PARTED), pulled, moving, 0.0))
 
@@ -113,7 +113,7 @@ def test_with_swapped_sides_each_gets_the_others() -> None:
     assert swapped.l2 == plain
     assert swapped.r2 is not None
     assert swapped.r2[-1] == 1
-    assert swapped.r2[0] == 0  # it retreats only once it is pulled farther than what advances
+    assert swapped.r2[0] == 0  # It retreats only once it is pulled farther than the advancing trigger.
 
 
 def test_another_reaction_time_is_another_free_travel() -> None:
@@ -141,11 +141,11 @@ def test_people_are_told_the_free_way_as_they_are_told_how_far_they_pull() -> No
     trigger = RenderedTrigger(USUAL, TriggerTravel(0.0, 1.0))
     assert trigger.free_travel == 1.0
     trigger.render(field(ways(0.06)), 1.0, 0.0, STILL, 0.0)
-    assert trigger.free_travel == pytest.approx(0.5 / 0.75)  # zone 5 begins at 0.5 of the travel, 0.75 of it sensed
+    assert trigger.free_travel == pytest.approx(0.5 / 0.75)  # Zone 5 begins at 0.5 of the travel, 0.75 of it sensed.
     trigger.render(field(ways(0.04, 0.045, 0.06)), 1.0, 0.0, STILL, 1.0)
     assert trigger.free_travel == pytest.approx(0.4 / 0.75)
     trigger.release()
     assert trigger.render(field(ways(0.0855)), 1.0, 0.0, STILL, 2.0) == FREE_TRIGGER
-    short = RenderedTrigger(USUAL, TriggerTravel(0.0, 0.88))  # a full pull ends at 0.66
+    short = RenderedTrigger(USUAL, TriggerTravel(0.0, 0.88))  # A full pull ends at 0.66.
     assert short.render(field(ways(0.085)), 1.0, 0.0, STILL, 0.0) == (0,) * 7 + (8,) * 3
     assert short.free_travel == 1.0

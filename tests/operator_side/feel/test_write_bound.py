@@ -1,4 +1,4 @@
-"""At most 100 writes in any second whatever comes, no release that waits, and no danger that waits for long."""
+"""At most 100 writes in any second, releases at once, and danger without long waits."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ RELEASE = NOTHING | {"state": "disarmed"}
 
 
 class Run:
-    """An operator side that is told something every millisecond, and its controller."""
+    """Operator side with a report every millisecond, and its controller."""
 
     def __init__(self) -> None:
         self.side, self.robot = OperatorSide(2, "clock"), LinkEnd("robot", 1, "clock")
@@ -92,7 +92,7 @@ def test_triggers_that_stiffen_in_turn_stay_within_it_and_danger_is_felt_soon() 
 def test_a_change_after_a_rest_goes_at_once() -> None:
     run = Run()
     for strength in range(1, 9):
-        run.tick -= 1  # all in one millisecond
+        run.tick -= 1  # All in one millisecond.
         run.feel(NOTHING | {"r2": strength})
     assert len(run.written_s) == 8
 

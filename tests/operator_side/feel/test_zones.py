@@ -1,4 +1,4 @@
-"""The ten zones: exact where worked out by hand, and monotone wherever a finger or the arm may be."""
+"""The ten zones: exact in examples by hand, and monotone for any finger and arm."""
 
 from typing import Any
 
@@ -24,7 +24,7 @@ WAYS = st.lists(st.floats(-0.1, HORIZON_M), min_size=8, max_size=8).map(lambda m
 
 @st.composite
 def fields(draw: st.DrawFn) -> TriggerField:
-    """What is to be touched may be touched: the slow ways are never the shorter ones."""
+    """Draw fields; slow distances are never the shorter ones."""
     fast: Ways = draw(WAYS)
     slow = ways(*(metres + draw(st.floats(0.0, 0.1)) for metres in fast)) if draw(st.booleans()) else fast
     full, acceleration = draw(st.floats(0.05, 0.5)), draw(st.floats(1.0, 20.0))
@@ -57,7 +57,7 @@ def test_an_example_worked_out_by_hand() -> None:
 
 
 def one_by_one(ahead: TriggerField, travels: tuple[float, ...], other: float, moving: Displacement) -> list[int]:
-    """Each zone's strength by the equation alone."""
+    """Compute each zone's strength by the equation alone."""
     full, strengths = ahead.full_speed_m_s, [0]
     advancing = [travel for travel in travels if travel > other]
     for travel in travels:

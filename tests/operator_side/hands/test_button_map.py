@@ -1,4 +1,4 @@
-"""One table of what does what, and docs and help that say the same."""
+"""One table of buttons and actions, with docs and help that agree."""
 
 import re
 

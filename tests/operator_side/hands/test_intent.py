@@ -1,4 +1,4 @@
-"""The controller's state to the operator's intent: calibration and the button map."""
+"""Operator's intent from the controller's state: calibration and the button map."""
 
 import pytest
 
@@ -39,7 +39,7 @@ def test_swapped_sides_swap_triggers_sticks_and_l1_and_nothing_else() -> None:
     )
     plain = operator_intent(state, calibration)
     swapped = operator_intent(state, calibration, swap_sides=True)
-    # Each trigger keeps its own calibration: the swap is of what they are for.
+    # Each trigger keeps its own calibration: only their purposes are swapped.
     assert (plain.l2, plain.r2) == pytest.approx((0.5, 0.5))
     assert (swapped.l2, swapped.r2) == (plain.r2, plain.l2)
     assert (swapped.lateral, swapped.turning) == (plain.turning, plain.lateral)

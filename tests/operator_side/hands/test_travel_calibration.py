@@ -1,4 +1,4 @@
-"""Raw travel to calibrated travel: dead zones, saturation, sticks that do not rest at the centre."""
+"""From raw to calibrated travel: dead zones, saturation, sticks that rest off centre."""
 
 import math
 
@@ -30,7 +30,7 @@ def test_raw_undoes_travel(travel: float, trigger: TriggerTravel) -> None:
 @pytest.mark.parametrize(
     ("saturation", "zones"), [(1.0, 8), (0.98, 8), (0.94, 8), (0.93, 7), (0.8, 6), (0.5, 4), (0.25, 2)]
 )
-def test_a_full_pull_reaches_so_many_zones(saturation: float, zones: int) -> None:
+def test_number_of_zones_that_a_full_pull_reaches(saturation: float, zones: int) -> None:
     assert TriggerTravel(0.01, saturation).reachable_zones == zones
 
 

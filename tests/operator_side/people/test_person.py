@@ -1,4 +1,4 @@
-"""The scripted person alone: hand-made views of a robot that is not there, and what the hands do."""
+"""Scripted person alone: hand-made views of an imaginary robot, and the hands' reactions."""
 
 import dataclasses
 import math
@@ -47,7 +47,7 @@ def test_nothing_is_answered_before_the_reaction_time(reaction_s: float) -> None
 # The phases
 
 UP_AT_M = 0.41
-"""Where a thing that was gripped with the tool at 0.3 m is carried."""
+"""Height to which an object gripped with the tool at 0.3 m is carried, in metres."""
 
 
 def at_height(height_m: float, back_m: float = 0.44, *, holding: bool = True) -> Telemetry:
@@ -55,7 +55,7 @@ def at_height(height_m: float, back_m: float = 0.44, *, holding: bool = True) ->
 
 
 def carried(settings: PersonSettings = CLEAR_SIGHTED) -> Desk:
-    """Up to where the person begins to lower what they hold."""
+    """Return a desk at the moment when the person begins to lower the object."""
     desk = Desk(settings)
     desk.arm()
     desk.until(Doing.LIFTING, armed(holding=True), 3.0)
@@ -65,7 +65,7 @@ def carried(settings: PersonSettings = CLEAR_SIGHTED) -> Desk:
 
 
 def sinks(desk: Desk, from_m: float, to_m: float, speed_m_s: float) -> None:
-    """The screen shows the tool sinking."""
+    """Show the tool sinking."""
     height_m = from_m
     while height_m > to_m:
         desk.watch(at_height(height_m), FRAME_S)
@@ -73,7 +73,7 @@ def sinks(desk: Desk, from_m: float, to_m: float, speed_m_s: float) -> None:
 
 
 def stick_speed_m_s(hands: Hands) -> float:
-    """Downwards."""
+    """Return the downward speed that the stick commands."""
     return -FULL_STICK_M_S * CALIBRATION.left_stick.deflection(hands.left)[1]
 
 
@@ -82,7 +82,7 @@ def test_the_task_from_waiting_to_withdrawing() -> None:
     for hands in desk.watch(None, 0.5):
         assert (hands.l2_n, hands.r2_n, hands.left, hands.buttons) == (0.0, 0.0, (0.0, 0.0), frozenset({Button.L1}))
         assert hands.phase == Doing.RESTING
-    # The first picture takes a reaction time, and resting the hands as long as arming asks for.
+    # The first picture takes a reaction time, and arming needs hands at rest.
     assert 0.7 < desk.until(Doing.ARMING, VIEW, 3.0) < 1.3
     assert all(hands.buttons == {Button.L1, Button.OPTIONS} for hands in desk.watch(VIEW, 0.1))
     desk.until(Doing.ADVANCING, armed((0.0, 0.0, 0.3)), 0.5)
@@ -100,7 +100,7 @@ def test_the_task_from_waiting_to_withdrawing() -> None:
     assert (back.l2_n > 0.0, back.r2_n, back.left, Button.CROSS in back.buttons) == (True, 0.0, (0.0, 0.0), True)
     assert 0.0 < desk.watch(at_height(UP_AT_M, 0.46), 1.0)[-1].l2_n < back.l2_n
     desk.until(Doing.LOWERING, at_height(UP_AT_M), 0.5)
-    # What sags before it is lowered does not stand yet.
+    # An object that sags before it is lowered is not in contact yet.
     sinks(desk, UP_AT_M, UP_AT_M - 0.004, 0.01)
     lowering = desk.watch(at_height(UP_AT_M - 0.004), 1.0)[-1]
     assert lowering.phase == Doing.LOWERING
@@ -109,7 +109,7 @@ def test_the_task_from_waiting_to_withdrawing() -> None:
     assert desk.person.phase == Doing.LOWERING
     desk.until(Doing.LETTING_GO, at_height(0.32), 1.0)
     assert all(hands.buttons == {Button.L1, Button.SQUARE} for hands in desk.watch(at_height(0.32), 0.5)[1:])
-    # Out of where they have pressed it down, before they draw back.
+    # First up from where they pressed it down, then back.
     rising = desk.watch(at_height(0.32, holding=False), 1.0)[-1]
     assert (rising.phase, stick_speed_m_s(rising) < 0.0) == (Doing.LETTING_GO, True)
     desk.until(Doing.DRAWING_BACK, at_height(0.335, holding=False), 0.5)
@@ -121,7 +121,7 @@ def test_the_task_from_waiting_to_withdrawing() -> None:
 
 
 @pytest.mark.parametrize("trust", [0.0, 1.0])
-def test_who_believes_what_rumbles_lowers_gently_a_reaction_later_and_until_it_stands(trust: float) -> None:
+def test_a_trusting_person_lowers_gently_from_a_reaction_after_rumble_until_contact(trust: float) -> None:
     desk = carried(dataclasses.replace(CLEAR_SIGHTED, trust=trust))
     sinks(desk, UP_AT_M, 0.38, 0.05)
     desk.tell(Feel(rumble=Rumble(left=0.25)))
@@ -130,13 +130,13 @@ def test_who_believes_what_rumbles_lowers_gently_a_reaction_later_and_until_it_s
     eased = [h.now_s for h in desk.hands if h.now_s >= felt_s and stick_speed_m_s(h) < 1.01 * GENTLY_M_S]
     assert bool(eased) == bool(trust)
     assert all(eased_s - felt_s > 0.15 for eased_s in eased)
-    # It stays gentle, as what was felt is still there.
+    # It stays gentle: what was felt is still there.
     desk.tell(Feel(rumble=Rumble()))
     assert (stick_speed_m_s(desk.watch(at_height(0.35), 0.3)[-1]) < 1.01 * GENTLY_M_S) == bool(trust)
 
 
 @pytest.mark.parametrize("state", ["disarmed", "stopped"])
-def test_a_robot_that_stopped_makes_them_let_go_and_begin_anew(state: str) -> None:
+def test_a_stopped_robot_makes_them_release_and_restart(state: str) -> None:
     desk = Desk()
     desk.arm()
     assert desk.watch(armed((0.0, 0.0, 0.3)), 1.0)[-1].r2_n > 0.0
@@ -176,7 +176,7 @@ def test_the_stick_goes_to_where_the_target_is_seen(
     length = math.hypot(*hands.left)
     assert length > CALIBRATION.left_stick.dead_zone
     assert (hands.left[0] / length, hands.left[1] / length) == pytest.approx(direction)
-    # So far off the line they centre first.
+    # At this distance from the line they centre first.
     assert hands.r2_n == 0.0
 
 
@@ -223,7 +223,7 @@ TOWARDS = armed((0.0, 0.0, 0.06))
 @pytest.mark.parametrize(
     ("strength", "noticeable", "eases"), [(0, 0.07, False), (1, 0.07, True), (8, 0.07, True), (1, 0.5, False)]
 )
-def test_who_notices_and_believes_a_stiffer_trigger_eases_off_a_reaction_later(
+def test_a_trusting_person_eases_off_a_reaction_after_a_stiffer_trigger(
     strength: int, noticeable: float, eases: bool
 ) -> None:
     desk = Desk(dataclasses.replace(CLEAR_SIGHTED, noticeable_force=noticeable))
@@ -242,7 +242,7 @@ PULSE = Feel(rumble=Rumble(left=1.0, right=0.7))
 
 
 @pytest.mark.parametrize(("trust", "light"), [(1.0, USUAL_LIGHT), (0.0, USUAL_LIGHT), (1.0, WARNING_LIGHT)])
-def test_who_feels_the_pulse_of_what_stands_lets_go_a_reaction_later(trust: float, light: Color) -> None:
+def test_a_person_who_feels_the_contact_pulse_releases_a_reaction_later(trust: float, light: Color) -> None:
     desk = carried(dataclasses.replace(CLEAR_SIGHTED, trust=trust))
     desk.watch(at_height(UP_AT_M), 0.5)
     desk.tell(dataclasses.replace(PULSE, light=light))
@@ -273,7 +273,7 @@ def test_at_the_warning_light_they_rest_their_hands_and_go_on_a_moment_after_it(
 # Moving and waiting
 
 
-def test_who_moves_and_waits_moves_as_far_as_it_is_and_looks_again_only_after_the_delay() -> None:
+def test_a_person_who_moves_and_waits_moves_the_seen_distance_and_looks_after_the_delay() -> None:
     desk = Desk(dataclasses.replace(CLEAR_SIGHTED, aiming="move-and-wait"))
     desk.arm(armed((0.0, 0.0, 0.2)))
     delay_s, seen = 0.4, desk.watch(armed((0.0, 0.0, 0.2)), 6.0, 0.4)
@@ -281,7 +281,7 @@ def test_who_moves_and_waits_moves_as_far_as_it_is_and_looks_again_only_after_th
     first, ends = pulled.index(True), pulled.index(False, pulled.index(True))
     again = pulled.index(True, ends)
     assert (again - ends) * TICK_S == pytest.approx(delay_s + 0.25, abs=0.1)
-    # The way of a minimum-jerk move, by what was meant and not by where a finger with its own time constant is.
+    # The path of a minimum-jerk move, by the intended travel and not by the lagging finger's.
     meant = [habitual_travel(hands.r2_n) * FULL_TRIGGER_M_S * TICK_S for hands in seen[first:ends]]
     assert sum(meant) == pytest.approx(0.2 + GRASP_M, rel=0.02)
 
@@ -290,7 +290,7 @@ def test_who_moves_and_waits_moves_as_far_as_it_is_and_looks_again_only_after_th
 
 
 def habitual_travel(force_n: float) -> float:
-    """What a free trigger's calibrated travel is at that force."""
+    """Return a free trigger's calibrated travel at that force."""
     return (
         0.0 if force_n == 0.0 else CALIBRATION.r2.travel((force_n - SPRING_PRELOAD_N) / SPRING_RISE_N / SENSED_TRAVEL)
     )

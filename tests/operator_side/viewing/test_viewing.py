@@ -1,4 +1,4 @@
-"""What people at this side are shown: facts of the core, figures of the scene, and who is fed with them."""
+"""Views at this side: facts of the core, figures of the scene, and the viewers that get them."""
 
 import math
 from collections import deque
@@ -43,7 +43,7 @@ def facts_of(bench: Bench, surroundings: Surroundings | None = None) -> Operator
 
 
 def felt_bench(*, swap_sides: bool = False, l2: float = 0.0, r2: float = 0.0) -> Bench:
-    """Nothing moves yet; the robot side reckons with the delay."""
+    """Return a bench at rest, with compensation by the robot side."""
     bench = Bench(compensation="robot", swap_sides=swap_sides)
     bench.hands(Button.L1, l2=l2, r2=r2)
     bench.feel_field(
@@ -110,7 +110,7 @@ def test_delays_are_those_of_the_last_second() -> None:
     assert there.newest_ms == pytest.approx(99.0)
     bench.now_s += 1.1
     assert facts_of(bench).to_operator.mean_ms is None
-    # Half of the round trip stands for a way that nobody knows.
+    # Half of the round trip is used for an unknown one-way delay.
     bench.side.link.recent.append((bench.now_s, None, 0.2))
     facts = facts_of(bench)
     assert facts.to_operator.mean_ms is None
@@ -118,7 +118,7 @@ def test_delays_are_those_of_the_last_second() -> None:
 
 
 class FakeConsole:
-    """Its pages are in the test's hands."""
+    """Console whose pages are in the test's hands."""
 
     def __init__(self) -> None:
         self.pages = 0
@@ -151,7 +151,7 @@ def surroundings(now_s: float) -> Surroundings:
 
 
 class Looking:
-    """A turn of the operator side each 4 ms."""
+    """Operator side with a turn each 4 ms."""
 
     def __init__(self) -> None:
         self.bench, self.console = Bench(), FakeConsole()
@@ -185,7 +185,7 @@ def test_four_times_a_second_it_is_asked_for_and_thirty_times_shown() -> None:
     assert 295 <= len(looking.console.shown) <= 301
     looking.console.pages = 0
     assert looking.turns(1.0) == []
-    # After a pause it goes on at its rate, instead of making up for it.
+    # After a pause it continues at its rate, without catching up.
     before, looking.console.pages = len(looking.console.shown), 1
     looking.turns(1.0)
     assert 29 <= len(looking.console.shown) - before <= 31
@@ -225,7 +225,7 @@ def test_without_a_console_nothing_is_asked_for_and_pictures_are_passed_over() -
     assert set(view_topics(OperatorSettings(console=True))) == {b"telemetry", VIDEO_TOPIC, SCENE_TOPIC}
 
 
-def test_what_pages_say_reaches_whoever_follows_them() -> None:
+def test_messages_of_pages_reach_their_listeners() -> None:
     looking = Looking()
     looking.console.words.append((3, {"hands": {"page": "ours", "number": 1, "driving": True}}))
     looking.console.words.append((3, {"tune": {"probability": 0.9}}))
@@ -247,7 +247,7 @@ def test_overlaps_of_the_trigger_with_more_and_ticks_are_read_from_the_newest_sc
     for told, overlap_mm3 in ((scene, 2000.0), (msgspec.structs.replace(scene, overlaps=()), 0.0)):
         figures.take(encode(told))
         expected = (overlap_mm3, 60.0, 130.0, 3)
-        # Shapes, and what is broken, change nothing.
+        # Shapes and broken payloads change nothing.
         for payload in (None, shapes(), encode(scene)[:-3], b"", b"scene"):
             if payload is not None:
                 figures.take(payload)

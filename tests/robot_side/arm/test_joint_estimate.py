@@ -1,4 +1,4 @@
-"""The estimate of joints and fingers beside the same filters in plain NumPy, and where it begins anew."""
+"""Estimate of joints and fingers beside the same filters in plain NumPy, and its restarts."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ def state(time_s: float, joints: FloatArray, velocities: FloatArray, fingers: Fl
 
 
 def test_it_is_a_complementary_filter_and_an_alpha_beta_filter() -> None:
-    """The same in plain NumPy, over uneven steps."""
+    """Compare with the filters in plain NumPy, over uneven steps."""
     random, estimate, time_s = np.random.default_rng(6), JointEstimate(), 0.0
     joints, fingers, finger_velocities = np.zeros(5), np.zeros(2), np.zeros(2)
     last_velocities = np.zeros(5)

@@ -1,4 +1,4 @@
-"""From hands to joints: tool motion, resolved rates, what the arm can do, each beside the same in plain NumPy."""
+"""From hands to joints: tool motion, resolved rates, abilities of the arm, each beside the same in plain NumPy."""
 
 import dataclasses
 import math
@@ -98,7 +98,7 @@ def test_limits_hold_and_keep_the_direction(twist: FloatArray, limits: FloatArra
     jacobian = jacobian_with(np.linspace(0.2, 1.0, 6), seed, 6)
     free, limited = joint_velocities(jacobian, twist, FREE), joint_velocities(jacobian, twist, limits)
     assert (np.abs(limited) <= limits * (1.0 + 1e-12)).all()
-    # Parallel and of the same sense, and no shorter than it has to be.
+    # Parallel and of the same sense, and no shorter than necessary.
     np.testing.assert_allclose(limited * np.linalg.norm(free), free * np.linalg.norm(limited), atol=1e-9)
     assert limited @ free >= 0.0
     if (np.abs(free) > limits).any():
@@ -124,7 +124,7 @@ def test_values_that_are_not_finite_are_refused(bad: float) -> None:
 @pytest.mark.parametrize("joints", [5, 6, 7])
 @pytest.mark.parametrize("smallest", [0.0, 1e-9, 1e-3, 0.02, 0.05, 0.0599, 0.06 - 1e-12, 0.06 + 1e-12, 0.0601, 0.1])
 def test_the_solution_is_the_damped_one_on_both_sides_of_the_threshold(smallest: float, joints: int) -> None:
-    """Above the threshold it is found without the singular values."""
+    """Above the threshold the solver needs no singular values."""
     twist = np.random.default_rng(7).uniform(-0.2, 0.2, 6)
     for seed in range(20):
         singular_values = np.append(np.linspace(2.0, 0.3, min(joints, 6) - 1), smallest)
@@ -138,7 +138,7 @@ def test_the_solution_is_the_damped_one_on_both_sides_of_the_threshold(smallest:
 
 @settings(derandomize=True, deadline=None, max_examples=60)
 @given(seed=seeds, joints=st.integers(1, 9), least=st.sampled_from([0.0, 0.02, 0.2]))
-def test_it_is_what_the_resolved_rates_come_to(seed: int, joints: int, least: float) -> None:
+def test_the_speed_is_that_of_the_resolved_rates(seed: int, joints: int, least: float) -> None:
     random = np.random.default_rng(seed)
     jacobian = random.normal(size=(6, joints))
     jacobian[:, 0] *= least
@@ -178,7 +178,7 @@ def test_the_simulated_arm_gives_that_speed_and_no_less_acceleration(direction: 
         driver.move(twist, PERIOD_S)
         speeds.append(float((driver.tool_m() - here) @ along) / PERIOD_S)
     assert max(speeds) == pytest.approx(0.25, rel=0.02)
-    # From rest to nine tenths, at least as fast as said, but for the drives' own lag of some 30 ms.
+    # From rest to nine tenths, at least as fast as predicted, but for the drives' own lag of some 30 ms.
     risen_s = PERIOD_S * int(np.argmax(np.array(speeds) > 0.9 * 0.25))
     assert risen_s < 0.9 * 0.25 / able.acceleration_m_s2 + 0.04
 

@@ -1,4 +1,4 @@
-"""The speed is capped to what still stops where full strength is due; what is to be touched may be."""
+"""Speed is capped so that the arm still stops before full strength; objects to be touched stay in reach."""
 
 import pytest
 from hypothesis import given, settings

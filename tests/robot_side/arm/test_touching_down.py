@@ -1,4 +1,4 @@
-"""A held object that stands is noticed at once, and never in the air; it stands until the tool rises."""
+"""Contact of a held object with a support: noticed at once, never in the air, and kept until the tool rises."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ STIFFNESS_N_M = 8e3
 
 
 class Arm:
-    """A tool that follows its commands, with a load in its fingers, above a table at height 0."""
+    """Tool that follows its commands, with a load in its fingers, above a table at height 0."""
 
     def __init__(self, weight_n: float = 2.0, *, measures: bool = True, noise_n: float = 0.0) -> None:
         self.touching_down = TouchingDown()
@@ -25,11 +25,11 @@ class Arm:
 
     @property
     def pressed_n(self) -> float:
-        """Force on the table."""
+        """Return the force on the table in newtons."""
         return STIFFNESS_N_M * max(0.0, -self.meant_m)
 
     def go(self, speed_m_s: float, duration_s: float, jolt_n: float = 0.0) -> float | None:
-        """Rise or sink at this speed; what stands is heeded. When it came to stand, None for not at all."""
+        """Rise or sink at this speed, heeding a contact; return the time of a new contact, None without."""
         for tick in range(round(duration_s / TICK_S)):
             stands = self.touching_down.stands
             told_m_s = max(0.0, speed_m_s) if stands else speed_m_s
@@ -37,7 +37,7 @@ class Arm:
             self.meant_m += told_m_s * TICK_S
             self.height_m = max(0.0, self.meant_m)
             borne_n = self._weight_n + self.pressed_n if self.meant_m <= 0.0 else 0.0
-            jolt = -jolt_n if tick < 12 else 0.0  # so long an arm takes to its speed
+            jolt = -jolt_n if tick < 12 else 0.0  # Time that an arm takes to its speed.
             carried = self._weight_n - borne_n + jolt + self._noise_n * self._random.normal()
             self.touching_down.update(carried if self._measures else None, self.height_m, told_m_s, self.now_s)
             if self.touching_down.stands and not stands:
@@ -53,7 +53,7 @@ def test_a_load_that_comes_to_stand_is_noticed_before_it_is_pressed_hard(speed_m
     assert arm.pressed_n < 8.0 + 0.01 * STIFFNESS_N_M * speed_m_s
     pressed_n = arm.pressed_n
     arm.go(-speed_m_s, 1.0)
-    assert arm.pressed_n == pressed_n  # not wound up
+    assert arm.pressed_n == pressed_n  # No windup.
 
 
 def test_it_gives_way_for_a_moment() -> None:
@@ -64,7 +64,7 @@ def test_it_gives_way_for_a_moment() -> None:
     assert (arm.touching_down.stands, arm.touching_down.gives_way) == (True, False)
 
 
-def test_it_stands_until_the_tool_has_risen_by_3_mm_and_may_stand_anew() -> None:
+def test_a_contact_lasts_until_the_tool_has_risen_by_3_mm_and_may_come_again() -> None:
     arm = Arm()
     assert arm.go(-0.025, 5.0)
     arm.go(0.01, 0.25)

@@ -1,4 +1,4 @@
-"""Kernels that are compiled in a moment, as a process has them at its start."""
+"""Kernels that compile quickly, in the state of a new process."""
 
 import robot_side.parts  # noqa: F401  (brings the kernels)
 from robot_side.compiled import kernel as compile_module
@@ -12,7 +12,7 @@ NAMES = (
 
 
 def fresh_kernels() -> tuple[Compiled, ...]:
-    """Those of `NAMES`, not yet compiled, and known to nobody else."""
+    """Return the kernels of `NAMES`, not yet compiled, and not registered."""
     fresh = tuple(
         Compiled(kernel.function, tuple(kernel.signature.args), kernel.signature.return_type)
         for kernel in imported_kernels()

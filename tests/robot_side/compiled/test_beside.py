@@ -1,4 +1,4 @@
-"""Compiling in other processes: who gets which, what they leave on disk, and what happens when they cannot."""
+"""Compilation in other processes: distribution of kernels, files left on disk, and failures."""
 
 import os
 import select
@@ -25,7 +25,7 @@ def ours() -> list[Compiled]:
 
 
 def taken_in_turns(kernels: Sequence[Compiled], processes: int) -> list[list[Compiled]]:
-    """What each gets when all take as long as their bytecode is."""
+    """Return each process's kernels if all take time in proportion to their bytecode."""
     queue, busy, found = KernelQueue(kernels, processes), [0] * processes, [list[Compiled]() for _ in range(processes)]
     while (kernel := queue.take(place := busy.index(min(busy)))) is not None:
         before = size(found[place])
@@ -44,7 +44,7 @@ def test_each_kernel_goes_to_one_process_and_all_end_alike(count: int) -> None:
     assert sorted(kernel.name for part in found for kernel in part) == sorted(kernel.name for kernel in ours())
     sizes = [size(part) for part in found]
     assert min(sizes) > 0.8 * max(sizes)
-    # What is compiled twice stays little.
+    # Little is compiled twice.
     assert sum(sizes) < 1.25 * size(ours())
 
 
@@ -120,7 +120,7 @@ def test_nothing_goes_on_compiling_for_a_process_that_has_gone(tmp_path: Path) -
         ended = os.pidfd_open(int(process.stdout.readline()))
         process.kill()
     try:
-        # Readable once it has ended: a few seconds, in which it would not have compiled them.
+        # Readable at its end: within a few seconds, too few to compile the kernels.
         assert select.select([ended], [], [], 30.0)[0]
     finally:
         os.close(ended)

@@ -1,4 +1,4 @@
-"""Columns that are declared once: what a kernel sees of them, and what is refused."""
+"""Columns declared once: a kernel's views of them, and refusals."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple

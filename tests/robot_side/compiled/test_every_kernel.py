@@ -1,4 +1,4 @@
-"""The pipeline's kernels: all ready before the first tick."""
+"""Kernels of the pipeline: all ready before the first tick."""
 
 import sys
 from typing import get_args

@@ -1,4 +1,4 @@
-"""The kernels' compilation: once, beforehand, and never from stale machine code."""
+"""Compilation of the kernels: once, beforehand, and never from stale machine code."""
 
 import errno
 import os

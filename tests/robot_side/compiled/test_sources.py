@@ -1,4 +1,4 @@
-"""The key of the cache on disk: no change in what a kernel is built from may go unseen."""
+"""Key of the cache on disk: every change in a kernel's sources changes it."""
 
 import ast
 import importlib
@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import robot_side
-import robot_side.parts  # before a test starts: a library of the simulation starts a process as it is imported
+import robot_side.parts  # Before a test starts: a library of the simulation starts a process at its import.
 from robot_side.compiled import sources as kernel_sources
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import digest, sources

@@ -1,4 +1,4 @@
-"""What the prediction of the delay's displacement misses, as a table says."""
+"""Errors of the predicted displacement, from a table."""
 
 import math
 from pathlib import Path
@@ -43,7 +43,7 @@ def read(folder: Path, content: str) -> PredictionErrors:
     ("loop_age_s", "expected"),
     [
         *((age_s, (mean_m, sd_m)) for age_s, mean_m, sd_m in ROWS),
-        # Between two rows it goes straight; before the first it is no less than there.
+        # Linear between two rows; before the first row no less than in it.
         *((0.15, (-0.0005, 0.003)), (0.25, (-0.0005, 0.0055)), (0.0, (0.001, 0.002)), (0.01, (0.001, 0.002))),
         # Beyond the last one it grows with the loop age.
         *((0.8, (0.008, 0.020)), (60.0, (0.6, 1.5))),
@@ -108,5 +108,5 @@ def test_the_built_in_table_says_that_the_operators_own_reckoning_is_far_better(
         operator, robot = (errors.at(kind, loop_age_s, 0.25) for kind in ("operator", "robot"))
         assert all(math.isfinite(value) for value in (*operator, *robot))
         assert abs(operator[0]) + operator[1] < 0.5 * (abs(robot[0]) + robot[1])
-        # And the fifth that is taken for an unknown arm is more than what this one misses on average.
+        # The fifth that is assumed for an unknown arm exceeds this one's mean error.
         assert abs(operator[0]) < WITHOUT_TABLE * 0.25 * loop_age_s

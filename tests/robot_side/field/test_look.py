@@ -1,4 +1,4 @@
-"""D_σ of each sphere against eq. 3-10 in NumPy, and what of a scene is looked at at all."""
+"""D_σ of each sphere against eq. 3-10 in NumPy, and the parts of a scene that a look examines."""
 
 import dataclasses
 import math
@@ -35,7 +35,7 @@ def any_pose(rng: np.random.Generator, spheres: int, joints: int) -> GripperPose
 
 
 def sigmas(by: Ahead, pose: GripperPose, looked: Along) -> FloatArray:
-    """By how much each sphere is inflated, and D_σ (m, 2)."""
+    """Return each sphere's inflation, and D_σ (m, 2)."""
     look(pose, EMPTY, looked, by=by)
     return np.hstack([by.scratch.inflation_m, by.scratch.sigma_m])[: len(pose.sphere_radii_m)]
 
@@ -73,7 +73,7 @@ def test_the_enlargement_is_eq_10_for_each_sphere(
 
 
 def test_the_largest_of_the_enlargements_is_told() -> None:
-    # The second joint turns the tool about y: what lies farther out along x errs more along z.
+    # The second joint turns the tool about y: points farther out along x have larger errors along z.
     pose = free_pose([[0.01, 0.0, 0.0], [0.3, 0.0, 0.0]], [0.01, 0.01])
     by = Ahead(np.array([0.0, 0.0, 0.0, 0.0, 1e-2, 0.0]))
     assert look(pose, EMPTY, along(AHEAD, 0.001, quantile=2.0), by=by).sigma_m == pytest.approx(0.001 + 2.0 * 3e-3)
@@ -81,7 +81,7 @@ def test_the_largest_of_the_enlargements_is_told() -> None:
 
 @pytest.mark.parametrize("p", [0.9, 0.99])
 def test_it_covers_the_drawn_errors_with_probability_p(p: float) -> None:
-    """True gripper and true object drawn many times: the gap closes by more than D_σ in 1 - P of them."""
+    """Draw true gripper and true object many times: the gap closes by more than D_σ in 1 - P of them."""
     rng = np.random.default_rng(5)
     known = Uncertainty(p, (0.001, -0.002, 0.0005), 0.002, (0.0005, 0.001, -0.001))
     jacobian, encoder_sigma = rng.normal(size=(6, 6)), np.full(6, 1e-3)
@@ -114,7 +114,7 @@ def test_what_is_far_beside_or_behind_costs_no_overlap() -> None:
 
 
 def test_a_scene_of_many_far_things_is_as_quickly_told_as_one() -> None:
-    """Only what may shorten a way is worked out: what is behind the nearest wall costs nothing."""
+    """Only objects that may shorten a distance are computed: those behind the nearest wall cost nothing."""
     wall = Scene().add().box([0.0, 0.0, 0.15], [0.3, 0.3, 0.01])
     looked = along(AHEAD, 0.007, reach_m=0.3)
     expected = look(gripper_pose(), wall.objects(), looked)

@@ -1,4 +1,4 @@
-"""Where a moving sphere begins to enter closed meshes of any form, against the definition of the ways."""
+"""First contact of a moving sphere with closed meshes of any form, against the definition."""
 
 import itertools
 
@@ -21,7 +21,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def star(rng: np.random.Generator) -> tuple[FloatArray, IntArray]:
-    """A prism over a polygon with dents, some 60 mm wide and up to 60 mm high."""
+    """Draw a prism over a polygon with dents, some 60 mm wide and up to 60 mm high."""
     corners = 2 * int(rng.integers(3, 9))
     turns = 2.0 * np.pi * (np.arange(corners) + rng.uniform(0.0, 0.4, corners)) / corners
     reach = np.where(np.arange(corners) % 2, rng.uniform(0.008, 0.02), rng.uniform(0.02, 0.05, corners))
@@ -38,7 +38,7 @@ def star(rng: np.random.Generator) -> tuple[FloatArray, IntArray]:
 
 
 def hollow() -> tuple[FloatArray, IntArray]:
-    """A block of 90 mm with a cubic cavity of 30 mm in its middle."""
+    """Return a block of 90 mm with a cubic cavity of 30 mm in its middle."""
     places, tetrahedra = grid_tetrahedra(3)
     middle = (np.floor(places[tetrahedra].mean(axis=1)) == 1.0).all(axis=1)
     triangles = surface_of(tetrahedra[~middle])
@@ -53,7 +53,7 @@ def any_mesh(rng: np.random.Generator) -> Mesh:
 @settings(derandomize=True, deadline=None, max_examples=60)
 @given(seed=seeds)
 def test_the_ways_to_a_mesh_are_those_of_the_definition(seed: int) -> None:
-    """Before it, in its dents, in its cavity, and overlapping it at the start."""
+    """The sphere starts before it, in its dents, in its cavity, or overlapping it."""
     rng = np.random.default_rng(seed)
     mesh, radius, inflated = any_mesh(rng), float(rng.uniform(0.004, 0.015)), float(rng.uniform(0.0, 0.01))
     rotation, start = random_rotation(rng), rng.uniform(-0.06, 0.06, 3)
@@ -78,7 +78,7 @@ def test_a_sphere_in_a_cavity_meets_its_far_wall() -> None:
         assert first_contact_m(objects, np.zeros(3), 0.004, rotation @ axis, REACH_M + MARGIN_M) == pytest.approx(
             0.011, abs=1e-12
         )
-    # All of it in the block, it overlaps.
+    # Entirely within the block, the sphere overlaps.
     assert first_contact_m(objects, rotation @ [0.0, 0.0, 0.03], 0.004, rotation @ AHEAD, REACH_M + MARGIN_M) == 0.0
 
 
@@ -86,7 +86,7 @@ def test_walls_that_lean_in_are_entered_and_walls_that_lead_away_are_not() -> No
     for degrees, sign in itertools.product((0.05, 0.3, 2.0), (1.0, -1.0)):
         angle = sign * np.radians(degrees)
         turned = np.array([[np.cos(angle), 0.0, -np.sin(angle)], [0.0, 1.0, 0.0], [np.sin(angle), 0.0, np.cos(angle)]])
-        # Beside a plate of 20 mm that goes on for a metre; its side is 0.1 mm and the radius off.
+        # Beside a plate of 20 mm that extends a metre; its side is 0.1 mm beyond the radius.
         plate = Scene().add().mesh(Mesh(CUBE_CORNERS * [0.01, 0.5, 0.5], CUBE_TRIANGLES), [0.0, 0.0, 0.0], turned)
         start = turned @ [-0.01 - 0.008 - 1e-4, 0.0, 0.0]
         found = first_contact_m(plate.objects(), start, 0.008, AHEAD, REACH_M + MARGIN_M)

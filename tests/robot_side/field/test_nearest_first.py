@@ -1,4 +1,4 @@
-"""The queue of what is looked at next, against Python's own heap."""
+"""Queue of the next objects to examine, against Python's own heap."""
 
 import heapq
 import math
@@ -13,14 +13,14 @@ from robot_side.compiled.stack import on_stack
 from robot_side.field.nearest_first import drop_first, push
 
 DROP = math.nan
-"""Instead of a key: remove the first."""
+"""Mark in place of a key: remove the first."""
 MOST = 60
 _heap, _items = on_stack(2 * MOST), on_stack(2 * MOST, dtype=np.int64)
 
 
 @compiled(input_array(1), output_indices())
 def _dropped(keys: FloatArray, dropped: IntArray) -> None:
-    """Push and drop; which items were dropped, one after another."""
+    """Push and drop; write the dropped items in order."""
     heap, items, count, drops = _heap(), _items(), 0, 0
     for item in range(keys.size):
         if not math.isnan(keys[item]):

@@ -23,11 +23,11 @@ def cover_one(half_sizes_m: tuple[float, ...], stand_out_m: float) -> SphereCove
 
 
 def uncovered_cells(half_sizes_m: FloatArray, cover: SphereCover) -> FloatArray:
-    """Middles of the surface's cells that no one sphere contains, however small they are cut.
+    """Return middles of the surface's cells that no one sphere contains, down to the smallest cells.
 
-    A proof and not a sample: cells tile the faces with their edges and corners, and a cell counts as covered only if
-    its farthest point is within TOLERANCE_M of being in a sphere. The others are cut, down to that tolerance.
-    One eighth of the box is enough, since the spheres are mirror-symmetric: the nearest images are those in it.
+    A proof, not a sample: cells tile the faces with their edges and corners. A cell counts as covered only if its
+    farthest point is within TOLERANCE_M of being in a sphere. The others are cut, down to that tolerance. One eighth of
+    the box is enough, as the spheres are mirror-symmetric: the nearest images are those in it.
     """
     spheres = np.unique(np.column_stack([np.abs(cover.centers_m), cover.radii_m + TOLERANCE_M]), axis=0)
     left = []
@@ -40,7 +40,7 @@ def uncovered_cells(half_sizes_m: FloatArray, cover: SphereCover) -> FloatArray:
             # Neighbours stay neighbours, so that few spheres are near a piece of the list.
             pieces = np.array_split(middles, 1 + len(middles) // 64)
             middles = np.concatenate([piece[~_contained(piece, halves, spheres)] for piece in pieces])
-            # Long cells are cut across until they are as good as square.
+            # Long cells are cut across until they are almost square.
             cut = halves > 0.5 * halves.max()
             halves = np.where(cut, 0.5 * halves, halves)
             middles = (middles[:, None] + np.unique(SIDES * cut, axis=0) * halves).reshape(-1, 3)
@@ -49,7 +49,7 @@ def uncovered_cells(half_sizes_m: FloatArray, cover: SphereCover) -> FloatArray:
 
 
 def _contained(middles: FloatArray, halves: FloatArray, spheres: FloatArray) -> BoolArray:
-    """Whether one of the spheres contains the cell, of each of the cells."""
+    """Return whether one of the spheres contains the cell, for each of the cells."""
     low, high = middles.min(axis=0) - halves, middles.max(axis=0) + halves
     centers, squared_radii = spheres[:, :3], spheres[:, 3] ** 2
     near = ((np.clip(centers, low, high) - centers) ** 2).sum(axis=1) <= squared_radii
@@ -77,7 +77,7 @@ def test_no_point_of_the_surface_is_outside_and_no_sphere_stands_out_too_far(
     cover = cover_one(half_sizes_m, stand_out_m)
     assert len(cover.radii_m) <= 2000
 
-    # Of a centre in the box, the farthest outside point is straight above the nearest face.
+    # For a centre in the box, the farthest outside point is straight above the nearest face.
     depths = (half_sizes - np.abs(cover.centers_m)).min(axis=1)
     assert (depths >= -1e-15).all()
     assert (cover.radii_m - depths).max() <= cover.stand_out_m[0] * (1.0 + 1e-12)
@@ -101,13 +101,13 @@ def test_the_built_in_gripper_needs_few_spheres() -> None:
     assert len(cover.radii_m) <= 246
 
 
-def test_a_very_large_box_gets_the_stand_out_that_2000_spheres_take_and_the_others_what_was_asked_for() -> None:
+def test_a_very_large_box_stands_out_as_2000_spheres_require_and_others_as_set() -> None:
     half_sizes = np.array([(0.05, 5.0, 5.0), PALM_M])
     cover = cover_boxes(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), half_sizes)
     wall = int((cover.box == 0).sum())
     assert 1900 <= wall <= 2000
     assert cover.stand_out_m[1] == 0.003
     assert cover.stand_out_m[0] > 0.003
-    # A little less is too little: it is not raised farther than needed.
+    # Slightly less is too little: it is not raised farther than needed.
     less = cover_one((0.05, 5.0, 5.0), float(cover.stand_out_m[0]) * 0.999)
     assert less.stand_out_m[0] == pytest.approx(cover.stand_out_m[0], rel=1e-5)

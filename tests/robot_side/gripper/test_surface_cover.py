@@ -33,7 +33,7 @@ def outside_m(points: FloatArray, centers: FloatArray, radii: FloatArray) -> Flo
 
 
 def check(solids: list[Solid], true_depth_m: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Nothing sticks out, and the ball about each centre that is 3 mm smaller than its sphere is within the shape."""
+    """Assert that nothing sticks out, and that each sphere, made 3 mm smaller, is within the shape."""
     centers, radii, stand_out_m = cover_surface(solids, STAND_OUT_M, [np.eye(3)])
     assert stand_out_m == STAND_OUT_M
     random = np.random.default_rng(0)
@@ -85,7 +85,7 @@ def test_the_convex_hull_of_points(seed: int) -> None:
 
 def test_the_spheres_are_mirror_symmetric_where_the_shape_is() -> None:
     turn = random_rotation(np.random.default_rng(2))
-    # A wedge: alike to both sides of one plane, and not of the other two.
+    # A wedge: symmetric to one plane, and not to the other two.
     points = np.array([[x, y, z] for x in (-0.02, 0.02) for y, z in ((0.0, 0.0), (0.02, 0.0), (0.0, 0.03))])
     wedge = convex_solid(points)
     assert wedge is not None

@@ -1,4 +1,4 @@
-"""What is told of the surroundings, wherever sticks may take the gripper, and when it is looked at."""
+"""Map from around: distances wherever sticks may take the gripper, and the times of its looks."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -71,7 +71,7 @@ def post(x_m: float, y_m: float, z_m: float = 0.06) -> PerceivedObjects:
     return Scene().add().box([x_m, y_m, z_m], [0.01, 0.01, 0.01]).objects()
 
 
-def test_nobody_gets_it_who_does_not_ask() -> None:
+def test_only_those_who_ask_get_a_map() -> None:
     assert around(swept(), walls(0.1)) is None
 
 
@@ -81,7 +81,7 @@ def test_a_wall_is_as_far_from_every_probe_across_and_nearer_or_farther_in_a_tur
     for ways_m, ahead_m in ((told.r2_m, 0.08), (told.l2_m, 0.05)):
         across = np.delete(np.array(ways_m), [*HALF, *TURNED])
         np.testing.assert_allclose(across, ahead_m - SIGMA_M, atol=3e-3)
-        # A ball that turns about itself goes along the chord, half the turn aside: by 1/cos farther, on an arc.
+        # A ball that turns about itself moves along the chord, half the turn aside: by 1/cos farther, on an arc.
         for probes, half in ((HALF, 0.125 * FULL_S), (TURNED, 0.25 * FULL_S)):
             farther = (ahead_m - SIGMA_M) / np.cos(half) * half / np.sin(half)
             np.testing.assert_allclose(np.array(ways_m)[probes], farther, atol=3e-3)
@@ -97,7 +97,7 @@ def test_each_side_is_where_a_stick_leads_there() -> None:
 
 
 def test_what_is_under_way_is_gone_by_the_time_that_a_probe_is_reached(law: SweptLaw) -> None:
-    """At 0.2 m/s, 40 mm are under way: what is nearer, aside, is passed before the stick gets there."""
+    """At 0.2 m/s, 40 mm are under way: nearer objects aside are passed before the stick gets there."""
     aside_m = STICK_SPEED_M_S * FULL_S
     forth = np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0])
     still = around(law, post(aside_m, 0.0, 0.03))
@@ -150,7 +150,7 @@ def test_what_matters_sooner_is_never_late_for_it(law: SweptLaw) -> None:
         assert now_s - law.memory.looked_s[:2, 0].min() < 0.02
 
 
-def test_it_is_looked_at_anew_where_roles_or_p_change(law: SweptLaw) -> None:
+def test_changed_roles_or_p_cause_new_looks(law: SweptLaw) -> None:
     looks(law, 300, np.zeros(6), 0.0)
     law.expect(0.5)
     assert looks(law, 500, np.zeros(6), 0.3) > 100 + PROBES
@@ -166,7 +166,7 @@ def test_what_has_just_appeared_straight_ahead_is_in_the_next_map(law: SweptLaw)
     told = told_by(law, ball_pose())
     assert told is not None
     assert told.r2_m[0] < 0.05
-    assert told.r2_m[1:].max() > 0.09  # of before
+    assert told.r2_m[1:].max() > 0.09  # From before.
 
 
 def test_what_is_held_or_ignored_shortens_no_way_by_moving(law: SweptLaw) -> None:
@@ -222,7 +222,7 @@ def test_there_is_no_map_for_an_operator_who_is_not_heard_of(law: SweptLaw, loop
 
 
 def test_a_map_of_before_is_withheld_and_the_robot_side_follows_the_path_itself(law: SweptLaw) -> None:
-    """After another T, P or role, and after a time in which the robot side reckoned."""
+    """After another T, P or role, and after a time in which the robot side compensated."""
     drifting = np.array([0.1, 0.0, 0.2, 0.0, 0.0, 0.0])
     looks(law, 300, drifting, 0.0)
     assert law.around(ball_pose()) is not None
@@ -246,8 +246,8 @@ def test_errors_of_the_prediction_shorten_these_ways_too() -> None:
     assert told[0] - told[1] == pytest.approx(0.005, abs=2e-3)
 
 
-def test_who_explains_what_was_before_a_grip_changes_nothing() -> None:
-    """What counts of a map begins again once a thing is held; what people look at is older than the newest tick."""
+def test_explaining_a_moment_before_a_grip_changes_nothing() -> None:
+    """A map's validity restarts once an object is held; people's explanations are older than the newest tick."""
     until_s = []
     for explains in (True, False):
         law, before = asking(), situation(ball_pose(), post(0.05, 0.0), loop_age_s=LOOP_S)
@@ -256,7 +256,7 @@ def test_who_explains_what_was_before_a_grip_changes_nothing() -> None:
         law.sense(held, 0.1)
         if explains:
             law.explain("r2", before, sensed)
-        # Shorter by less than what asks for another map.
+        # Shorter by less than would ask for another map.
         law.sense(replace(held, loop_age_s=0.99 * LOOP_S), 0.2)
         until_s.append(float(law.memory.state["until"][0]))
     assert until_s[0] == until_s[1] == pytest.approx(FULL_S)

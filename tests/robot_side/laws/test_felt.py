@@ -1,4 +1,4 @@
-"""What holds of the looks of the last tenth of a second, against plain lists of them."""
+"""Contact distances kept from the looks of the last tenth of a second, against plain lists of them."""
 
 from dataclasses import dataclass, replace
 
@@ -36,7 +36,7 @@ from tests.helpers.perceived_scenes import random_rotation
 
 @dataclass
 class Look:
-    """One, as it was found."""
+    """One look's result."""
 
     place: int
     at_s: float
@@ -53,7 +53,7 @@ class Look:
 
 
 class Kept:
-    """The same as the law's memory, as plain lists."""
+    """Memory of the law as plain lists."""
 
     def __init__(self) -> None:
         self.sides: list[list[Look]] = [[], [], []]

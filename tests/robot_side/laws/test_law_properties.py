@@ -1,4 +1,4 @@
-"""What the law promises of any field: where strength begins and is full, and how ways go with position and doubt."""
+"""Promises of the law for any field: first and full strength, and distances by position and uncertainty."""
 
 from itertools import pairwise
 
@@ -19,7 +19,7 @@ from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
 INFLATED_M = 0.007
 FREE_M = 0.07
-"""d"""
+"""Contact distance d, in metres"""
 FINGERTIP_X_M = 0.0485
 GRIPPER = gripper_pose()
 seeds = st.integers(0, 2**32 - 1)
@@ -27,7 +27,7 @@ repeatable = settings(derandomize=True, deadline=None, max_examples=40)
 
 
 def thing(kind: str, face_m: float, x_m: float = 0.0, rotation: FloatArray | None = None) -> PerceivedObjects:
-    """Something whose nearest point is `face_m` ahead of the origin; thin things lie across the approach, at x_m."""
+    """Return an object whose nearest point is `face_m` ahead of the origin; thin ones lie across, at x_m."""
     turned = np.eye(3) if rotation is None else rotation
     half_m = {"wall": (0.6, 0.6, 0.05), "plate": (0.1, 0.1, 0.001)}
     half_m |= {f"{mm} mm rod": (5e-4 * mm, 0.3, 5e-4 * mm) for mm in (10, 5, 2, 1, 0.4)}
@@ -46,7 +46,7 @@ def thing(kind: str, face_m: float, x_m: float = 0.0, rotation: FloatArray | Non
     return scene.box(turned @ [0.0 if half[0] > 0.05 else x_m, 0.0, face_m + half[2]], half, turned).objects()
 
 
-# Where strength begins, and where it is full
+# First and full strength
 
 
 @pytest.mark.parametrize("gripper", [False, True], ids=["one sphere", "gripper"])
@@ -61,9 +61,9 @@ def test_strength_is_0_until_the_margin_before_the_free_way_and_full_from_there_
     objects = thing(kind, front_m + INFLATED_M + FREE_M, FINGERTIP_X_M if gripper else 0.0, rotation)
     ways = ways_of(pose, objects, along(rotation[:, 2], INFLATED_M))
     assert (np.diff(ways) > 0.0).all()
-    # Alike for all: each strength's way differs by less than 4 mm, though the overlaps do so by a factor of 300.
+    # Similar for all: a strength's distances differ by less than 4 mm, though the overlaps differ by a factor of 300.
     assert FREE_M - MARGIN_M < ways[0] < FREE_M - 0.009
-    # A thin rod's overlap hardly grows any more before it is full.
+    # A thin rod's overlap hardly grows before it is full.
     assert FREE_M - 0.003 < ways[7] <= FREE_M
     assert FREE_M - 0.0102 < ways[3] < FREE_M - 0.004
 
@@ -79,7 +79,7 @@ def test_a_wall_that_is_touched_exactly_without_any_doubt_is_felt() -> None:
 @pytest.mark.parametrize("degrees", [2, 5, 10, 15, 20, 30, 45, 60, 89])
 @pytest.mark.parametrize("gap_m", [0.0005, 0.003, 0.0065])
 def test_a_wall_that_leans_into_the_way_is_full_before_it_is_touched(degrees: int, gap_m: float) -> None:
-    """The inflated sphere is in it from the start; only what is added counts, and the uninflated one."""
+    """The inflated sphere is in it from the start; only the growth counts, and the uninflated sphere."""
     angle = np.radians(degrees)
     wall = Scene().add().half_space([np.cos(angle), 0.0, -np.sin(angle)], -RADIUS_M - gap_m).objects()
     ways = ways_of(ball_pose(), wall, along(AHEAD, INFLATED_M))
@@ -118,13 +118,13 @@ def test_a_ball_that_the_inflated_sphere_has_swallowed_is_felt(gap_m: float) -> 
     assert np.isinf(ways_of(ball_pose(), behind, along(AHEAD, inflated_m))).all()
 
 
-# How ways go with position
+# Distances by position
 
 
 @repeatable
 @given(seed=seeds, ahead_m=st.floats(0.0, 0.05))
 def test_ways_fall_by_just_as_much_as_the_gripper_goes_ahead(seed: int, ahead_m: float) -> None:
-    """Until it is touched: what is streamed is shortened by it between two looks."""
+    """Streamed distances are shortened by this motion between two looks, until the contact."""
     rng = np.random.default_rng(seed)
     direction, scene = rng.normal(size=3), Scene()
     direction /= np.linalg.norm(direction)
@@ -176,7 +176,7 @@ def test_moving_and_turning_everything_changes_no_way(seed: int) -> None:
 @repeatable
 @given(seed=seeds)
 def test_the_field_is_the_least_over_objects_and_spheres(seed: int) -> None:
-    """So no object, and no sphere, ever lengthens a way; and nothing that was passed over for speed was needed."""
+    """No object and no sphere ever lengthens a distance; nothing passed over for speed was needed."""
     rng = np.random.default_rng(seed)
     objects, pose = random_scene(rng, 3, 0.15), any_gripper(rng)
     direction = rng.normal(size=3)
@@ -197,7 +197,7 @@ def test_the_field_is_the_least_over_objects_and_spheres(seed: int) -> None:
     np.testing.assert_allclose(whole, np.min(of_spheres, axis=0), atol=EQUAL_M)
 
 
-# How ways go with doubt
+# Distances by uncertainty
 
 
 def test_more_probability_and_more_doubt_shorten_all_ways() -> None:
@@ -208,7 +208,7 @@ def test_more_probability_and_more_doubt_shorten_all_ways() -> None:
     ]
     for before, after in pairwise(fields):
         assert (after < before).all()
-    # Each way by as much as the spheres grow, but for how a larger one goes in.
+    # Each distance by the spheres' growth, but for the way a larger sphere enters.
     np.testing.assert_allclose(fields[2] - fields[3], 1.33 * 0.003, atol=3e-4)
 
 

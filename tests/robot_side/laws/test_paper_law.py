@@ -1,4 +1,4 @@
-"""The paper's plain law: D_incr as printed, one total overlap, one stiffness for both triggers."""
+"""The paper's law: D_incr as printed, one total overlap, one stiffness for both triggers."""
 
 import dataclasses
 import math
@@ -65,7 +65,7 @@ def test_it_grows_with_speed_and_with_delay_in_any_direction() -> None:
 def test_the_overlap_is_the_total_of_all_spheres_and_objects() -> None:
     pose = free_pose([[0.0, 0.0, 0.0], [0.03, 0.0, 0.0]], [0.01, 0.02])
     scene = Scene().add().box([0.0, 0.0, 0.069], [0.2, 0.2, 0.05]).add(Role.TARGET).sphere([0.06, 0.0, 0.0], 0.02)
-    # The paper's own law takes no notice of the gap between the fingers.
+    # The paper's law ignores the gap between the fingers.
     sensed = senses().sense(pose, scene.objects(), gap_m=0.0)
     radii = pose.sphere_radii_m + SIGMA_M
     box = np.array([[0.0, 0.0, 0.069]] * 2), np.tile(np.eye(3), (2, 1, 1)), np.array([[0.2, 0.2, 0.05]] * 2)
@@ -111,7 +111,7 @@ def test_the_speed_is_that_along_r2() -> None:
 def test_what_is_ignored_or_held_overlaps_nothing() -> None:
     scene = Scene().add(Role.IGNORED).add(Role.SUPPORT).box([0.0, 0.0, 0.0], [0.1, 0.1, 0.1])
     assert senses().sense(ball_pose(), scene.objects(), held=1).overlap_m3 == 0.0
-    # A support is like anything else to the paper's law.
+    # To the paper's law a support is like any other object.
     assert senses().sense(ball_pose(), scene.objects()).r2.stiffness == 1.0
 
 

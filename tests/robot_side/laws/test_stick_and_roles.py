@@ -1,4 +1,4 @@
-"""What the stick's rumble says, and what roles and a held object change in what is streamed."""
+"""The stick's rumble, and the effects of roles and of a held object on the stream."""
 
 import math
 
@@ -71,7 +71,7 @@ def test_it_is_the_strength_at_what_a_reaction_and_the_loop_age_take_in_eighths(
         found = [rumble(wall_to(RIGHT, gap), (1.0, 0.0), loop_age_s) for gap in gaps]
         assert found == sorted(found, reverse=True)
         assert {8.0 * value for value in found} == set(range(9))
-        # The first strength is due 9 mm or more before the free way; the last within 3 mm of it.
+        # The first strength is due 9 mm or more before the contact distance; the last within 3 mm of it.
         assert found[int(np.searchsorted(gaps, here))] == 1.0
         assert 0.009 < gaps[int(np.argmin(found))] - here < 0.012
 
@@ -100,7 +100,7 @@ def test_what_is_touched_slowly_enough() -> None:
     assert touch_speed_m_s(0.1) == pytest.approx(0.018)
 
 
-# Roles and what is held
+# Roles and held objects
 
 
 def one(role: Role, **changes: object) -> Sensed:
@@ -123,7 +123,7 @@ def test_what_is_ignored_is_not_felt() -> None:
 
 
 def test_toggling_the_target_changes_only_what_it_must() -> None:
-    """From frame to frame: fast ways not at all, slow ones shorter at once and longer after a tenth of a second."""
+    """Fast distances never change; slow ones shorten at once and lengthen after 0.1 s."""
     senses = Senses(step_s=0.001)
     frames = {
         role: Scene().add(role).box([0.0, 0.0, 0.15], [0.2, 0.2, 0.05]).objects()
@@ -151,7 +151,7 @@ def test_the_held_object_is_no_danger_to_what_holds_it() -> None:
 
 
 def test_what_the_held_object_comes_near_is_felt() -> None:
-    """A rod that sticks out ahead by more than the fingers meets a wall that these are far from."""
+    """A rod that sticks out ahead of the fingers meets a wall far from them."""
     pose = gripper_pose()
     scene = Scene().add(Role.TARGET).box([0.0, 0.0, 0.08], [0.01, 0.01, 0.1])
     with_wall = scene.add().half_space([0.0, 0.0, -1.0], -0.22).objects()

@@ -1,4 +1,4 @@
-"""What the swept law streams and says: how far it looks, its own displacement, and eq. 9-10 as it applies them."""
+"""The swept law's stream: its horizon, its own displacement, and eq. 9-10 as it applies them."""
 
 import dataclasses
 import math
@@ -35,7 +35,7 @@ def horizon_m(loop_age_s: float) -> float:
     return FULL_SPEED_M_S * (loop_age_s + HORIZON_S) + braking_m + BEYOND_M
 
 
-# How far it looks
+# Horizon
 
 
 @pytest.mark.parametrize("loop_age_s", [0.001, 0.1, 0.4, 1.0])
@@ -75,7 +75,7 @@ def test_nothing_is_claimed_of_what_has_not_been_looked_at() -> None:
 
 
 def test_the_ways_are_the_same_at_every_loop_age() -> None:
-    """The delay moves the gripper along the ways, on whichever side reckons with it; it does not swell the gripper."""
+    """The delay moves the gripper along the path, whichever side compensates; it does not enlarge the gripper."""
     expected = Senses().sense(GRIPPER, walls(0.05, front_m=FRONT_M), loop_age_s=0.0)
     for loop_age_s in (0.05, 0.2, 0.8):
         ahead = moving(0.2 * AHEAD)
@@ -85,7 +85,7 @@ def test_the_ways_are_the_same_at_every_loop_age() -> None:
         np.testing.assert_allclose(found.r2.fast_m, expected.r2.fast_m, atol=1e-9)
 
 
-# The displacement by the robot side's own reckoning
+# The displacement by the robot side's own prediction
 
 
 @pytest.mark.parametrize("speed_m_s", [0.0, 0.2, -0.15])
@@ -125,10 +125,10 @@ def test_the_stiffness_is_that_of_the_fast_list_at_the_displacement() -> None:
 
 
 def test_a_camera_that_sees_things_too_near_lengthens_the_ways_on_its_side_and_shortens_the_others() -> None:
-    """μ_c is true minus perceived: 5 mm along the approach, and all there is is 5 mm farther ahead."""
+    """μ_c is true minus perceived: with 5 mm along the approach, every object is 5 mm farther ahead."""
     rotation = random_rotation(np.random.default_rng(2))
     approach = rotation[:, 2]
-    # A large sphere goes into a wall as a larger one does.
+    # A large sphere enters a wall as a larger one does.
     pose = ball_pose(0.1, tool_rotation=rotation)
     scene = Scene()
     for side in (-1.0, 1.0):
@@ -139,13 +139,13 @@ def test_a_camera_that_sees_things_too_near_lengthens_the_ways_on_its_side_and_s
     )
     np.testing.assert_allclose(np.array(known.r2.fast_m) - plain.r2.fast_m, 0.005, atol=1e-4)
     np.testing.assert_allclose(np.array(known.l2.fast_m) - plain.l2.fast_m, -0.005, atol=1e-4)
-    # An arm that is 5 mm farther along than it reckons is the same from the other side.
+    # An arm 5 mm farther along than estimated is the same from the other side.
     arm = Senses(swept(kinematic_mean_m=tuple(-0.005 * approach), camera_sd_m=0.01)).sense(pose, scene.objects())
     np.testing.assert_allclose(arm.r2.fast_m, known.r2.fast_m, atol=1e-9)
     np.testing.assert_allclose(arm.l2.fast_m, known.l2.fast_m, atol=1e-9)
 
 
-def test_what_the_prediction_misses_is_that_of_whoever_predicts() -> None:
+def test_prediction_errors_are_those_of_the_predicting_side() -> None:
     missed = PredictionErrors({"operator": ((0.2, 0.001, 0.0),), "robot": ((0.2, 0.0, 0.02),)})
     pose, wall = ball_pose(0.1), walls(0.15, front_m=0.1)
 
@@ -156,7 +156,7 @@ def test_what_the_prediction_misses_is_that_of_whoever_predicts() -> None:
     np.testing.assert_allclose(exact - ways(missed, compensation="operator"), 0.001, atol=1e-4)
     robot = 2.3263478740408408 * math.hypot(0.003, 0.02)
     np.testing.assert_allclose(exact - ways(missed, compensation="robot"), robot - SIGMA_M, atol=6e-4)
-    # Without a table, a fifth of the way that full speed goes in the loop age.
+    # Without a table, a fifth of full speed's displacement in the loop age.
     np.testing.assert_allclose(exact - ways(PredictionErrors()), 0.2 * FULL_SPEED_M_S * 0.2, atol=3e-4)
 
 
@@ -181,7 +181,7 @@ def test_the_enlargement_and_the_overlap_by_hand() -> None:
     assert still.overlap_m3 == 0.0
 
 
-# What cannot be
+# Impossible values
 
 
 @pytest.mark.parametrize("name", ["tool_position_m", "tool_rotation", "tool_jacobian", "sphere_centers_m"])

@@ -1,4 +1,4 @@
-"""When the swept law looks, tick by tick in virtual time, and what holds until it looks again."""
+"""Times of the swept law's looks, tick by tick in virtual time, and the validity of results in between."""
 
 from dataclasses import replace
 from typing import Any
@@ -15,11 +15,11 @@ from tests.helpers.field.situations import Senses, at, situation, swept, walls
 from tests.helpers.gripper_poses import free_pose
 from tests.helpers.perceived_scenes import Scene
 
-# When it looks
+# Times of looks
 
 
 class Watched:
-    """A law that is used tick by tick, and where it looked in each."""
+    """Law used tick by tick, and its looks in each tick."""
 
     def __init__(self) -> None:
         self.law = swept()
@@ -27,7 +27,7 @@ class Watched:
         self.now_s = 7.0
 
     def tick(self, step_s: float, count: int, **changes: Any) -> list[int]:
-        """How often it looked in each tick."""
+        """Tick; return the number of looks in each tick."""
         numbers = []
         for _ in range(count):
             self.now_s += step_s
@@ -59,7 +59,7 @@ def test_fields_are_looked_at_in_turns_a_hundred_times_a_second(watched: Watched
     for side in sides:
         pauses_s = watched.pauses_s(side)
         assert len(pauses_s) >= 18
-        # The first pause is longer by a tick that measures, and by one for each side before it.
+        # The first pause is longer by a measuring tick, and by one for each side before it.
         assert pauses_s[0] <= FIELD_PERIOD_S + 0.003 + 1e-9
         np.testing.assert_allclose(pauses_s[1:], FIELD_PERIOD_S, atol=1e-9)
 
@@ -97,7 +97,7 @@ def test_what_an_object_is_is_worked_out_when_roles_or_the_held_object_change() 
     assert held.tolist() != first.tolist()
 
 
-# What holds between two looks
+# Validity between two looks
 
 
 def test_ways_are_shortened_by_what_the_tool_has_moved_along() -> None:
@@ -112,7 +112,7 @@ def test_ways_are_shortened_by_what_the_tool_has_moved_along() -> None:
 
 
 def test_a_way_that_was_found_holds_for_a_tenth_of_a_second_and_a_new_one_at_once() -> None:
-    """Strength rises at once and falls slowly: where something is just passed, noise must not make it flicker."""
+    """Strength rises at once and falls slowly: when an object is just passed, noise must not make strength flicker."""
     senses = Senses(step_s=0.01)
     near, far = walls(0.05), walls(0.09)
     there = senses.sense(at(0.0), near).r2.fast_m
@@ -137,7 +137,7 @@ def test_what_was_seen_along_another_direction_holds_no_more() -> None:
     assert found.r2.fast_m[0] == found.horizon_m
 
 
-# What does not fit
+# Mismatches
 
 
 def test_a_gripper_of_more_spheres_that_is_refused_leaves_the_fingers_at_rest() -> None:

@@ -1,4 +1,4 @@
-"""What is to be touched: a target, or a support while something is held. In slow zones it is felt less, and later."""
+"""Objects to be touched: a target, or a support while something is held. Slow zones feel them less, and later."""
 
 import numpy as np
 import pytest
@@ -97,8 +97,8 @@ def test_both_lists_are_the_least_over_spheres_that_err_differently(seed: int) -
     assert whole.sigma_m == max(one.sigma_m for one in alone)
 
 
-def test_what_is_known_better_may_touch_first_though_it_is_felt_last() -> None:
-    """An outer sphere may err by 20 mm, as the tool may turn; the one on the axis is 3 mm farther ahead, for sure."""
+def test_a_better_known_sphere_may_touch_first_though_felt_last() -> None:
+    """An outer sphere may err by 20 mm, as the tool may turn; the one on the axis is exactly 3 mm farther ahead."""
     outer, middle = ([0.2, 0.0, 0.0], [0.0, 0.0, 0.003])
     turning = Ahead(np.array([0.0, 0.0, 0.0, 0.0, 0.1 / QUANTILE, 0.0]))
     looked = along(AHEAD, 0.0, quantile=QUANTILE)
@@ -116,7 +116,7 @@ def test_what_is_known_better_may_touch_first_though_it_is_felt_last() -> None:
 
 
 def fingers_about(object_class: int, widest_m: float, inflated_m: float = 0.02) -> Field:
-    """Two fingertips on the way to a block between them, and a palm behind it."""
+    """Look with two fingertips towards a block between them, and a palm behind it."""
     pose = free_pose([[0.03, 0.0, 0.0], [-0.03, 0.0, 0.0], [0.0, 0.0, -0.1]], [0.008] * 3, [True, True, False])
     block = Scene().add().box([0.0, 0.0, 0.05], [0.015, 0.02, 0.02]).objects()
     return look(pose, block, along(AHEAD, inflated_m), classes=[object_class], widest_m=widest_m)
@@ -127,11 +127,11 @@ def test_towards_the_target_a_finger_is_enlarged_by_at_most_half_the_gap_and_tha
     assert free.counts[Count.LIMITED] == 0
     limited = fingers_about(TARGET, 0.004)
     assert limited.counts[Count.LIMITED] == 2
-    # The fingers pass it by, 7 mm to each side: the palm alone meets it, as far enlarged as ever.
+    # The fingers pass it, 7 mm to each side: the palm alone meets it, with its full enlargement.
     assert free.fast_m[0] < 0.0 < limited.fast_m[0]
     face_m = 0.03 + 0.1 - 0.008 - 0.02
     assert face_m - 0.012 < limited.fast_m[0] < limited.fast_m[7] <= face_m
-    # A limit that does not bind counts for nothing.
+    # A limit that does not bind is not counted.
     loose = fingers_about(TARGET, 0.021)
     assert loose.counts[Count.LIMITED] == 0
     np.testing.assert_array_equal(loose.fast_m, free.fast_m)
@@ -146,7 +146,7 @@ def test_towards_anything_else_it_is_never_reduced(object_class: int) -> None:
 
 
 def test_a_limited_finger_still_meets_what_is_ahead_of_it() -> None:
-    """It is expected where the limited enlargement says; the palm is not limited."""
+    """The expected place follows the limited enlargement; the palm is not limited."""
     pose = free_pose([[0.0, 0.0, 0.0]], [0.008], [True])
     looked = along(AHEAD, 0.001, variance_m2=1e-4, quantile=2.0)
     found = look(pose, WALL, looked, classes=[TARGET], widest_m=0.004)
@@ -156,7 +156,7 @@ def test_a_limited_finger_still_meets_what_is_ahead_of_it() -> None:
 
 
 def test_a_target_drawn_in_between_the_fingers_ends_before_the_palm() -> None:
-    """The trigger's free travel is the depth that is left: nothing is felt of the sides."""
+    """The trigger's free travel is the remaining depth: the sides are not felt."""
     pose = gripper_pose()
     palm_m = -0.105 + 0.040 + 0.003
     left = []

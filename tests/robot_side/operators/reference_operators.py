@@ -1,4 +1,4 @@
-"""Who commands and what moves, written down a second time: the reference that the state machine compares with."""
+"""Second implementation of who commands and what moves: the reference of the state machine."""
 
 from dataclasses import dataclass, field
 
@@ -9,7 +9,7 @@ from robot_side.operators.safety import RELEASED_TRAVEL, SafetySettings
 
 State = SessionState
 ROOM = 2
-"""Observers, and operators that went away, at most: the machine lowers the product's own limits to this."""
+"""Most observers, and most departed operators: the machine lowers the product's limits to this."""
 
 
 @dataclass(eq=False)
@@ -38,17 +38,17 @@ class ReferenceOperators:
             self.discarded
         ) = 0
         self.stops: list[tuple[float, str]] = []
-        """(when, how the reason begins)"""
+        """(time, beginning of the reason)"""
         self.stopped = self.next_target = self.owner_changed = False
         self.followed: dict[int, int] = {}
-        """The epoch and the number of the newest stop that was followed."""
+        """Newest followed stop's number, by epoch."""
         self.loop_began_s: float | None = None
         self.loop_heard_s = 0.0
-        """When the stamp was sent that the newest accepted command of this lease echoes."""
+        """Sending time of the stamp echoed by this lease's newest accepted command."""
         self._listen()
 
     def _listen(self) -> None:
-        """Begin a lease: nothing that was said before counts."""
+        """Begin a lease: earlier messages do not count."""
         self.command: MotionCommand | None = None
         self.accepted_s: float | None = None
         self.echo_s: float | None = None
@@ -66,7 +66,7 @@ class ReferenceOperators:
         self._settle()
 
     def check(self, now_s: float) -> None:
-        """Disarm after a gap, and under a loop age that is too high or unknown."""
+        """Disarm after a gap, and for a loop age that is too high or unknown."""
         if self.accepted_s is not None and now_s - self.accepted_s > self.settings.gap_s:
             self._disarm(now_s, f"no command for {1e3 * (now_s - self.accepted_s):.0f} ms")
             self.command = self.accepted_s = None
@@ -74,7 +74,7 @@ class ReferenceOperators:
             self._disarm(now_s, "loop age of")
 
     def hear(self, message: Hello | MotionCommand, peer: bytes, arrival: Arrival, now_s: float) -> None:
-        """Take one message; of `arrival` its ages count, and freshness is found out here."""
+        """Receive one message; `arrival` gives the ages, and freshness is computed here."""
         self.update(now_s)
         self._hear(message, peer, arrival, now_s)
         self._settle()
@@ -144,7 +144,7 @@ class ReferenceOperators:
             self.owner.state = State.STOPPED if self.stopped else State.DISARMED
 
     def _hear_stop(self, command: MotionCommand, now_s: float) -> None:
-        """A stop counts however late it comes, but a copy of one that was followed, or an older one, does not."""
+        """Follow a stop however late it comes, except a copy of a followed one, or an older one."""
         epoch, sequence = command.header.epoch, command.header.sequence
         if command.emergency_stop and sequence > self.followed.get(epoch, 0):
             self.followed = {epoch: sequence}
@@ -183,7 +183,7 @@ class ReferenceOperators:
         self._listen()
 
     def _settle(self) -> None:
-        """Begin with what came of all that one message changed: an owner for an instant is none."""
+        """Act on the final state after one message: an owner for an instant is none."""
         if self.owner is not None and self.token != self.settled_token:
             self.settled_token = self.token
             self.granted += 1
@@ -191,7 +191,7 @@ class ReferenceOperators:
             self.owner.hand_over_down = self.owner.next_target_down = True
 
     def _leave(self, party: Party, state: State, now_s: float) -> None:
-        """Give `party` a state that owns nothing; the lease passes on to who waited longest and was heard lately."""
+        """Give `party` a state without the lease; the lease passes to the longest waiting participant heard lately."""
         waiting = [one for one in self.observers() if now_s - one.heard_s < self.settings.lease_s]
         if party.state is State.ARMED:
             self.stops.append((now_s, ""))

@@ -1,4 +1,4 @@
-"""One owner, many observers: who gets the lease when, with virtual operators on a real robot side."""
+"""One owner, many observers: the lease over time, with virtual operators on a real robot side."""
 
 import msgspec
 import numpy as np
@@ -35,13 +35,13 @@ def test_observers_feel_at_a_reduced_rate_and_see_the_robots_state(bench: Bench)
     owner.inbox.clear()
     observer.inbox.clear()
     bench.drive(0.5, owner)
-    assert len(owner.felt) == pytest.approx(0.5 / KEEP_ALIVE_S, abs=1)  # nothing changes
+    assert len(owner.felt) == pytest.approx(0.5 / KEEP_ALIVE_S, abs=1)  # Nothing changes.
     assert len(observer.felt) == pytest.approx(0.5 / OBSERVER_PERIOD_S, abs=1)
     assert observer.felt[-1].state == "armed"
 
 
 def to_owner(bench: Bench, ticks: int) -> list[tuple[float, bool, AnyMessage]]:
-    """When each message left, and if everywhere."""
+    """Return the time of each message to the owner, and whether it went everywhere."""
     found = []
     for _ in range(ticks):
         bench.ticks += 1
@@ -76,7 +76,7 @@ def test_a_refusal_goes_everywhere(bench: Bench) -> None:
     ]
 
 
-def test_there_is_room_for_so_many_observers_and_the_next_is_told_so(bench: Bench) -> None:
+def test_the_number_of_observers_is_limited_and_the_next_is_refused(bench: Bench) -> None:
     for k in range(1 + MOST_OBSERVERS):
         bench.join(2 + k, b"%d" % k)
     one_more = bench.join(100, b"one more")
@@ -129,7 +129,7 @@ def place_of_a_stranger(bench: Bench) -> int:
     return stranger.notice.place
 
 
-def test_who_says_no_hello_hears_which_place_it_would_get(bench: Bench) -> None:
+def test_a_peer_without_hello_hears_the_place_it_would_get(bench: Bench) -> None:
     assert place_of_a_stranger(bench) == 0
     owner = bench.join(2)
     assert place_of_a_stranger(bench) == 1
@@ -150,7 +150,7 @@ def cruise_beside(asks: bool) -> tuple[list[tuple[float, float]], list[Stiffness
     return list(bench.watch.speeds_rad_s), owner.felt
 
 
-def test_whoever_drives_notices_nothing_of_a_stranger_who_asks() -> None:
+def test_the_driver_notices_nothing_of_a_stranger_who_asks() -> None:
     (speeds, felt), (undisturbed, felt_alone) = cruise_beside(asks=True), cruise_beside(asks=False)
     assert speeds == undisturbed
     stripped = [[msgspec.structs.replace(one, header=felt[0].header) for one in each] for each in (felt, felt_alone)]

@@ -1,4 +1,4 @@
-"""An arm that says nothing new, or only what is old: what the session makes of it, in virtual time."""
+"""Arm without new states, or with old ones only: the session's reaction, in virtual time."""
 
 import re
 from dataclasses import replace
@@ -12,7 +12,7 @@ from tests.robot_side.session_bench import QUICK, Bench
 
 
 class SlowArm(PassedOnArm):
-    """The simulated arm, whose states come late or not at all."""
+    """Simulated arm whose states come late or not at all."""
 
     silent = False
     late_s = 0.0
@@ -71,7 +71,7 @@ def test_an_emergency_stop_outlasts_a_lost_arm(slow: tuple[Bench, SlowArm]) -> N
 def test_a_state_that_is_20_ms_old_adds_20_ms_to_the_loop_and_is_carried_to_now(slow: tuple[Bench, SlowArm]) -> None:
     bench, arm = slow
     operator = bench.join(2)
-    bench.drive(5.0, operator)  # until the assumed loop age has faded
+    bench.drive(5.0, operator)  # Until the assumed loop age has faded.
     age_s = bench.robot.loop_age_s(bench.now_s)
     arm.late_s = 0.02
     bench.cruise(operator)

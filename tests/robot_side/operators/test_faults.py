@@ -1,6 +1,6 @@
-"""Faults of the stream of commands, to the millisecond of the arm; and without its guard, each test fails.
+"""Faults of the stream of commands, to the millisecond of the arm; without its guard, each test fails.
 
-The state machine beside this file holds what needs no arm: who commands, which commands count, and stops.
+The state machine beside this file covers what needs no arm: who commands, which commands count, and stops.
 """
 
 import math
@@ -23,7 +23,7 @@ Patch = Callable[[pytest.MonkeyPatch], None]
 
 
 def cruising() -> tuple[Bench, Operator]:
-    """Make a robot side whose arm an operator moves at an even speed."""
+    """Return a robot side whose arm an operator moves at an even speed."""
     bench = Bench()
     operator = bench.join(2)
     bench.cruise(operator)
@@ -31,11 +31,11 @@ def cruising() -> tuple[Bench, Operator]:
 
 
 def begins_to_slow_s(bench: Bench, before: int) -> float:
-    """Find when the arm began to slow down, after so many states at an even speed."""
+    """Return when the arm began to slow down, after `before` states at an even speed."""
     even = float(np.median([speed for _, speed in bench.watch.speeds_rad_s[before - 20 : before]]))
     later = bench.watch.speeds_rad_s[before:]
     measured_s, speed = next(one for one in later if one[1] < 0.95 * even)
-    # It has slowed down for a while by now, at a rate that is known.
+    # By now the arm has slowed down for a while, at a known rate.
     return measured_s - (even - speed) / MotionLimits().deceleration_rad_s2
 
 
@@ -55,7 +55,7 @@ def stream_stops() -> None:
 
 
 def nobody_ticks() -> None:
-    """The second line of defence: nobody ticks any more, and the arm goes on by itself for a second."""
+    """Second line of defence: without ticks the arm moves by itself for a second."""
     bench, _ = cruising()
     start_s, before = bench.now_s, len(bench.watch.speeds_rad_s)
     for millisecond in range(1, 1001):

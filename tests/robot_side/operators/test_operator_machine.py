@@ -1,4 +1,4 @@
-"""Lease, safety and session under whatever operators do, step by step beside a reference of their own."""
+"""Lease, safety and session for any actions of operators, step by step beside a separate reference."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -40,7 +40,7 @@ arrivals = st.builds(
 
 
 class DrawnLink(LinkEnd):
-    """Orders messages as the real one does; the ages are those that the machine drew."""
+    """Link end that orders messages as the real one does; the machine draws the ages."""
 
     ages = FRESH
 
@@ -49,7 +49,7 @@ class DrawnLink(LinkEnd):
 
 
 class OperatorMachine(RuleBasedStateMachine):
-    """Operators come, go, replay and press; each step is compared with the reference and with what must always hold."""
+    """Operators that come, go, replay and press; each step is checked against the reference and the invariants."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -79,7 +79,7 @@ class OperatorMachine(RuleBasedStateMachine):
 
     @rule(place=st.integers(0, 20))
     def restart(self, place: int) -> None:
-        """Begin another epoch over somebody's connection; rarely, as the epoch before never comes back."""
+        """Begin another epoch over somebody's connection; rarely, as an ended epoch never comes back."""
         if place < len(self.reference.parties):
             self.epoch += 1
             self.hello(self.epoch, list(self.reference.parties.values())[place].peer)
@@ -104,7 +104,7 @@ class OperatorMachine(RuleBasedStateMachine):
         content: dict[str, bool],
         travels: tuple[float, float],
     ) -> None:
-        """Send one command; `behind`: how many leases ago the token was."""
+        """Send one command; `behind`: age of the token, in leases."""
         waiting = self.reference.observers()
         if whose == "owner" and self.reference.owner is not None:
             epoch = self.reference.owner.epoch
@@ -114,25 +114,25 @@ class OperatorMachine(RuleBasedStateMachine):
 
     @rule(place=st.integers(0, 30), key=st.sampled_from(["", "another"]))
     def replay(self, place: int, key: str) -> None:
-        """Deliver something again, over another connection of the same key or of another one."""
+        """Deliver a message again, over another connection of the same key or of another one."""
         self.deliver(self.sent[max(0, len(self.sent) - 1 - place)], peer_name(key, b"elsewhere"))
 
     @rule(epoch=epochs, stop=st.booleans())
     def forge(self, epoch: int, *, stop: bool) -> None:
-        """Command under the epoch of somebody else, with another key."""
+        """Command under another operator's epoch, with another key."""
         forged = MotionCommand(self.header(epoch), 1.0, 0.0, run=True, emergency_stop=stop, token=self.reference.token)
         self.deliver(forged, peer_name("another", b"forger"))
 
     @rule(duration_s=st.sampled_from([0.001, 0.03, 0.099, 0.101, 0.3, 0.41, 0.6]), ticks=st.integers(0, 3))
     def silence(self, duration_s: float, ticks: int) -> None:
-        """Let time pass; without a tick it is the next message that finds out."""
+        """Let time pass; without a tick the next message reveals it."""
         for _ in range(ticks):
             self.tick(duration_s / ticks)
         self.now_s += 0.0 if ticks else duration_s
 
     @rule()
     def come_back(self) -> None:
-        """Fall silent, all of them, and return in turn."""
+        """Silence all participants, and let them return in turn."""
         self.tick(SETTINGS.lease_s)
         for epoch, party in list(self.reference.parties.items()):
             self.hello(epoch, party.peer)
@@ -146,7 +146,7 @@ class OperatorMachine(RuleBasedStateMachine):
         echo=st.booleans(),
     )
     def stream(self, count: int, travels: tuple[float, float], content: dict[str, bool], *, echo: bool) -> None:
-        """Command for a while; those who wait say Hello after it."""
+        """Command for a while; waiting participants say Hello after it."""
         for _ in range(count):
             if (owner := self.reference.owner) is not None:
                 ages = FRESH if echo else replace(FRESH, loop_age_s=None)
@@ -186,7 +186,7 @@ class OperatorMachine(RuleBasedStateMachine):
         self.compare()
 
     def tick(self, duration_s: float) -> None:
-        """Let time pass, and do what the core does in a tick."""
+        """Advance time, and do the core's work in a tick."""
         self.now_s += duration_s
         self.session.update(self.now_s)
         self.reference.update(self.now_s)
@@ -205,7 +205,7 @@ class OperatorMachine(RuleBasedStateMachine):
         self.compare()
 
     def compare(self) -> None:
-        """Hold the session to the reference."""
+        """Compare the session with the reference."""
         session, reference = self.session, self.reference
         owner = session.lease.owner
         assert (None if owner is None else owner.epoch) == (None if not reference.owner else reference.owner.epoch)
@@ -237,7 +237,7 @@ class OperatorMachine(RuleBasedStateMachine):
         self.hold_what_must_always_hold()
 
     def hold_what_must_always_hold(self) -> None:
-        """Check, without the reference: one lease, tokens that grow, nothing older, arming as it is meant."""
+        """Check the invariants: one lease, growing tokens, nothing older, correct arming."""
         lease, command = self.session.lease, self.safety.command
         owning = [one for one in lease.known() if one.state in OWNING]
         assert owning == ([] if lease.owner is None else [lease.owner])

@@ -1,4 +1,4 @@
-"""P and the link, changed while the run goes on: by the owner, where that is permitted, whole or not at all."""
+"""Changes of P and the link during a run: by the owner, if permitted, whole or not at all."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def enlargement_mm(bench: Bench) -> float:
 
 @pytest.mark.parametrize("law", ["swept", "paper"])
 def test_the_gripper_is_enlarged_by_the_probability_that_was_tuned(law: LawName) -> None:
-    # Eq. 9-10 at rest: a mean and the quantile's multiple of one deviation, so that three probabilities lie on a line.
+    # Eq. 9-10 at rest: a mean and the quantile's multiple of one deviation, so that three probabilities are on a line.
     bench = Bench(replace(QUICK, permit_tuning=True, law=law))
     owner = bench.join(2)
     probabilities, found = (0.6, 0.9, 0.999), []

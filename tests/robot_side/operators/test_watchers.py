@@ -46,7 +46,7 @@ def test_an_old_watch_again_counts_for_nothing(bench: Bench) -> None:
     assert looked_at(bench) == frozenset()
 
 
-def test_pictures_are_steps_only_where_all_who_look_at_them_show_steps() -> None:
+def test_pictures_are_steps_only_if_all_their_viewers_show_steps() -> None:
     watchers, header = Watchers(), Bench().operator(1).link.stamp(0.0)
     assert watchers.lacks(0.0) is None
     watchers.heard(1, Watch(header, overview=True, lacks=(3, 0)), 0.0)
@@ -58,7 +58,7 @@ def test_pictures_are_steps_only_where_all_who_look_at_them_show_steps() -> None
     assert watchers.lacks(0.7) is None
 
 
-def test_beginning_to_look_is_counted_once_for_each_who_begins() -> None:
+def test_each_viewer_that_begins_to_look_is_counted_once() -> None:
     watchers = Watchers()
     header = Bench().operator(1).link.stamp(0.0)
     look, away = Watch(header, scene=True), Watch(header)

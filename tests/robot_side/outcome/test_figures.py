@@ -89,7 +89,7 @@ def test_the_smallest_distance_is_kept_and_absence_is_no_distance() -> None:
 
 
 def contacts(touching_s: list[float], step_s: float = 0.01) -> int:
-    """Contact onsets of one pair that touches in the steps of `touching_s` (from, to, from, to ...)."""
+    """Return the contact onsets of one pair that touches in the steps of `touching_s` (from, to, from, to ...)."""
     figures = RunFigures()
     for step in range(200):
         now_s = step * step_s

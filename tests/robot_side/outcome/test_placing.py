@@ -1,4 +1,4 @@
-"""What counts as placed, and as felt before it was touched: a target whose truth the test makes up."""
+"""Criteria of a placed target, and of a contact felt in advance: with an invented truth of the target."""
 
 import math
 
@@ -16,7 +16,7 @@ def at(gap_m: float, sinking_m_s: float = 0.0, tilt_rad: float = 0.0, x_m: float
 def set_down(
     warned_from_m: float | None = 0.03, tilt_rad: float = 0.0, let_go_at_m: float = -1.0
 ) -> tuple[Placing, float]:
-    """Lifted by 100 mm, lowered at 20 mm/s and let go on the table, or at a height; and when it touched."""
+    """Lift by 100 mm, lower at 20 mm/s and release on the table, or at a height; return also the time of contact."""
     placing, now_s = Placing(), 0.0
     placing.observe(at(0.0), False, False, now_s)
     gap_m = 0.1

@@ -1,4 +1,4 @@
-"""The public functions' arguments: shapes, broadcasting, errors; and the unchecked kernels beneath."""
+"""Arguments of the public functions: shapes, broadcasting, errors; and the unchecked kernels beneath."""
 
 import re
 from collections.abc import Callable
@@ -103,7 +103,7 @@ def test_numbers_at_their_limits_are_in_range(kind: str) -> None:
         np.testing.assert_allclose(result, near, rtol=1e-14, atol=1e-60)
 
 
-def test_what_nobody_vouched_for_is_doubtful() -> None:
+def test_bad_unvouched_numbers_are_doubtful() -> None:
     rng = np.random.default_rng(9)
     centers, vertices = rng.normal(size=(200, 3)), rng.normal(size=(200, 4, 3))
     for threads in (1, 2):
@@ -164,7 +164,7 @@ def test_what_is_refused(kind: str, name: str, value: object, said: str) -> None
 def test_rotations_are_orthonormal_to_a_millionth_and_no_further(sign: float) -> None:
     arguments = {**CALLS["box"][1], "centers": np.zeros((2, 3))}
     shear = sign * np.eye(3, k=2)
-    # Two numbers off the diagonal of QᵀQ are the shear, and the others next to nothing.
+    # Two numbers off the diagonal of QᵀQ are the shear, and the others almost 0.
     for share, refused in ((0.98, False), (0.999, False), (1.001, True)):
         turned = np.array([np.eye(3), np.eye(3) + share * 1e-6 / np.sqrt(2.0) * shear])
         if refused:

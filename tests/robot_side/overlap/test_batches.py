@@ -1,4 +1,4 @@
-"""Blocks, lanes and threads: how pairs are grouped changes nothing about their results."""
+"""Blocks, lanes and threads: the grouping of pairs changes no result."""
 
 import subprocess
 import sys
@@ -85,7 +85,7 @@ def test_the_ways_are_counted(pairs: Pairs, make: Callable[[int], Arrays]) -> No
     volumes, _, areas = pairs(centers, radii, *solids, counts=counts)
     cut = int(((volumes > 0.0) & (areas > 0.0) & (areas < 12.56 * radii**2)).sum())
     assert counts.pairs == 2000
-    # What bounds leave includes every pair that is cut, and not many others.
+    # The bounds keep every pair that is cut, and few others.
     assert cut <= 2000 - counts.early <= 1.2 * cut
     assert 0 <= counts.precise <= 0.02 * cut
 

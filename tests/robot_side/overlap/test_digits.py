@@ -27,7 +27,7 @@ from robot_side.overlap.digits.expansion import determinant, exact_power
 from robot_side.overlap.digits.precise_arctangent import NO_TURN, arctangent, turned, whole_angle
 
 ROUNDING = Fraction(1, 2**103)
-"""What `double_double` promises."""
+"""Error bound promised by `double_double`."""
 
 
 def _numbers() -> st.SearchStrategy[DoubleDouble]:

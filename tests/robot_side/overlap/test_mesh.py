@@ -1,4 +1,4 @@
-"""Closed meshes equal the oracle, in the positions that overlap algorithms fail in."""
+"""Closed meshes equal the oracle, in positions where overlap algorithms fail."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from robot_side.overlap import Mesh
 from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, round_mesh, surface_of
 
 WORST = 1e-15
-"""Of the sphere's volume, surface and, for the gradient, great circle."""
+"""Limit as a share of the sphere's volume, surface and, for the gradient, great circle."""
 
 Rng = np.random.Generator
 
@@ -25,7 +25,7 @@ def assert_exact(vertices: FloatArray, triangles: IntArray, centers: FloatArray,
 
 
 def positions(rng: Rng, vertices: FloatArray, triangles: IntArray, count: int) -> tuple[FloatArray, FloatArray]:
-    """Spheres anywhere, with their centre on a corner, edge or face, or with their surface through one."""
+    """Draw spheres anywhere, with their centre on a corner, edge or face, or with their surface through one."""
     centers, radii = np.empty((count, 3)), np.empty(count)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     for number in range(count):
@@ -112,7 +112,7 @@ def test_relabelling_and_splitting_change_nothing() -> None:
     relabelled = Mesh(vertices[order], np.roll(place[triangles[rows]], 1, axis=1))
     sphere = 4.0 / 3.0 * np.pi * radii**3
     assert (np.abs(relabelled.overlap(centers, radii) - expected) <= WORST * sphere).all()
-    # Every triangle with vertices of its own: they are found to be the same places.
+    # Triangles with separate vertices: equal places are found.
     apart = Mesh(vertices[triangles].reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3))
     assert (np.abs(apart.overlap(centers, radii) - expected) <= WORST * sphere).all()
 

@@ -1,4 +1,4 @@
-"""What a mesh accepts, and what it says about what it does not."""
+"""Accepted meshes, and the errors for others."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""The winding number and the nearest point of placed meshes against slow sums over every triangle."""
+"""Winding number and nearest point of placed meshes against slow sums over every triangle."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ Surface = tuple[FloatArray, IntArray]
 
 
 def slow_winding(vertices: FloatArray, triangles: IntArray, points: FloatArray) -> FloatArray:
-    """(n,): the solid angles of all triangles, by the angles of their spherical triangles (L'Huilier's theorem)."""
+    """Sum the solid angles (n,) of all triangles, by their spherical triangles' angles (L'Huilier's theorem)."""
     total = np.zeros(len(points))
     for triangle in triangles:
         sides = vertices[triangle] - points[:, None]

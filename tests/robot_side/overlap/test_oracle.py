@@ -1,7 +1,7 @@
-"""Every kind of solid, in every class that algorithms fail on and in every layout, equals the oracle.
+"""Every kind of solid equals the oracle, in every class where algorithms fail and in every layout.
 
-Errors are shares of the sphere's volume, great circle and surface. The hard counts of `feelahead bench overlap`, what
-must never happen, are held over a few thousand pairs more.
+Errors are shares of the sphere's volume, great circle and surface. The hard counts of `feelahead bench overlap`, of
+forbidden results, are checked over a few thousand pairs more.
 """
 
 import itertools
@@ -53,7 +53,7 @@ PUBLIC: dict[Solid, Callable[..., Overlaps]] = {
 
 
 def precise_overlaps(pairs: Pairs) -> Overlaps:
-    """What the compensated forms make of all rows."""
+    """Compute all rows by the compensated forms."""
     count = len(pairs)
     results = np.full(count, np.nan), np.full((count, 3), np.nan), np.full(count, np.nan)
     kernel = precise_boxes if pairs.solid == "box" else precise_tetrahedra
@@ -62,7 +62,7 @@ def precise_overlaps(pairs: Pairs) -> Overlaps:
 
 
 def mesh_overlaps(pairs: Pairs) -> Overlaps:
-    """The same solids as closed meshes, oriented outward."""
+    """Compute the same solids as closed meshes, oriented outward."""
     found = []
     for row, corners in enumerate(pairs.corners):
         edges = corners[[4, 2, 1] if pairs.solid == "box" else [1, 2, 3]] - corners[0]
@@ -74,13 +74,13 @@ def mesh_overlaps(pairs: Pairs) -> Overlaps:
 
 
 def layouts(name: str, pairs: Pairs) -> Iterator[tuple[str, Overlaps, IntArray]]:
-    """All ways to the same overlaps, and the rows that they hold."""
+    """Yield all layouts of the same overlaps, with their rows."""
     every = np.arange(len(pairs))
     yield "checked", PUBLIC[pairs.solid](*pairs.arguments, gradient=True), every
     yield "kernel", kernel_overlaps(pairs), every
     if pairs.solid in ("tetrahedron", "box"):
         yield "precise", precise_overlaps(pairs), every
-        # The corners of a turned box are rounded, so that its mesh is another solid. What is flat is no mesh.
+        # The corners of a turned box are rounded, so that its mesh is another solid. A flat solid is no mesh.
         solid = pairs.solid_volumes > 1e-9 * np.ptp(pairs.corners, axis=1).max(axis=1) ** 3
         if solid.any() and (pairs.solid == "tetrahedron" or "grid" in name):
             yield "mesh", mesh_overlaps(pairs[np.flatnonzero(solid)]), np.flatnonzero(solid)
@@ -93,7 +93,7 @@ def assert_equal_to_the_oracle(name: str, pairs: Pairs) -> list[Truth]:
         assert found.volume.max() <= WORST, layout
         assert found.gradient.max() <= 2.0 * WORST, layout
         assert found.area.max() <= (2.0 * WORST if layout == "precise" else WORST), layout
-        # The meshes' relative error has a bound of its own, in test_mesh.
+        # The meshes' relative error has a separate bound, in test_mesh.
         if layout != "mesh" and any(f"depth {depth}," in name for depth in DEPTHS):
             # Only caps that deep are left to the vector lanes.
             lanes = layout != "precise" and "face depth 1e-3" in name
@@ -164,7 +164,7 @@ def test_caps_and_lenses_are_relatively_exact(depth: float, ratio: float) -> Non
             ],
         ),
         (
-            # The planes of this needle's long faces round by more than they lie apart.
+            # The planes of this needle's long faces round by more than they are apart.
             [2.75, -0.5625, 0.5],
             0.125,
             [
@@ -227,7 +227,7 @@ def test_what_must_never_happen_does_not(solid: str) -> None:
 
 @both
 def test_zeros_are_exact_where_nothing_is_shared(solid: Solid) -> None:
-    """Grid-aligned pairs, which touch in every way, solids without volume among them."""
+    """Grid-aligned pairs, with every kind of contact and with solids without volume."""
     rng = np.random.default_rng(11)
     centers, radii = rng.integers(-5, 6, (1000, 3)), rng.integers(1, 8, 1000)
     shape: tuple[np.ndarray, ...] = (rng.integers(-4, 5, (1000, 4, 3)),)

@@ -1,4 +1,4 @@
-"""What holds for every overlap, whatever the shapes: bounds, additivity, invariances, monotonicity."""
+"""Invariants of every overlap: bounds, additivity, invariances, monotonicity."""
 
 import itertools
 
@@ -12,7 +12,7 @@ from robot_side.overlap import sphere_box, sphere_half_space, sphere_sphere, sph
 
 repeatable = settings(derandomize=True, deadline=None, max_examples=150)
 
-# Integers and eighths bring about the degenerate positions that random reals never reach.
+# Integers and eighths produce the degenerate positions that random reals never reach.
 coordinates = st.floats(-4.0, 4.0, width=32) | st.integers(-3, 3).map(float) | st.integers(-32, 32).map(lambda n: n / 8)
 points = arrays.arrays(np.float64, 3, elements=coordinates)
 corners = arrays.arrays(np.float64, (4, 3), elements=coordinates)
@@ -21,14 +21,14 @@ half_sizes = arrays.arrays(np.float64, 3, elements=st.floats(0.0, 3.0) | st.inte
 seeds = st.integers(0, 2**32 - 1)
 
 SUBNORMAL = 1e-300
-"""Smaller volumes (m³) lose digits, or come of products that did: they are near the least doubles."""
+"""Volume in m³ below which digits are lost, near the least doubles."""
 
 SIZE = 16.0
-"""The largest distance (m) between any two of these points, generously."""
+"""Upper bound of the distance between any two of these points, in metres."""
 
 
 def rounding(radius: float) -> float:
-    """What the documented error comes to in m³: 1e-15 of the sphere, more for solids that are larger."""
+    """Return the documented error in m³: 1e-15 of the sphere, more for solids that are larger."""
     return 1e-15 * 4.2 * radius**2 * max(radius, SIZE)
 
 
@@ -57,7 +57,7 @@ def test_a_tetrahedron_bounds_its_overlap_and_is_the_sum_of_its_parts(
     assert np.ptp(volumes) <= rounding(radius)
     assert np.ptp(gradients, axis=0).max() <= 2e-15 * 4.0 * max(radius, SIZE) * radius
     assert np.ptp(areas) <= 1e-15 * 13.0 * max(radius, SIZE) * radius
-    # Its parts add up. The cut is rounded, which moves the parts' faces by that.
+    # Its parts add up. The cut is rounded, which moves the parts' faces equally.
     cut = (1.0 - share) * vertices[2] + share * vertices[3]
     parts = np.stack([[*vertices[:3], cut], [vertices[0], vertices[1], cut, vertices[3]]])
     moved = 1e-15 * SIZE * 2.0 * np.pi * radius**2
@@ -151,7 +151,7 @@ def test_every_valid_input_gives_finite_results(
 
 
 def test_a_tetrahedron_that_is_nothing_beside_its_sphere_is_whole() -> None:
-    """Found by hypothesis: products of such lengths overflow and vanish on the way."""
+    """Found by hypothesis: products of such lengths overflow and vanish in between."""
     least = 6.13479543e-122
     vertices = np.full((4, 3), least)
     vertices[0, 0], vertices[1, 1], vertices[2, 2] = 0.0, 1.43633914e-60, 1.0

@@ -1,4 +1,4 @@
-"""Arm states and frames come back bit for bit, also as what is new in them."""
+"""Arm states and frames return bit for bit, also as differences."""
 
 from dataclasses import fields, replace
 from typing import Any
@@ -46,7 +46,7 @@ COUNTS = st.tuples(*(st.integers(0, 5) for _ in ARRAYS))
 
 
 def test_every_array_of_a_frame_is_recorded() -> None:
-    # Nothing of the core depends on the two before the last, and the last one says nothing that the arrays do not.
+    # The core does not read `positions_m` and `rotations`, and `since` repeats the arrays.
     others = {"time_s", "names", "roles", "mesh_library", "positions_m", "rotations", "since"}
     assert {field.name for field in fields(PerceivedObjects)} == {*ARRAYS, *others}
 

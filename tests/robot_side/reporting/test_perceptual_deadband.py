@@ -30,14 +30,14 @@ def changed(found: Sensed, **changes: Any) -> Sensed:
 
 
 def sensed(left_m: float, speed_m_s: float = 0.0, **changes: Any) -> Sensed:
-    """A wall so far ahead of R2, and nothing behind."""
+    """Return a wall `left_m` ahead of R2, and nothing behind."""
     wall = field(ways(*(min(left_m + 1e-3 * k, FAR_M) for k in range(8))), **ABLE)
     free = field(ways(*[FAR_M] * 8), **ABLE)
     return changed(Sensed.of(free, wall, speed_m_s=speed_m_s, horizon_m=FAR_M), **changes)
 
 
 class Run:
-    """A gripper before a wall, tick by tick, with what the receiver believes beside it."""
+    """Gripper before a wall, tick by tick, beside the receiver's belief."""
 
     def __init__(self, left_m: float, **options: Any) -> None:
         self.deadband = StiffnessDeadband(**options)
@@ -66,7 +66,7 @@ class Run:
 
     @property
     def nearer_m(self) -> float:
-        """By how much the wall is nearer than the receiver believes."""
+        """Return by how much the wall is nearer than the receiver believes."""
         return self.believed_m - self.moved_m - self.left_m
 
     @property
@@ -91,7 +91,7 @@ def test_the_receiver_is_never_wrong_by_more_than_can_be_felt(left_m: float, mov
                     assert run.nearer_m >= -deadband_m - 1e-9
             assert run.now_s - run.sent_s[-1] < KEEP_ALIVE_S + 1e-9
             if due and run.since_s < WRITE_S - TICK_S and len(run.sent_s) > 2:
-                assert wall_m_s > 0.0 or told_m_s != 0.0  # only what comes nearer than believed
+                assert wall_m_s > 0.0 or told_m_s != 0.0  # Only for a wall nearer than believed.
 
 
 def test_what_goes_as_reckoned_is_said_as_seldom_as_may_be() -> None:
@@ -107,7 +107,7 @@ def test_a_command_that_does_less_than_it_asks_for_is_found_out() -> None:
     run.tick()
     while not run.tick(0.25, made_of_it_m_s=0.0, now=sensed(0.03, 0.25)):
         pass
-    # A joint at its end: the receiver reckons on by its own commands, and nothing moves.
+    # A joint at its end: the receiver predicts by its own commands, and nothing moves.
     while not run.tick(0.25, made_of_it_m_s=0.0, now=sensed(0.03, 0.25)):
         pass
     assert run.since_s == pytest.approx(WRITE_S)

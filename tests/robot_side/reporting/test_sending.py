@@ -1,4 +1,4 @@
-"""The way out: haptics at once, telemetry where there is room, pictures in pieces that come together again."""
+"""Sending: haptics at once, telemetry where there is room, pictures in pieces that are joined again."""
 
 from common.emulation.spec import LinkSpec
 from common.rate.outgoing_queue import OutgoingQueue
@@ -10,7 +10,7 @@ PICTURE = bytes(range(256)) * 60
 
 
 class Sockets:
-    """Keeps what leaves."""
+    """Sockets that keep the sent messages."""
 
     def __init__(self) -> None:
         self.sent: list[tuple[bytes, bytes]] = []

@@ -1,4 +1,4 @@
-"""Nearest points against scipy's convex hulls and non-negative least squares, and the distances made of them."""
+"""Nearest points against scipy's convex hulls and non-negative least squares, and distances made of them."""
 
 import math
 from collections.abc import Callable
@@ -40,8 +40,8 @@ repeatable = settings(derandomize=True, deadline=None, max_examples=40)
 def _check_against_hull(points: FloatArray, hulls: list[FloatArray], found: Nearest) -> None:
     """Compare with convex hulls, one for each point.
 
-    Outside, the point reached lies on the hull (not too near), and no convex combination of the vertices
-    lies nearer (not too far). Inside, the distance is that of the nearest facet plane.
+    Outside, the point reached is on the hull (not too near), and no convex combination of the vertices
+    is nearer (not too far). Inside, the distance is that of the nearest facet plane.
     """
     distances, directions = found
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, atol=1e-12)
@@ -112,7 +112,7 @@ def test_direction_is_the_negative_gradient_of_the_signed_distance(kind: str) ->
         [(nearest(points + e)[0] - nearest(points - e)[0]) / (2.0 * step) for e in np.eye(3) * step],
         axis=1,
     )
-    # A few of the points lie within a step of a medial axis, where there is no gradient.
+    # A few of the points are within a step of a medial axis, where there is no gradient.
     agree = np.abs(slopes + direction).max(axis=1) < 1e-4
     assert agree.mean() > 0.99
     for inside in (distance < 0.0, distance > 0.0):
@@ -213,5 +213,5 @@ def test_meshes_and_what_they_describe_are_equally_far() -> None:
     for center in np.random.default_rng(2).uniform(-1.0, 1.0, (40, 3)):
         round_mesh, sphere, of_faces, box = object_distances(center[None], np.array([0.03]), table, 10.0)
         assert of_faces == pytest.approx(box, abs=1e-12)
-        # The mesh lies around the sphere, by less than 2 mm.
+        # The mesh encloses the sphere, by less than 2 mm.
         assert sphere - 0.002 < round_mesh <= sphere + 1e-12

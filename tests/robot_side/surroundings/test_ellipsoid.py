@@ -37,13 +37,13 @@ def shape(center: FloatArray, rotation: FloatArray, half_axes: FloatArray) -> Fl
 
 
 def overlap(of: FloatArray, center: FloatArray, radius: float) -> tuple[float, FloatArray]:
-    """V in m³ and dV/dcentre (3,) in m²."""
+    """Return V in m³ and dV/dcentre (3,) in m²."""
     push = np.empty(3)
     return ellipsoid.overlap_one_ellipsoid(of, 0, *center, radius, NO_MESHES, push), push
 
 
 def beside(rng: np.random.Generator, half_axes: FloatArray, depth: float) -> tuple[FloatArray, FloatArray]:
-    """A point so deep below the surface at a random normal, and this normal, in the own frame."""
+    """Draw a point `depth` below the surface at a random normal, and this normal, in the own frame."""
     on_surface = rng.normal(size=3)
     on_surface *= half_axes / np.linalg.norm(on_surface)
     normal = on_surface / half_axes**2
@@ -53,7 +53,7 @@ def beside(rng: np.random.Generator, half_axes: FloatArray, depth: float) -> tup
 
 @pytest.mark.parametrize("depth", [0.0, -1e-4, 1e-3])
 def test_a_needle_that_pierces_the_balls_pole_pushes(depth: float) -> None:
-    """No section between the pole and the outermost node sees where it does."""
+    """No section between the pole and the outermost node shows where it pierces."""
     of, radius, step = shape(np.zeros(3), np.eye(3), np.array([1e-4, 1e-4, 0.05])), 0.008, 1e-6
     before, after = (overlap(of, np.array([0.0, 0.0, 0.05 - depth + side]), radius)[0] for side in (-step, step))
     _, push = overlap(of, np.array([0.0, 0.0, 0.05 - depth]), radius)
@@ -75,7 +75,7 @@ def test_a_ball_is_a_sphere(seed: int) -> None:
 
 
 def by_columns(half_axes: FloatArray, center: FloatArray, radius: float) -> float:
-    """V by the lengths of columns over a grid about the ball's centre, polar, so that its rim is one of the grid's."""
+    """Integrate V over columns on a polar grid about the ball's centre, so that its rim is on the grid."""
     nodes, weights = np.polynomial.legendre.leggauss(400)
     rho, turn = radius * np.sin(0.25 * math.pi * (nodes + 1.0)), np.arange(800) * math.tau / 800
     x, y = center[0] + rho[:, None] * np.cos(turn), center[1] + rho[:, None] * np.sin(turn)

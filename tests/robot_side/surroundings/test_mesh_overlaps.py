@@ -18,7 +18,7 @@ Surface = tuple[FloatArray, IntArray]
 
 
 def hollow() -> Surface:
-    """A cube with a cubic cavity in its middle."""
+    """Return a cube with a cubic cavity in its middle."""
     places, tetrahedra = grid_tetrahedra(3)
     middle = (np.floor(places[tetrahedra].mean(axis=1)) == 1.0).all(axis=1)
     used, numbers = np.unique(surface_of(tetrahedra[~middle]), return_inverse=True)
@@ -37,7 +37,7 @@ SURFACES: dict[str, tuple[Surface, bool]] = {
 
 
 def centers_about(mesh: Mesh, rng: np.random.Generator) -> FloatArray:
-    """Points (n, 3) all about a mesh, some of them right above a corner or an edge of it."""
+    """Draw points (n, 3) all about a mesh, some of them right above a corner or an edge of it."""
     size = mesh.highest_m - mesh.lowest_m
     centers: FloatArray = rng.uniform(mesh.lowest_m - 0.3 * size, mesh.highest_m + 0.3 * size, (COUNT, 3))
     corners = mesh.tables.triangles[:, :9].reshape(-1, 3)[rng.integers(3 * mesh.triangle_count, size=COUNT)]
@@ -48,7 +48,7 @@ def centers_about(mesh: Mesh, rng: np.random.Generator) -> FloatArray:
 @pytest.mark.parametrize("radius_m", [0.0005, 0.004, 0.02, 0.08])
 @pytest.mark.parametrize("name", SURFACES)
 def test_a_mesh_has_the_overlap_of_the_library(name: str, radius_m: float) -> None:
-    """Before its faces, edges and corners, within it, swallowing it, and where one plane alone is met."""
+    """Before its faces, edges and corners, within it, swallowing it, and where it meets only one plane."""
     rng = np.random.default_rng(len(name))
     library, rotation, position = MeshLibrary([Mesh(*SURFACES[name][0])]), random_rotation(rng), rng.normal(size=3)
     mesh = Mesh(*SURFACES[name][0])

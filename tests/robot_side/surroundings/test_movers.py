@@ -1,4 +1,4 @@
-"""Frames that say what is new since an earlier one, against frames that say all."""
+"""Frames as differences from an earlier one, against whole frames."""
 
 from dataclasses import fields, replace
 
@@ -26,7 +26,7 @@ def whole(rng: np.random.Generator) -> PerceivedObjects:
 
 
 def elsewhere(objects: PerceivedObjects, things: np.ndarray, rng: np.random.Generator) -> PerceivedObjects:
-    """Some of them somewhere else: every number of theirs is another."""
+    """Move some objects: every number of theirs changes."""
     changed = {}
     for kind in KINDS:
         mine = np.isin(getattr(objects, kind.owner), things)
@@ -54,7 +54,7 @@ def test_such_a_frame_is_the_whole_frame(seed: int, share: float) -> None:
     seeing = Surroundings()
     assert seeing.target(found) == 0
     assert seeing.target(first) is None
-    # So far nothing was made whole.
+    # No array was built yet.
     assert not {name for kind in KINDS for name in kind.fields} & set(vars(found))
     for one in (found, replace(found, time_s=4.0)):
         for field in fields(PerceivedObjects):
@@ -65,7 +65,7 @@ def test_such_a_frame_is_the_whole_frame(seed: int, share: float) -> None:
     assert replace(found, time_s=4.0).since is None
 
 
-def test_what_nobody_knows_of_some_nobody_knows_of_all() -> None:
+def test_figures_unknown_for_some_objects_are_unknown_for_all() -> None:
     first = replace(whole(np.random.default_rng(1)), velocities_m_s=None)
     movers = Movers(first, np.array([0, 4]))
     assert movers.frame(0.0, movers.at_first, first.roles).velocities_m_s is None

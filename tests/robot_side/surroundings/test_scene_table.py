@@ -1,4 +1,4 @@
-"""The table of a frame: a row for each primitive, those of an object together; made once, refused where it is bad."""
+"""Table of a frame: a row for each primitive, grouped by object; made once, and refused if invalid."""
 
 import dataclasses
 import weakref
@@ -28,7 +28,7 @@ from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
 
 def mixed() -> PerceivedObjects:
-    """Objects whose primitives of one kind do not follow each other."""
+    """Return objects whose primitives of one kind do not follow each other."""
     cube = Mesh(0.1 * CUBE_CORNERS, CUBE_TRIANGLES)
     scene = Scene().add().sphere([1.0, 0.0, 0.0], 0.1).box([1.0, 0.0, 0.2], [0.1, 0.2, 0.3]).mesh(cube, [1.0, 0.5, 0.0])
     scene.add(Role.IGNORED).add().half_space([0.0, 0.0, 1.0], -1.0)
@@ -81,7 +81,7 @@ def test_a_table_is_made_once_for_each_frame(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def moved(objects: PerceivedObjects, rng: np.random.Generator) -> PerceivedObjects:
-    """Every primitive somewhere else and turned, and no larger or smaller."""
+    """Move and turn every primitive, without changing its size."""
     shift, turn = rng.normal(size=3), random_rotation(rng)
     return dataclasses.replace(
         objects,
@@ -97,12 +97,12 @@ def moved(objects: PerceivedObjects, rng: np.random.Generator) -> PerceivedObjec
 
 
 def frame_of(movers: Movers, objects: PerceivedObjects) -> PerceivedObjects:
-    """The movers as `objects` has them, all else as in the first frame."""
+    """Return a frame with the movers as in `objects`, and all else as in the first frame."""
     return movers.frame(0.0, movers.numbers_in(objects), objects.roles)
 
 
 def assert_as_defined(table: SceneTable, objects: PerceivedObjects) -> None:
-    """The table has what its definitions say of each primitive and each object."""
+    """Assert that the table agrees with the definitions of each primitive and each object."""
     rows = rows_of_primitives(objects)
     of_thing = [[row for row in rows if row.thing == thing] for thing in range(len(objects.names))]
     same = partial(np.testing.assert_allclose, rtol=1e-12, atol=1e-12)
@@ -125,7 +125,7 @@ def any_objects(seed: int) -> tuple[PerceivedObjects, np.random.Generator]:
 
 @settings(derandomize=True, deadline=None, max_examples=30)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_a_table_has_what_is_defined_of_each_primitive_and_so_has_that_of_the_next_frame(seed: int) -> None:
+def test_the_tables_of_a_frame_and_the_next_agree_with_the_definitions(seed: int) -> None:
     first, rng = any_objects(seed)
     assert_as_defined(make(first), first)
     last, objects = scene_table(first), moved(first, rng)
@@ -148,7 +148,7 @@ def test_what_is_new_since_an_earlier_frame_is_written_into_its_table_alone(seed
         assert seeing.see(objects) is table
         assert table.objects is objects
         assert_as_defined(table, objects)
-        # To the bit: a recording says the same frame whole.
+        # To the bit: a recording holds the same frame whole.
         said_whole = make(dataclasses.replace(objects))
         for name in ("shapes", "bounds", "object_bounds", "object_volumes"):
             np.testing.assert_array_equal(getattr(table, name), getattr(said_whole, name))
@@ -184,7 +184,7 @@ def test_what_loses_its_volume_has_a_table_of_its_own() -> None:
     assert seeing.see(without).flat == 2
     assert_as_defined(seeing.see(without), without)
     assert_as_defined(table, frame)
-    # And where something had none in the first place.
+    # Also where an object had no volume from the start.
     spread = Movers(dataclasses.replace(without), np.array([0, 3]))
     assert_as_defined(seeing.see(frame_of(spread, first)), frame)
 
@@ -213,7 +213,7 @@ def test_blocks_bound_their_objects_wherever_these_go(unbounded: int) -> None:
             apart = np.linalg.norm(blocks.bounds[:, :3] - around[:, :3], axis=1) + blocks.bounds[:, 3]
             assert (apart <= around[:, 3] * (1.0 + 1e-12)).all()
         if objects is first:
-            # What follows each other is near each other: a block of random ones would be 1.7 m large.
+            # Consecutive objects are near each other: a block of random ones would be 1.7 m large.
             assert np.median(blocks.blocks[:, 3]) < 0.7
 
 
@@ -225,7 +225,7 @@ def test_other_objects_and_those_that_lose_their_volume_get_a_table_of_their_own
     for other in (flat, swapped, Scene().add().objects()):
         assert moved_table(last, other) is None
     assert scene_table(flat).flat == 2
-    # Whose table leaves rows out has none of the next frame's order, either.
+    # A table that leaves rows out has none of the next frame's order, either.
     assert moved_table(scene_table(flat), objects) is None
     np.testing.assert_array_equal(scene_table(swapped).kinds, make(swapped).kinds)
 
@@ -237,7 +237,7 @@ def test_frames_do_not_pile_up() -> None:
         seeing.see(objects)
         frames.append(weakref.ref(objects))
     del objects
-    # A tick in real time runs without Python's collector of cycles.
+    # A tick in real time runs without Python's cyclic garbage collector.
     assert len([frame for frame in frames if frame() is not None]) <= 10
 
 
@@ -245,7 +245,7 @@ def test_frames_do_not_pile_up() -> None:
     ("field", "factor"), [("sphere_centers_m", np.nan), ("mesh_positions_m", np.nan), ("mesh_rotations", 1.1)]
 )
 def test_bad_objects_are_named_and_never_silently_far_away(field: str, factor: float) -> None:
-    """The rest of what is bad: test_validity.py."""
+    """Other invalid values: test_validity.py."""
     objects = random_scene(np.random.default_rng(0), 2, meshes=1)
     broken = dataclasses.replace(objects, **{field: getattr(objects, field) * factor})
     for _ in range(2):

@@ -18,7 +18,7 @@ def test_a_steady_motion_has_its_velocity(speed: float, frames: int) -> None:
     np.testing.assert_allclose(found, [[speed, 0.0, 0.0], [0.0, 0.0, -0.5 * speed]], atol=1e-9)
 
 
-def test_of_one_frame_nothing_is_known_but_that_it_stands() -> None:
+def test_one_frame_alone_means_rest() -> None:
     seen = ObjectVelocities()
     assert (seen.see(0.0, np.ones((3, 3))) == 0.0).all()
     assert (seen.see(0.0, np.zeros((3, 3))) == 0.0).all()

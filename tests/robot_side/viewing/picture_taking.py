@@ -1,4 +1,4 @@
-"""Pictures of a scene by the real companion, and where in them a point of the scene is."""
+"""Pictures of a scene by the real companion, and the pixels of the scene's points."""
 
 import select
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ Image = npt.NDArray[np.uint8]
 
 
 class PictureTaker:
-    """Asks a companion for one picture at a time, and waits for it."""
+    """Client that orders one picture at a time from a companion, and waits for it."""
 
     def __init__(self, scene: Scene, companion: Companion, viewpoints_of: dict[ViewName, Viewpoint]) -> None:
         self.scene = scene
@@ -44,12 +44,12 @@ class PictureTaker:
         self.ready = self._answer()
 
     def take(self, view: ViewName, captured_s: float = 1.5, *, halved: bool = False) -> Image:
-        """RGB (HEIGHT, WIDTH, 3) of the scene as it is, or half of each."""
+        """Return the present scene in RGB (HEIGHT, WIDTH, 3), or half of each."""
         image: Image = simplejpeg.decode_jpeg(self.picture(view, captured_s, halved=halved).content)
         return image
 
     def picture(self, view: ViewName, captured_s: float = 1.5, *, halved: bool = False, h264: bool = False) -> Picture:
-        """The companion's answer to one order."""
+        """Return the companion's answer to one order."""
         mujoco.mj_forward(self.scene.model, self.scene.data)
         data, channel = self.scene.data, self._companion.channel
         mocap = np.concatenate([data.mocap_pos, data.mocap_quat], axis=1)
@@ -73,7 +73,7 @@ class PictureTaker:
         return message
 
     def pixel(self, view: ViewName, point_m: FloatArray) -> tuple[int, int]:
-        """Row and column at which a point (3,) of the world is seen; it has to be in the picture."""
+        """Return row and column of a point (3,) of the world, which must be in the picture."""
         row, column, ahead_m = project(self.scene, self.viewpoints[view], point_m)
         assert ahead_m > 0.0
         assert 0 <= row < HEIGHT
@@ -83,13 +83,13 @@ class PictureTaker:
 
 @contextmanager
 def picture_taker(scene: Scene, viewpoints_of: dict[ViewName, Viewpoint] | None = None) -> Iterator[PictureTaker]:
-    """With a companion of its own."""
+    """Yield a picture taker with a new companion."""
     with Companion(MODULE) as companion:
         yield PictureTaker(scene, companion, viewpoints_of or viewpoints(scene))
 
 
 def project(scene: Scene, viewpoint: Viewpoint, point_m: FloatArray) -> tuple[float, float, float]:
-    """Row and column in the picture, and how far ahead of the camera a point (3,) of the world is."""
+    """Return row and column in the picture, and the distance ahead of the camera, of a point (3,) of the world."""
     data, model = scene.data, scene.model
     if viewpoint.camera is None:
         place_m, forward, up = placed(viewpoint, data)
@@ -106,7 +106,7 @@ def project(scene: Scene, viewpoint: Viewpoint, point_m: FloatArray) -> tuple[fl
 
 
 def around(image: Image, pixel: tuple[int, int], by: int = 2) -> FloatArray:
-    """The mean colour (3,) of some pixels."""
+    """Return the mean colour (3,) of some pixels."""
     row, column = pixel
     mean: FloatArray = image[row - by : row + by + 1, column - by : column + by + 1].reshape(-1, 3).mean(axis=0)
     return mean

@@ -1,4 +1,4 @@
-"""Pictures in H.264 from the robot side's encoder to the JPEG that an operator side makes of them."""
+"""Pictures in H.264 from the robot side's encoder to the operator side's JPEG."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
 
 
 def moving(number: int, width: int = 160, height: int = 96) -> Image:
-    """A bright disc that crosses a slope of colours."""
+    """Draw a bright disc that crosses a slope of colours."""
     rows, columns = np.mgrid[0:height, 0:width]
     picture = np.stack([columns % 256, 2 * rows % 256, 128 + 0 * rows], axis=2)
     picture[np.hypot(rows - height // 2, columns - 20 - 3 * number) < 12] = (250, 250, 90)
@@ -31,7 +31,7 @@ def step(encoder: H264, picture: Image, quality: int = 90, *, whole: bool = Fals
 
 
 def error(steps: Steps, sent: VideoStep, picture: Image) -> float | None:
-    """Root of the mean square between what is shown and what was seen, of 255; None where nothing is shown."""
+    """Return the root mean square error of the shown picture, of 255; None if nothing is shown."""
     frame = steps.follow(sent)
     if frame is None:
         return None
@@ -65,7 +65,7 @@ def test_after_a_picture_that_is_lost_nothing_is_shown_until_a_whole_one() -> No
     late = Steps()
     assert late.follow(sent[4]) is None
     assert late.lacks == (0, 5)
-    # Those who see them all are shown the whole one like any other.
+    # Viewers that missed nothing are shown the whole one like any other.
     assert late.follow(sent[19]) is not None
     assert late.lacks == (0, 0)
 
@@ -74,7 +74,7 @@ def test_another_size_or_quality_begins_with_a_whole_picture() -> None:
     encoder, steps = H264(), Steps()
     for sent, picture, whole in (
         (step(encoder, moving(0)), moving(0), True),
-        (step(encoder, moving(1), 91), moving(1), False),  # as near as x264's factor goes
+        (step(encoder, moving(1), 91), moving(1), False),  # As near as x264's factor goes.
         (step(encoder, moving(2), 30), moving(2), True),
         (step(encoder, moving(3, 80, 48), 30), moving(3, 80, 48), True),
         (step(encoder, moving(4, 80, 48), 30), moving(4, 80, 48), False),

@@ -1,4 +1,4 @@
-"""What is made for whoever looks, in virtual time: how much, when, and what it says."""
+"""Views for those who look, in virtual time: their amount, time and content."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ def test_nobody_looks_nothing_is_made() -> None:
         assert 55 <= made["nobody_looks"] <= 61
 
 
-def test_what_is_looked_at_comes_thirty_times_a_second_and_ends_a_second_after_the_last_watch() -> None:
+def test_watched_views_come_thirty_times_a_second_until_a_second_after_the_last_watch() -> None:
     table = Table()
     table.watch(**ALL)
     table.run(3.0)
@@ -58,7 +58,7 @@ def test_what_is_looked_at_comes_thirty_times_a_second_and_ends_a_second_after_t
     table.run(1.0)
     assert len(table.seen) == before
     newest_s = max(state.taken_s for state in table.states())
-    assert 3.6 < newest_s < 3.8  # the last Watch came at 2.75 s
+    assert 3.6 < newest_s < 3.8  # The last Watch came at 2.75 s.
 
 
 def test_shapes_come_again_every_three_seconds_and_when_another_begins_to_look() -> None:
@@ -95,7 +95,7 @@ def test_a_slow_video_link_delays_frames_and_never_a_stiffness() -> None:
         table.run(4.0)
     assert slow.ages_s["haptics"] == free.ages_s["haptics"]
     assert slow.ages_s["telemetry"] == free.ages_s["telemetry"]
-    # 18 kB at 2 Mbit/s are 73 ms; what waits behind one other is the most, as nothing more is made meanwhile.
+    # 18 kB at 2 Mbit/s take 73 ms; at most one waits behind another, as no more are made meanwhile.
     assert min(slow.ages_s["video"]) >= 0.072
     assert max(slow.ages_s["video"]) < 0.25
     assert 10 * 4 <= len(slow.frames()) <= 14 * 4
@@ -132,7 +132,7 @@ def test_the_same_link_shows_whole_size_in_h264_and_another_codec_begins_where_i
     assert table.frames() == []
     # Whole ones of both views are under way for 1.2 s; then no step waits long.
     assert max(table.ages_s["video"][10:]) < 0.25
-    # One who shows JPEG alone begins to look.
+    # A viewer that shows only JPEG begins to look.
     table.watch(overview=True, first_person=True)
     table.run(1.0)
     assert table.looking.pictures == {"rate_hz": 5.0, "quality": 30, "size": 0.5}
@@ -150,7 +150,7 @@ def test_a_state_says_where_the_robot_side_believes_everything_is(law: str) -> N
     _, situation = table.robot.newest
     objects = situation.objects
     assert objects.positions_m is not None
-    # Links where the encoders say, objects where the camera does: each is wrong by its own error.
+    # Links where the encoders say, objects where the camera does: each with its own error.
     bodies = np.array([scene.model.body(name).id for name in shapes.links])
     links = rows(state.link_poses, 7)
     np.testing.assert_allclose(links[:, :3], kinematics.body_poses(bodies)[:, :3], atol=2e-4)
@@ -185,7 +185,7 @@ def test_overlaps_add_up_to_the_total_that_the_law_has(law: str) -> None:
     core = table.robot
     assert core.newest is not None
     sensed, situation = core.newest
-    # Among things, with a delay that is known, moving: a tenth of a second's way ahead something is met.
+    # Among objects, with a known delay, moving: something is met within a tenth of a second.
     pose = situation.pose
     there = replace(pose, sphere_centers_m=pose.sphere_centers_m + np.array([0.2, 0.02, -0.17]))
     velocities = np.linalg.pinv(pose.tool_jacobian) @ [0.1, 0.0, 0.0, 0.0, 0.0, 0.0]

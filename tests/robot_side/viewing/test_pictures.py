@@ -1,4 +1,4 @@
-"""The robot side's end of rendering in virtual time, with a companion that does as the test says."""
+"""Robot side's end of rendering in virtual time, with a companion that acts as the test says."""
 
 from collections.abc import Iterator
 from typing import Literal
@@ -119,14 +119,14 @@ def test_after_a_minute_without_anybody_it_ends_and_begins_anew_for_the_next(des
     assert companion.channel.ended
     companion.running = False
     desk.cameras.update(0.3 + IDLE_S, 0.0, ())
-    # It has ended by itself: it is only seen off.
+    # It has ended by itself and is only closed.
     assert companion.closed == [0.0]
     desk.cameras.update(0.4 + IDLE_S, 0.0, BOTH)
     assert len(desk.companions) == 2
     assert desk.notes == []
 
 
-def test_who_cannot_start_a_process_is_told_so(desk: Desk) -> None:
+def test_a_process_that_cannot_start_is_noted(desk: Desk) -> None:
     desk.fails_to_start = "no process can be started: Cannot allocate memory"
     desk.cameras.update(0.0, 0.0, BOTH)
     assert "Cannot allocate memory" in desk.notes[0]
@@ -156,16 +156,16 @@ def test_a_whole_picture_is_ordered_once_for_each_that_is_lacking_and_not_too_of
         assert isinstance(desk.cameras.message(picture, HEADER), VideoStep)
 
     for number in range(1, 100):
-        # The tenth is lost; that is known two pictures later, and said until the whole one is there, and longer.
+        # The tenth is lost; that is known two pictures later, and reported until the whole one is there, and longer.
         turn(0.1 * number, number, 10 if 12 <= number < 40 else 0)
     assert began == [12]
     for number in range(100, 130):
         turn(10.0 + 0.01 * number, number, number - 1)
-    # Whoever always lacks the newest is answered twice a second.
+    # A viewer that always lacks the newest is answered twice a second.
     assert began == [12, 100]
 
 
-def test_nothing_is_ordered_before_the_companion_is_ready_so_that_no_picture_is_as_old_as_its_start(desk: Desk) -> None:
+def test_nothing_is_ordered_before_the_companion_is_ready(desk: Desk) -> None:
     companion = desk.started()
     companion.channel.receive()
     for turn in range(1, 100):

@@ -1,4 +1,4 @@
-"""Real pictures by the real companion: what is where, by its colour."""
+"""Real pictures by the real companion: places of objects, by their colour."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.processes
 
 
 def place_target(scene: Scene, position_m: FloatArray) -> None:
-    """Put the target, which has a free joint, somewhere."""
+    """Put the target, which has a free joint, at a position (3,)."""
     [target] = [thing for thing in scene.objects if thing.name == "target"]
     body = scene.model.geom_bodyid[target.geoms[0]]
     first = scene.model.jnt_qposadr[scene.model.body_jntadr[body]]
@@ -25,7 +25,7 @@ def place_target(scene: Scene, position_m: FloatArray) -> None:
 
 
 def is_green(color: FloatArray) -> bool:
-    """The target's colour, in whatever light."""
+    """Return whether it is the target's colour, in any light."""
     return bool(color[1] > 1.4 * color[0] and color[1] > 1.4 * color[2] and color[1] > 30.0)
 
 
@@ -39,7 +39,7 @@ def test_the_target_is_seen_where_projection_says_wherever_it_stands() -> None:
     generator = np.random.default_rng(3)
     with picture_taker(scene) as taker:
         for _ in range(5):
-            # In front of the open gripper, above all else.
+            # In front of the open gripper, above everything else.
             center_m = np.array([0.80, 0.0, 0.22]) + generator.uniform(-0.04, 0.04, 3)
             place_target(scene, center_m)
             for view in VIEW_NAMES:

@@ -51,7 +51,7 @@ def state_of(view: SceneView, sensed: Sensed, situation: Situation) -> SceneStat
 
 
 def placed(shape: Shape, owner_pose: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Where a shape is in the world: (3,) and (3, 3)."""
+    """Return a shape's position (3,) and rotation (3, 3) in the world."""
     turned = Rotation.from_quat(owner_pose[3:], scalar_first=True)
     rotation = turned * Rotation.from_quat(shape.pose[3:], scalar_first=True)
     position_m: FloatArray = owner_pose[:3] + turned.apply(shape.pose[:3])
@@ -76,7 +76,7 @@ def test_every_kind_of_geom_is_where_the_model_has_it(tmp_path: Path) -> None:
             (index, geom)
             for index, geom in left
             if index == shape.owner
-            # What is seen is wrong by the camera's error, all parts of an object alike.
+            # The view has the camera's error, the same for all parts of an object.
             and np.linalg.norm(position_m - data.geom_xpos[geom] - _offset(scene, poses, index)) < 1e-5
             and np.abs(rotation - data.geom_xmat[geom].reshape(3, 3)).max() < 1e-5
         ]
@@ -109,7 +109,7 @@ def test_links_are_the_robots_bodies_and_their_shapes_go_with_them() -> None:
             position_m, _ = placed(shape, links[shape.owner])
             body = scene.model.body(said.links[shape.owner]).id
             near = [geom for geom in range(scene.model.ngeom) if scene.model.geom_bodyid[geom] == body]
-            # The encoders' error apart.
+            # Apart from the encoders' error.
             assert min(np.linalg.norm(scene.data.geom_xpos[near] - position_m, axis=1)) < 2e-3
     assert sum(shape.of_robot for shape in said.shapes) > 10
 
@@ -130,7 +130,7 @@ def test_what_there_is_no_room_for_is_counted_and_the_nearest_is_kept(monkeypatc
     assert robot.newest is not None
     tool_m = robot.newest[1].pose.tool_position_m
     distances = np.linalg.norm(poses[:, :3] - tool_m, axis=1)
-    # A mesh takes more room than what stands behind it.
+    # A mesh takes more room than the objects after it.
     left_out = set(range(len(distances))) - kept - {said.objects.index("tetrahedron")}
     assert max(distances[list(kept)]) <= min(distances[list(left_out)])
 

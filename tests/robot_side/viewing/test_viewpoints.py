@@ -30,7 +30,7 @@ def test_the_overview_shows_tool_base_and_what_is_ahead(built_in: bool, tmp_path
         assert depth_m > 0.3
         assert 0.1 * HEIGHT < row < 0.9 * HEIGHT
         assert 0.1 * WIDTH < column < 0.9 * WIDTH
-    # From above, and ahead is up.
+    # From above, with ahead upwards.
     assert project(scene, overview, ahead_m)[0] < project(scene, overview, tool.xpos)[0]
     assert overview.forward[2] < -0.7
 

@@ -1,4 +1,4 @@
-"""A viewer of a real robot side: it says Hello and Watch, and takes what comes."""
+"""Viewer of a real robot side: it says Hello and Watch, and receives the views."""
 
 import contextlib
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ _COMPANION = b"robot_side.viewing.companion"
 
 @dataclass
 class Seen:
-    """Messages of one stretch of time; ages are those on arrival, by the clock that both processes share."""
+    """Messages of one stretch of time; ages are those on arrival, by the processes' shared clock."""
 
     began_s: float
     ended_s: float = 0.0
@@ -30,7 +30,7 @@ class Seen:
 
 
 class Viewer:
-    """A participant that looks; the first one is the owner, but drives nothing."""
+    """Participant that looks; the first one is the owner, but drives nothing."""
 
     def __init__(self, control: str, view: str, epoch: int) -> None:
         self._sockets = OperatorSockets(control, view, topics=(VIDEO_TOPIC, SCENE_TOPIC))
@@ -38,12 +38,12 @@ class Viewer:
         self._end = LinkEnd("operator", epoch, clock_domain())
 
     def say(self, now_s: float, what: Mapping[str, Any]) -> None:
-        """Ask for some of overview, first_person and scene, and for the others no more."""
+        """Ask for some of overview, first_person and scene; the others end."""
         self._sockets.send(encode(self._end.hello(now_s)))
         self._sockets.send(encode(Watch(self._end.stamp(now_s), **what)))
 
     def take(self, seen: Seen, now_s: float) -> None:
-        """Take in all that has arrived."""
+        """Receive all that has arrived."""
         for payload in self._sockets.receive():
             message: Any = decode(payload)
             if isinstance(message, StiffnessUpdate):
@@ -61,7 +61,7 @@ class Viewer:
         self._sockets.wait(seconds)
 
     def close(self) -> None:
-        """Go away."""
+        """Close the sockets."""
         self._sockets.close()
 
 
@@ -83,7 +83,7 @@ def look(viewers: Sequence[Viewer], seconds: float, **what: Any) -> Seen:
 
 
 def companion_of(process_id: int) -> int | None:
-    """Return the number of the process that renders for the robot side `process_id`; None while there is none."""
+    """Return the process that renders for the robot side `process_id`; None if there is none."""
     for children in Path(f"/proc/{process_id}/task").glob("*/children"):
         for child in children.read_text(encoding="ascii").split():
             with contextlib.suppress(OSError):

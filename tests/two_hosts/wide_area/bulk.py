@@ -1,4 +1,4 @@
-"""A bulk transfer over TCP beside the sides, as an upload to somewhere: `receive`, or `send SECONDS`."""
+"""Bulk transfer over TCP beside the sides, like an upload: `receive`, or `send SECONDS`."""
 
 import select
 import socket
@@ -14,7 +14,7 @@ _LOOKS_S: Final = 0.2
 
 
 def receive() -> None:
-    """Take what one sender sends; at the end of the standard input say how many bytes."""
+    """Receive from one sender; at the end of the standard input print the number of bytes."""
     with socket.create_server(_ADDRESS) as server:
         sys.stdout.write("{}\n")
         sys.stdout.flush()

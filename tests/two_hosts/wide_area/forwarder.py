@@ -1,7 +1,7 @@
-"""The wide area as a process: two namespaces with a TUN device each, and the packets between them.
+"""Wide area as a process: two namespaces with a TUN device each, and the packets between them.
 
-It makes the namespaces and deletes them, with all that runs there, when its standard input ends: nothing is left even
-when its parent is killed. A line of JSON in (`Order`) gets a line out: what was counted since the line before.
+It makes the namespaces, and deletes them with all programs in them when its standard input ends: nothing is left even
+when its parent is killed. Each input line of JSON (`Order`) gets an output line: the counts since the line before.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ from tests.two_hosts.wide_area.way import Counts, Direction, Way, WayWords
 DEVICE: Final = "wan0"
 ADDRESSES: Final[dict[str, str]] = {"robot": "10.78.0.1", "operator": "10.78.0.2"}
 _LEAVING: Final[tuple[Direction, ...]] = ("to_operator", "to_robot")
-"""The direction in which each host sends, in their order."""
+"""Direction in which each host sends, in their order."""
 _CLONE_NEWNET: Final = 0x40000000
 _TUNSETIFF: Final = 0x400454CA
 _TUN_WITHOUT_HEADER: Final = 0x1001
@@ -36,22 +36,22 @@ _CONTROLS: Final = Path("/proc/sys/net/ipv4/tcp_available_congestion_control")
 _NETWORK: Final = "10.78.0.0/24"
 _LARGEST: Final = 2048
 _IN_A_ROW: Final = 64
-"""Packets read before the next is looked for that is due."""
+"""Number of packets read before the next check for due ones."""
 
 
 class Order(msgspec.Struct, frozen=True):
-    """Words for the forwarder: the first at its start, others at any time."""
+    """Order to the forwarder: the first at its start, others at any time."""
 
     ways: dict[Direction, WayWords] | None = None
-    """Directions without words stay as they are."""
+    """Words by direction; directions without words stay as they are."""
     control: str | None = None
-    """The hosts' TCP congestion control, in the first order; None: the machine's."""
+    """TCP congestion control of the hosts, in the first order; None: the machine's."""
     seed: int = 0
 
 
 @contextlib.contextmanager
 def _inside(namespace: str) -> Iterator[None]:
-    """Let this thread be in a network namespace."""
+    """Move this thread into a network namespace."""
     libc = ctypes.CDLL(None, use_errno=True)
     with contextlib.ExitStack() as stack:
         for path in ("/proc/self/ns/net", f"/run/netns/{namespace}"):
@@ -85,10 +85,10 @@ def _hosts(control: str | None) -> Iterator[tuple[dict[str, str], list[int]]]:
                     raise RuntimeError(f"congestion control {control!r}; valid on this machine: {', '.join(here)}")
             _ip("-n", namespace, "link", "set", "lo", "up")
             _ip("-n", namespace, "address", "add", f"{ADDRESSES[host]}/32", "dev", DEVICE)
-            # Without addresses of IPv6 the device says nothing by itself.
+            # Without IPv6 addresses the device sends nothing by itself.
             _ip("-n", namespace, "link", "set", DEVICE, "addrgenmode", "none", "up")
             route = ("route", "add", _NETWORK, "dev", DEVICE, "src", ADDRESSES[host])
-            # The route decides: a namespace's own default is limited to what all users of the machine may take.
+            # The route decides: a namespace's default is limited to the controls allowed to all users of the machine.
             _ip("-n", namespace, *route, *(() if control is None else ("congctl", control)))
         yield namespaces, descriptors
     finally:
@@ -154,7 +154,7 @@ class _Forwarder:
                 self._failed += 1
 
     def _obey(self, order: Order) -> dict[str, Any]:
-        """Count what was since the last order, and change the ways."""
+        """Count since the last order, and change the directions."""
         now_s = time.monotonic()
         late_ms = 1e3 * np.array(self._late_s or [0.0])
         figures: dict[str, Any] = {

@@ -15,15 +15,15 @@ from tests.two_hosts.wide_area.forwarder import ADDRESSES
 
 PAYLOAD_BYTES: Final = 156
 WARM_UP_S: Final = 3.0
-"""Messages of this time do not count: TCP opens its window with them."""
+"""Time in seconds whose messages do not count: TCP opens its window with them."""
 _ENDPOINT: Final = f"tcp://{ADDRESSES['operator']}:5555"
 _STAMP: Final = struct.Struct("<d?")
-"""When it was sent by the clock that all processes of a machine share; whether it counts."""
+"""Time of sending by the machine's shared clock, and whether the message counts."""
 _SETTLES_S: Final = 1.0
 
 
 def receive() -> None:
-    """Take messages until the standard input ends; then say their ages in ms, and how many there were."""
+    """Receive until the standard input ends; then print the ages in ms, and the number of messages."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     socket = context.socket(zmq.ROUTER)
     socket.setsockopt(zmq.RCVHWM, 0)
@@ -43,7 +43,7 @@ def receive() -> None:
 
 
 def ages(delays_s: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, float]:
-    """`mean_ms`, `p50_ms`, `p95_ms`, `p99_ms` and `arrived` of (n,) delays in seconds."""
+    """Return `mean_ms`, `p50_ms`, `p95_ms`, `p99_ms` and `arrived` of (n,) delays in seconds."""
     of_ms = 1e3 * delays_s if delays_s.size else np.array([math.nan])
     p50, p95, p99 = np.quantile(of_ms, (0.5, 0.95, 0.99))
     found = {"mean_ms": of_ms.mean(), "p50_ms": p50, "p95_ms": p95, "p99_ms": p99, "arrived": delays_s.size}
@@ -51,7 +51,7 @@ def ages(delays_s: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, fl
 
 
 def send(hz: float, seconds: float) -> None:
-    """Send at `hz`, then wait until the standard input ends; nothing is held back and nothing dropped."""
+    """Send at `hz`, then wait until the standard input ends; nothing is delayed or dropped here."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     socket = context.socket(zmq.DEALER)
     socket.setsockopt(zmq.SNDHWM, 0)

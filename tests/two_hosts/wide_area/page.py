@@ -1,6 +1,6 @@
-"""A page of the console without a browser: it looks at everything, and counts pictures and their ages.
+"""Page of the console without a browser: it watches everything, and counts pictures and their ages.
 
-page ADDRESS, which the operator side tells at its start.
+page ADDRESS, which the operator side prints at its start.
 """
 
 import asyncio
@@ -19,11 +19,11 @@ from websockets.typing import Origin
 from operator_side.viewing.console.pages import ROUND_ENDS
 
 _PICTURE: Final = struct.Struct("<Bd")
-"""The view, and when it was captured by the clock that all processes of a machine share."""
+"""View, and time of capture by the machine's shared clock."""
 
 
 async def look(address: str) -> dict[str, float]:
-    """Look until the standard input ends; pictures of both views a second, and their ages on arrival in ms."""
+    """Watch until the standard input ends; return pictures of both views a second, and their ages on arrival in ms."""
     ends = asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
     origin = Origin("http://" + urlsplit(address).netloc)
     ages_s: list[float] = []

@@ -1,4 +1,4 @@
-"""A wide area under both sides: what do delay, loss, rate and queue do to them over the kernel's own TCP?
+"""What do delay, loss, rate and queue of a wide area do to both sides, over the kernel's own TCP?
 
 python -m tests.two_hosts.wide_area --delay 100 --loss 0 0.1 1 --control reno cubic bbr --csv wide.csv
 """
@@ -23,37 +23,37 @@ _Numbers = Annotated[tuple[float, ...], tyro.conf.arg(metavar="NUMBER...")]
 
 @dataclass(frozen=True)
 class WideSweep(Sweep):
-    """Both sides in two network namespaces, with a wide area between them: each value with each other one.
+    """Run both sides in two network namespaces, with a wide area between them: all combinations of the values.
 
     Needs root, iproute2 and /dev/net/tun. Each run takes --seconds and ten more to start; they take turns.
     """
 
     delay: _Numbers = (100.0,)
-    """Milliseconds each way."""
+    """Delay in milliseconds, in each direction."""
     loss: _Numbers = (0.0,)
-    """Per cent of packets, each way."""
+    """Per cent of packets lost, in each direction."""
     burst: _Numbers = (0.0,)
-    """Milliseconds in which all packets are lost, every 5 s, each way."""
+    """Milliseconds in which all packets are lost, every 5 s, in each direction."""
     rate: _Numbers = (0.0,)
-    """Mbit/s of the robot's uplink; 0: free."""
+    """Mbit/s of the robot's uplink; 0: unlimited."""
     falls_to: _Numbers = (0.0,)
-    """Mbit/s of the robot's uplink from half of the time on; 0: it stays."""
+    """Mbit/s of the robot's uplink in the second half of the time; 0: no change."""
     queue: _Numbers = (200.0,)
     """Milliseconds for which a packet may wait for the rate."""
     control: tuple[str, ...] = ("reno",)
-    """TCP's congestion control: reno, cubic, bbr; those that the machine has."""
+    """TCP's congestion control: reno, cubic, bbr, if the machine has them."""
     connections: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N...")] = (0,)
     """Connections of the operator side; 0: its default."""
     person: tuple[Literal["drives", "rests"], ...] = ("drives",)
     """The scripted person, or hands that do nothing."""
     pictures: tuple[bool, ...] = (False,)
-    """Whether a page looks at both views and the scene."""
+    """Whether a page watches both views and the scene."""
     bulk: tuple[bool, ...] = (False,)
     """Whether a TCP transfer fills the robot's uplink."""
     observer: tuple[Literal["none", "reads", "stops"], ...] = ("none",)
     """A second operator side; stops: stopped (SIGSTOP) after a third of the time."""
     seconds: float = 20.0
-    """Length of each run, from the operator side's start on."""
+    """Length of each run, from the operator side's start."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -64,7 +64,7 @@ _VARIED: Final = tuple(one.name for one in fields(Trial) if one.name != "seconds
 
 
 def cells(settings: WideSweep) -> Iterator[Trial]:
-    """Lay out the grid."""
+    """Yield the grid."""
     for chosen in product(*(getattr(settings, name) for name in _VARIED)):
         yield Trial(**dict(zip(_VARIED, chosen, strict=True)), seconds=settings.seconds)
 
@@ -75,7 +75,7 @@ def run(cell: Trial, seed: int) -> Iterator[Row]:
 
 
 def show(_: WideSweep, table: Table) -> Iterator[RenderableType]:
-    """Show a line for each run: what varies, and what came of it."""
+    """Show a line for each run: the varied values, and the figures."""
     varied = [name for name in (*_VARIED, "seed") if len({row[name] for row in table}) > 1] or ["delay"]
     columns = {name: parts for name, parts in _COLUMNS.items() if any(table.values(part) for part in parts)}
     lines = (
@@ -105,9 +105,9 @@ _COLUMNS: Final[Mapping[str, Sequence[str]]] = {
     "late after fall, s": ("late_after_fall_s",),
     "late, ms": ("late_p99_ms", "late_max_ms"),
 }
-"""Figures that stand in one column; of two the first is to the operator. queueing: in ages, and in the link itself.
+"""Figures that share a column; the first of two is to the operator. queueing: in ages, and in the link itself.
 
-late: the forwarder's p99 and most.
+late: the forwarder's p99 and maximum.
 """
 
 

@@ -1,4 +1,4 @@
-"""Runs a trial: both sides over the wide area for some seconds, and who looks or transfers beside them."""
+"""Runs of a trial: both sides over the wide area for some seconds, with viewers or transfers beside them."""
 
 import contextlib
 import os
@@ -28,7 +28,7 @@ _DEVICES: Final = {"drives": "simulated", "rests": "browser"}
 
 
 def run_trial(trial: Trial, seed: int = 0) -> Row:
-    """Run it; FeelaheadError where there can be no wide area, or a side fails."""
+    """Run a trial; FeelaheadError if no wide area is possible, or a side fails."""
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="feelahead-wide-")))
         wide = stack.enter_context(WideArea(trial.ways(), trial.control, seed))
@@ -44,7 +44,7 @@ def run_trial(trial: Trial, seed: int = 0) -> Row:
 
 @dataclass
 class _Sides:
-    """The processes of a trial, and what their statuses have said."""
+    """Processes of a trial, and their statuses."""
 
     stack: contextlib.ExitStack
     wide: WideArea
@@ -52,16 +52,16 @@ class _Sides:
     folder: Path
     seed: int
     statuses: int = 0
-    """Count of the robot side's, since it was armed first."""
+    """Number of the robot side's statuses since it was first armed."""
     armed: int = 0
     armed_after_s: float | None = None
     fell_s: float = 0.0
-    """The moment at which the rate fell, on the clock that all processes of a machine share."""
+    """Time at which the rate fell, on the machine's shared clock."""
     beside: dict[str, float] = field(default_factory=dict)
     """Figures of the page and the bulk transfer."""
 
     def start(self) -> None:
-        """Start everything; the time counts from when the operator side speaks."""
+        """Start everything; the time counts from the operator side's first status."""
         trial = self.trial
         cameras = () if trial.pictures else ("--no-cameras",)
         self.robot = self._side("robot", "robot", f"--bind=tcp://{_ENDPOINT}", "--insecure", *cameras)
@@ -69,7 +69,7 @@ class _Sides:
         self.wide.figures()
         more = [*(["--console"] if trial.pictures else ()), *([f"--record={self._record}"] if trial.falls_to else ())]
         self.operator = self._operator("operator", *more)
-        # Who comes second observes.
+        # The second operator observes.
         self.observer = self._operator("observer") if trial.observer != "none" else None
         self.page: Child | None = None
         self.sink: Child | None = None
@@ -88,7 +88,7 @@ class _Sides:
         return self.stack.enter_context(side)
 
     def _operator(self, name: str, *more: str) -> SideProcess:
-        """One that has spoken."""
+        """Start an operator side and wait for its first status."""
         connections = (f"--connections={self.trial.connections}",) if self.trial.connections else ()
         device = f"--device={_DEVICES[self.trial.person]}"
         side = self._side("operator", name, f"--connect=tcp://{_ENDPOINT}", device, *connections, *more)
@@ -99,7 +99,7 @@ class _Sides:
         return self.stack.enter_context(self.wide.run(host, *words))
 
     def watch(self) -> Iterator[Mapping[str, Any]]:
-        """Let the time pass; what the forwarder counted until the rate falls, and from then on."""
+        """Let the time pass; yield the forwarder's counts until the rate falls, and after."""
         trial = self.trial
         began_s = time.monotonic()
         for of_all in (1 / 3, 1 / 2, 1.0):
@@ -149,9 +149,9 @@ class _Sides:
         return late_s
 
     def row(self, total: Mapping[str, Any], robot: Mapping[str, Any], operator: Mapping[str, Any]) -> Row:
-        """Make the row of both summaries, the statuses, and what was counted; None where nothing was measured.
+        """Make the row of both summaries, the statuses, and the counts; None for unmeasured figures.
 
-        Ages are those of what is applied: at the operator on arrival, at the robot in each tick that moves the arm. A
+        Ages are those of applied messages: at the operator on arrival, at the robot in each tick that moves the arm. A
         late message was overtaken, and counts as `slowest` alone. `armed` is a share of the statuses.
         """
         row: Row = {}
@@ -181,7 +181,7 @@ _ADDED: Final = ("seconds", "packets", "bytes", "lost", "dropped")
 
 
 def _total(parts: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """Counts of all parts together; of other figures the worst, and what the last part says of words and rates."""
+    """Sum the counts of all parts; of other figures take the worst, and of words and rates the last part's."""
     first, *others = parts
     total = dict(first)
     for part in others:

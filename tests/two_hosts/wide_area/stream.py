@@ -1,4 +1,4 @@
-"""Is the emulated link's `stream` what the kernel's TCP does to messages: one connection, the same delay and loss?
+"""Does the emulated link's `stream` delay messages as the kernel's TCP does, on one connection of equal delay and loss?
 
 python -m tests.two_hosts.wide_area stream --delay 25 100 --loss 1 --seconds 60
 """
@@ -24,25 +24,25 @@ from tests.two_hosts.wide_area.way import WayWords
 
 _MODEL: Final = "stream"
 _LAST_S: Final = 3.0
-"""The last messages may have to be sent again."""
+"""Time in seconds for the last messages, which may need retransmission."""
 _Numbers = Annotated[tuple[float, ...], tyro.conf.arg(metavar="NUMBER...")]
 
 
 @dataclass(frozen=True)
 class StreamSweep(Sweep):
-    """Messages of 156 bytes over one ZeroMQ connection: the kernel's TCP beside the model, one way.
+    """Send messages of 156 bytes over one ZeroMQ connection: the kernel's TCP beside the model, in one direction.
 
     Needs root, iproute2 and /dev/net/tun.
     """
 
     delay: _Numbers = (25.0, 100.0)
-    """Milliseconds each way."""
+    """Delay in milliseconds, in each direction."""
     loss: _Numbers = (1.0,)
-    """Per cent of packets, each way."""
+    """Per cent of packets lost, in each direction."""
     hz: _Numbers = (100.0, 250.0)
     """Messages a second."""
     control: tuple[str, ...] = ("reno", "cubic", "bbr")
-    """TCP's congestion control; those that the machine has."""
+    """TCP's congestion control, if the machine has it."""
     seconds: Annotated[float, Meta(ge=1.0, le=3600.0)] = 30.0
     """Length of each run, after 3 s in which TCP opens its window."""
 
@@ -53,7 +53,7 @@ class StreamSweep(Sweep):
 
 @dataclass(frozen=True)
 class Cell(Limited):
-    """One link, and what carries the messages."""
+    """One link, and the carrier of its messages."""
 
     delay: Annotated[float, Meta(ge=0.0, le=5000.0)]
     loss: Annotated[float, Meta(ge=0.0, le=100.0)]
@@ -64,7 +64,7 @@ class Cell(Limited):
 
 
 def cells(settings: StreamSweep) -> Iterator[Cell]:
-    """Lay out the grid, the model first."""
+    """Yield the grid, the model first."""
     for delay in settings.delay:
         for loss in settings.loss:
             for hz in settings.hz:

@@ -6,7 +6,7 @@ from tests.two_hosts.wide_area.way import Way, WayWords
 
 _PACKET_BYTES = 1250
 _RATE_BIT_S = 1e6
-"""A packet takes 10 ms."""
+"""Rate in bit/s at which a packet takes 10 ms."""
 
 
 def arrivals(words: WayWords, sent_s: list[float]) -> list[float | None]:

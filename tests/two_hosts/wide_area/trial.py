@@ -1,4 +1,4 @@
-"""A trial over a wide area."""
+"""Trial over a wide area."""
 
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
@@ -11,7 +11,7 @@ from tests.two_hosts.wide_area.way import Direction, WayWords
 
 @dataclass(frozen=True)
 class Trial(Limited):
-    """One link, and what is done over it; the flags of `question.WideSweep` have the words to each."""
+    """One link, and the load on it; the flags of `question.WideSweep` explain each field."""
 
     delay: Annotated[float, Meta(ge=0.0, le=5000.0)] = 100.0
     loss: Annotated[float, Meta(ge=0.0, le=100.0)] = 0.0
@@ -28,6 +28,6 @@ class Trial(Limited):
     seconds: Annotated[float, Meta(ge=2.0, le=3600.0)] = 20.0
 
     def ways(self) -> dict[Direction, WayWords]:
-        """The link in SI units, at first."""
+        """Return the link at the start, in SI units."""
         words = WayWords(self.delay / 1e3, self.loss / 1e2, self.burst / 1e3, queue_s=self.queue / 1e3)
         return {"to_operator": replace(words, rate_bit_s=1e6 * self.rate), "to_robot": words}

@@ -1,4 +1,4 @@
-"""The wide area from outside: its hosts, the programs that run there, and what the forwarder counts."""
+"""The wide area from outside: its hosts, their programs, and the forwarder's counts."""
 
 import os
 import shutil
@@ -21,7 +21,7 @@ _ENDS_S: Final = 5.0
 
 
 class Child:
-    """A program of ours that reads lines of JSON and writes some; it ends when its standard input does."""
+    """Program that reads and writes lines of JSON; it ends when its standard input does."""
 
     def __init__(self, module: str, *arguments: str, before: Sequence[str] = ()) -> None:
         environment = os.environ | {"PYTHONPATH": str(ROOT)}
@@ -44,7 +44,7 @@ class Child:
         self.end()
 
     def say(self, line: str) -> None:
-        """Write a line to it; FeelaheadError when it is gone."""
+        """Write a line to it; FeelaheadError if it is gone."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(line + "\n")
@@ -53,7 +53,7 @@ class Child:
             raise FeelaheadError(f"wide area: the {self.name} has ended") from error
 
     def hear(self) -> dict[str, Any]:
-        """Read the next line that it says; FeelaheadError when it ends first, or names an error."""
+        """Read its next line; FeelaheadError if it ends first, or reports an error."""
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         said: dict[str, Any] = msgspec.json.decode(line) if line else {"error": f"the {self.name} has ended"}
@@ -62,13 +62,13 @@ class Child:
         return said
 
     def last(self) -> dict[str, Any]:
-        """End its input; return the last line that it says."""
+        """End its input; return its last line."""
         assert self._process.stdin is not None
         self._process.stdin.close()
         return self.hear()
 
     def end(self) -> None:
-        """End it, by force where it does not by itself."""
+        """End it, by force if necessary."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.close()
@@ -81,7 +81,7 @@ class Child:
 
 
 class WideArea(Child):
-    """The forwarder with its hosts, as a context: at its end nothing of them is left."""
+    """Forwarder with its hosts, as a context: nothing of them is left at its end."""
 
     def __init__(self, ways: dict[Direction, WayWords], control: str | None = None, seed: int = 0) -> None:
         """FeelaheadError without root, `ip`, TUN devices or this congestion control."""
@@ -96,7 +96,7 @@ class WideArea(Child):
             raise
 
     def surroundings(self, host: Host) -> list[str]:
-        """The command that runs a program there."""
+        """Return the command prefix that runs a program there."""
         return ["ip", "netns", "exec", self._namespaces[host], "env", f"PYTHONPATH={ROOT}"]
 
     def run(self, host: Host, module: str, *arguments: str) -> Child:
@@ -104,13 +104,13 @@ class WideArea(Child):
         return Child(module, *arguments, before=self.surroundings(host))
 
     def figures(self, ways: dict[Direction, WayWords] | None = None) -> dict[str, Any]:
-        """Return what was counted since the last call; with `ways`, change these from now on."""
+        """Return the counts since the last call; with `ways`, change these directions from now on."""
         self.say(msgspec.json.encode(Order(ways)).decode())
         return self.hear()
 
 
 def what_is_missing() -> str | None:
-    """Say why there can be no wide area on this machine, and what mends it; None where there can."""
+    """Return why no wide area is possible on this machine, and the remedy; None if one is."""
     if os.geteuid() != 0:
         return "network namespaces need root"
     if shutil.which("ip") is None:

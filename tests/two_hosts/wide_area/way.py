@@ -1,4 +1,4 @@
-"""One direction of the wide area: loses, queues and delays packets, and counts them. It knows no clock."""
+"""One direction of the wide area: loses, queues and delays packets, and counts them. It has no clock."""
 
 import random
 from dataclasses import dataclass, field
@@ -19,14 +19,14 @@ class WayWords(Limited):
     delay_s: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
     """Delay of each packet, after the queue."""
     loss: Share = 0.0
-    """The share of packets that are lost, each by itself."""
+    """Share of packets lost, each independently."""
     burst_s: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
     """Time in which all packets are lost, at the end of each `burst_every_s`."""
     burst_every_s: Annotated[float, Meta(gt=0.0, le=1000.0)] = 5.0
     rate_bit_s: Annotated[float, Meta(ge=0.0, le=1e11)] = 0.0
-    """0: free."""
+    """Rate of the link; 0: unlimited."""
     queue_s: Annotated[float, Meta(ge=0.0, le=100.0)] = 0.2
-    """A packet that would wait for longer is dropped."""
+    """Longest wait; a packet that would wait longer is dropped."""
 
 
 @dataclass
@@ -37,19 +37,19 @@ class Counts:
     bytes: int = 0
     lost: int = 0
     dropped: int = 0
-    """Count of those that met a full queue."""
+    """Number of packets that met a full queue."""
     queued_s: list[float] = field(default_factory=list)
-    """Time for which each packet waited for the rate."""
+    """Waiting time of each packet for the rate."""
 
     def summary(self) -> dict[str, float]:
-        """`packets`, `bytes`, `lost`, `dropped`, `queue_p95_ms`."""
+        """Return `packets`, `bytes`, `lost`, `dropped` and `queue_p95_ms`."""
         p95 = 1e3 * float(np.quantile(self.queued_s, 0.95)) if self.queued_s else 0.0
         counted = {name: getattr(self, name) for name in ("packets", "bytes", "lost", "dropped")}
         return counted | {"queue_p95_ms": p95}
 
 
 class Way:
-    """A drop-tail queue before a rate, and a delay behind it. The order is netem's: lose, drop, delay."""
+    """Drop-tail queue before a rate, and a delay behind it. The order is netem's: lose, drop, delay."""
 
     def __init__(self, words: WayWords, seed: int, direction: Direction, began_s: float) -> None:
         self.counts = Counts()
@@ -58,14 +58,14 @@ class Way:
         self._began_s = self._free_s = began_s
 
     def change(self, words: WayWords, now_s: float) -> None:
-        """Other words from now on; the bits that wait go at the new rate."""
+        """Change the words from now on; waiting bits leave at the new rate."""
         if self._words.rate_bit_s and words.rate_bit_s:
             waiting_s = max(0.0, self._free_s - now_s)
             self._free_s = now_s + waiting_s * self._words.rate_bit_s / words.rate_bit_s
         self._words = words
 
     def take(self, size_bytes: int, now_s: float) -> float | None:
-        """When a packet of this size arrives, in seconds of the caller's clock; None when it never does."""
+        """Return when a packet of this size arrives, on the caller's clock in seconds; None if lost or dropped."""
         words, counts = self._words, self.counts
         counts.packets += 1
         counts.bytes += size_bytes

@@ -1,4 +1,4 @@
-"""Who is let in: nobody without the token, from another site, or by another name."""
+"""Admission: refused without the token, from another site, or by another name."""
 
 import pytest
 from hypothesis import given
@@ -21,7 +21,7 @@ def admits(path: str, host: str | None = HERE, origin: str | None = None, *, upg
 
 
 @pytest.mark.parametrize("host", [HERE, f"localhost:{PORT}"])
-def test_who_has_the_token_is_let_in_by_either_name(host: str) -> None:
+def test_the_token_opens_the_gate_by_either_name(host: str) -> None:
     origin = f"http://{host}"
     assert admits(f"/{TOKEN}/", host) == "/"
     assert admits(f"/{TOKEN}/app.js?x=1", host, origin) == "/app.js"
@@ -31,7 +31,7 @@ def test_who_has_the_token_is_let_in_by_either_name(host: str) -> None:
 
 
 OTHER_HOSTS = (None, "", "example.com", f"example.com:{PORT}", "127.0.0.1", f"127.0.0.1:{PORT + 1}")
-"""A site whose name suddenly means this machine would else share our origin."""
+"""Hosts under which a site, once its name resolves to this machine, would share our origin."""
 OTHER_SITES = ("http://example.com", f"https://{HERE}", "null", f"http://localhost:{PORT}", "http://127.0.0.1", "")
 OURS = f"http://{HERE}"
 

@@ -1,4 +1,4 @@
-"""The page and the operator side agree on names, and the page compares codes, never words."""
+"""Page and operator side agree on names, and the page compares codes, never words."""
 
 import re
 from typing import Final
@@ -18,14 +18,14 @@ _COMPARED: Final = re.compile(
     rf"(?:[=!]==?|\bcase\b)\s*({_TEXT})|({_TEXT})\s*[=!]==?|\.(?:startsWith|endsWith|includes)\(\s*({_TEXT})"
 )
 _READ: Final = {
-    r"\bfacts\??\.(\w+)": (OperatorFacts, TriggerFacts),  # triggers.js calls its own part so, too
+    r"\bfacts\??\.(\w+)": (OperatorFacts, TriggerFacts),  # triggers.js calls its own part the same.
     r"\bfacts\??\.page\??\.(\w+)": (HandsFacts,),
     r"\bhands\?\.(\w+)": (HandsFacts,),
     r"\bfacts\.to_(?:robot|operator)\.(\w+)": (DelayFacts,),
     r"\bstatus\??\.(\w+)": (OperatorStatus,),
     r"\bscreen\??\.(\w+)": (Telemetry,),
 }
-"""Where the page reads a struct, with the ones that it may be"""
+"""Places where the page reads a struct, with the possible structs"""
 
 
 def test_the_page_uses_only_codes_that_there_are() -> None:
@@ -40,7 +40,7 @@ def test_the_page_uses_only_codes_that_there_are() -> None:
 
 def test_the_page_compares_no_sentence() -> None:
     compared = [text for source in _SOURCES.values() for found in _COMPARED.findall(source) for text in found if text]
-    assert '"running"' in compared  # the page's own codes: the search finds something
+    assert '"running"' in compared  # The page's own codes: the search finds something.
     assert [text for text in compared if " " in text] == []
 
 

@@ -1,4 +1,4 @@
-"""What pages get, what they may say, and how many there may be: over real WebSockets, in one process."""
+"""Pages: their messages, their permissions, and their number, over real WebSockets in one process."""
 
 import asyncio
 import contextlib
@@ -18,7 +18,7 @@ Opens = Callable[[], contextlib.AbstractAsyncContextManager[ClientConnection]]
 
 
 class Desk:
-    """Pages, and what they made of it."""
+    """Pages, and the messages that they caused."""
 
     def __init__(self) -> None:
         self.counts: list[int] = []
@@ -51,7 +51,7 @@ def run(story: Callable[[Desk, Opens], Awaitable[None]]) -> Desk:
 
 
 async def a_round(page: ClientConnection) -> list[str | bytes]:
-    """All up to its end."""
+    """Return all messages up to the round's end."""
     messages: list[str | bytes] = []
     while (message := await page.recv()) != ROUND_ENDS:
         messages.append(message)
@@ -105,11 +105,11 @@ def test_what_hands_and_sliders_say_is_passed_on_with_the_pages_number() -> None
         ("s", [2, {"hands": {"keys": []}, "tune": {"probability": 0.9}}]),
         ("s", [2, {"play": {"paused": True}}]),
     ]
-    # Whose page is gone holds nothing any more.
+    # A closed page holds nothing.
     assert sorted(page for _, (page, said) in heard[3:] if said is None) == [1, 2]
 
 
-def test_slow_is_whoever_says_so_until_that_page_is_gone() -> None:
+def test_a_page_that_reports_slow_counts_until_it_is_gone() -> None:
     async def story(desk: Desk, opens: Opens) -> None:
         async with opens() as page:
             assert not desk.pages.slow
@@ -134,7 +134,7 @@ def test_slow_is_whoever_says_so_until_that_page_is_gone() -> None:
         pytest.param("[" * 30_000, id="nested"),
     ],
 )
-def test_who_talks_nonsense_is_shown_out_alone(nonsense: str | bytes) -> None:
+def test_a_page_that_sends_nonsense_is_disconnected_alone(nonsense: str | bytes) -> None:
     async def story(desk: Desk, opens: Opens) -> None:
         async with opens() as guest, opens() as page:
             await guest.send(nonsense)
@@ -146,7 +146,7 @@ def test_who_talks_nonsense_is_shown_out_alone(nonsense: str | bytes) -> None:
     assert [said for _, (_, said) in run(story).heard if said is not None] == []
 
 
-def test_who_talks_without_end_is_shown_out() -> None:
+def test_a_page_that_sends_without_end_is_disconnected() -> None:
     async def story(desk: Desk, opens: Opens) -> None:
         async with opens() as page:
             with contextlib.suppress(ConnectionClosed):

@@ -1,4 +1,4 @@
-"""The console as a process: its gate from outside, what a page of it gets, and its ends."""
+"""Console as a process: its gate from outside, the messages to a page, and its ends."""
 
 import asyncio
 import os
@@ -123,7 +123,7 @@ def test_steps_become_pictures_and_a_gap_is_told(console: Console) -> None:
     asyncio.run(story())
 
 
-def test_the_gate_keeps_out_who_is_not_ours(console: Console) -> None:
+def test_the_gate_keeps_strangers_out(console: Console) -> None:
     address = address_of(console)
     parts = urlsplit(address)
     here, token = f"http://{parts.netloc}", parts.path.strip("/")
@@ -243,7 +243,7 @@ def test_no_more_scenes_than_pages_are_drawn_for(console: Console) -> None:
     asyncio.run(story())
 
 
-def test_it_outlives_ctrl_c_and_ends_with_whoever_feeds_it() -> None:
+def test_it_outlives_ctrl_c_and_ends_with_its_feeder() -> None:
     with Console("a test") as console:
         until(console, lambda: console.address is not None)
         port = urlsplit(address_of(console)).port
@@ -255,7 +255,7 @@ def test_it_outlives_ctrl_c_and_ends_with_whoever_feeds_it() -> None:
 
 
 def notes_of(console: Console) -> list[str]:
-    """What it says first."""
+    """Return its first notes."""
     with console:
         until(console, lambda: console.gone)
         return console.take_notes()
@@ -276,7 +276,7 @@ def test_a_port_that_is_taken_is_said() -> None:
             "no console: viser is not installed on this machine; valid: pip install 'feelahead[operator]'",
         ),
         (
-            # As a viser that opens its server in another way would.
+            # As a viser that opens its server differently would.
             "class ViserServer:\n    def __init__(self, **options): pass\n    def get_port(self): return 1\n"
             "SceneApi = BatchedMeshHandle = LabelHandle = None",
             "no console: this viser opens its server in another way than viser 1.1 does",

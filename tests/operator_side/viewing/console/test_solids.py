@@ -1,4 +1,4 @@
-"""Meshes that look as the shapes are: closed, seen from outside, and of the right volume."""
+"""Meshes of the shapes: closed, facing outwards, and of the right volume."""
 
 import math
 

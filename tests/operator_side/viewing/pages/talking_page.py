@@ -1,4 +1,4 @@
-"""A page of the console that talks, without a browser."""
+"""A talking page of the console, without a browser."""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,7 +20,7 @@ class TalkingPage:
         self.number = 0
 
     def content(self, **hands: Any) -> dict[str, Any]:
-        """The next message, as it comes out of JSON."""
+        """Return the next message, as decoded from JSON."""
         self.number += 1
         return {"hands": {"page": self.word, "number": self.number, "driving": True} | hands}
 
@@ -28,18 +28,18 @@ class TalkingPage:
         self.pages.receive(self.page, self.content(**hands), now_s)
 
     def go_on(self, now_s: float, for_s: float, **hands: Any) -> float:
-        """Say the same 50 times a second; when the next message is due."""
+        """Send the same 50 times a second; return when the next message is due."""
         for step in range(round(for_s / PERIOD_S)):
             self.say(now_s + step * PERIOD_S, **hands)
         return now_s + round(for_s / PERIOD_S) * PERIOD_S
 
 
 Does = Callable[[float], dict[str, Any] | None]
-"""What the hands at the page do at a time; None says nothing."""
+"""Hands at the page at a time; None for silence."""
 
 
 class AtThePage:
-    """Whoever has the controller, and somebody at a page who does as told: for whole runs."""
+    """Person at the controller, and a scripted person at a page, for whole runs."""
 
     def __init__(self, page: TalkingPage, whoever: BrowserHands, does: Does) -> None:
         self.page = page

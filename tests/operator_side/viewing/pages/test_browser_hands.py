@@ -24,11 +24,11 @@ TICK_S = 0.004
 WORN = TravelCalibration(
     TriggerTravel(0.2, 0.9), TriggerTravel(0.0, 0.7), StickRest(0.1, -0.05, 0.2), StickRest(-0.1, 0.1, 0.05)
 )
-"""The person's controller"""
+"""Calibration of the person's controller"""
 
 
 class Desk:
-    """A page, a controller, and a screen that the test sets."""
+    """Page, controller, and a screen that the test sets."""
 
     def __init__(self, *, swap_sides: bool = False, person: bool = False):
         self.swap_sides = swap_sides
@@ -58,7 +58,7 @@ class Desk:
         return self.ticks * TICK_S
 
     def let_pass(self, for_s: float, says: bool = True, **hands: Any) -> list[OperatorIntent]:
-        """The page says the same, or nothing; what the controller's states mean."""
+        """Let the page send the same, or nothing; return the intents of the controller's states."""
         meant = []
         for step in range(round(for_s / TICK_S)):
             if says and step % round(PERIOD_S / TICK_S) == 0:
@@ -89,7 +89,7 @@ def test_travel_and_sticks_arrive_as_given(person: bool, swap_sides: bool) -> No
 
 
 @pytest.mark.parametrize("person", [False, True])
-def test_what_the_trigger_was_told_takes_nothing_from_the_travel_and_waits_for_who_goes_on(person: bool) -> None:
+def test_trigger_effects_change_no_travel_and_go_to_the_persons_device(person: bool) -> None:
     desk = Desk(person=person)
     desk.arm()
     stiff = Feel(l2=feedback(0, 8), r2=feedback(0, 8))
@@ -110,7 +110,7 @@ def test_silence_releases_everything() -> None:
     assert after[round(0.1 / TICK_S)].run
 
 
-def test_what_was_pulled_before_the_arm_was_armed_counts_once_it_was_let_go() -> None:
+def test_a_trigger_pulled_before_arming_counts_after_its_release() -> None:
     desk = Desk()
     desk.let_pass(1.1)
     assert {one.r2 for one in desk.let_pass(0.5, run=True, r2=1.0)} == {0.0}
@@ -120,7 +120,7 @@ def test_what_was_pulled_before_the_arm_was_armed_counts_once_it_was_let_go() ->
     assert desk.let_pass(0.1, run=True, r2=1.0)[-1].r2 == 1.0
 
 
-def test_the_arming_button_is_pressed_anew_until_the_arm_is_armed_and_not_again_in_the_same_press() -> None:
+def test_the_arming_button_is_pressed_again_until_the_arm_is_armed_and_never_twice_in_a_press() -> None:
     desk = Desk()
     desk.let_pass(1.1)
     levels = [one.arm for one in desk.let_pass(1.6, run=True)]
@@ -151,7 +151,7 @@ def test_the_person_lets_go_when_a_page_drives_and_silence_gives_nothing_back() 
     assert (first[0].r2, first[0].arm) == (0.0, False)
 
 
-def test_a_stop_takes_the_controller_from_the_person_for_good_and_nobody_goes_on_where_there_is_nobody() -> None:
+def test_a_stop_takes_the_controller_from_the_person_for_good() -> None:
     desk = Desk(person=True)
     desk.let_pass(1.3, says=False)
     desk.page.say(desk.now_s, driving=False, stop=True)

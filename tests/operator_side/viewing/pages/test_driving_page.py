@@ -1,4 +1,4 @@
-"""Which page drives, and when its hands count: by example, and for whatever pages say and do not say."""
+"""The driving page, and the times when its hands count: by examples, and for any messages and silences."""
 
 import math
 from dataclasses import dataclass
@@ -84,7 +84,7 @@ def test_nobody_takes_over_from_a_page_that_drives_nor_drives_without_meaning_it
     pages.close(1, now_s)
     assert pages.hands(now_s) is None
     two.say(now_s + 0.02)
-    assert pages.driver is None  # it asked while somebody else drove: it has to ask anew
+    assert pages.driver is None  # It asked while another page drove: it must ask again.
     two.say(now_s + 0.04, driving=False)
     two.say(now_s + 0.06)
     assert pages.driver == "page2"
@@ -101,7 +101,7 @@ def test_any_page_stops_and_then_all_keys_are_up_first(pages: DrivingPage) -> No
     assert pages.hands(now_s + 0.02) is None
 
 
-def test_what_was_overtaken_counts_no_more_but_for_a_stop_in_it(pages: DrivingPage) -> None:
+def test_an_overtaken_message_counts_only_for_its_stop(pages: DrivingPage) -> None:
     page = TalkingPage(pages)
     late, late_stop = page.content(run=True, r2=1.0), page.content(stop=True)
     now_s = running(pages, page)
@@ -133,7 +133,7 @@ def test_the_person_goes_on_only_by_the_page_that_drives_or_any_when_none_does(p
     assert pages.take_give_back()
     assert pages.driver is None
     one.say(0.04, driving=False, give_back=True)
-    assert not pages.take_give_back()  # held, and not pressed again
+    assert not pages.take_give_back()  # Held, and not pressed again.
     two.say(0.06, driving=False)
     two.say(0.08, driving=False, give_back=True)
     assert pages.take_give_back()
@@ -141,7 +141,7 @@ def test_the_person_goes_on_only_by_the_page_that_drives_or_any_when_none_does(p
 
 @dataclass(frozen=True)
 class Heard:
-    """What a page said, and when."""
+    """Message of a page, and its time."""
 
     now_s: float
     page: int
@@ -202,7 +202,7 @@ def test_hands_count_only_while_fresh_and_after_a_second_of_rest(script: list[tu
 
 
 def judge(pages: DrivingPage, heard: list[Heard], now_s: float) -> None:
-    """What counts is fresh, and has behind it a second of rest of the same page, without a gap and without a stop."""
+    """Assert that counted hands are fresh and follow a second of the same page's rest, without a gap or a stop."""
     hands = pages.hands(now_s)
     if hands is None:
         return

@@ -1,4 +1,4 @@
-"""The terminal view: what is on the screen, and that the terminal is given back however the run ends."""
+"""Terminal view: the content of the screen, and the terminal's restoration at every end."""
 
 import io
 import os

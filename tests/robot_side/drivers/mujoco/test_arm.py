@@ -48,7 +48,7 @@ def test_an_arm_that_nobody_ticks_stops_by_itself() -> None:
     stopped = driver.tool_m()
     assert np.linalg.norm(driver.scene.data.qvel[driver.scene.robot.arm_velocities]) < 1e-3
     assert np.abs(state.joint_velocities_rad_s).max() < 1e-3
-    # What the command still allowed, then a stop; at 12 rad/s² it takes less than 2 cm from 0.25 m/s.
+    # The rest of the command, then a stop; at 12 rad/s² it takes less than 2 cm from 0.25 m/s.
     assert speed * VALID_S * 0.95 < np.linalg.norm(stopped - last) < speed * VALID_S + 0.02
     driver.wait(1.0)
     assert np.linalg.norm(driver.tool_m() - stopped) < 1e-5
@@ -93,7 +93,7 @@ def test_a_suspended_process_skips_all_but_two_seconds() -> None:
 
 
 class SlowMachine:
-    """A clock on which every look at it takes as long as a step does on a machine that is too slow for the model."""
+    """Clock on which every reading takes as long as a step on a machine too slow for the model."""
 
     def __init__(self, step_s: float) -> None:
         self.now_s = 50.0
@@ -113,7 +113,7 @@ def test_physics_that_cannot_keep_up_gives_way_and_falls_behind() -> None:
     arm.command(np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0]), 0.25)
     for turn in range(1, 11):
         began_s = machine.now_s
-        # It says when it was measured on the caller's clock, and a command runs out by that, too.
+        # The measurement is on the caller's clock, and a command expires by that, too.
         assert arm.state(0.1 * turn).time_s == pytest.approx(0.1 * turn)
         assert LONGEST_TURN_S < machine.now_s - began_s < LONGEST_TURN_S + 6e-3
     # 7 steps of 100 in each turn.
@@ -162,12 +162,12 @@ def test_a_blocked_arm_winds_nothing_up(tmp_path: Path) -> None:
     assert "block" in {name for _, name in GroundTruth(scene).observe().contacts}
     blocked = state.joint_positions_rad
     pressing = abs(float(scene.data.actuator_force[0]))
-    # Halted, it lets go of what it pressed on and stays where it is.
+    # Halted, it stops pressing and stays where it is.
     released = arm.state(3.0)
     assert np.abs(released.joint_velocities_rad_s).max() < 1e-3
     assert np.abs(released.joint_positions_rad - blocked).max() < 0.02
     assert abs(float(scene.data.actuator_force[0])) < pressing - 10.0
-    # Told to go back it does so at once: 1.5 s of pressing at 0.5 rad/s left no 0.75 rad to be unwound.
+    # Commanded back it moves at once: 1.5 s of pressing at 0.5 rad/s left no 0.75 rad to be unwound.
     arm.command(np.array([-0.5, 0.0]), 4.0)
     assert arm.state(3.2).joint_positions_rad[0] < blocked[0] - 0.06
 
@@ -177,7 +177,7 @@ def test_every_kind_of_actuator_holds_moves_and_stops_an_arm(tmp_path: Path, act
     scene = load_scene(planar_arm(tmp_path, arm_actuators=actuators), "tcp")
     arm = perfect_arm(scene)
     start = arm.state(0.0).joint_positions_rad
-    # Gravity pulls on an arm that has no compensation of its own.
+    # Gravity pulls on an arm without gravity compensation.
     np.testing.assert_allclose(arm.state(1.0).joint_positions_rad, start, atol=2e-3)
     velocity = np.array([0.4, -0.3])
     positions = []

@@ -1,4 +1,4 @@
-"""The compiled step of the simulated arm against plain NumPy and MuJoCo's own products, over long random runs."""
+"""Compiled step of the simulated arm against plain NumPy and MuJoCo's own products, over long random runs."""
 
 import math
 from collections.abc import Callable
@@ -22,7 +22,7 @@ SPRING = '<joint name="elbow" stiffness="3" springref="-40"'
 
 
 class PlainReference:
-    """The reference in array operations."""
+    """Reference in array operations."""
 
     def __init__(self, position: FloatArray, ends: tuple[FloatArray, FloatArray], windup: FloatArray) -> None:
         self.position, (self.lower, self.upper), self.windup = position, ends, windup
@@ -54,7 +54,7 @@ class PlainReference:
 
 
 class PlainGripper:
-    """The gripper's reference, its opening and its grip, by interpolation in the travel."""
+    """Gripper's reference, opening and grip, by interpolation in the travel."""
 
     def __init__(self, travel: GripperTravel) -> None:
         self.travel = travel
@@ -84,7 +84,7 @@ class PlainGripper:
 
 
 def plain_inputs(scene: Scene, reference: PlainReference) -> tuple[FloatArray, FloatArray]:
-    """The inputs (n,) that the arm's actuators are to have, and the torques (n,) that they are to give."""
+    """Return the expected inputs (n,) and torques (n,) of the arm's actuators."""
     data, robot, drives = scene.data, scene.robot, scene.robot.drives
     dofs, motor = robot.arm_velocities, (drives.stiffness == 0.0) & (drives.damping == 0.0)
     error = reference.position - data.qpos[robot.arm_positions]
@@ -153,7 +153,7 @@ def test_every_step_is_what_plain_formulas_say(tmp_path: Path, load: Callable[[P
         followed, ran_out = followed + (now_s < ends_s), ran_out + (now_s >= ends_s)
         before, was_there = reference.velocity, data.qpos[robot.arm_positions].copy()
         reference.advance(now_s < ends_s, step_s, was_there, data.qvel[robot.arm_velocities])
-        # No limit is broken, and nothing jumps but to what is measured when a command ends.
+        # No limit is broken, and the only jump is to the measurement when a command ends.
         assert (np.abs(reference.velocity) <= LIMITS.velocity_rad_s + 1e-12).all()
         assert (np.abs(reference.position - was_there) <= windup_rad + np.abs(reference.velocity * step_s) + 1e-9).all()
         assert ((arm.ends_rad[0] <= reference.position) & (reference.position <= arm.ends_rad[1])).all()

@@ -1,4 +1,4 @@
-"""What is drawn from the seed stays within what is said of it."""
+"""Values drawn from the seed stay within their stated ranges."""
 
 from typing import Any, get_args
 
@@ -14,7 +14,7 @@ NAMES: tuple[SceneName, ...] = get_args(SceneName)
 
 
 def box(scene: Scene, name: str) -> tuple[Any, Any]:
-    """Centre (3,) and half sizes (3,) of the object's only geom."""
+    """Return centre (3,) and half sizes (3,) of the object's only geom."""
     geom = next(thing for thing in scene.objects if thing.name == name).geoms[0]
     return scene.data.geom_xpos[geom], scene.model.geom_size[geom]
 
@@ -43,7 +43,7 @@ def test_what_is_drawn_stays_within_what_is_said_of_it() -> None:
     for seed in SEEDS:
         scene = load_scene(name="wall", seed=seed)
         (wall, wall_half), (target, _) = box(scene, "wall"), box(scene, "target")
-        # The target's centre lies 20 mm behind the tool's point, which the tips pass by 15 mm.
+        # The target's centre is 20 mm beyond the tool's point, which the tips pass by 15 mm.
         behind_m.append(wall[0] - wall_half[0] - (target[0] + 0.020 + 0.015))
 
         scene = load_scene(name="slot", seed=seed)

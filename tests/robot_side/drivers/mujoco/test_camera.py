@@ -23,7 +23,7 @@ def test_exact_shapes_are_exact(shapes: Scene) -> None:
     np.testing.assert_allclose(seen.sphere_centers_m[lamp], data.geom("lamp").xpos)
     assert seen.sphere_radii_m[lamp] == pytest.approx(0.04)
 
-    # The vertices as written, taken to the world by the body's own frame.
+    # The vertices as written, moved to the world by the body's own frame.
     written = np.array([[0, 0, 0.1], [0.07, 0, 0], [-0.035, 0.06, 0], [-0.035, -0.06, 0.01]])
     body = data.body("stone")
     expected = body.xpos + written @ body.xmat.reshape(3, 3).T
@@ -32,7 +32,7 @@ def test_exact_shapes_are_exact(shapes: Scene) -> None:
     for vertex in expected:
         assert np.linalg.norm(found - vertex, axis=1).min() < 1e-7
 
-    # Solid is the side that the plane's z axis points away from.
+    # Solid is the side away from the plane's z axis.
     away = np.array([-1.0, 0.0, 0.2]) / np.linalg.norm([-1.0, 0.0, 0.2])
     np.testing.assert_allclose(seen.half_space_normals, [away], atol=1e-12)
     np.testing.assert_allclose(seen.half_space_offsets_m, [away @ np.array([1.5, 0.0, 0.0])], atol=1e-12)
@@ -60,11 +60,11 @@ def test_a_frame_lasts_until_the_next_is_due(built_in: Scene) -> None:
     first, second, *_ = frames.values()
     assert first.time_s == 5.0
     assert second.time_s == pytest.approx(5.0 + 1.0 / 30.0, abs=1e-3)
-    # Drawn anew, the error moves what stands fixed as well.
+    # A newly drawn error moves fixed objects as well.
     assert second.since is not None
     assert second.since[0].things.tolist() == list(range(len(names)))
     assert (first.box_centers_m != second.box_centers_m).all()
-    # After a pause there is one new frame, not all those that were missed.
+    # After a pause there is one new frame, not all the missed ones.
     late = camera.perceive(9.0)
     assert camera.perceive(9.001) is late
 
@@ -72,7 +72,7 @@ def test_a_frame_lasts_until_the_next_is_due(built_in: Scene) -> None:
 @pytest.mark.parametrize(("name", "speed_m_s"), [("moving", -0.06), ("fleeing", 0.03), ("wall", 0.0)])
 def test_how_fast_a_thing_moves_is_seen_after_a_while(name: str, speed_m_s: float) -> None:
     scene = load_scene(DATA / f"{name}.xml", "tool")
-    # What stays wrong of its position makes nothing of its velocity.
+    # A lasting error of the position causes no velocity.
     arm, camera = MujocoArm(scene, Encoder()), MujocoCamera(scene, CameraError(tuple(scene.roles), 0.01, 0.003, seed=1))
     arm.state(0.0)
     np.testing.assert_array_equal(camera.perceive(0.0).velocities_m_s, np.zeros((1, 3)))

@@ -1,4 +1,4 @@
-"""The frozen scenes of tests/data are what their comments say: what is there, how far it is, and what moves."""
+"""Frozen scenes of tests/data agree with their comments: objects, distances, and motion."""
 
 import copy
 import re
@@ -20,7 +20,7 @@ STEP_M = 1e-3
 
 
 Hit = tuple[float, str, str]
-"""The end of a free way: after so many mm this part of the gripper, or of what it holds, meets that object."""
+"""End of a free path: distance in mm, part of the gripper or of the held object, and the object hit."""
 SCENES: dict[str, tuple[str, Hit | None]] = {
     "wall": ("wall", (320, "fingertip", "wall")),
     "plate": ("plate", (320, "fingertip", "plate")),
@@ -49,9 +49,9 @@ SCENES: dict[str, tuple[str, Hit | None]] = {
     "terrain": ("terrain", None),
     "terrain_ahead": ("terrain", (320, "fingertip", "terrain")),
 }
-"""The objects of each, and the hit; None where going on never collides."""
+"""Objects of each scene, and the hit; None where a continued pull never collides."""
 DOWN = {"place_held", "u_mesh", "mug"}
-"""Where the tool points downwards."""
+"""Scenes in which the tool points downwards."""
 TABLES = [name for name in SCENES if name.startswith("table_")]
 every_scene = pytest.mark.parametrize("name", SCENES)
 
@@ -61,7 +61,7 @@ def load(name: str) -> Scene:
 
 
 def part_name(scene: Scene, geom: int) -> str:
-    """The object that a geom belongs to, or the robot's geom itself."""
+    """Return the object that a geom belongs to, or the name of the robot's geom."""
     return next((thing.name for thing in scene.objects if geom in thing.geoms), str(scene.model.geom(geom).name))
 
 
@@ -71,16 +71,16 @@ def approach(scene: Scene) -> FloatArray:
 
 
 def split_geoms(scene: Scene) -> tuple[list[int], list[int]]:
-    """The gripper's geoms and those of a target that it holds, and all that may be in their way."""
+    """Return the geoms of the gripper and a held target, and all others."""
     held = [geom for thing in scene.objects if scene.roles[thing.name] is Role.TARGET for geom in thing.geoms]
     others = [geom for thing in scene.objects for geom in thing.geoms if geom not in held]
     return [*scene.robot.gripper_geoms.tolist(), *held], others
 
 
 def first_hit(scene: Scene) -> Hit | None:
-    """Where the true gripper ends when it goes straight on, by halves of the step in which it meets something."""
+    """Return where the true gripper ends straight ahead, by bisection of the step with the first contact."""
     data = copy.copy(scene.data)
-    # MuJoCo's tree of a body's geoms was built where they stood.
+    # MuJoCo's tree of a body's geoms was built for their original places.
     scene.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     moving, others = split_geoms(scene)
     start, axis = data.geom_xpos[moving].copy(), approach(scene)
@@ -117,7 +117,7 @@ def test_it_is_loaded_as_meant_and_stands_free(name: str) -> None:
     assert (scene.primitives.volume_errors, scene.shared_names, scene.warnings) == ({}, (), ())
     assert scene.data.ncon == 0
     np.testing.assert_array_equal(scene.data.qpos[scene.robot.finger_positions], [0.0425, 0.0425])
-    # Fingers close along y; one home for all that go ahead and one for all that go down.
+    # Fingers close along y; one home for all that move ahead and one for all that move down.
     axes = scene.data.site_xmat[scene.robot.site].reshape(3, 3)
     home, ahead = ([0.45, 0.0, 0.48], [0, 0, -1]) if name in DOWN else ([0.55, 0.0, 0.2], [1, 0, 0])
     np.testing.assert_allclose(scene.data.site_xpos[scene.robot.site], home, atol=1e-5)
@@ -150,7 +150,7 @@ def test_the_four_tables_are_perceived_as_one_solid() -> None:
         "table_12_tetrahedra": (0, 12, 0),
         "table_mesh": (0, 0, 1),
     }
-    # Around all of it, at the seam under the way, on an edge, at two corners; then anywhere near the top.
+    # Around all of it: at the seam below the path, on an edge, at two corners; then anywhere near the top.
     centers = [[0.75, 0, 0.128], [0.75, 0, 0.15], [0.35, 0.1, 0.148], [0.35, 0.4, 0.148], [1.15, -0.4, 0.108]]
     random = np.random.default_rng(5)
     anywhere = random.uniform([0.3, -0.45, 0.08], [1.2, 0.45, 0.18], (100, 3))

@@ -1,4 +1,4 @@
-"""A Panda with a Robotiq gripper, from a package that does not know of feelahead: torque motors, a tendon servo."""
+"""Panda with a Robotiq gripper, from a package unrelated to feelahead: torque motors, a tendon servo."""
 
 import importlib.util
 from pathlib import Path
@@ -14,7 +14,7 @@ from tests.helpers.tool_driver import PERIOD_S, VALID_S, ToolDriver
 
 
 def asset(name: str) -> Path:
-    # The package itself needs what is not installed here, so it is found and not imported.
+    # The package needs others that are not installed, so it is found and not imported.
     found = importlib.util.find_spec("gym_hil")
     assert found is not None, "the Panda's package is missing: make test installs it"
     assert found.submodule_search_locations is not None
@@ -23,7 +23,7 @@ def asset(name: str) -> Path:
 
 @pytest.fixture(scope="module")
 def alone() -> ToolDriver:
-    """The robot's own file; the tests go on from wherever the last one left it."""
+    """Robot's own file; each test continues from where the last one left it."""
     return ToolDriver.load(asset("panda.xml"), "pinch")
 
 
@@ -78,7 +78,7 @@ def test_the_gripper_closes_and_opens(alone: ToolDriver) -> None:
 
 def test_it_picks_up_the_block_of_its_own_scene() -> None:
     driver = ToolDriver.load(asset("scene.xml"), "pinch")
-    # The marker that is called target cannot be touched and is no object.
+    # The marker named target cannot be touched and is no object.
     assert driver.scene.roles == {"floor": Role.SUPPORT, "block": Role.OBSTACLE}
     block = driver.scene.data.body("block")
     driver.go_to(np.array([0.5, 0.0, 0.2]), 2.0)

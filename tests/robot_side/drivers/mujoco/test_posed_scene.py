@@ -1,4 +1,4 @@
-"""A gripper that is put among the objects: distances against those that one can work out by hand."""
+"""Gripper placed among the objects: distances against those computed by hand."""
 
 import math
 
@@ -21,7 +21,7 @@ NOWHERE = np.zeros(3)
 
 
 class Posed:
-    """A frozen scene, and where its keyframe has the joints."""
+    """Frozen scene, and the joints of its keyframe."""
 
     def __init__(self, name: str) -> None:
         self.scene = load_scene(DATA / f"{name}.xml", "tool")
@@ -31,7 +31,7 @@ class Posed:
         self.fingers: FloatArray = qpos[robot.finger_positions].copy()
 
     def at(self, *shift_m: float, fingers: FloatArray | None = None, turned_rad: float = 0.0) -> PosedScene:
-        """`turned_rad`: of the first joint, which turns the whole arm about the vertical."""
+        """Pose the scene; `turned_rad`: of the first joint, which turns the whole arm about the vertical."""
         arm_rad = self.arm_rad + turned_rad * np.eye(6)[0]
         self.posed.put(arm_rad, self.fingers if fingers is None else fingers, np.array(shift_m or NOWHERE))
         return self.posed
@@ -48,7 +48,7 @@ def beside() -> Posed:
 
 
 def path(ahead_m: float, across_m: float = 0.0, turned_rad: float = 0.0) -> ToolPath:
-    """From the home pose evenly along x and y, or along an arc that turns about the vertical; 3 mm a step."""
+    """Return a path from the home pose, evenly along x and y, or along an arc about the vertical; 3 mm a step."""
     share = np.linspace(0.0, 1.0, 1 + math.ceil(ahead_m / 0.003))[:, None]
     half = 0.5 * share * turned_rad
     moved_m = share * ahead_m * np.sinc(half / math.pi) * np.hstack([np.cos(half), np.sin(half), 0.0 * half])
@@ -78,12 +78,12 @@ def test_before_a_wall_it_stays_clear_up_to_the_margin(
 def test_a_drift_towards_a_wall_beside_is_not_clear_and_one_away_is(beside: Posed) -> None:
     for across_m, clear in ((-0.02, True), (0.02, True), (0.026, False), (-0.026, True)):
         assert beside.at().stays_clear(path(0.35, across_m), 0.0) is clear
-    # It is as far off in the end, but for the rotation about the way, as along its own axis.
+    # In the end it is as far off as along its own axis, except for the rotation about the path.
     assert not beside.at().stays_clear(path(0.35, 0.02), 0.006)
 
 
 def test_a_turn_goes_along_an_arc(wall: Posed, beside: Posed) -> None:
-    """About the tool's point, which goes on where it points: towards a wall beside, by half the angle at first."""
+    """The tool's point moves where it points: towards a wall beside, by half the angle at first."""
     for turned, clear in ((0.4, False), (-0.4, True), (0.02, True)):
         assert beside.at().stays_clear(path(0.2, 0.0, turned), 0.0) is clear
     before = wall.at().gap_m()
@@ -121,7 +121,7 @@ def test_a_camera_is_off_by_its_errors_and_the_shift(name: str) -> None:
 
 
 def test_where_things_may_sleep_they_are_moved_as_well() -> None:
-    """MuJoCo then looks but once where those are that stand fixed."""
+    """With sleep enabled, MuJoCo reads the places of fixed geoms only once."""
     scene = load_scene(DATA / "wall.xml", "tool")
     scene.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     mujoco.mj_step(scene.model, scene.data)

@@ -107,7 +107,7 @@ def test_contacts_name_the_gripper_geom_and_the_object_supports_included(built_i
     data.qpos[address : address + 3] = data.geom("left_fingertip").xpos
     table = model.body("table_scene/table").id
     model.body_pos[table, 2] = data.geom("palm").xpos[2]
-    # Where things may sleep MuJoCo looks but once where those are that stand fixed.
+    # With sleep enabled, MuJoCo reads the places of fixed geoms only once.
     model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     mujoco.mj_forward(model, data)
     contacts = GroundTruth(built_in).observe().contacts
@@ -130,7 +130,7 @@ def test_a_bare_robot_gets_the_table_where_its_tool_is(tmp_path: Path, yaw_deg: 
     np.testing.assert_allclose(target[:2] - tool[:2], 0.23 * ahead, atol=1e-6)
     half_height = scene.model.geom("table_scene/target").size[2]
     np.testing.assert_allclose(target[2], 0.1 + half_height, atol=1e-6)
-    # The configuration came through the attaching.
+    # Attaching kept the configuration.
     np.testing.assert_allclose(scene.data.qpos[scene.robot.arm_positions], [0.1, -0.2])
 
 
@@ -270,7 +270,7 @@ def test_what_a_keyframe_sets_in_motion_moves_and_the_robot_rests(tmp_path: Path
     assert load_scene().fixed == {"floor", "table"}
 
 
-# What tells an arm: its joints, links and limits, and nothing of where it stands or what stands around it.
+# An arm's identity: its joints, links and limits, independent of its place and surroundings.
 
 
 @pytest.mark.parametrize(

@@ -40,26 +40,26 @@ VOLUMES_M3 = {
 
 
 def mesh_asset(name: str, vertices: FloatArray, triangles: IntArray, inertia: str = "convex") -> str:
-    """An MJCF asset with just these vertices and triangles."""
+    """Return an MJCF asset with these vertices and triangles."""
     numbers = " ".join(f"{value:.17g}" for value in vertices.ravel())
     indices = " ".join(str(index) for index in triangles.ravel())
     return f'<asset><mesh name="{name}" inertia="{inertia}" vertex="{numbers}" face="{indices}"/></asset>'
 
 
 def scene_with(path: Path, world: str, assets: str = "") -> Scene:
-    """The planar arm at the objects `world`."""
+    """Load the planar arm before the objects `world`."""
     return load_scene(planar_arm(path, world=world, extra_top=assets), "tcp")
 
 
 def placed(scene: Scene, in_body_m: FloatArray, body: str = "round") -> FloatArray:
-    """Points (n, 3) of a body's frame in the world."""
+    """Return points (n, 3) of a body's frame in the world."""
     frame = scene.data.body(body)
     in_world: FloatArray = frame.xpos + in_body_m @ frame.xmat.reshape(3, 3).T
     return in_world
 
 
 def overlap_of(objects: PerceivedObjects, name: str, centers_m: FloatArray, radius_m: float) -> FloatArray:
-    """(n,) of spheres with one object, in m³, by the way that a tick takes."""
+    """Return the overlaps (n,) of spheres with one object, in m³, by the code path of a tick."""
     scene = scene_table(objects)
     classes = np.full(len(objects.names), PASSED_OVER, dtype=np.int64)
     classes[objects.names.index(name)] = OBSTACLE
@@ -83,7 +83,7 @@ def axis_points(*heights_m: float) -> FloatArray:
     [
         # Through the flat end, and within.
         ("cylinder", [0.12, 0.105, 0.09, 0.0], 0.03, lambda z: cap(0.03, min(0.13 - z, 0.06) if z < 0.1 else 0.13 - z)),
-        # The end of a capsule is a ball's, as far as the other ball reaches no farther than its middle.
+        # The end of a capsule equals a ball if the other ball reaches no farther than its middle.
         ("capsule", [0.1, 0.085, 0.08], 0.03, lambda z: float(sphere_sphere([0, 0, z], 0.03, [0, 0, 0.05], 0.03))),
         ("ball", [0.08, 0.06, 0.03, 0.0], 0.05, lambda z: float(sphere_sphere([0, 0, z], 0.05, [0, 0, 0], 0.04))),
     ],
@@ -96,7 +96,7 @@ def test_overlaps_are_the_closed_forms_within_the_stated_error(
     found = overlap_of(MujocoCamera(scene).perceive(0.0), "round", placed(scene, axis_points(*heights_m)), radius_m)
     for height, volume in zip(heights_m, found, strict=True):
         exact = closed_form(height)
-        # What the mesh adds to the shape is no more than the allowance, wherever the sphere is.
+        # The mesh adds at most the allowance to the shape, for every place of the sphere.
         assert exact * (1.0 - 1e-9) <= volume <= exact + allowance * (1.0 + 1e-12)
 
 
@@ -163,7 +163,7 @@ def test_a_mesh_without_an_inside_stands_for_its_convex_hull(change: str, tmp_pa
     objects = MujocoCamera(scene).perceive(0.0)
     mouth = overlap_of(objects, "cup", placed(scene, np.zeros((1, 3)), "cup"), 0.01)[0]
     if change == "inward":
-        # Turned round as a whole it is closed, and means the same.
+        # Turned round as a whole it is closed, and describes the same solid.
         assert scene.primitives.volume_errors == {}
         assert mouth == 0.0
     else:
@@ -211,7 +211,7 @@ def test_a_height_field_is_the_solid_that_rays_hit(shape: tuple[int, int], tmp_p
     geom, random = scene.data.geom("hills"), np.random.default_rng(1)
     rotation, hit = geom.xmat.reshape(3, 3), 0
     for _ in range(200):
-        # From all round towards somewhere in the solid, through its top, its sides or its base.
+        # From all round towards a point in the solid, through its top, its sides or its base.
         way = random.normal(size=3)
         way /= np.linalg.norm(way)
         aim = geom.xpos + rotation @ (random.uniform(-1.0, 1.0, 3) * [0.3, 0.2, 0.05])
@@ -225,7 +225,7 @@ def test_a_height_field_is_the_solid_that_rays_hit(shape: tuple[int, int], tmp_p
     assert hit > 100
 
 
-# What is said and skipped
+# Notes and skipped work
 
 
 def test_nothing_is_compiled_within_a_tick_at_meshes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

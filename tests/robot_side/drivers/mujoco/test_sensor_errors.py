@@ -1,4 +1,4 @@
-"""What encoders and camera get wrong: as much as they are told to, and the same for the same seed."""
+"""Errors of encoders and camera: of the given size, and the same for the same seed."""
 
 import math
 
@@ -26,7 +26,7 @@ def test_readings_are_whole_steps() -> None:
 
 
 def test_the_lasting_error_has_the_mean_and_deviation_asked_for_with_the_papers_sign() -> None:
-    """perceived = true - e_c, and what is added to the true positions is -e_c."""
+    """perceived = true - e_c, so -e_c is added to the true positions."""
     names = tuple(f"object{index}" for index in range(4000))
     offsets = CameraError(names, mean_m=0.004, standard_deviation_m=0.002, seed=1).next_frame()
     assert offsets.shape == (4000, 3)
@@ -40,7 +40,7 @@ def test_the_mean_may_differ_from_axis_to_axis() -> None:
     np.testing.assert_array_equal(error.next_frame(), [[-0.001, 0.002, -0.003]] * 2)
     np.testing.assert_array_equal(error.mean_m, [0.001, -0.002, 0.003])
     np.testing.assert_array_equal(CameraError(("a",), mean_m=0.004).mean_m, [0.004] * 3)
-    # What is drawn is the same, whatever the mean.
+    # The draws are the same for every mean.
     drawn, shifted = (CameraError(("a",), mean, 0.003, 0.001, seed=5).next_frame() for mean in (0.0, (0.1, 0.0, -0.1)))
     np.testing.assert_allclose(shifted - drawn, [[-0.1, 0.0, 0.1]], atol=1e-15)
 

@@ -1,4 +1,4 @@
-"""What rests in a built-in scene sleeps where it would stand awake."""
+"""Objects at rest in a built-in scene sleep where they would rest awake."""
 
 from pathlib import Path
 from typing import get_args
@@ -18,7 +18,7 @@ SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 
 
 def asleep(scene: Scene) -> set[str]:
-    """The free bodies that sleep."""
+    """Return the free bodies that sleep."""
     model, data = scene.model, scene.data
     bodies = {name: model.body(f"table_scene/{name}").id for name in FREE}
     return {name for name, body in bodies.items() if not data.tree_awake[model.body_treeid[body]]}
@@ -43,5 +43,5 @@ def test_what_rests_sleeps_where_it_would_stand_awake() -> None:
 @pytest.mark.parametrize("name", get_args(SceneName))
 def test_things_may_sleep_before_the_built_in_arm_alone(name: SceneName, tmp_path: Path) -> None:
     assert load_scene(name=name).model.opt.enableflags & SLEEP
-    # A bare arm of somebody else's stands before the same things, and its model's options hold.
+    # A foreign arm without a scene gets the same objects, and its model's options hold.
     assert not load_scene(planar_arm(tmp_path), "tcp", name=name).model.opt.enableflags & SLEEP

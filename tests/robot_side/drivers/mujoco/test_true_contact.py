@@ -1,4 +1,4 @@
-"""The first true contact and its speed, on approaches that are scripted: whatever the arm's own physics would do."""
+"""First true contact and its speed, on scripted approaches without the arm's own physics."""
 
 import math
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ from tests.helpers.repository import DATA
 
 STEP_S = 0.001
 WAY_M = 0.32
-"""From home to the contact, in every scene here; the scenes' own tests hold it."""
+"""Distance from home to the contact in every scene here, in metres; the scenes' own tests check it."""
 AHEAD = np.array([1.0, 0.0, 0.0])
 DOWN = np.array([0.0, 0.0, -1.0])
 STILL = np.zeros(3)
@@ -24,11 +24,11 @@ STILL = np.zeros(3)
 
 @dataclass
 class Script:
-    """A gripper that moves exactly as told, step by step, through contacts, too."""
+    """Gripper that moves exactly as commanded, step by step, also through contacts."""
 
     scene: Scene
     held: str | None = None
-    """This object goes along with the gripper."""
+    """Object that moves along with the gripper."""
     truth: TrueContact = field(init=False)
 
     def __post_init__(self) -> None:
@@ -39,7 +39,7 @@ class Script:
         return Script(load_scene(path if isinstance(path, Path) else DATA / f"{path}.xml", "tool"), held)
 
     def step(self, velocity_m_s: FloatArray, turning_rad_s: FloatArray = STILL, **joints: float) -> ContactOnset | None:
-        """One step of the tool at that velocity, linear and angular, in the world frame; `joints` move at theirs."""
+        """Step the tool with that velocity, linear and angular, in the world frame; `joints` move at theirs."""
         model, data, robot = self.scene.model, self.scene.data, self.scene.robot
         jacobian = np.zeros((6, model.nv))
         mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], robot.site)
@@ -65,7 +65,7 @@ class Script:
         return None
 
     def go(self, way_m: float, direction: FloatArray = AHEAD) -> "Script":
-        """Go there in steps of a millimetre, each of which makes up for what the last one missed."""
+        """Move there in steps of a millimetre, each correcting the last one's error."""
         tool = self.scene.data.site_xpos[self.scene.robot.site]
         path = np.linspace(tool, tool + way_m * direction, math.ceil(way_m / 0.001) + 1)
         for place_m in path[1:]:
@@ -76,7 +76,7 @@ class Script:
 def speed_of_coming_nearer(
     script: Script, velocity_m_s: FloatArray, turning_rad_s: FloatArray = STILL, **joints: float
 ) -> float:
-    """What the distances say of the speed, up to the last step before the contact."""
+    """Return the speed from the distances, up to the last step before the contact."""
     gaps = [script.truth.gap_m(script.held)]
     while script.step(velocity_m_s, turning_rad_s, **joints) is None:
         gaps.append(script.truth.gap_m(script.held))
@@ -105,7 +105,7 @@ def test_a_gripper_that_turns_closes_as_fast_as_the_distance_falls(name: str, tu
 
 
 def test_of_several_contacts_the_fastest_counts() -> None:
-    """Both tips are 1.5 mm off; the second step puts both into the wall, the outer one by its turning faster."""
+    """Both tips are 1.5 mm off; the second step puts both into the wall, the outer one faster by its turning."""
     script, motion = Script.load("wall").go(0.3185), (1.0 * AHEAD, np.array([0.0, 0.0, 4.0]))
     assert script.step(*motion) is None
     onset = script.step(*motion)
@@ -120,7 +120,7 @@ def test_a_contact_that_goes_on_is_reported_at_its_onset_alone() -> None:
     script = Script.load("wall").go(0.319)
     assert script.until_contact(0.1 * AHEAD) is not None
     assert script.until_contact(0.02 * AHEAD, steps=50) is None
-    # Off the wall and on it again is another onset.
+    # Leaving the wall and touching it again is another onset.
     assert script.until_contact(-0.1 * AHEAD, steps=50) is None
     again = script.until_contact(0.03 * AHEAD)
     assert again is not None

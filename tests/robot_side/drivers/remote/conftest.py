@@ -1,4 +1,4 @@
-"""The built-in scene."""
+"""Built-in scene."""
 
 import pytest
 

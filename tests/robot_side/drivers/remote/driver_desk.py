@@ -1,4 +1,4 @@
-"""A driver and a robot side's end of it in virtual time, with a delay both ways and a clock of the driver's own."""
+"""Driver and the robot side's end of it in virtual time, with a delay both ways and a separate driver clock."""
 
 from collections import deque
 from typing import Any
@@ -13,11 +13,11 @@ from robot_side.drivers.remote.driver_session import ArmShape
 SHAPE = ArmShape(("shoulder", "elbow"), ("finger",), np.array([0.04]), 0.08)
 TICK_S = 0.001
 AHEAD_S = 1000.0
-"""What the driver's clock is ahead of ours."""
+"""Lead of the driver's clock over ours, in seconds."""
 
 
 class DriverDesk:
-    """The wire between both, and a driver that follows velocities perfectly."""
+    """Wire between both, and a driver that follows velocities perfectly."""
 
     def __init__(self, delay_s: float = 0.0, measuring_s: float = 0.0, period_s: float = 0.01) -> None:
         self.delay_s, self.measuring_s, self.period_s = delay_s, measuring_s, period_s
@@ -37,7 +37,7 @@ class DriverDesk:
         self._to_driver: deque[tuple[float, dict[str, Any]]] = deque()
 
     def receive(self) -> list[tuple[bytes, bytes, float]]:
-        """As the robot side's port."""
+        """Receive as the robot side's port does."""
         found = []
         while self._to_robot and self._to_robot[0][0] <= self.now_s:
             _, peer, payload = self._to_robot.popleft()
@@ -45,17 +45,17 @@ class DriverDesk:
         return found
 
     def send(self, peer: bytes, payload: bytes) -> bool:
-        """As the robot side's port."""
+        """Send as the robot side's port does."""
         self._to_driver.append((self.now_s + self.delay_s, msgpack.unpackb(payload)))
         return peer == self.peer
 
     @property
     def drivers_s(self) -> float:
-        """The time by the driver's clock."""
+        """Time of the driver's clock, in seconds."""
         return self.now_s + AHEAD_S
 
     def say(self, peer: bytes | None = None, **fields: Any) -> None:
-        """Send a state; fields: in place of what is true."""
+        """Send a state; fields: replace the true values."""
         self.sequence += 1
         newest = self.newest
         state: dict[str, Any] = {
@@ -72,7 +72,7 @@ class DriverDesk:
         self._to_robot.append((self.now_s + self.delay_s, peer or self.peer, payload))
 
     def drive(self) -> None:
-        """What a driver does all the time, if it runs."""
+        """Run the driver for one tick."""
         while self._to_driver and self._to_driver[0][0] <= self.now_s:
             message = self._to_driver.popleft()[1]
             if "refused" in message:
@@ -100,5 +100,5 @@ class DriverDesk:
             self.arm.command_gripper(0.0, until_s)
 
     def age_s(self) -> float:
-        """How old the newest state is taken to be."""
+        """Return the age of the newest state as the robot side assumes it."""
         return self.now_s - self.arm.state(self.now_s).time_s

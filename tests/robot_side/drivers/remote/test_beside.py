@@ -1,4 +1,4 @@
-"""A robot side whose arm and objects are other processes: the examples of docs/drivers, over real sockets."""
+"""Robot side whose arm and objects are other processes: the examples of docs/drivers, over real sockets."""
 
 import pytest
 
@@ -43,7 +43,7 @@ def test_a_robot_side_waits_for_both_and_knows_no_truth(scene: Scene) -> None:
     summary = robot.summary()
     assert [summary["contacts"], summary["min_distance_mm"], summary["task"]["placing"]] == [None] * 3
     assert beside.summary()["arm"].keys() == {"accepted"}
-    # What was measured in the simulation holds for no other arm.
+    # Measurements in the simulation hold for no other arm.
     assert any("has not been measured" in note for note in parts.notes)
     with pytest.raises(ConfigurationError, match="roles: there is no object 'ball'"):
         build_parts(RobotSettings(roles={"ball": Role.SUPPORT}, scene="wall"), 1, "clock")

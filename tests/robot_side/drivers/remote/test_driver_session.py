@@ -1,4 +1,4 @@
-"""An arm behind a driver, in virtual time: how old its states are, when it stops, and what is rejected whole."""
+"""Arm behind a driver, in virtual time: ages of its states, its stops, and messages rejected whole."""
 
 import math
 from typing import Any
@@ -15,7 +15,7 @@ def test_a_state_is_as_old_as_it_can_be_and_little_older(delay_s: float, measuri
     desk = DriverDesk(delay_s, measuring_s, period_s=0.001)
     desk.run(1.0)
     true_s = delay_s + measuring_s
-    # At worst the whole round trip counts as the way here.
+    # At worst the whole round trip counts as the delay from the driver.
     assert true_s - 1e-9 <= desk.age_s() <= true_s + delay_s + 0.006
 
 
@@ -68,7 +68,7 @@ def test_a_driver_that_was_stopped_goes_on_and_what_it_said_before_is_known_to_b
     before = desk.drivers_s
     desk.speaks = False
     desk.run(1.0)
-    # What lay in its queue comes first.
+    # The messages in its queue come first.
     desk.say(sent_s=before, measured_s=before, echo_s=None, held_s=0.0)
     desk.run(0.001)
     assert desk.age_s() > 0.9
@@ -137,7 +137,7 @@ def test_what_cannot_be_is_rejected_whole_counted_and_told_once(wrong: dict[str,
     desk = DriverDesk()
     desk.run(0.5)
     newest = desk.arm.session.state
-    # A clock that has jumped is another clock: what comes by it next counts.
+    # A clock that has jumped is another clock: the next state by it counts.
     times = 1 if why == "clock" else 3
     for _ in range(times):
         desk.say(**wrong)

@@ -1,4 +1,4 @@
-"""What docs/drivers shows to users, run as it is: over real sockets, as processes, by a fake of LeRobot's interface."""
+"""Examples of docs/drivers, run as they are: over real sockets, as processes, with a fake of LeRobot's interface."""
 
 import contextlib
 import importlib.util
@@ -31,7 +31,7 @@ TURN_S = 0.005
 
 @contextlib.contextmanager
 def running(name: str, address: str) -> Iterator["subprocess.Popen[str]"]:
-    """An example as a process, killed at the end."""
+    """Run an example as a process, and kill it at the end."""
     with start(str(EXAMPLES / name), address) as process:
         try:
             yield process
@@ -81,7 +81,7 @@ def test_the_example_arm_follows_stops_when_it_is_killed_and_another_takes_its_p
 
 
 def silent_s(arm: RemoteArm, port: DriverPort) -> float:
-    """How old the newest state is after a turn in which the arm is told to stand."""
+    """Return the age of the newest state after a turn in which the arm is commanded to stop."""
     state = arm.state(now_s := port.wait(TURN_S))
     arm.command(np.zeros(6), state.time_s)
     arm.command_gripper(0.0, now_s)
@@ -102,7 +102,7 @@ def test_the_example_of_perception_is_perceived(port: DriverPort) -> None:
 @pytest.mark.processes
 @pytest.mark.skipif(shutil.which("g++") is None, reason="there is no g++")
 def test_the_example_in_cpp_packs_what_the_robot_side_reads(tmp_path: Path) -> None:
-    # Where libzmq's header is missing, too: a stand-in writes the first message to a file.
+    # libzmq's header may be missing: a stand-in writes the first message to a file.
     (tmp_path / "zmq.h").write_text(
         "#pragma once\n#include <cstdio>\n#include <cstdlib>\n"
         "enum { ZMQ_DEALER, ZMQ_SNDHWM, ZMQ_DONTWAIT };\n"
@@ -126,7 +126,7 @@ def test_the_example_in_cpp_packs_what_the_robot_side_reads(tmp_path: Path) -> N
 
 
 def lerobot_arm() -> ModuleType:
-    """The driver for LeRobot, imported from where it lies."""
+    """Return the driver for LeRobot, imported from its folder."""
     found = importlib.util.spec_from_file_location("lerobot_arm", EXAMPLES / "lerobot_arm.py")
     assert found is not None
     assert found.loader is not None
@@ -136,7 +136,7 @@ def lerobot_arm() -> ModuleType:
 
 
 class FakeFollower:
-    """A robot by LeRobot 0.4's interface that is where its goals are, but for a gripper that something blocks."""
+    """Robot with LeRobot 0.4's interface that is at its goals, except for a blocked gripper."""
 
     def __init__(self) -> None:
         self.at = {"shoulder_pan.pos": 10.0, "elbow_flex.pos": -20.0, "gripper.pos": 100.0}
@@ -152,7 +152,7 @@ class FakeFollower:
 
 
 def lerobot_turns(arm: Any, since_s: float, turns: int, command: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Let it turn at 50 Hz; the last state."""
+    """Run turns at 50 Hz; return the last state."""
     state: dict[str, Any] = {}
     for turn in range(turns):
         now_s = since_s + 0.02 * turn
@@ -187,7 +187,7 @@ def test_an_arm_of_lerobot_holds_what_its_gripper_cannot_close_on_and_is_not_pus
     follower.send_action = lambda action: action  # type: ignore[method-assign]  # something holds the arm up
     lerobot_turns(arm, 2.0, 200, {"joint_velocities": [0.5, 0.0], "closing": 0.0, "valid_until_s": 100.0})
     assert math.radians(math.degrees(arm._goals[0]) - held) == pytest.approx(0.1)
-    # A bus that hung for a second moves the goals by no more than a tenth of one.
+    # A bus that hung for a second moves the goals by no more than a tenth of a second's motion.
     follower = FakeFollower()
     arm = lerobot_arm().VelocityArm(follower, ["shoulder_pan", "elbow_flex"], "gripper", 0.08, None)
     lerobot_turns(arm, 0.0, 2)

@@ -1,4 +1,4 @@
-"""Perceived objects of another process, in virtual time."""
+"""Perceived objects from another process, in virtual time."""
 
 import math
 from typing import Any
@@ -17,11 +17,11 @@ from robot_side.viewing.perceived_shapes import PerceivedModel
 CUP: dict[str, Any] = {"name": "cup", "sphere": 0.05, "position_m": [0.5, 0.0, 0.1]}
 CORNERS = [[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]]
 TURNED = [math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
-"""By a right angle about z"""
+"""Quaternion of a right angle about z"""
 
 
 class Sender:
-    """A process that perceives, and the wire from it."""
+    """Perceiving process, and the wire from it."""
 
     def __init__(self) -> None:
         self.now_s, self.sequence = 10.0, 0
@@ -39,7 +39,7 @@ class Sender:
         return bool(peer)
 
     def says(self, *things: dict[str, Any], peer: bytes = b"eyes", **fields: Any) -> PerceivedObjects:
-        """What is perceived after this frame has come."""
+        """Send this frame; return the perceived objects."""
         self.sequence += 1
         frame = {"version": 1, "sequence": self.sequence, "sent_s": 3.0, "taken_s": 2.98, "objects": things} | fields
         self._sent.append((peer, msgpack.packb(frame), self.now_s))
@@ -59,7 +59,7 @@ def test_each_kind_is_where_it_is_said_to_be() -> None:
     assert frame.names == ("target", "table", "egg", "wedge", "door", "cup")
     assert [role.value for role in frame.roles] == ["target", "support", "obstacle", "obstacle", "ignored", "obstacle"]
     assert frame.time_s == pytest.approx(9.98)
-    assert frame.box_object.tolist() == [0]  # what is ignored has no shape
+    assert frame.box_object.tolist() == [0]  # An ignored object has no shape.
     assert frame.box_rotations[0, :, 0] == pytest.approx([0.0, 1.0, 0.0])
     assert (frame.half_space_normals[0], frame.half_space_offsets_m[0]) == (pytest.approx([0, 0, 1]), -0.1)
     assert frame.tetrahedron_vertices_m[0, 1] == pytest.approx([1.0, 2.1, 3.0])
