@@ -4,7 +4,7 @@
     robot ── Hello, LeaseNotice, LinkReport, StiffnessUpdate ──▶ operator   control
     robot ── Telemetry ──▶ viewers                          view, PUB/SUB; view_messages.py has the others
 
-    A field out of range or not finite makes the whole message invalid: no part is applied.
+A field out of range or not finite makes the whole message invalid: no part is applied.
 """
 
 import math

@@ -1,8 +1,8 @@
 """View messages besides Telemetry: camera pictures, and the scene as the robot side perceives it.
 
-operator ── Watch ──▶ robot                                 control: the views that it shows, renewed
-robot ── VideoFrame, VideoStep ──▶ viewers                  view, PUB/SUB, topic `video`
-robot ── SceneShapes, SceneState ──▶ viewers                view, PUB/SUB, topic `scene`
+    operator ── Watch ──▶ robot                                 control: the views that it shows, renewed
+    robot ── VideoFrame, VideoStep ──▶ viewers                  view, PUB/SUB, topic `video`
+    robot ── SceneShapes, SceneState ──▶ viewers                view, PUB/SUB, topic `scene`
 
 Arrays travel as bytes, little-endian, row by row; their docstrings give the shapes.
 """
