@@ -26,16 +26,16 @@ class Arrival:
     """Delays of one message by its stamps, at its arrival."""
 
     fresh: bool
-    """Newer than all messages of its kind in the peer's present epoch: it may be applied."""
+    """Newer than all messages of the kind in the peer's present epoch: it may be applied."""
     queueing_age_s: float
     """Queueing delay: one-way delay above the sliding minimum, whatever the distance."""
     one_way_s: float | None
     """One-way delay from the peer, as uncertain as the clock offset; None while the offset is unknown."""
     loop_age_s: float | None
-    """Round trip of the echoed stamp, plus the part of its holding time that counts (common/silence.py). None before
-    the first echo."""
+    """Round trip of the echoed stamp, plus the counted part of the holding time (common/silence.py). None before the
+    first echo."""
     copy: bool = False
-    """Duplicate of the newest of its kind, by another connection."""
+    """Duplicate of the newest message of the kind, by another connection."""
 
 
 class LinkEnd:

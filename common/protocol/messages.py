@@ -226,7 +226,7 @@ class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
     """Distances, never falling, at which strengths 1 to 8 begin; `horizon_m` for those beyond it. Below 0: the gripper
     is past the onset."""
     slow_m: Ways
-    """The same for zones slow enough to touch the target."""
+    """Distances for slow zones, in which touching the target is allowed."""
     full_speed_m_s: float
     """v_max: speed that a full pull commands in this pose."""
     acceleration_m_s2: float

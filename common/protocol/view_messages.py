@@ -57,7 +57,7 @@ class Shape(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=
     """One solid of a link or an object, in the owner's frame."""
 
     owner: int
-    """Index of its link or object in SceneShapes.links or .objects"""
+    """Index into SceneShapes.links or .objects"""
     of_robot: bool
     kind: ShapeKind
     size_m: Vector3

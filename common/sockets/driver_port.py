@@ -1,4 +1,4 @@
-"""Port of the robot side for one program of its user: an arm's driver, or perception."""
+"""Port of the robot side for one program of the user: an arm's driver, or perception."""
 
 from typing import Final, NamedTuple
 
