@@ -113,7 +113,7 @@ def _build() -> tuple[Transition, ...]:
         *_rows(OWNING, event.HAND_OVER, state.OBSERVING, "the owner handed the lease over"),
         *_rows(known, event.SILENT, state.AWAY, "nothing heard for the lease limit"),
         *_rows((*known, state.AWAY), event.NEW_EPOCH, state.ENDED, "the operator side began a new epoch"),
-        *_rows([state.AWAY], event.FORGOTTEN, state.ENDED, "so many others are remembered"),
+        *_rows([state.AWAY], event.FORGOTTEN, state.ENDED, "too many are remembered"),
     )
 
 

@@ -80,7 +80,7 @@ def open_recording(path: Path) -> Recording:
             end_ns = max(end_ns, record.message_end_time)
         whole |= isinstance(record, DataEnd)
     if not headers and damaged:
-        raise ConfigurationError(f"{path}: what it says of itself is damaged; valid: a file as --record made it")
+        raise ConfigurationError(f"{path}: its header is damaged; valid: a file as --record made it")
     if not headers:
         raise ConfigurationError(
             f"{path}: holds nothing that feelahead recorded; valid: a file that --record made, of a second or more"

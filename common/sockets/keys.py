@@ -113,7 +113,7 @@ class KeyFolder:
         whose = f"this {side} side"
         _write(
             path,
-            f"# The secret key of {whose}: whoever reads it can pass for it. It never leaves this machine.\n{secret}\n",
+            f"# The secret key of {whose}: its readers can act as it. It never leaves this machine.\n{secret}\n",
         )
         _write(
             self.public_path(side), f"# The public key of {whose}, to be given to its peers.\n{public}\n", mode=0o644

@@ -106,13 +106,13 @@ class RobotSockets(SocketShell):
         wrong = []
         if self.crowded:
             limit = self._gates[0].crowd.limit
-            wrong.append(f"more than {limit} connections at once: strangers are hung up on; who is in stays in")
+            wrong.append(f"more than {limit} connections at once: new strangers are cut off, admitted peers stay")
         if self._keys is not None and self._authenticator is not None:
             allowed = self._keys.allowed
             news = self._authenticator.news()
             wrong += [f"passed over, so that it lets nobody in: {fault}" for fault in allowed.faults]
             if allowed.unreadable is not None:
-                who = "whoever was let in stays so" if allowed.names else "nobody is let in any more"
+                who = "admitted peers stay" if allowed.names else "nobody is let in any more"
                 wrong.append(f"{who}: {allowed.unreadable}")
         told, self._told = self._told, wrong
         return news + [text for text in wrong if text not in told]
