@@ -77,7 +77,7 @@ class Status:
         return self._mode != "none" and now_s >= self._next_s
 
     def show(self, now_s: float, *, robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> None:
-        """Show a status, at most five times a second, ten with facts; raises BrokenPipeError once if nobody reads."""
+        """Show a status, at most five times a second, ten with facts; raises BrokenPipeError once if the pipe broke."""
         if not self.due(now_s):
             return
         self._next_s = now_s + (_FACTS_PERIOD_S if self.wants_facts else _PERIOD_S)

@@ -88,7 +88,7 @@ class LinkEnd:
         self._last_sent_s = self._last_received_s = 0.0
 
     def begin_anew(self) -> None:
-        """Begin our next epoch after the peer ended this one. The number is a hash: nobody else can guess it."""
+        """Begin our next epoch after the peer ended this one; the number is a hash, which strangers cannot guess."""
         self._epoch = int.from_bytes(hashlib.sha256(self._epoch.to_bytes(8)).digest()[:8]) >> 11
 
     def hello(self, now_s: float, sequence: int | None = None) -> Hello:
