@@ -87,7 +87,7 @@ def read_fields(profile: str, spec: str, model: LinkModel) -> dict[str, Any]:
         if clause not in _READERS:
             raise words.error(f"{clause!r} is unknown there")
         if clause in seen and clause != "outage":
-            raise words.error(f"{clause!r} stands there twice", clause)
+            raise words.error(f"{clause!r} is there twice", clause)
         seen.add(clause)
         try:
             _READERS[clause](words, settings)
@@ -96,7 +96,7 @@ def read_fields(profile: str, spec: str, model: LinkModel) -> dict[str, Any]:
         except ValueError as error:
             raise ConfigurationError(f"link {spec!r}: {clause}: {error}") from error
     if "trace" in seen and (other := seen & {"delay", "loss", "reorder"}):
-        raise words.error(f"'trace' brings its own delays and losses, and stands beside {min(other)!r}", "trace")
+        raise words.error(f"'trace' has its own delays and losses, and excludes {min(other)!r}", "trace")
     if "reorder" in seen and settings.get("delay_s", 0.0) == 0.0:
         raise words.error("'reorder' without a delay to overtake", "delay")
     if "retransmit" in seen and model != "stream":

@@ -54,7 +54,7 @@ class LinkSpec:
             if name in clauses:
                 what = repr(name) if name else "a profile without a name"
                 raise ConfigurationError(
-                    f"link {spec!r}: {what} stands there twice; "
+                    f"link {spec!r}: {what} is there twice; "
                     f"valid: one profile without a name and one for each of {_valid_names()}"
                 )
             clauses[name] = LinkProfile.parse_within(profile, spec, seed, model)

@@ -55,7 +55,7 @@ def require_recordable(path: Path | None) -> None:
     if not path.absolute().parent.is_dir():
         raise ValueError(f"--record {path}: its folder is not there; valid: a file's path")
     if path.exists() or path.is_symlink():
-        raise ValueError(f"--record {path}: is there already; valid: a path where nothing is yet")
+        raise ValueError(f"--record {path}: exists already; valid: a new file's path")
     require_packages("--record", "foxglove", "mcap")
 
 

@@ -142,7 +142,7 @@ class KeyFolder:
             raise ConfigurationError(f"this key is allowed already, as {peers[public]!r}")
         if name in peers.values() and public not in peers:
             raise ConfigurationError(
-                f"name {name!r}: stands for another key; valid: another name, "
+                f"name {name!r}: belongs to another key; valid: another name, "
                 f"or `{self.command(f'revoke {name}')}` first"
             )
         if len(peers) >= PEER_LIMIT:

@@ -120,7 +120,7 @@ def show(findings: list[Finding], console: Console) -> None:
     table = Table(title="feelahead doctor")
     table.add_column("what")
     table.add_column("")
-    table.add_column("how it stands", overflow="fold")
+    table.add_column("state", overflow="fold")
     for finding in findings:
         table.add_row(finding.name, Text(finding.verdict.value, _COLOURS[finding.verdict]), Text(finding.said))
     console.print(table)

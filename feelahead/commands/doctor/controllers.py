@@ -30,7 +30,7 @@ def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Se
         return Finding(name, Verdict.OK, "there, for USB and Bluetooth")
     remedy = installing_command()
     if is_root:
-        return Finding(name, Verdict.OK, "not needed by root, who you are; what is below is for everybody else", remedy)
+        return Finding(name, Verdict.OK, "not needed by root, as you are; the command below is for other users", remedy)
     denied = any("no permission" in seen.said for seen in controllers)
     opened = f"lets you open {', '.join(missing)}; plug the controller in again after it"
     verdict = Verdict.MISSING if denied else Verdict.NOTE

@@ -154,7 +154,7 @@ class _Questions:
             return
         # The robot side would hang up after 3 s without a heartbeat, and the next connection would be clear.
         if not any(self._ask() and self._answered(_LARGE_LIMIT_S / 2) for _ in range(2)):
-            said = f"small packets reach {self._place}, large ones do not: the way swallows what is too long for it"
+            said = f"small packets reach {self._place}, large ones do not: the path drops too long packets"
             remedy = "a smaller MTU here, such as: sudo ip link set DEVICE mtu 1280 (VPNs and tunnels need that)"
             raise WayError("large packets", said, remedy)
 
@@ -168,14 +168,12 @@ class _Questions:
                 "our key", said, f"run there: feelahead keys allow NAME {public_part(self._way.keys.secret)}"
             )
         said = f"the program at {place} has another key than --robot-key says, or is no such port of a robot side"
-        remedy = "--robot-key with what is shown on the robot's machine by: feelahead keys show robot"
+        remedy = "--robot-key with the key that this shows on the robot's machine: feelahead keys show robot"
         return WayError("robot key", said, remedy)
 
     def _no_answer(self) -> WayError:
-        said = (
-            f"{self._place} speaks ZeroMQ and does not answer: a robot side that still starts or stands still, its view"
-        )
-        remedy = "wait until it says that it listens (its first start compiles for a minute), and say its control port"
+        said = f"{self._place} speaks ZeroMQ and does not answer: a robot side that is starting or paused, its view"
+        remedy = "wait until it listens (its first start compiles for a minute), and give its control port"
         return WayError("no answer", f"{said} port, or another program", remedy)
 
     def _ask(self) -> bool:

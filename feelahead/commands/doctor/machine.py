@@ -81,7 +81,7 @@ def check_rendering(troubles: Mapping[str, str | None]) -> Finding:
     """Check that the cameras' pictures can be rendered; `troubles`: backend -> why not, None if it works."""
     working = [name for name, trouble in troubles.items() if trouble is None]
     if working:
-        return Finding("cameras", Verdict.OK, f"rendered without a screen by way of {working[0].upper() or 'OpenGL'}")
+        return Finding("cameras", Verdict.OK, f"rendered without a screen by {working[0].upper() or 'OpenGL'}")
     said = "; ".join(trouble for trouble in troubles.values() if trouble is not None)
     remedy = REMEDY if "egl" in troubles else None
     return Finding("cameras", Verdict.NOTE, f"no pictures, the arm is driven without: {said}", remedy)

@@ -62,7 +62,7 @@ def judge_port(way: Way, port: Endpoint, opening: Opening, *, loopback: bool = F
     place = host_and_port(port)
     if opening.error is not None:
         raise _no_connection(way, port, opening.error, loopback=loopback)
-    see_who = f"say the robot side's own port; who has this one is shown there by: ss -ltnp 'sport = :{port.port}'"
+    see_who = f"give the robot side's port; the program at this one is shown there by: ss -ltnp 'sport = :{port.port}'"
     match mechanism_of(opening.said), way.keys is not None:
         case ("NULL", False) | ("CURVE", True):
             return
@@ -81,8 +81,8 @@ def judge_port(way: Way, port: Endpoint, opening: Opening, *, loopback: bool = F
         said += " with too many connections"
         see_who = "start the robot side behind it, or end the program that keeps connecting"
     else:
-        said = f"{place} takes connections and says nothing: no robot side, or one that stands still"
-        see_who += "; a stopped process goes on after: kill -CONT PID"
+        said = f"{place} takes connections and says nothing: no robot side, or a paused one"
+        see_who += "; a stopped process continues after: kill -CONT PID"
     raise WayError("something else", said, see_who)
 
 
@@ -105,7 +105,7 @@ def _no_connection(way: Way, port: Endpoint, error: int, *, loopback: bool) -> W
         return WayError("closed port", f"{place} refuses connections: nothing listens there", remedy)
     if error == errno.ETIMEDOUT:
         ports = list(dict.fromkeys(str(each.port) for each in (way.control, way.view)))
-        said = f"{place} gave no answer in {_CONNECT_LIMIT_S:g} s: a firewall drops what is sent there, or nothing has"
+        said = f"{place} gave no answer in {_CONNECT_LIMIT_S:g} s: a firewall drops the packets, or no machine has"
         remedy = (
             f"let TCP ports {' and '.join(ports)} in on the robot's machine, such as: sudo ufw allow proto tcp from"
         )
