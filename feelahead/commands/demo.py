@@ -58,7 +58,7 @@ class DemoSettings(RunOptions):
     """
 
     scene: Literal["table", "wall", "slot", "shelf"] | None = None
-    """Objects around the built-in arm's target. table (default): a cluttered table. wall: a wall 10 to 60 mm behind it.
+    """Objects around the built-in arm's target. table: a cluttered table (default). wall: a wall 10 to 60 mm behind it.
     slot: two posts in front of it, 15 to 40 mm to spare on each side. shelf: a shelf with a raised front edge to reach
     over. The last three are drawn from the seed."""
     duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = 30.0
