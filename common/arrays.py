@@ -1,4 +1,4 @@
-"""The array types that the packages share."""
+"""Array types that the packages share."""
 
 import numpy as np
 import numpy.typing as npt
@@ -9,6 +9,6 @@ BoolArray = npt.NDArray[np.bool_]
 
 
 def require_finite(name: str, values: FloatArray) -> None:
-    """Raise a ValueError that names the argument when an element of `values` is NaN or infinite."""
+    """Raise ValueError, which names the argument, if an element of `values` is NaN or infinite."""
     if not np.isfinite(values).all():
         raise ValueError(f"{name} holds NaN or infinity; valid: finite numbers")

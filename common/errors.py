@@ -1,24 +1,24 @@
-"""The exceptions of feelahead.
+"""Exceptions of feelahead.
 
     FeelaheadError
-    ├── ConfigurationError   what a person asked for cannot be done (also a ValueError); a command prints it
-    │                        as one line and ends with exit code 2
-    ├── RemoteProtocolError  the peer sent what is no valid message; it is counted and dropped whole
+    ├── ConfigurationError   a person's wish cannot be met (also a ValueError); a command prints the error as one
+    │                        line and ends with exit code 2
+    ├── RemoteProtocolError  the peer sent an invalid message, which is counted and dropped whole
     │   └── OtherVersionError    the peer speaks another version of the protocol
-    └── DeviceError          the controller is unreadable or gone; the text says what to do about it
-        ├── NoDeviceError        there is none; one may be plugged in at any time
-        └── NoDriverError        what reads controllers is missing (also a ConfigurationError): no waiting mends that
+    └── DeviceError          the controller is unreadable or gone; the text names a remedy
+        ├── NoDeviceError        none is connected; one may be plugged in at any time
+        └── NoDriverError        the library for controllers is missing (also a ConfigurationError): do not wait
 
-Arguments of public functions that are out of range raise a plain ValueError that names the argument.
+Public functions raise a plain ValueError, which names the argument, for arguments out of range.
 """
 
 
 class FeelaheadError(Exception):
-    """The root of everything that feelahead raises on purpose."""
+    """Base of all errors that feelahead raises on purpose."""
 
 
 class ConfigurationError(FeelaheadError, ValueError):
-    """A setting, flag or file asks for something impossible; the text names the value and what is valid."""
+    """Impossible setting, flag or file; the text names the value and what is valid."""
 
 
 class RemoteProtocolError(FeelaheadError):
@@ -26,7 +26,7 @@ class RemoteProtocolError(FeelaheadError):
 
 
 class OtherVersionError(RemoteProtocolError):
-    """A message of another version of the protocol: the two sides are of different releases."""
+    """Message of another protocol version: the two sides are of different releases."""
 
 
 class DeviceError(FeelaheadError):

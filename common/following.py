@@ -1,4 +1,4 @@
-"""The model of an arm that both sides reckon with: it goes towards a commanded speed at a bounded acceleration."""
+"""Model of an arm that both sides use: it approaches a commanded speed at a bounded acceleration."""
 
 import math
 
@@ -8,7 +8,7 @@ from common.arrays import FloatArray
 
 
 def follow(way_m: float, speed: float, target: float, acceleration: float, duration_s: float) -> tuple[float, float]:
-    """Way and speed after `duration_s` towards the speed `target`, changing by at most `acceleration`."""
+    """Return position and speed after `duration_s` towards the speed `target`, at most at `acceleration`."""
     changing_s = abs(target - speed) / acceleration
     if changing_s > duration_s:
         after = speed + math.copysign(acceleration * duration_s, target - speed)
@@ -21,7 +21,7 @@ def follow_together(
 ) -> tuple[FloatArray, FloatArray]:
     """Integrate and return trigger and sticks (5,) as the arm follows them from `followed` towards `target`, both (5,).
 
-    changes_s: K (n, 5). A change Δ takes max |K Δ|, in proportion: the joint that changes most limits all.
+    changes_s: K (n, 5). A change Δ takes the time max |K Δ|, linearly: the slowest joint limits all.
     """
     change = target - followed
     takes_s = float(np.abs(changes_s @ change).max())

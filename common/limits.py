@@ -4,8 +4,8 @@
     class SafetySettings(Limited):
         gap_s: Annotated[float, Meta(gt=0.0, lt=60.0)] = 0.1
 
-msgspec reads the same `Meta` when it decodes a message or a TOML file, so that a range is declared once. NaN lies in
-no range. `Finite` is any number but NaN and the infinities.
+msgspec uses the same `Meta` to decode a message or a TOML file, so that a range is declared once. NaN lies in no
+range. `Finite` is any number but NaN and the infinities.
 """
 
 import functools
@@ -18,20 +18,20 @@ from msgspec import Meta
 
 Finite = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
-"""A probability or a part of a whole, both ends included."""
+"""Probability or part of a whole, both ends included."""
 
 _Check = Callable[[str, Any], None]
 
 
 def check_limits(record: Any) -> None:
-    """Raise a ValueError that names the first field out of its range, its value and what is valid."""
+    """Raise ValueError if a field is out of range; the text names the first such field, its value and what is valid."""
     kind: Any = type(record)
     for name, check in _checks(kind):
         check(name, getattr(record, name))
 
 
 class Limited:
-    """A dataclass that is checked when it is made."""
+    """Base of dataclasses whose ranges are checked when they are made."""
 
     __slots__ = ()
 
@@ -40,14 +40,14 @@ class Limited:
 
 
 def check_value(name: str, value: object, hint: object) -> None:
-    """Raise a ValueError that names `name` when `value` lies outside the range that the type hint declares."""
+    """Raise ValueError, which names `name`, if `value` lies outside the range that the type hint declares."""
     check = _check_of(hint)
     if check is not None:
         check(name, value)
 
 
 def range_in_words(meta: Meta) -> str:
-    """Say which values a `Meta` allows, as in "above 0 and below 60"."""
+    """Describe the values that a `Meta` allows, such as "above 0 and below 60"."""
     if meta.ge == -sys.float_info.max and meta.le == sys.float_info.max:
         return "a finite number"
     if meta.max_length is not None:
@@ -65,7 +65,7 @@ def _checks(kind: Any) -> tuple[tuple[str, _Check], ...]:
 
 
 def _check_of(hint: Any) -> _Check | None:
-    """Make the check of one type hint; None where it declares no range."""
+    """Make the check of one type hint; None if it declares no range."""
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is Annotated:
         metas = [meta for meta in arguments[1:] if isinstance(meta, Meta)]

@@ -1,4 +1,4 @@
-"""Emulated links, for users: one profile in netem's words, and the line that carries it out."""
+"""Emulated links, for users: a profile in netem's words, and the delay line that applies it."""
 
 from common.emulation.delay_line import DelayLine
 from common.emulation.profile import LinkProfile

@@ -1,12 +1,12 @@
-"""How long it takes from a trigger's effect to what the arm is told: one number for whoever reckons with it."""
+"""Reaction: time from a trigger's effect to the changed command, the same for all who use it."""
 
 from typing import Final
 
 REACTION_S: Final = 0.25
-"""What a person needs from feeling to letting go (assumed; 0.25 to 0.3 s for touch)."""
+"""Time from feeling to release, of a person (assumed; 0.25 to 0.3 s for touch)."""
 FINGER_S: Final = 0.04
-"""And the finger's own way (assumed)."""
+"""Time of the finger's motion (assumed)."""
 WRITE_S: Final = 0.01
-"""A controller is written to at most a hundred times a second."""
+"""Period of writes to a controller: at most a hundred a second."""
 HORIZON_S: Final = REACTION_S + FINGER_S + WRITE_S
-"""h: for so long a speed goes on before anything felt can change it; braking comes on top."""
+"""h: time for which a speed continues before anything felt can change it; braking comes on top."""

@@ -1,11 +1,11 @@
-"""What an object is to the task."""
+"""Role of an object in the task."""
 
 from enum import Enum
 from typing import Final
 
 
 class Role(Enum):
-    """What an object is to the task; on the wire a role is its place here."""
+    """Role of an object in the task; on the wire a role is the index in ROLES."""
 
     OBSTACLE = "obstacle"
     TARGET = "target"

@@ -9,17 +9,17 @@ from collections.abc import Sequence
 import numpy as np
 
 RESERVOIR_SIZE = 100_000
-"""Samples kept for quantiles: 100 s at 1 kHz are exact, a longer run is a uniform random sample of it."""
+"""Number of samples kept for quantiles: 100 s at 1 kHz are exact; of a longer run a uniform random sample is kept."""
 BLOCK = 512
-"""So many samples are reckoned with together."""
+"""Number of samples that are processed together."""
 
 
 class RunningStatistics:
-    """Mean, standard deviation, extremes and quantiles of every sample added; None where there is none yet.
+    """Mean, standard deviation, extremes and quantiles of all samples added; None without samples.
 
-    All but the quantiles are exact. Quantiles come from all samples up to `RESERVOIR_SIZE`, and from a
-    uniform random choice of as many beyond that. A sample waits until there is a block of them, or until
-    somebody asks: a tick that adds one should not have to reckon.
+    All but the quantiles are exact. Quantiles come from all samples up to `RESERVOIR_SIZE`, and beyond that from a
+    uniform random choice of as many. Samples are processed in blocks, or when a figure is read: a tick that adds one
+    should not compute.
     """
 
     def __init__(self, seed: int = 0) -> None:
@@ -35,7 +35,7 @@ class RunningStatistics:
         self._next_kept = RESERVOIR_SIZE
 
     def add(self, value: float) -> None:
-        """Take in one sample; ValueError when it is not finite."""
+        """Add one sample; raises ValueError if it is not finite."""
         if not math.isfinite(value):
             raise ValueError(f"value = {value}; valid: a finite number")
         self._waiting.append(value)
@@ -43,7 +43,7 @@ class RunningStatistics:
             self._take_in()
 
     def extend(self, values: Sequence[float]) -> None:
-        """Take in many samples; ValueError, and none of them is, when one is not finite."""
+        """Add many samples; raises ValueError, and adds none, if one is not finite."""
         if not all(map(math.isfinite, values)):
             raise ValueError("values; valid: finite numbers")
         self._waiting.extend(values)
@@ -51,7 +51,7 @@ class RunningStatistics:
             self._take_in()
 
     def _take_in(self) -> None:
-        """Reckon with what waits. Combining moments: Chan, Golub and LeVeque 1979."""
+        """Process the waiting samples. Combining moments: Chan, Golub and LeVeque 1979."""
         waiting, self._waiting = self._waiting, []
         if not waiting:
             return
@@ -72,9 +72,9 @@ class RunningStatistics:
             self._choose_next_kept()
 
     def _choose_next_kept(self) -> None:
-        """Skip ahead to the next sample that the reservoir takes in (Li 1994, algorithm L).
+        """Skip to the next sample that enters the reservoir (Li 1994, algorithm L).
 
-        A random number for each sample that is kept, instead of one for each that is added.
+        That draws random numbers for each kept sample, not for each added one.
         """
         first, second = 1.0 - self._generator.random(2)
         self._log_threshold += math.log(first) / RESERVOIR_SIZE
@@ -82,42 +82,42 @@ class RunningStatistics:
 
     @property
     def count(self) -> int:
-        """How many samples were added."""
+        """Number of samples added."""
         return self._count + len(self._waiting)
 
     @property
     def mean(self) -> float | None:
-        """The arithmetic mean."""
+        """Arithmetic mean."""
         self._take_in()
         return self._mean if self._count else None
 
     @property
     def sd(self) -> float | None:
-        """The standard deviation of a sample (n − 1); None below two samples."""
+        """Standard deviation of a sample (n − 1); None below two samples."""
         self._take_in()
         return math.sqrt(self._squares / (self._count - 1)) if self._count > 1 else None
 
     @property
     def minimum(self) -> float | None:
-        """The least sample."""
+        """Least sample."""
         self._take_in()
         return self._minimum if self._count else None
 
     @property
     def maximum(self) -> float | None:
-        """The greatest sample."""
+        """Greatest sample."""
         self._take_in()
         return self._maximum if self._count else None
 
     def quantile(self, probability: float) -> float | None:
-        """The `probability` quantile, interpolated linearly; ValueError outside [0, 1]."""
+        """Return the `probability` quantile, interpolated linearly; raises ValueError outside [0, 1]."""
         if not 0.0 <= probability <= 1.0:
             raise ValueError(f"probability = {probability}; valid: 0 to 1")
         self._take_in()
         return float(np.quantile(np.array(self._reservoir), probability)) if self._count else None
 
     def summary_ms(self) -> dict[str, float | None]:
-        """`mean`, `sd`, `p50`, `p95` and `p99` in milliseconds, of samples in seconds."""
+        """Return `mean`, `sd`, `p50`, `p95` and `p99` in milliseconds, of samples in seconds."""
         values_s = {
             "mean": self.mean,
             "sd": self.sd,
@@ -136,10 +136,10 @@ def _mean(values: list[float]) -> float:
 
 
 class SlidingQuantile:
-    """A quantile of the newest `window` samples, up to date after each of them.
+    """Quantile of the newest `window` samples, updated with each.
 
-    Nearest rank: the least sample that at least that fraction of the window does not exceed, so that a few
-    samples give their maximum.
+    Nearest rank: the least sample that at least that fraction of the window does not exceed; a few samples give their
+    maximum.
     """
 
     def __init__(self, window: int = 500, probability: float = 0.95) -> None:
@@ -150,16 +150,16 @@ class SlidingQuantile:
         self._window = window
         self._probability = probability
         self._rank = math.ceil(probability * window) - 1
-        """The index of the quantile in a full window, sorted"""
+        """Index of the quantile in a full window, sorted"""
         self._arrivals: deque[float] = deque()
         self._sorted: list[float] = []
         self.value: float | None = None
-        """The quantile of the window; None while it is empty."""
+        """Quantile of the window; None while it is empty."""
 
     def update(self, value: float) -> float:
-        """Take in the newest sample and forget the oldest of a full window; the quantile now.
+        """Add the newest sample, forget the oldest of a full window, and return the quantile.
 
-        ValueError for a value that is not finite.
+        Raises ValueError if the value is not finite.
         """
         if not math.isfinite(value):
             raise ValueError(f"value = {value}; valid: a finite number")
@@ -174,14 +174,14 @@ class SlidingQuantile:
         return newest
 
     def clear(self) -> None:
-        """Forget every sample."""
+        """Forget all samples."""
         self._arrivals.clear()
         self._sorted.clear()
         self.value = None
 
 
 class SlidingMinimum:
-    """The least of the values at the newest `span` positions, in memory bounded by `span`.
+    """Least value at the newest `span` positions, in memory bounded by `span`.
 
     A monotonic queue: a value is forgotten as soon as a later one is not above it.
     """
@@ -191,7 +191,7 @@ class SlidingMinimum:
         self._candidates: deque[tuple[int, float]] = deque()
 
     def update(self, position: int, value: float) -> float:
-        """Take in `value` at `position`, which never decreases; the minimum of the positions up to it."""
+        """Add `value` at `position`, which never decreases; return the minimum."""
         candidates = self._candidates
         while candidates and candidates[-1][1] >= value:
             candidates.pop()
@@ -206,5 +206,5 @@ class SlidingMinimum:
 
     @property
     def value(self) -> float | None:
-        """The present minimum; None before the first value."""
+        """Present minimum; None before the first value."""
         return self._candidates[0][1] if self._candidates else None

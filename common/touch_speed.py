@@ -1,4 +1,4 @@
-"""How slow a motion must be to touch what is to be touched: one rule for zones and for the rumble."""
+"""Highest speed at which touching the target is allowed: one rule for zones and for the rumble."""
 
 from typing import Final
 
@@ -7,5 +7,5 @@ _SHARE: Final = 0.18
 
 
 def touch_speed_m_s(full_speed_m_s: float) -> float:
-    """v_touch, below which a slow field counts: 45 mm/s, or 18 % of `full_speed_m_s` where that is less."""
+    """Return v_touch, below which the slow list applies: 45 mm/s, or 18 % of `full_speed_m_s` if that is less."""
     return min(_MOST_M_S, _SHARE * full_speed_m_s)

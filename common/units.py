@@ -1,4 +1,4 @@
-"""Human units at the edge (`50ms`, `10mbit`, `1%`), SI inside."""
+"""Parsers of human units (`50ms`, `10mbit`, `1%`); values are SI inside."""
 
 import math
 import re
@@ -7,7 +7,7 @@ from common.errors import ConfigurationError
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _PER_SECOND = {"us": 1e6, "ms": 1e3, "s": 1.0, "usec": 1e6, "msec": 1e3, "sec": 1.0}
-"""Divisors, because 800 / 1e6 is rounded once, as 0.0008 is, and 800 × 1e-6 twice."""
+"""Divisors: 800 / 1e6 is rounded once, like 0.0008, but 800 × 1e-6 twice."""
 _BITS_PER_SECOND = {
     f"{prefix}{unit}": factor * bits
     for prefix, factor in {
@@ -23,14 +23,14 @@ _BITS_PER_SECOND = {
     }.items()
     for unit, bits in {"bit": 1.0, "bps": 8.0}.items()
 }
-"""As tc has them: `bit` counts bits, `bps` bytes; k is 1000, ki 1024."""
+"""Factors of tc's units: `bit` counts bits, `bps` bytes; k is 1000, ki 1024."""
 
 
 def parse_duration(text: str, field: str) -> float:
-    """Read a duration such as `50ms`, `0.2s` or `150us`; seconds.
+    """Read a duration such as `50ms`, `0.2s` or `150us`; return seconds.
 
-    A bare number has no unit and is refused, because netem reads it as microseconds and people as
-    milliseconds. ConfigurationError names `field` and `text`.
+    A bare number is refused, because netem reads it as microseconds and people as milliseconds. Raises
+    ConfigurationError, which names `field` and `text`.
     """
     match = re.fullmatch(rf"({_NUMBER})([a-z]+)", text.strip())
     if match is None or match[2] not in _PER_SECOND:
@@ -42,9 +42,9 @@ def parse_duration(text: str, field: str) -> float:
 
 
 def parse_rate(text: str, field: str) -> float:
-    """Read a rate such as `10mbit`, `500kbit` or `2mbps` (bytes, as tc has it); bits per second.
+    """Read a rate such as `10mbit`, `500kbit` or `2mbps` (bytes, as in tc); return bits per second.
 
-    ConfigurationError names `field` and `text`; a bare number is refused.
+    Raises ConfigurationError, which names `field` and `text`, also for a bare number.
     """
     match = re.fullmatch(rf"({_NUMBER})([a-zA-Z]+)", text.strip())
     if match is None or match[2].lower() not in _BITS_PER_SECOND:
@@ -59,7 +59,7 @@ def parse_rate(text: str, field: str) -> float:
 
 
 def parse_share(text: str, field: str) -> float:
-    """Read a percentage from `0%` to `100%`; a share from 0 to 1. ConfigurationError names `field` and `text`."""
+    """Read a percentage from `0%` to `100%`; return a share. Raises ConfigurationError, which names `field`, `text`."""
     match = re.fullmatch(rf"({_NUMBER})%", text.strip())
     share = float(match[1]) / 100.0 if match is not None else math.nan
     if not 0.0 <= share <= 1.0:

@@ -1,4 +1,4 @@
-"""The console script `feelahead`, also `python -m feelahead`."""
+"""Console script `feelahead`, also `python -m feelahead`."""
 
 from common.command.launch import Command, launch
 
@@ -9,7 +9,7 @@ def main() -> None:
 
 
 def _load() -> Command:
-    from feelahead.main import command  # noqa: PLC0415  # large: a signal must find its handler before
+    from feelahead.main import command  # noqa: PLC0415  # large: the signal handlers come first
 
     return command
 

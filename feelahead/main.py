@@ -1,4 +1,4 @@
-"""The command `feelahead`: what needs both sides."""
+"""Command `feelahead`: all that needs both sides."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -14,15 +14,15 @@ from feelahead.commands.virtual_dualsense import virtual_dualsense
 
 _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
     "demo": (demo, "both sides on this machine, with a simulated controller and person"),
-    "doctor": (doctor, "what is missing on this machine, or wrong on the way to a robot side, and what mends it"),
+    "doctor": (doctor, "find what is missing on this machine, or wrong on the path to a robot side, with the remedy"),
     "calibrate": (calibrate, "measure where a controller's triggers and sticks begin and end"),
     "keys": (keys, "who may operate the robot side: make key pairs, allow, list and revoke"),
     "virtual-dualsense": (virtual_dualsense, "a controller that every program on this machine sees, with no hardware"),
-    "replay": (replay, "show a recording, or compute it anew and compare"),
+    "replay": (replay, "show a recording, or compute it again and compare"),
     "export": (export, "turn a recording into CSV, Parquet, a LeRobot dataset, or a whole file"),
     "plot": (plot, "draw a recording on one page"),
-    "bench": (bench, "how fast and how exact things are, beside what is used in their place"),
-    "try": (try_out, "what happens to people and robots under delay, faults and attacks"),
+    "bench": (bench, "measure speed and accuracy, compared with alternatives"),
+    "try": (try_out, "test people and robots under delay, faults and attacks"),
 }
 
 

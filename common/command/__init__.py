@@ -1,1 +1,1 @@
-"""What every command line needs: settings, status, stop signals, orderly ends."""
+"""Parts of every command line: settings, status, stop signals, orderly ends."""

@@ -1,4 +1,4 @@
-"""Settings from three layers, defaults under a TOML file under flags, and errors in one line."""
+"""Settings from three layers (flags over a TOML file over defaults), and errors in one line."""
 
 import contextlib
 import dataclasses
@@ -24,7 +24,7 @@ Settings = TypeVar("Settings")
 
 _LONGEST_COMPLAINT = 400
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""The system's errors where standard output leads to a file that cannot grow."""
+"""The system's errors if standard output is a file that cannot grow."""
 _LARGEST_CONFIG_BYTES = 1_000_000
 
 
@@ -34,8 +34,8 @@ def parse_settings(
     """Build the dataclass `settings_type` from its defaults, then `--config FILE.toml`, then the flags.
 
     Every field of the (nested) dataclass is a key of the file and a flag: `[camera] mean_m = 0.001` and
-    `--camera.mean-m 0.001`. `elsewhere` ends the complaint about an unknown key of the file. ConfigurationError for
-    whatever is unknown, malformed or out of range; SystemExit after `--help`.
+    `--camera.mean-m 0.001`. `elsewhere` is appended to the error about an unknown key of the file. Raises
+    ConfigurationError for unknown, malformed or out-of-range values, SystemExit after `--help`.
     """
     path = _config_path(arguments)
     try:
@@ -62,19 +62,19 @@ def parse_settings(
 
 
 def given_fields(arguments: Sequence[str], settings_type: type) -> frozenset[str]:
-    """The top-level fields that a person set, by a flag or in the `--config` file; the others have their defaults."""
+    """Return the top-level fields that a person set, by a flag or in the `--config` file."""
     hints = get_type_hints(settings_type)
     flags = {argument.partition("=")[0] for argument in arguments if argument.startswith("--")}
     said = {flag.removeprefix("--").partition(".")[0].replace("-", "_") for flag in flags}
     said |= {name.removeprefix("no_") for name in said}
     if (path := _config_path(arguments)) is not None:
-        with contextlib.suppress(OSError, ValueError):  # parse_settings has said what is wrong with it
+        with contextlib.suppress(OSError, ValueError):  # parse_settings has reported the fault
             said |= set(read_toml(Path(path), _LARGEST_CONFIG_BYTES))
     return frozenset(said & set(hints))
 
 
 def load_toml(path: Path, settings_type: type[Settings], elsewhere: str = "") -> Settings:
-    """Read `settings_type` from a TOML file; ConfigurationError names the file, the key and what is valid."""
+    """Read `settings_type` from a TOML file; raises ConfigurationError, which names file, key and valid values."""
     try:
         content = read_toml(path, _LARGEST_CONFIG_BYTES)
     except OSError as error:
@@ -101,12 +101,12 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
         print(f"{program}: {error}", file=sys.stderr)
         code = 2 if isinstance(error, ConfigurationError) else 1
     except BrokenPipeError:
-        # The reader of our output has gone, as `head` does.
+        # The reader of our output has ended, as `head` does.
         ignore_broken_output()
         code = 0
     except OSError as error:
         if error.filename is not None:
-            # A file or folder that somebody named, and that the system does not let us at.
+            # A file or folder that a person named is inaccessible.
             print(f"{program}: {str(error.filename)[:200]}: {error.strerror}", file=sys.stderr)
             code = 2
         elif error.errno in _NO_ROOM:
@@ -115,21 +115,21 @@ def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
             raise
     except KeyboardInterrupt:
         code = 0
-    # All is done and written: an impatient second Ctrl-C must not turn a clean end into another one.
+    # All is written: a second Ctrl-C must not spoil a clean end.
     for number in STOP_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     sys.exit(code)
 
 
 def _from_toml(kind: type, value: object) -> object:
-    """A value of a type that TOML does not have."""
+    """Convert a value to a type that TOML lacks."""
     if kind is Path and isinstance(value, str):
         return Path(value)
     raise TypeError(f"Expected `{kind.__name__}`, got `{type(value).__name__}`")
 
 
 def _config_path(arguments: Sequence[str]) -> str | None:
-    """The value of --config, read before the flags because it provides their defaults."""
+    """Return the value of --config, read before the flags because the file provides their defaults."""
     if (path := value_of("--config", arguments)) == "":
         raise ConfigurationError("--config: no file given; valid: the path of a TOML file")
     return path
@@ -148,7 +148,7 @@ def _refuse_unknown_keys(content: dict[str, Any], settings_type: Any, path: Path
 
 
 def _one_line(box: str, program: str, settings_type: type) -> str:
-    """The first paragraph of tyro's complaint as one line; its box is drawn in ASCII where nothing else can be."""
+    """Return the first paragraph of tyro's error as one line; its box may be drawn in ASCII."""
     words: list[str] = []
     for line in box.splitlines()[1:]:
         text = line.strip("│╭╮╰╯|+ \t")
@@ -158,7 +158,7 @@ def _one_line(box: str, program: str, settings_type: type) -> str:
         if not ruled:
             words += text.split()
     said = " ".join(words).removeprefix("Error parsing ")
-    said = re.sub(r"^[A-Z]\w*: ", "", said)  # the class whose check it was
+    said = re.sub(r"^[A-Z]\w*: ", "", said)  # the class that checked
     if named := re.match(r"(?:([\w.]+): )?(\w+) = ", said):
         place = f"{named[1]}.{named[2]}" if named[1] else named[2]
         if place.partition(".")[0] in get_type_hints(settings_type):
@@ -168,7 +168,7 @@ def _one_line(box: str, program: str, settings_type: type) -> str:
     said, fits = re.subn(r"no type matching \S*(FLOAT|INT)\S* could be instantiated from \[(.*)\]\.", r"\2", said)
     if fits:
         return f"{_shortened(said)}; valid: a number"
-    # Of an option that takes several values tyro does not say which kind they are.
+    # For an option with several values tyro does not name their kind.
     several = re.match(r"(--\S+): Could not find valid parse for arguments: \[(.*)\]$", said)
     if several:
         return f"{several[1]} {_shortened(several[2])}: valid: a number for each value"
@@ -179,5 +179,5 @@ def _one_line(box: str, program: str, settings_type: type) -> str:
 
 
 def _shortened(text: str) -> str:
-    """Cut a value of a thousand digits, which would bury what is wrong with it."""
+    """Cut a value of a thousand digits, which would hide the fault."""
     return text if len(text) <= _LONGEST_COMPLAINT else f"{text[:_LONGEST_COMPLAINT]}..."

@@ -1,10 +1,10 @@
-"""The value of a flag, before anything that could parse it is imported."""
+"""Value of a flag, read before a parser is imported."""
 
 from collections.abc import Sequence
 
 
 def value_of(flag: str, arguments: Sequence[str]) -> str | None:
-    """Find the last value of a flag; None without the flag, and "" where the arguments end behind it."""
+    """Return the last value of a flag; None without the flag, and "" if the arguments end after it."""
     value = None
     for argument, following in zip(arguments, [*arguments, ""][1:], strict=True):
         if argument == flag:

@@ -1,7 +1,6 @@
-"""The first moments of a command, before anything large is imported: signals, output, and what is not installed.
+"""Start of a command, before large imports: signals, output, and missing packages.
 
-Only the standard library is imported here, and what imports nothing else, so that a Ctrl-C right after the start meets
-a handler.
+Only the standard library and small modules are imported here, so that a Ctrl-C right after the start meets a handler.
 """
 
 import importlib.metadata
@@ -23,10 +22,9 @@ _BAD_INPUT = 2
 def launch(program: str, load: Callable[[], Command], extra: str | None = None, *, has_summary: bool = False) -> None:
     """Import the command with `load`, run it with this process's arguments, and exit.
 
-    A stop signal ends the process with code 0 and without a traceback, whatever is being imported or built. With
-    `has_summary` it leaves the summary that --summary asks for, until the command opens a `StopSignal`. A module that
-    is not installed becomes one line that names `extra`, the optional dependencies to install. `--version` needs no
-    import.
+    A stop signal ends the process with code 0 and without a traceback, even during imports. With `has_summary` it
+    writes the summary for --summary, until the command opens a `StopSignal`. A missing module becomes one line that
+    names `extra`, the optional dependencies to install. `--version` needs no import.
     """
     LeavingAtOnce(_summary_path(sys.argv[1:]) if has_summary else None)
     _write_in_any_locale()
@@ -52,27 +50,27 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
             signal.signal(number, _interrupt)
         run_command(program, command)
     except KeyboardInterrupt:
-        # Just before or after what run_command looks after itself; unhandled, it would end us with SIGINT's status.
+        # Just before or after run_command's own handling; otherwise the exit status would be SIGINT's.
         sys.exit(0)
 
 
 def _summary_path(arguments: Sequence[str]) -> str | None:
-    """Find the value of --summary, the last one; nothing that could parse it, or a --config, is imported yet."""
+    """Return the last value of --summary; parsers of it, or of a --config, are not imported yet."""
     path = value_of("--summary", arguments)
     return None if path is None or path in ("", "None") or path.startswith("--") else path
 
 
 def single_threaded_algebra() -> None:
-    """One thread for NumPy's linear algebra, unless somebody said otherwise; before NumPy is imported.
+    """Default NumPy's linear algebra to one thread; call before NumPy is imported.
 
-    A tick's matrices are tiny: the other threads would only wait for work, on processors that others could use.
+    A tick's matrices are tiny: further threads would only wait for work and take processors from others.
     """
     for library in ("OPENBLAS", "MKL", "OMP"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 
 def _write_in_any_locale() -> None:
-    """A character that the terminal's encoding does not have becomes a question mark instead of a traceback."""
+    """Replace characters that the terminal's encoding lacks by question marks, instead of a traceback."""
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")

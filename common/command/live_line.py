@@ -1,4 +1,4 @@
-"""One line about what is going on, for a terminal of any width: whole facts only, the important ones first."""
+"""Live line of a run, for a terminal of any width: whole facts only, the important ones first."""
 
 from rich.cells import cell_len
 
@@ -9,16 +9,16 @@ _BETWEEN = "  "
 UNKNOWN = "–"
 _QUEUE_MS = 5.0
 _LOST_PERCENT = 0.05
-"""Less of either is not worth a place."""
+"""Least queueing delay and least loss that are shown."""
 _LONGEST_NAME = 12
-"""An object with a longer name is shown without it."""
+"""Longest name of an object that is shown, in columns."""
 
 _Fact = tuple[int, str]
 """(importance, text): 0 is the most important."""
 
 
 def live_line(view: LiveView, width: int) -> str:
-    """`view` in at most `width` columns: all facts, closer together where it is tight, or those that have room."""
+    """Write `view` in at most `width` columns: all facts, with less space if needed, or the important ones."""
     facts = _facts(view)
     for between in (_BETWEEN, " "):
         line = _BETWEEN.join((facts[0][1], between.join(text for _, text in facts[1:])))
@@ -34,7 +34,7 @@ def live_line(view: LiveView, width: int) -> str:
 
 
 def millimetres(value_mm: float | None, space: str = " ") -> str:
-    """A distance, in metres from one metre on; nothing is nearer than 0."""
+    """Write a distance, in metres from one metre on; negative ones as 0."""
     if (known_mm := number(value_mm)) is None:
         return f"{UNKNOWN}{space}mm"
     known_mm = max(0.0, known_mm)
@@ -42,7 +42,7 @@ def millimetres(value_mm: float | None, space: str = " ") -> str:
 
 
 def percent(share: float | None, digits: int = 0) -> str:
-    """A share without its sign for per cent."""
+    """Write a share as per cent, without the sign."""
     return f"{UNKNOWN:>{digits}}" if share is None else f"{100.0 * share:{digits}.0f}"
 
 

@@ -1,4 +1,4 @@
-"""A run as a few lines for a file: one whenever something changed that a person cares about, and else none."""
+"""Story of a run for a file: one line for each change that matters to a person."""
 
 import math
 from collections.abc import Mapping
@@ -11,13 +11,13 @@ from common.command.words import printable
 from common.status.codes import LinkState
 
 SHORTEST_GAP_S = 0.4
-"""Between two lines, so that what goes to and fro is not told each time; an alarm does not wait."""
+"""Least time between two lines, in seconds: rapid changes to and fro give no lines; an alarm does not wait."""
 _APART_AGAIN_MM = 8.0
-"""What was touched is touched until it is so far away: perception has an error of millimetres."""
+"""Distance at which a touch ends, in millimetres: hysteresis for millimetres of perception error."""
 
 
 class Resistance(IntEnum):
-    """How much a trigger resists, in three words."""
+    """Resistance of a trigger in three levels."""
 
     NONE = 0
     SOME = 1
@@ -25,38 +25,38 @@ class Resistance(IntEnum):
 
 
 def next_resistance(before: Resistance, stiffness: float) -> Resistance:
-    """The word for a stiffness of 0 to 1, with hysteresis: none below 0.01, some from 0.05, full from 0.95 to 0.85."""
+    """Return the level of a stiffness, 0 to 1, with hysteresis: none below 0.01, some from 0.05, full 0.95 to 0.85."""
     if stiffness >= (0.85 if before is Resistance.FULL else 0.95):
         return Resistance.FULL
     return Resistance.SOME if stiffness >= (0.05 if before is Resistance.NONE else 0.01) else Resistance.NONE
 
 
 class _State(NamedTuple):
-    """What is worth a line when it changes."""
+    """State whose changes are reported."""
 
     phase: str = ""
     reason: str | None = None
     linked: bool = False
     armed: bool = False
     felt: tuple[Resistance, ...] = (Resistance.NONE, Resistance.NONE)
-    """Of L2 and of R2"""
+    """Resistance of L2 and of R2"""
     touched: str | None = None
     holding: str | None = None
     stands: str = ""
 
 
 class Story:
-    """Remembers what has been told."""
+    """Story of a run; remembers the reported state."""
 
     def __init__(self) -> None:
         self._state = self._told = _State()
         self._start_s: float | None = None
         self._told_s = -math.inf
         self._peaks = {"L2": 0.0, "R2": 0.0}
-        """The most that each trigger resisted since it last yielded."""
+        """Largest stiffness of each trigger since it last yielded."""
 
     def tell(self, now_s: float, view: LiveView) -> str | None:
-        """A line with what is new at `now_s` and the time since the first call; None while there is nothing."""
+        """Return a line with the news at `now_s` and the time since the first call; None without news."""
         if self._start_s is None:
             self._start_s = now_s
         for trigger in view.triggers:
@@ -106,7 +106,7 @@ def _news(told: _State, state: _State, view: LiveView, peaks: Mapping[str, float
 
 
 def _resistance(trigger: TriggerView, before: Resistance, after: Resistance, peak: float, haptics: bool) -> str:
-    """What a finger on the trigger notices; without haptics, what it would."""
+    """Describe the change that a finger on the trigger feels; without haptics, would feel."""
     would, s = ("", "s") if haptics else ("would ", "")
     if after is Resistance.NONE:
         return f"{trigger.name} {would}yield{s} freely, after up to {percent(peak)} %"

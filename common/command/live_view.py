@@ -1,7 +1,6 @@
-"""A run as people see it: the statuses of one side or both, and the state in words.
+"""View of a run for people: the statuses of one side or both, and the state in words.
 
-`live_line` writes it for a terminal, `live_story` for a file. All distances are perceived ones, never the simulation's
-truth.
+`live_line` writes it for a terminal, `live_story` for a file. Distances are perceived, never the simulation's truth.
 """
 
 from typing import NamedTuple
@@ -12,21 +11,21 @@ from common.status.statuses import OperatorStatus, RobotStatus
 
 _LARGEST = 1e300
 SLOW = 0.9
-"""A simulation below this share of real time is said to be slow."""
+"""Share of real time below which a simulation is called slow."""
 
 
 class TriggerView(NamedTuple):
-    """One trigger of the controller; None is not known."""
+    """Trigger of the controller; None is unknown."""
 
     name: str
     pulled: float | None
     """Calibrated travel, 0 to 1."""
     resists: float | None
-    """Stiffness, 0 to 1; 0 while the arm is not armed, as the trigger is free then."""
+    """Stiffness, 0 to 1; 0 while the arm is not armed, because the trigger is free then."""
 
 
 class LiveView:
-    """One moment; a side that says nothing knows nothing."""
+    """View of one moment; the fields of a missing status are unknown."""
 
     def __init__(self, robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> None:
         facts, first = phase_of(robot, operator), operator or robot
@@ -34,7 +33,7 @@ class LiveView:
         self.phase, self.reason = phase_words(facts, first)
         self.robot, self.operator = robot or RobotStatus(), operator or OperatorStatus()
         self.side, self.scene = first or self.operator, robot or self.operator
-        """Who knows it better: of controller and link, and of what is ahead and in the hand."""
+        """Better source: `side` for controller and link, `scene` for the objects ahead and in the hand."""
         side, free = self.side, self.side.state not in (None, "armed")
         self.armed = side.state == "armed"
         self.triggers = (
@@ -43,10 +42,10 @@ class LiveView:
         )
         held = self.scene.holding
         self.holding = printable(held) if isinstance(held, str) else "something" if held else None
-        """What is between the fingers."""
+        """Object between the fingers."""
         self.stands = ", it stands" if self.scene.stands else ""
 
 
 def number(value: float | None) -> float | None:
-    """Return a finite number; None for everything else."""
+    """Return a finite number unchanged; None for all else."""
     return value if value is not None and -_LARGEST < value < _LARGEST else None

@@ -1,4 +1,4 @@
-"""A stream that holds nobody up while its context is open: a reader that stalls loses what does not fit."""
+"""Output stream that never blocks while its context is open: a stalled reader loses texts that do not fit."""
 
 import contextlib
 import io
@@ -10,18 +10,18 @@ from collections.abc import Callable
 from typing import Final, TextIO
 
 _WAITING: Final = 64
-"""Texts that wait for a reader; the oldest is dropped for one more."""
+"""Number of texts that may wait; the oldest is dropped for another."""
 _END_S: Final = 0.5
-"""The context's end waits so long for the last of them."""
+"""Longest wait of the context's end for the last text, in seconds."""
 
 
 class PatientOutput(io.TextIOBase):
-    """Writes to a stream by a thread of its own while the context is open, and directly after it.
+    """Stream that is written by a thread while the context is open, and directly after it.
 
-    Results are written after it: behind all that waits, and for as long as the reader takes. A reader that has gone is
-    told within the context only, by the first write that comes later: there it ends a run.
+    Results are written after it: behind all waiting texts, at the reader's speed. The end of the reader raises an
+    error only within the context, at a later write: there it ends a run.
 
-    The stream's buffer is not used: a flush of it at the end would wait for the thread.
+    The stream's buffer is not used: a flush at the end would wait for the thread.
     """
 
     def __init__(self, stream: TextIO | None) -> None:
@@ -31,7 +31,7 @@ class PatientOutput(io.TextIOBase):
         self._failure: Exception | None = None
         self._open = False
         self._waiting: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-        # A daemon: a write that never returns must not keep the process from ending.
+        # A daemon: a write that never returns must not keep the process alive.
         self._thread = threading.Thread(target=self._write_on, daemon=True, name="output")
 
     def __enter__(self) -> "PatientOutput":
@@ -48,15 +48,15 @@ class PatientOutput(io.TextIOBase):
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
-        """The stream's."""
+        """Encoding of the stream."""
         return getattr(self._stream, "encoding", None) or "utf-8"
 
     def isatty(self) -> bool:
-        """Whether a person reads it."""
+        """Return whether the stream is a terminal."""
         return self._stream is not None and self._stream.isatty()
 
     def write(self, text: str) -> int:
-        """Have it written whole, or dropped; once, the error of an earlier one, after which all is dropped."""
+        """Queue a text to be written whole or dropped. Raises an earlier write's error once; then all is dropped."""
         if self._open:
             if self._waiting.qsize() >= _WAITING:
                 with contextlib.suppress(queue.Empty):
@@ -86,21 +86,21 @@ class PatientOutput(io.TextIOBase):
 
 
 def _sink(stream: TextIO | None) -> Callable[[str], object]:
-    """Make what writes a text to `stream` at once."""
+    """Return a function that writes a text to `stream` at once."""
     if stream is None:
         return len
     try:
         stream.flush()
         descriptor = stream.fileno()
     except io.UnsupportedOperation:
-        return stream.write  # in memory, where nothing stalls
+        return stream.write  # in memory, which never stalls
 
     def write(text: str) -> None:
         left = text.encode(stream.encoding, stream.errors or "strict")
         while left:
             try:
                 left = left[os.write(descriptor, left) :]
-            except BlockingIOError:  # another program that has it, too, wants no write to wait
+            except BlockingIOError:  # another program with the same file has made it non-blocking
                 select.select([], [descriptor], [])
 
     return write

@@ -1,4 +1,4 @@
-"""A live line for people, a story in a file, or a line of JSON at a time for the program that started us."""
+"""Status output: a live line for people, a story in a file, or JSON lines for programs."""
 
 import json
 import sys
@@ -25,14 +25,14 @@ _LINES_OF_JSON = ("json", "facts")
 
 class _Console(Console):
     def on_broken_pipe(self) -> None:
-        """Leave it to the command what follows: Rich would end the process with code 1."""
+        """Raise the error for the command to handle: Rich would end the process with code 1."""
         raise  # noqa: PLE0704  # called where the BrokenPipeError is handled
 
 
 class Status:
-    """Shows a status a few times a second; errors go elsewhere, always to standard error.
+    """Output of a status a few times a second; errors always go to standard error.
 
-    Nothing waits for the reader: what one that stalls has no room for is dropped. A note after the context is
+    Nothing waits for the reader: texts that a stalled reader has no room for are dropped. A note after the context is
     a result, which waits for its reader.
     """
 
@@ -45,7 +45,7 @@ class Status:
         self._story = Story()
         self._next_s = -1.0
         self.also: Callable[[str], None] | None = None
-        """A second place that each note goes to"""
+        """Second receiver of each note"""
 
     def __enter__(self) -> "Status":
         self._output.__enter__()
@@ -55,7 +55,7 @@ class Status:
                 auto_refresh=False,
                 transient=False,
                 redirect_stdout=False,
-                redirect_stderr=False,  # errors are not dropped, as the line may be
+                redirect_stderr=False,  # unlike the line, errors are never dropped
             )
             self._live.start()
         return self
@@ -69,15 +69,15 @@ class Status:
 
     @property
     def wants_facts(self) -> bool:
-        """Whether `show_facts` shows anything: they take longer to put together than a status."""
+        """Whether `show_facts` shows anything: facts take longer to make than a status."""
         return self._mode == "facts"
 
     def due(self, now_s: float) -> bool:
-        """Whether `show` would show anything; building the values costs time in a tick."""
+        """Return whether `show` would show anything; the values cost time in a tick."""
         return self._mode != "none" and now_s >= self._next_s
 
     def show(self, now_s: float, *, robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> None:
-        """Show it at most five times a second, ten with facts; BrokenPipeError, once, when the reader left."""
+        """Show a status, at most five times a second, ten with facts; raises BrokenPipeError once if the pipe broke."""
         if not self.due(now_s):
             return
         self._next_s = now_s + (_FACTS_PERIOD_S if self.wants_facts else _PERIOD_S)
@@ -86,7 +86,7 @@ class Status:
             return
         view = LiveView(robot, operator)
         if self._live is not None:
-            # The last column stays free: some terminals break the line as soon as it is written to.
+            # The last column stays free: some terminals break the line when it is filled.
             text = live_line(view, self._console.width - 1)
             style = "bold red" if view.alarm else ""
             self._live.update(Text(text, style=style, overflow="crop", no_wrap=True), refresh=True)
@@ -94,7 +94,7 @@ class Status:
             self._output.write(f"{told}\n")
 
     def show_facts(self, facts: Any) -> None:
-        """All that is known of one moment, a struct, at once."""
+        """Write the facts of one moment, a struct, at once."""
         if self._mode == "facts":
             self._write({"event": "facts", "facts": facts})
 
@@ -103,13 +103,13 @@ class Status:
         self._output.write(msgspec.json.encode(event).decode() + "\n")
 
     def event(self, kind: str, **values: str | int) -> bool:
-        """One line of JSON, at once; False outside the modes for programs, where it says nothing."""
+        """Write one line of JSON at once; outside the modes for programs do nothing and return False."""
         if self._mode in _LINES_OF_JSON:
             self._output.write(json.dumps({"event": kind, **values}) + "\n")
         return self._mode in _LINES_OF_JSON
 
     def note(self, text: str) -> None:
-        """A line that stays, for people; an event of its own in the modes for programs."""
+        """Write a line that stays, for people; in the modes for programs a separate event."""
         if self.also is not None:
             self.also(text)
         if self._mode in _LINES_OF_JSON:

@@ -1,4 +1,4 @@
-"""SIGINT and SIGTERM as a flag that the main loop reads, so that every exit goes the same clean way."""
+"""Stop signals as a flag that the main loop reads, so that every exit is clean."""
 
 import os
 import select
@@ -12,12 +12,12 @@ from common.errors import ConfigurationError
 from common.files.output_file import write_json
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""A closed terminal, too: a controller must not be left with stiff triggers."""
+"""Signals that end a run, also a closed terminal: a controller must not keep stiff triggers."""
 _NEVER_BEGAN: Final = {"duration_s": 0.0, "ticks": 0, "stops": [], "errors": []}
 
 
 class StopSignal:
-    """Set by SIGINT or SIGTERM while the context is open; the old handlers come back after it."""
+    """Flag that STOP_SIGNALS set while the context is open; the old handlers are restored after it."""
 
     def __init__(self) -> None:
         self.is_set = False
@@ -36,27 +36,27 @@ class StopSignal:
 
 
 def ignore_broken_output() -> None:
-    """After a reader of our standard output went away: keep the interpreter's last flush from complaining."""
+    """Prevent an error of the interpreter's last flush, after the reader of standard output has ended."""
     sys.stdout = None
 
 
 def say_output_failed(program: str, error: OSError) -> int:
-    """After our standard output could not be written, as on a full disk: one line, and the exit code."""
+    """Report in one line that standard output cannot be written, as on a full disk; return the exit code."""
     ignore_broken_output()
     sys.stderr.write(f"{program}: the output cannot be written: {error.strerror}; valid: a place with room for it\n")
     return 1
 
 
 class LeavingAtOnce:
-    """Lets a stop signal end the process on the spot, with code 0, until a `StopSignal` opens.
+    """Handler that ends the process at once on a stop signal, with code 0, until a `StopSignal` opens.
 
-    An exception could be caught by a module that is half imported, or lost in a compiler's callback, and the process
-    would go on.
+    An exception could be caught by a half-imported module, or lost in a compiler's callback, and the process would
+    continue.
     """
 
     def __init__(self, summary: str | Path | None = None) -> None:
         self.summary = summary
-        """File for the summary of a run that never began; None once it has begun"""
+        """File for the summary of a run that never began; None after its begin"""
         for number in STOP_SIGNALS:
             signal.signal(number, self._leave)
 

@@ -1,4 +1,4 @@
-"""Codes in words, for a terminal and a log: the only place that makes sentences of a status."""
+"""Words for codes, for a terminal and a log: the only place that puts a status in sentences."""
 
 from enum import StrEnum
 from typing import Final
@@ -11,12 +11,12 @@ _LOST: Final = "nothing heard from the {}"
 
 
 def words(code: StrEnum | str | None) -> str:
-    """A code in words; empty for none."""
+    """Return a code in words; empty for none."""
     return "" if code is None else str(code).replace("_", " ")
 
 
 def phase_words(facts: PhaseFacts, side: RobotStatus | OperatorStatus | None) -> tuple[str, str | None]:
-    """The phase, in capitals for an alarm, and the reason; None for none. side: whose link it is about."""
+    """Return the phase, in capitals for an alarm, and the reason or None. side: owner of the link."""
     said, reason = words(facts.doing or facts.phase), facts.reason
     if facts.phase in (Phase.WAITING, Phase.OBSERVING):
         said = link_words(side)
@@ -26,7 +26,7 @@ def phase_words(facts: PhaseFacts, side: RobotStatus | OperatorStatus | None) ->
 
 
 def link_words(side: RobotStatus | OperatorStatus | None) -> str:
-    """The link in words, without a reason."""
+    """Return the link's state in words, without a reason."""
     if side is None:
         return ""
     if side.link is LinkState.WAITING:
@@ -37,5 +37,5 @@ def link_words(side: RobotStatus | OperatorStatus | None) -> str:
 
 
 def printable(text: str) -> str:
-    """Put a question mark for each sign that cannot be printed, such as a terminal's control characters."""
+    """Replace each unprintable character, such as a terminal's control characters, by a question mark."""
     return text if text.isprintable() else "".join(sign if sign.isprintable() else "?" for sign in text)

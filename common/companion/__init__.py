@@ -1,1 +1,1 @@
-"""A process of ours beside a side's own, which it never waits for: cameras, a console, a recorder."""
+"""Processes besides a side's, for which it never waits: cameras, a console, a recorder."""

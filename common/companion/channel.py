@@ -1,6 +1,6 @@
-"""Messages between two processes of one machine, over a stream socket: neither ever waits for the other.
+"""Channel of messages between two processes of one machine, over a stream socket: neither waits for the other.
 
-A message is a few bytes of length and its bytes. What does not fit into the bounded queue is refused whole.
+A message is a length and its bytes. A message that does not fit into the bounded queue is refused whole.
 """
 
 import contextlib
@@ -12,32 +12,32 @@ from typing import Final
 _LENGTH: Final = struct.Struct("<I")
 _AT_ONCE: Final = 1 << 18
 MESSAGE_LIMIT_BYTES: Final = 1 << 26
-"""A longer one means that what comes is not ours."""
+"""Longest message, in bytes; a longer one means that the sender is not ours."""
 
 
 class Channel:
-    """One end. Whoever waits for it waits for `fileno` and, while `waiting`, until it can be written to."""
+    """One end of the channel. To wait for it, select `fileno` for reading and, while `waiting`, for writing."""
 
     def __init__(self, part: socket.socket, room_bytes: int = 1 << 23) -> None:
-        """`room_bytes`: so much may wait here to be sent, beside what the system's own buffer takes."""
+        """`room_bytes`: capacity of the send queue, besides the system's buffer."""
         part.setblocking(False)
         for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
             part.setsockopt(socket.SOL_SOCKET, option, _AT_ONCE)
         self.ended = False
-        """Whether the other end is gone: nothing is sent any more, and what has arrived is the last."""
+        """Whether the other end is gone: no more messages are sent or arrive."""
         self._part = part
         self._room_bytes = room_bytes
         self._waiting: deque[memoryview] = deque()
         self.waiting = 0
-        """Bytes that have not left yet."""
+        """Number of bytes that have not left yet."""
         self._begun = bytearray()
 
     def fileno(self) -> int:
-        """To wait for it."""
+        """Return the socket's descriptor."""
         return self._part.fileno()
 
     def send(self, *parts: bytes) -> bool:
-        """Send `parts` as one message, now or in a later call; False when there is no room for it."""
+        """Send `parts` as one message, now or in a later call; return False if there is no room."""
         self.flush()
         length = sum(map(len, parts))
         if length > MESSAGE_LIMIT_BYTES:
@@ -52,7 +52,7 @@ class Channel:
         return True
 
     def flush(self) -> None:
-        """Let leave what can leave now."""
+        """Send as much as the socket takes now."""
         waiting = self._waiting
         while waiting and not self.ended:
             try:
@@ -71,7 +71,7 @@ class Channel:
                 sent -= len(first)
 
     def receive(self) -> list[bytes]:
-        """What has arrived whole, oldest first; at most one read of the system's buffer, so that none holds us."""
+        """Return the complete messages, oldest first. Reads the system's buffer once: a fast sender cannot block us."""
         self.flush()
         try:
             arrived = self._part.recv(_AT_ONCE)
@@ -103,7 +103,7 @@ class Channel:
         self.waiting = 0
 
     def close(self) -> None:
-        """End it; the other end notices."""
+        """Close this end; the other end notices."""
         self._end()
         with contextlib.suppress(OSError):
             self._part.close()

@@ -1,4 +1,4 @@
-"""Start a companion and end it; what a companion does first."""
+"""Start and end of a companion, on both ends."""
 
 import signal
 import socket
@@ -13,7 +13,7 @@ _END_LIMIT_S: Final = 2.0
 
 
 class Companion:
-    """A Python process of ours at the other end of `channel`: it ends when the channel does, however we end."""
+    """Python process at the other end of `channel`: it ends with the channel, however we end."""
 
     def __init__(
         self,
@@ -22,7 +22,7 @@ class Companion:
         room_bytes: int = 1 << 23,
         output: int = subprocess.DEVNULL,
     ) -> None:
-        """Run `module`, whose main function calls `companion_channel`; its errors go where ours go.
+        """Run `module`, whose main function calls `companion_channel`; both processes share standard error.
 
         `output`: a descriptor of ours that becomes its standard output.
         """
@@ -34,19 +34,19 @@ class Companion:
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
                 stdout=output,
-                # Ctrl-C reaches us alone.
+                # Ctrl-C reaches only us.
                 start_new_session=True,
             )
         self.channel = Channel(ours, room_bytes)
 
     @property
     def process_id(self) -> int:
-        """The operating system's number for it."""
+        """Process id."""
         return self._process.pid
 
     @property
     def running(self) -> bool:
-        """Whether it has not ended yet."""
+        """Whether the process has not ended yet."""
         return self._process.poll() is None
 
     def __enter__(self) -> Self:
@@ -56,9 +56,9 @@ class Companion:
         self.close()
 
     def close(self, limit_s: float = _END_LIMIT_S) -> bool:
-        """Close the channel and wait for its end, `limit_s` at most, before it is killed; whether it ended by itself.
+        """Close the channel, wait `limit_s` for the process, then kill it; return whether it ended by itself.
 
-        What has not left yet is lost: whoever minds calls `channel.flush` until nothing waits.
+        Waiting bytes are lost; to send them first, call `channel.flush` until nothing waits.
         """
         self.channel.close()
         try:
@@ -71,7 +71,7 @@ class Companion:
 
 
 def companion_channel(arguments: Sequence[str], room_bytes: int = 1 << 23) -> tuple[Channel, list[str]]:
-    """In the companion: its end of the channel, and the arguments after it. It outlives signals, not the channel."""
+    """Return the companion's end of the channel and the other arguments; from now on stop signals are ignored."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     return Channel(socket.socket(fileno=int(arguments[0])), room_bytes), list(arguments[1:])

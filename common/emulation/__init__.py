@@ -1,1 +1,1 @@
-"""A bad link, in the words of netem: profiles, and the line that carries them out."""
+"""Emulated links, in netem's words: profiles, and the delay line that applies them."""

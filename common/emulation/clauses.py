@@ -1,4 +1,4 @@
-"""The clauses of a link profile that are more than a number: frozen and validated."""
+"""Clauses of a link profile that are more than a number: frozen and validated."""
 
 import math
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from common.limits import Limited, Share, check_limits
 LinkModel = Literal["datagram", "stream"]
 
 QUEUE_LIMIT = 1000
-"""netem's own limit, in messages: what comes on top is dropped."""
+"""netem's default limit of the queue, in messages: surplus ones are dropped."""
 
 
 @dataclass(frozen=True)
 class Chance(Limited):
-    """Something that happens to a share of the messages."""
+    """Probability of an event per message, with netem's correlation."""
 
     share: Share
     correlation: Share = 0.0
@@ -24,25 +24,25 @@ class Chance(Limited):
 
 @dataclass(frozen=True)
 class Rate(Limited):
-    """A bottleneck that takes one message after the other."""
+    """Bottleneck that sends one message after the other."""
 
     bits_per_second: Annotated[float, Meta(ge=1.0)]
     overhead_bytes: int = 0
-    """On each message, such as headers; negative takes away."""
+    """Bytes added to each message, such as headers; negative ones are subtracted."""
 
     def transmission_s(self, size_bytes: int) -> float:
-        """How long a message of `size_bytes` takes."""
+        """Return the transmission time of `size_bytes`, in seconds."""
         return 8.0 * max(0, size_bytes + self.overhead_bytes) / self.bits_per_second
 
 
 @dataclass(frozen=True)
 class Outage:
-    """A time without a link, counted from the line's start."""
+    """Time without a link, counted from the line's start."""
 
     duration_s: Annotated[float, Meta(gt=0.0)]
     at_s: Annotated[float, Meta(ge=0.0)]
     every_s: float | None = None
-    """The period with which it comes again; None: once."""
+    """Period of repetition; None: once."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -50,7 +50,7 @@ class Outage:
             raise ValueError(f"every {self.every_s} s; valid: longer than the {self.duration_s:g} s that it lasts")
 
     def end_s(self, elapsed_s: float) -> float | None:
-        """When the outage ends in which `elapsed_s` lies, both since the line's start; None outside of any."""
+        """Return the end of the outage that contains `elapsed_s`, both since the line's start; None outside of any."""
         since_s = elapsed_s - self.at_s
         if since_s < 0.0:
             return None

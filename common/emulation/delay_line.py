@@ -1,4 +1,4 @@
-"""The delay line: does to messages what a profile says."""
+"""Delay line: applies a profile to messages."""
 
 import heapq
 import math
@@ -24,11 +24,11 @@ _MOST_OUTAGES_ON_END = 1000
 
 
 class DelayLine(Generic[Item]):
-    """Takes messages in, and gives them out when they are due: fewer, more, altered or in another order.
+    """Delay line: returns messages when they are due, with losses, copies, corruption and reordering.
 
-    The order of events is netem's: duplicate, lose, corrupt, drop what exceeds the limit, delay. A copy goes
-    first, and through all of it by itself. It never runs by itself: ask `next_due` when to call `pop`. The same
-    profile, pushes and times give the same deliveries.
+    The order of events is netem's: duplicate, lose, corrupt, drop beyond the limit, delay. A copy goes first, through
+    all events by itself. The line has no thread: ask `next_due` when to call `pop`. The same profile, pushes and
+    times give the same deliveries.
     """
 
     def __init__(
@@ -36,21 +36,21 @@ class DelayLine(Generic[Item]):
     ) -> None:
         """Outages count from `start_s`, by default from the first push.
 
-        `corrupt` turns over one bit of an item by means of the function that it is given; it is needed where
-        the profile corrupts and the items are not bytes.
+        `corrupt` flips one bit of an item by the function that it receives; needed if the profile corrupts items that
+        are not bytes.
         """
         self.figures = LinkFigures(profile.seed)
-        """Everything that has happened so far."""
+        """Counts and statistics up to now."""
         self._start_s = start_s
         self._corrupt = corrupt
         self._queue: list[tuple[float, int, Item, float, int, int, bool]] = []
-        """Messages by due time and order of arrival."""
+        """Heap of messages by due time and order of arrival."""
         self._entered = 0
         self._last_due_s = -math.inf
         self._follow(profile)
 
     def change(self, profile: LinkProfile) -> None:
-        """From the next push on do what `profile` says; what waits leaves when it was due, and the figures go on."""
+        """Apply `profile` from the next push on; waiting messages keep their due times, and the figures continue."""
         if profile != self.profile:
             self._follow(profile)
 
@@ -65,7 +65,7 @@ class DelayLine(Generic[Item]):
         self._recovery_s = profile.recovery_s() if self._in_order else 0.0
 
         def generator(number: int) -> np.random.Generator:
-            # One for each mechanism: to add loss changes no delay.
+            # One for each mechanism: adding loss changes no delay.
             return np.random.default_rng(np.random.SeedSequence(profile.seed, spawn_key=(number,)))
 
         def chances(chance: Chance | None, number: int) -> Iterator[bool] | None:
@@ -82,10 +82,10 @@ class DelayLine(Generic[Item]):
         self._lost_again = decisions(generator(7), profile.retransmitted_share())
 
     def push(self, now_s: float, item: Item, size_bytes: int | None = None) -> None:
-        """Take `item` in at `now_s`; its size, which `rate` needs, is that of its bytes unless it is given.
+        """Add `item` at `now_s`; `size_bytes`, which `rate` needs, defaults to the length of bytes.
 
-        ValueError for a time that is not finite, a negative size, an unknown size where a rate needs it, and
-        an item that is to be corrupted but is not bytes.
+        Raises ValueError for a time that is not finite, a negative size, a missing size with a rate, and an item that
+        is to be corrupted but is not bytes.
         """
         if not math.isfinite(now_s):
             raise ValueError(f"now_s = {now_s}; valid: finite seconds")
@@ -110,9 +110,9 @@ class DelayLine(Generic[Item]):
             self._push_datagram(now_s, item, number, size_bytes)
 
     def pop(self, now_s: float) -> list[Item]:
-        """Everything due by `now_s`, in order of due time; at the same due time, in order of `push`.
+        """Return the items due by `now_s`, in order of due time, and of `push` at the same due time.
 
-        ValueError for a time that is not finite.
+        Raises ValueError for a time that is not finite.
         """
         if not math.isfinite(now_s):
             raise ValueError(f"now_s = {now_s}; valid: finite seconds")
@@ -125,22 +125,22 @@ class DelayLine(Generic[Item]):
         return due
 
     def next_due(self) -> float | None:
-        """When the next message is due, in seconds on the clock of `push`; None while nothing waits."""
+        """Return when the next message is due, in seconds on the clock of `push`; None while nothing waits."""
         return self._queue[0][0] if self._queue else None
 
     def backlog_s(self, now_s: float) -> float:
-        """Time that a message pushed now would wait for a rate, beyond its delay."""
+        """Return the queueing delay, in seconds, that a message pushed now would get from the rate."""
         if self._rate is None:
             return 0.0
         return max(0.0, self._last_due_s - now_s - self._mean_delay_s)
 
     @property
     def waiting(self) -> int:
-        """Messages that are not due yet."""
+        """Number of messages that are not due yet."""
         return len(self._queue)
 
     def summary(self) -> dict[str, Any]:
-        """`asked`, in the grammar's words, with model and seed, and what was `achieved`."""
+        """Return the profile `asked`, in the grammar's words, with model and seed, and the figures `achieved`."""
         return {
             "asked": self.profile.words,
             "model": self.profile.model,
@@ -163,7 +163,7 @@ class DelayLine(Generic[Item]):
         if lost and not doubled:
             self.figures.lost += 1
             return
-        # Doubled and lost at once leaves the one message that there was.
+        # Duplicated and lost at once leaves one message.
         if doubled and not lost and not (self._losses is not None and next(self._losses)):
             self.figures.duplicated += 1
             self._admit(now_s, item, number, size_bytes, traced_s, copy=True)
@@ -198,7 +198,7 @@ class DelayLine(Generic[Item]):
         while missing and tries < _MOST_RETRANSMISSIONS:
             tries += 1
             sent_s = self._after_outage_s(sent_s + self._recovery_s)
-            # A round trip later a burst of loss is over: the long-run share counts.
+            # A round trip later a burst of loss is over: use the long-run share.
             missing = next(self._lost_again)
         self.figures.retransmitted += tries
         due_s = max(self._due_s(sent_s, size_bytes, traced_s), self._last_due_s)
@@ -236,7 +236,7 @@ class DelayLine(Generic[Item]):
         )
 
     def _outage_end_s(self, now_s: float) -> float | None:
-        """When the outages end in which `now_s` lies; None outside of any."""
+        """Return the end of the outages that contain `now_s`; None outside of any."""
         start_s = self._start_s
         if not self._outages or start_s is None:
             return None
@@ -244,7 +244,7 @@ class DelayLine(Generic[Item]):
         return start_s + max(ends_s) if ends_s else None
 
     def _after_outage_s(self, now_s: float) -> float:
-        # One outage may end within another, and that within the next time of the first.
+        # One outage may end within another, and that within the first one's next repetition.
         for _ in range(_MOST_OUTAGES_ON_END):
             if (end_s := self._outage_end_s(now_s)) is None or end_s <= now_s:
                 break
@@ -261,7 +261,7 @@ def _endless_delays(profile: LinkProfile, generator: np.random.Generator) -> Ite
 
 
 def link_summary(direction: Direction, lines: Mapping[Stream, DelayLine[Any]]) -> dict[str, Any]:
-    """The `link` of a summary: what was asked and achieved, under `to_robot` for haptics, else `to_robot.video`."""
+    """Return the `link` of a summary: asked and achieved, by direction for haptics, else such as `to_robot.video`."""
     return {
         direction if stream == "haptics" else f"{direction}.{stream}": line.summary() for stream, line in lines.items()
     }

@@ -1,4 +1,4 @@
-"""The figures of an emulated link, as measured, to stand beside the words that asked for it."""
+"""Measured figures of an emulated link, to compare with the profile that was asked for."""
 
 from typing import Any, Final
 
@@ -12,23 +12,23 @@ class LinkFigures:
 
     def __init__(self, seed: int = 0) -> None:
         self.sent = 0
-        """Messages taken in."""
+        """Messages pushed."""
         self.delivered = 0
-        """Messages given out, copies included."""
+        """Messages delivered, copies included."""
         self.lost = 0
-        """By the loss model, or by the trace."""
+        """Messages lost by the loss model or the trace."""
         self.outage = 0
-        """Lost because of an outage."""
+        """Messages lost in an outage."""
         self.held = 0
-        """In a stream, held back by an outage until its end."""
+        """Messages of a stream that an outage held back until it ended."""
         self.dropped = 0
-        """Because too many were waiting."""
+        """Messages dropped because the queue was full."""
         self.duplicated = 0
         """Copies made."""
         self.corrupted = 0
-        """Messages with a bit turned over; in a stream, found corrupt and sent again."""
+        """Messages with a flipped bit; in a stream, found corrupt and sent again."""
         self.retransmitted = 0
-        """In a stream, sendings on top of the first."""
+        """Retransmissions in a stream."""
         self.late = 0
         """Messages overtaken by a later one (RFC 4737, type-P-reordered)."""
         self._delay = RunningStatistics(seed)
@@ -43,7 +43,7 @@ class LinkFigures:
     def add_delivered(
         self, now_s: float, sent_s: float, due_s: float, number: int, size_bytes: int, *, copy: bool
     ) -> None:
-        """A message that entered as number `number` at `sent_s` leaves at `now_s`, having been due at `due_s`."""
+        """Count the message `number`, pushed at `sent_s`, due at `due_s` and delivered at `now_s`."""
         self._delay.add(now_s - sent_s)
         self._release_error.add(now_s - due_s)
         if not self.delivered:
@@ -61,14 +61,14 @@ class LinkFigures:
             self._newest = number
 
     def achieved(self) -> dict[str, Any]:
-        """The figures by name, in the units of their names; None where there is nothing to tell yet.
+        """Return the figures by name, in the units of their names; None without data.
 
-        `delay_ms` and the rate are of what was delivered, as the receiver's end of the link saw it, and so
-        include how late the process released it: `release_error_us`. `loss_share` is of all that was sent and
-        copied, the other shares are of what was delivered.
+        `delay_ms` and the rate describe delivered messages at the receiver's end, and so include how late the process
+        released them: `release_error_us`. `loss_share` refers to all messages sent and copied, the other shares to
+        those delivered.
         """
         span_s = self._last_delivered_s - self._first_delivered_s
-        # The first message opens the span, and its bits came before it.
+        # The first message's bits came before the span, which it opens.
         bits = 8.0 * (self._delivered_bytes - self._last_bytes)
         gone = self.lost + self.dropped + self.outage
         entered = self.sent + self.duplicated
@@ -86,7 +86,7 @@ class LinkFigures:
 
 
 def report_lines(link: dict[str, Any]) -> list[str]:
-    """A line of text for each line of a summary's `link`: what was asked, and what was achieved."""
+    """Return a line of text for each entry of a summary's `link`: asked and achieved."""
     return [
         f"link {name}: asked {one['asked'] or 'no delay'}; {_achieved(one['achieved'])}" for name, one in link.items()
     ]

@@ -1,4 +1,4 @@
-"""netem's grammar for a link profile, with clauses of our own for traces, outages and retransmission."""
+"""Grammar of a link profile: netem's, with additional clauses for traces, outages and retransmission."""
 
 import shlex
 from collections.abc import Callable
@@ -24,13 +24,13 @@ GRAMMAR = {
     "outage": "outage DURATION at TIME [every TIME]",
     "retransmit": "retransmit TIME",
 }
-"""Each clause with its form; they may stand in any order, each once (outage: as often as there are any)."""
+"""Form of each clause; in any order, each at most once, except outage."""
 
 _Value = TypeVar("_Value")
 
 
 class _Words:
-    """The words of a specification, read one after the other."""
+    """Reader of a specification's words."""
 
     def __init__(self, profile: str, spec: str) -> None:
         self.spec = spec
@@ -56,13 +56,13 @@ class _Words:
         return bool(word) and (word or "")[0] in "0123456789+-." and (word or "").endswith("%") is percent
 
     def value(self, read: Callable[[str, str], _Value], clause: str, name: str) -> _Value:
-        """The next word as `read` understands it."""
+        """Read the next word by `read`."""
         if (word := self.take()) is None:
             raise self.error(f"{clause!r} without {name}", clause)
         return read(word, f"link {self.spec!r}: {name}")
 
     def shares(self, clause: str, names: list[str]) -> list[float]:
-        """The first percentage, and those of the others that follow."""
+        """Read the first percentage, and as many of the others as follow."""
         shares = [self.value(parse_share, clause, names[0])]
         for name in names[1:]:
             if not self.number_follows(percent=True):
@@ -78,7 +78,7 @@ class _Words:
 def read_fields(profile: str, spec: str, model: LinkModel) -> dict[str, Any]:
     """Read the fields of `LinkProfile` from `profile`, which is `spec` or a clause of it.
 
-    ConfigurationError, in one line that quotes `spec`, for what no profile can be.
+    Raises ConfigurationError, in one line that quotes `spec`, for an invalid profile.
     """
     words = _Words(profile, spec)
     settings: dict[str, Any] = {}
@@ -87,7 +87,7 @@ def read_fields(profile: str, spec: str, model: LinkModel) -> dict[str, Any]:
         if clause not in _READERS:
             raise words.error(f"{clause!r} is unknown there")
         if clause in seen and clause != "outage":
-            raise words.error(f"{clause!r} stands there twice", clause)
+            raise words.error(f"{clause!r} is there twice", clause)
         seen.add(clause)
         try:
             _READERS[clause](words, settings)
@@ -96,7 +96,7 @@ def read_fields(profile: str, spec: str, model: LinkModel) -> dict[str, Any]:
         except ValueError as error:
             raise ConfigurationError(f"link {spec!r}: {clause}: {error}") from error
     if "trace" in seen and (other := seen & {"delay", "loss", "reorder"}):
-        raise words.error(f"'trace' brings its own delays and losses, and stands beside {min(other)!r}", "trace")
+        raise words.error(f"'trace' has its own delays and losses, and excludes {min(other)!r}", "trace")
     if "reorder" in seen and settings.get("delay_s", 0.0) == 0.0:
         raise words.error("'reorder' without a delay to overtake", "delay")
     if "retransmit" in seen and model != "stream":
@@ -109,7 +109,7 @@ def _read_delay(words: _Words, settings: dict[str, Any]) -> None:
     if words.number_follows(percent=False):
         settings["jitter_s"] = words.value(parse_duration, "delay", "jitter")
         if words.number_follows(percent=True):
-            # Without effect: in netem, too, the delays stay independent (measured lag-1 correlation 0).
+            # Without effect, as in netem: its delays stay independent (measured lag-1 correlation 0).
             words.value(parse_share, "delay", "correlation")
     if words.take_if("distribution"):
         if "jitter_s" not in settings:
@@ -130,7 +130,7 @@ def _read_loss(words: _Words, settings: dict[str, Any]) -> None:
     loss: LossModel
     if words.take_if("gemodel"):
         p, *rest = words.shares("loss", ["p", "r", "1-h", "1-k"])
-        # One probability alone is independent loss: the bad state is left as often as it is not entered.
+        # One probability alone is independent loss: with r = 1 − p the next state does not depend on the last.
         loss = GilbertElliott(p, *(rest or [1.0 - p]))
     elif words.take_if("state"):
         raise ConfigurationError(f"link {words.spec!r}: 'loss state' is not emulated; valid: {GRAMMAR['loss']}")

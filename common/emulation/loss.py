@@ -1,7 +1,7 @@
 """netem's loss models, independent or correlated and Gilbert-Elliott, and its correlated random numbers.
 
-netem mixes each uniform number with the one before, x = (1 − r) U + r last. That narrows the distribution around
-its middle, so that rare events all but vanish: `loss 10% 50%` loses 0.1 %.
+netem mixes each uniform number with the previous one, x = (1 − r) U + r last. That narrows the distribution around
+the middle, so that rare events nearly vanish: `loss 10% 50%` loses 0.1 %.
 """
 
 import itertools
@@ -18,10 +18,10 @@ _WORDS = 2**32
 
 
 def uniform_blocks(generator: np.random.Generator, correlation: float = 0.0) -> Iterator[FloatArray]:
-    """Blocks of numbers in [0, 1), without end, each correlated with the one before by `correlation`."""
+    """Yield endless blocks of numbers in [0, 1), each correlated with the previous one by `correlation`."""
     while correlation == 0.0:
         yield generator.random(_DRAWN_AT_ONCE)
-    # The kernel's words: weights of 32 bits, and the sum cut to 32 bits.
+    # As in the kernel: weights of 32 bits, and the sum cut to 32 bits.
     weight = round(correlation * (_WORDS - 1)) + 1
     last = int(generator.integers(_WORDS))
     while True:
@@ -35,7 +35,7 @@ def uniform_blocks(generator: np.random.Generator, correlation: float = 0.0) -> 
 
 
 def decisions(generator: np.random.Generator, share: float, correlation: float = 0.0) -> Iterator[bool]:
-    """Say time after time whether an event of probability `share` happens."""
+    """Yield, without end, whether an event of probability `share` happens."""
     for block in uniform_blocks(generator, correlation):
         yield from (block < share).tolist()
 
@@ -48,11 +48,11 @@ class RandomLoss(Limited):
     correlation: Share = 0.0
 
     def losses(self, generator: np.random.Generator) -> Iterator[bool]:
-        """Say of each message whether it is lost, without end and whatever the time between them."""
+        """Yield for each message whether it is lost, whatever the time between messages."""
         return decisions(generator, self.probability, self.correlation)
 
     def share(self) -> float:
-        """The share that is asked for; netem's correlation loses less."""
+        """Return the probability asked for; with netem's correlation the loss is less."""
         return self.probability
 
 
@@ -60,7 +60,7 @@ class RandomLoss(Limited):
 class GilbertElliott(Limited):
     """`loss gemodel p r 1-h 1-k`: a good and a bad state, with a loss probability in each.
 
-    Each message is lost by the state that the one before left behind, while it takes a step itself.
+    The state before a message's own transition decides its loss.
     """
 
     p: Share
@@ -73,7 +73,7 @@ class GilbertElliott(Limited):
     """1-k."""
 
     def losses(self, generator: np.random.Generator) -> Iterator[bool]:
-        """Say of each message whether it is lost, without end and whatever the time between them."""
+        """Yield for each message whether it is lost, whatever the time between messages."""
         bad = False
         while True:
             steps, losses = generator.random((2, _DRAWN_AT_ONCE)).tolist()
@@ -86,7 +86,7 @@ class GilbertElliott(Limited):
                     yield loss < self.loss_good
 
     def share(self) -> float:
-        """The share that is lost in the long run: p / (p + r) of the time is bad."""
+        """Return the long-run share of losses: p / (p + r) of the time is bad."""
         bad = self.p / (self.p + self.r) if self.p else 0.0
         return (1.0 - bad) * self.loss_good + bad * self.loss_bad
 

@@ -1,8 +1,8 @@
-"""Links by name, in words that the kernel's netem takes, too; docs/link.md has their published figures and sources.
+"""Links by name, in words that the kernel's netem accepts, too; docs/link.md has published figures and sources.
 
-A single packet now and then sees the published delays. Each link with jitter has a rate, because only then netem keeps
-packets in order, as a radio's queue does, and TCP would take the disorder for loss. So a message waits for the
-slowest one before it: many a second see more delay than a few do.
+Single, infrequent packets see the published delays. Each link with jitter has a rate, because only then netem keeps
+packets in order, as a radio's queue does; TCP would take disorder for loss. A message waits for the slowest one
+before it: frequent messages see more delay than rare ones.
 """
 
 from collections.abc import Mapping
@@ -21,9 +21,9 @@ NAMED_LINKS: Final[Mapping[str, str]] = MappingProxyType(
         "to_operator: delay 300ms 2ms distribution normal rate 10mbit",
     }
 )
-"""The links in order of delay."""
+"""Links in order of delay."""
 
 
 def with_names_spelled_out(spec: str) -> str:
-    """`spec` with each clause that is a link's name replaced by its words; all else as it was."""
+    """Replace each clause that is a link's name by the link's words; keep the rest."""
     return ";".join(NAMED_LINKS.get(clause.strip(), clause) for clause in spec.split(";"))

@@ -1,4 +1,4 @@
-"""A frozen, validated profile of one direction of one stream."""
+"""Frozen, validated profile of one direction of one stream."""
 
 import math
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ _RECOVERY_ROUND_TRIPS = 1.25
 _MOST_RETRANSMITTED = 0.99
 
 _LONGEST_S = 1e6
-"""No delay or jitter is longer: eleven days."""
+"""Longest delay or jitter, in seconds: eleven days."""
 _Delay = Annotated[float, Meta(ge=0.0, le=_LONGEST_S)]
 _Recovery = Annotated[float, Meta(ge=0.0, le=4.0 * _LONGEST_S)]
 _Count = Annotated[int, Meta(ge=1)]
@@ -27,16 +27,16 @@ _Count = Annotated[int, Meta(ge=1)]
 
 @dataclass(frozen=True)
 class LinkProfile:
-    """Everything that one direction of one stream does to messages, after netem.
+    """Effects of one direction of one stream on messages, after netem.
 
-    The model `datagram` loses, doubles and reorders messages, as UDP sees it. `stream` delivers every message that
-    its queue has room for, once and in order, as TCP does: nothing is due before what was sent earlier; a lost or
-    corrupted message is sent again `recovery_s` later, as often as it takes; duplicates and reordering do not show.
+    The model `datagram` loses, duplicates and reorders messages, as UDP sees it. `stream` delivers every message that
+    its queue accepts, once and in order, as TCP does. No message is due before an earlier one. A lost or corrupted
+    message is sent again every `recovery_s` until it arrives; duplicates and reordering do not show.
     """
 
     delay_s: _Delay = 0.0
     jitter_s: _Delay = 0.0
-    """Half the range (uniform), the standard deviation (normal), or the scale of another shape."""
+    """Half range (uniform), standard deviation (normal), or scale of another shape."""
     distribution: Distribution = "uniform"
     seed: int = 0
     model: LinkModel = "datagram"
@@ -44,21 +44,21 @@ class LinkProfile:
     duplicate: Chance | None = None
     corrupt: Chance | None = None
     reorder: Chance | None = None
-    """At once, ahead of what is being delayed."""
+    """Share of messages sent at once, ahead of delayed ones."""
     gap: _Count = 1
-    """The least number of messages from one that is reordered to the next."""
+    """Least number of messages from one reordered message to the next."""
     rate: Rate | None = None
     limit: _Count = QUEUE_LIMIT
-    """Messages that may wait; what comes on top is dropped."""
+    """Messages that may wait; surplus ones are dropped."""
     outages: tuple[Outage, ...] = ()
     trace: Trace | None = None
     """Recorded delays instead of delay, jitter and loss."""
     retransmit_s: _Recovery | None = None
-    """In a stream, how long until a lost message is sent again; None: see `recovery_s`."""
+    """Time until a stream sends a lost message again; None: see `recovery_s`."""
     round_trip_s: _Recovery | None = field(default=None, compare=False)
-    """The mean delay of both directions, where the other one is known; None: twice this one."""
+    """Sum of both directions' mean delays; None if the other is unknown: twice this one."""
     words: str = field(default="", compare=False)
-    """The profile in the grammar's words, as given."""
+    """Profile in the grammar's words, as given."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -72,13 +72,13 @@ class LinkProfile:
     def parse(cls, spec: str, seed: int = 0, model: LinkModel = "datagram") -> "LinkProfile":
         """Read one bare profile such as `delay 50ms 10ms distribution normal loss 1%`; empty means no delay.
 
-        ConfigurationError, in one line, for whatever is unknown, malformed, out of range or contradictory.
+        Raises ConfigurationError, in one line, for unknown, malformed, contradictory or out-of-range words.
         """
         return cls.parse_within(spec, spec, seed, model)
 
     @classmethod
     def parse_within(cls, profile: str, spec: str, seed: int, model: LinkModel) -> "LinkProfile":
-        """Read `profile`, which is `spec` or a clause of it; ConfigurationError in one line that quotes `spec`."""
+        """Read `profile`, which is `spec` or a clause of it; raises ConfigurationError, which quotes `spec`."""
         check_seed_and_model(seed, model)
         fields = read_fields(profile, spec, model)
         try:
@@ -87,20 +87,20 @@ class LinkProfile:
             raise ConfigurationError(f"link {spec!r}: {error}") from error
 
     def mean_delay_s(self) -> float:
-        """The mean of the delay asked for, without rate and retransmission."""
+        """Return the mean delay asked for, without rate and retransmission."""
         if self.trace is not None:
             known_s = [delay_s for delay_s in self.trace.delays_s if delay_s is not None]
             return math.fsum(known_s) / len(known_s)
         return moments(self.delay_s, self.jitter_s, self.distribution)[0]
 
     def recovery_s(self) -> float:
-        """In a stream, how long after it was sent a lost message is sent again.
+        """Return the time until a stream sends a lost message again, in seconds.
 
-        `retransmit_s`; without it 5/4 of the round trip, at least 1 ms. That is recovery as RACK does it
-        (RFC 8985): the acknowledgement of a later message tells that one is missing, a quarter of the least
-        round trip is granted for reordering, and lost retransmissions are found alike. It takes a steady
-        flow: the last message before a silence would wait for a time-out, on Linux 200 ms or more. Nor is
-        congestion control in it: bursts of loss shrink TCP's window and delay it more than this.
+        `retransmit_s`; by default 5/4 of the round trip, at least 1 ms. That is RACK's recovery (RFC 8985): the
+        acknowledgement of a later message shows that one is missing, a quarter of the least round trip is granted for
+        reordering, and lost retransmissions are found likewise. It assumes a steady flow: the last message before a
+        silence would wait for a time-out, on Linux 200 ms or more. Congestion control is left out: bursts of loss
+        shrink TCP's window and add more delay than this.
         """
         if self.retransmit_s is not None:
             return self.retransmit_s
@@ -108,7 +108,7 @@ class LinkProfile:
         return max(_RECOVERY_ROUND_TRIPS * round_trip_s, _SHORTEST_RECOVERY_S)
 
     def retransmitted_share(self) -> float:
-        """In a stream, the share of sendings that have to be repeated, because of loss or corruption."""
+        """Return the share of a stream's transmissions that are repeated because of loss or corruption."""
         arrives = 1.0
         if self.loss is not None:
             arrives -= self.loss.share()
@@ -120,7 +120,7 @@ class LinkProfile:
 
 
 def check_seed_and_model(seed: int, model: LinkModel) -> None:
-    """ConfigurationError for a negative seed and for an unknown model."""
+    """Raise ConfigurationError for a negative seed or an unknown model."""
     if seed < 0:
         raise ConfigurationError(f"seed = {seed} is negative; valid: 0 or a positive whole number")
     if model not in get_args(LinkModel):
@@ -128,5 +128,5 @@ def check_seed_and_model(seed: int, model: LinkModel) -> None:
 
 
 def choices(literal: object) -> str:
-    """The values of a Literal, for messages."""
+    """Join the values of a Literal, for messages."""
     return ", ".join(get_args(literal))

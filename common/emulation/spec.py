@@ -21,21 +21,21 @@ Stream = Literal["haptics", "telemetry", "video", "scene"]
 class LinkSpec:
     """Profiles by direction and stream.
 
-    The clause of a stream in a direction (`to_operator.video`) wins over that of the stream, that over the
-    direction's, and that over the bare one.
+    The clause of a stream in a direction (`to_operator.video`) overrides the stream's, that the direction's, and that
+    the bare one.
     """
 
     clauses: Mapping[str, LinkProfile] = field(default_factory=dict)
-    """By name; the bare profile under the empty name. Their seeds are not used."""
+    """Profiles by name, the bare one under the empty name. Their seeds are not used."""
     seed: int = 0
     model: LinkModel = "datagram"
 
     @classmethod
     def parse(cls, spec: str, seed: int = 0, model: LinkModel = "datagram") -> "LinkSpec":
-        """Read `[PROFILE;] [NAME: PROFILE;] ...`, a name being a direction, a stream or `DIRECTION.STREAM`.
+        """Read `[PROFILE;] [NAME: PROFILE;] ...`; NAME is a direction, a stream or `DIRECTION.STREAM`.
 
-        The name of a link, such as `wifi`, stands for its words. ConfigurationError, in one line, for an unknown or
-        repeated name and for a bad profile.
+        A link's name, such as `wifi`, is replaced by the link's words. Raises ConfigurationError, in one line, for an
+        unknown or repeated name and for a bad profile.
         """
         check_seed_and_model(seed, model)
         clauses: dict[str, LinkProfile] = {}
@@ -46,7 +46,7 @@ class LinkSpec:
                     " as 'delay 50ms 10ms distribution normal loss 1%'"
                 )
             before, colon, after = clause.partition(":")
-            # A colon further on belongs to a file's name.
+            # A later colon belongs to a file's name.
             named = bool(colon) and len(before.split()) <= 1
             name, profile = (before.strip(), after) if named else ("", clause)
             if named and name not in _names():
@@ -54,14 +54,14 @@ class LinkSpec:
             if name in clauses:
                 what = repr(name) if name else "a profile without a name"
                 raise ConfigurationError(
-                    f"link {spec!r}: {what} stands there twice; "
+                    f"link {spec!r}: {what} is there twice; "
                     f"valid: one profile without a name and one for each of {_valid_names()}"
                 )
             clauses[name] = LinkProfile.parse_within(profile, spec, seed, model)
         return cls(clauses, seed, model)
 
     def profile(self, direction: Direction, stream: Stream = "haptics") -> LinkProfile:
-        """The profile of `stream` in `direction`, with a seed of its own so that no two are correlated."""
+        """Return the profile of `stream` in `direction`, with a separate seed, so that no two are correlated."""
         directions, streams = get_args(Direction), get_args(Stream)
         if direction not in directions:
             raise ValueError(f"direction = {direction!r}; valid: {choices(Direction)}")
@@ -75,7 +75,7 @@ class LinkSpec:
         return dataclasses.replace(there, seed=seed, round_trip_s=round_trip_s)
 
     def unused(self, carried: Iterable[tuple[Direction, Stream]]) -> list[str]:
-        """The names of clauses that none of the streams in `carried` goes by, so that a person can be told."""
+        """Return the names of clauses that apply to no stream in `carried`."""
         used = {self._clause_name(direction, stream) for direction, stream in carried}
         return [name for name in self.clauses if name not in used]
 
@@ -92,7 +92,7 @@ class LinkSpec:
 
 
 def unused_clauses(link: LinkSpec, carried: Iterable[tuple[Direction, Stream]]) -> list[str]:
-    """A line for each clause of `link` that none of the streams in `carried` goes by, to be shown to a person."""
+    """Return a line for a person for each clause of `link` that applies to no stream in `carried`."""
     return [
         f"link: {f'the clause {name!r}' if name else 'the profile without a name'} applies to nothing that is sent here"
         for name in link.unused(carried)

@@ -1,4 +1,4 @@
-"""Recorded delays, to be replayed message by message."""
+"""Recorded delays, replayed message by message."""
 
 import csv
 import gzip
@@ -19,10 +19,10 @@ _COLUMNS = "delay_ns, or sent_ns and received_ns, with a heading, and seq where 
 
 @dataclass(frozen=True)
 class Trace:
-    """Delays in order of sending: the n-th message gets the n-th, and after the last the first again."""
+    """Delays in order of sending: the n-th message gets the n-th; after the last the first follows."""
 
     delays_s: tuple[float | None, ...]
-    """The delay of each message; None for a lost one."""
+    """Delay of each message; None for a lost one."""
 
     def __post_init__(self) -> None:
         if all(delay_s is None for delay_s in self.delays_s):
@@ -32,9 +32,9 @@ class Trace:
     def read(cls, path: Path, field: str) -> "Trace":
         """Read a CSV with the column delay_ns, or sent_ns and received_ns; empty: the message was lost.
 
-        A row is a message, in order of seq where there is such a column (a number that is missing is a lost
-        message), else of sent_ns, else of the file. A name that ends in .gz is unpacked. ConfigurationError,
-        in one line that begins with `field`, for everything else.
+        A row is a message, in order of seq if there is such a column, else of sent_ns, else of the file. A missing seq
+        is a lost message. A file whose name ends in .gz is unpacked. Raises ConfigurationError, in one line that begins
+        with `field`, for any other content.
         """
         rows = read_samples(path, field)
         try:
@@ -45,16 +45,16 @@ class Trace:
 
 @dataclass(frozen=True)
 class Sample:
-    """One message of a recording."""
+    """Message of a recording."""
 
     sent_s: float | None
-    """On the recording's own clock, where it has that."""
+    """Time of sending on the recording's clock, if known."""
     delay_s: float | None
-    """The message's delay; None for a lost one."""
+    """Delay; None for a lost message."""
 
 
 def read_samples(path: Path, field: str) -> list[Sample]:
-    """Every message of a recording in order of sending, as `Trace.read` reads it, send times kept."""
+    """Read the messages of a recording, in order of sending, as `Trace.read` does, with their send times."""
     try:
         text = read_regular_file(path, _LARGEST_BYTES)
         if path.suffix == ".gz":
@@ -125,7 +125,7 @@ def _sample(values: dict[str, float | None], names: set[str], where: str) -> Sam
 
 
 def _with_gaps(rows: Iterable[tuple[float, Sample]], path: Path, field: str) -> list[Sample]:
-    """Lost messages where sequence numbers are missing, sent evenly between their neighbours."""
+    """Insert lost messages for missing sequence numbers, with send times evenly between their neighbours."""
     samples: list[Sample] = []
     last: tuple[float, Sample] | None = None
     for sequence, sample in rows:

@@ -1,7 +1,7 @@
-"""What of an emulated link may be changed while a run goes on: delay, jitter and loss, by whoever drives.
+"""Limits of what the operator may change in an emulated link during a run: delay, jitter and loss.
 
-A file's name in netem's words would let the other side of the link open files here, and a delay of days would keep
-whoever asked for it from ever taking it back: neither is tuned.
+A file's name in netem's words would let the other side open files here. After a delay of days no further change
+could arrive. Neither can be tuned.
 """
 
 import dataclasses
@@ -23,9 +23,9 @@ _VALID: Final = (
 
 
 def tuned_link(link: LinkSpec, words: str) -> LinkSpec:
-    """`link` with `words` for both directions; ConfigurationError, in one line, for what may not be tuned.
+    """Return `link` with `words` for both directions; raises ConfigurationError, in one line, beyond the limits.
 
-    Clauses of `link` for telemetry and video stay: video that has a rate of its own keeps it.
+    Clauses of `link` for telemetry and video stay: video with a separate rate keeps it.
     """
     profile = tunable_profile(words)
     profile = dataclasses.replace(profile, model=link.model)
@@ -34,7 +34,7 @@ def tuned_link(link: LinkSpec, words: str) -> LinkSpec:
 
 
 def tunable_profile(words: str) -> LinkProfile:
-    """The profile that `words` ask for; ConfigurationError as `tuned_link`."""
+    """Return the profile that `words` ask for; errors as in `tuned_link`."""
     for word in words.split():
         if word not in _WORDS and not word[0].isdigit():
             raise ConfigurationError(f"link {words!r}: {word!r} cannot be tuned; valid: {_VALID}")

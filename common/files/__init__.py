@@ -1,1 +1,1 @@
-"""Files that people name: where they are, and how they are read with care."""
+"""Files that people name: their places, and careful reading and writing."""

@@ -1,10 +1,10 @@
-"""Whether a file that a person named can be read, asked before anything starts."""
+"""Check of a file that a person named, before anything starts."""
 
 from pathlib import Path
 
 
 def require_input_file(flag: str, path: Path, valid: str) -> None:
-    """ValueError unless `path` leads to a file: it says what is there instead, and what would be `valid`."""
+    """Raise ValueError, which names the fault and what is `valid`, unless `path` leads to a file."""
     if path.is_dir():
         raise ValueError(f"{flag} {path}: is a directory; valid: {valid}")
     if not path.is_file():

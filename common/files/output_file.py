@@ -1,4 +1,4 @@
-"""Files that a person wants written: whether they can be is asked at the start, and they are written whole or not."""
+"""Files that a person wants written: checked at the start, and written whole or not at all."""
 
 import json
 import os
@@ -14,13 +14,13 @@ from common.errors import ConfigurationError
 
 
 def require_output_file(flag: str, path: Path | None, endings: Sequence[str] = ()) -> None:
-    """ValueError unless `path` is None, or a file's path in a folder that is there, with one of `endings` if given."""
+    """Raise ValueError unless `path` is None, or a writable file in an existing folder, with an allowed ending."""
     if path is None:
         return
     if path.is_dir() or not path.absolute().parent.is_dir():
         raise ValueError(f"{flag} {path}: is a folder, or its folder is not there; valid: a file's path")
     end = os.path.realpath(path)
-    # Links that lead in a circle end at one of them.
+    # `realpath` of links in a circle is one of them.
     if os.path.lexists(end) and not os.access(end, os.W_OK):
         raise ValueError(f"{flag} {path}: cannot be written to; valid: a file's path")
     if endings and path.suffix.lower() not in endings:
@@ -29,10 +29,10 @@ def require_output_file(flag: str, path: Path | None, endings: Sequence[str] = (
 
 @contextmanager
 def output_file(flag: str, path: Path) -> Iterator[TextIO]:
-    """`path`, open for text, lines as they are given; what was there before stays until all of the new is written.
+    """Open `path` for text, with line ends unchanged; the old content stays until all of the new is written.
 
-    Where a new file would not be the same to others (a pipe, a second name, another's file), the old one is written to
-    instead. ConfigurationError, in one line of `flag`, when the system does not let us, as on a full disk.
+    If a new file would differ for others (a pipe, a second name, another user's file), the old one is written in place.
+    Raises ConfigurationError, in one line that names `flag`, if the system refuses, as on a full disk.
     """
     end = Path(os.path.realpath(path))  # a link stays a link
     new = end.with_name(f".feelahead-{secrets.token_hex(8)}")
@@ -57,7 +57,7 @@ def output_file(flag: str, path: Path) -> Iterator[TextIO]:
 
 
 def _state(path: Path) -> os.stat_result | None:
-    """What is there; None where nothing is."""
+    """Return the state of an existing file; None for none."""
     try:
         return path.stat()
     except FileNotFoundError:
@@ -65,7 +65,7 @@ def _state(path: Path) -> os.stat_result | None:
 
 
 def _own_output(old: os.stat_result | None) -> int | None:
-    """Our own output or error stream where that is what is written to; it goes on where the stream has come to."""
+    """Return our standard output or error if `old` is that file: writing continues at the stream's position."""
     for descriptor, stream in ((1, sys.stdout), (2, sys.stderr)):
         if old is not None and stream is not None and os.path.samestat(old, os.fstat(descriptor)):
             stream.flush()
@@ -74,7 +74,7 @@ def _own_output(old: os.stat_result | None) -> int | None:
 
 
 def _replaceable(path: Path, end: Path, old: os.stat_result | None) -> bool:
-    """Whether another file at `end` is the same to everybody: not a pipe, a file of others, or one of two names."""
+    """Return whether nobody sees a difference to a new file: no pipe, no file of others, no second name."""
     if old is None:
         return os.access(end.parent, os.W_OK)
     plain = stat.S_ISREG(old.st_mode) and path.absolute().parts[1] not in ("dev", "proc")
@@ -83,6 +83,6 @@ def _replaceable(path: Path, end: Path, old: os.stat_result | None) -> bool:
 
 
 def write_json(flag: str, path: Path, figures: Any) -> None:
-    """`figures` for programs; errors as in `output_file`."""
+    """Write `figures` as JSON; errors as in `output_file`."""
     with output_file(flag, path) as file:
         file.write(json.dumps(figures, indent=2) + "\n")

@@ -1,4 +1,4 @@
-"""Files that people name: read whole and without waiting, for a pipe or a device might never end."""
+"""Reading of files that people name: whole and without waiting, as a pipe or a device might never end."""
 
 import errno
 import os
@@ -7,12 +7,12 @@ from pathlib import Path
 
 
 def read_regular_file(path: Path, largest_bytes: int) -> bytes:
-    """The content of the regular file `path`, or of the one that a link there leads to.
+    """Return the content of the regular file `path`, or of the one that a link leads to.
 
-    OSError when the system does not let us at it, a folder included; ValueError, in one line without the path, for
-    what is no regular file or has more than `largest_bytes`.
+    Raises OSError if the system refuses, also for a folder; ValueError, in one line without the path, if the file is
+    not regular or has more than `largest_bytes`.
     """
-    # Windows has no such flags, and no pipes among its files either.
+    # Windows has no such flags, and no pipes among files.
     flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
     descriptor = os.open(path, flags)
     try:

@@ -1,4 +1,4 @@
-"""What is wrong with a value in a TOML file, in one line: the key, the value, and what would be valid."""
+"""Fault of a value in a TOML file, in one line: the key, the value, and what is valid."""
 
 import dataclasses
 import json
@@ -17,7 +17,7 @@ _LONGEST_VALUE = 100
 
 
 def explain(complaint: str, content: Mapping[str, Any], settings_type: type) -> str:
-    """The one line for msgspec's `complaint` about `content`, which was to become a `settings_type`."""
+    """Return one line for msgspec's `complaint` about converting `content` to `settings_type`."""
     said, _, path = complaint.partition(" - at `$.")
     keys = re.findall(r"\w+", path.partition("[")[0].rstrip("`"))
     if not keys:
@@ -27,7 +27,7 @@ def explain(complaint: str, content: Mapping[str, Any], settings_type: type) -> 
     for key in keys:
         value, hint = value[key], get_type_hints(hint, include_extras=True)[key]
     if not said.startswith(("Expected", "Invalid enum value")):
-        # A dataclass's own complaint about its fields, which says what is valid.
+        # A dataclass's error about its fields, which names what is valid.
         return f"{'.'.join(keys)}: {said}"
     shown = json.dumps(value, default=str, ensure_ascii=False)
     if len(shown) > _LONGEST_VALUE:
@@ -36,7 +36,7 @@ def explain(complaint: str, content: Mapping[str, Any], settings_type: type) -> 
 
 
 def _valid(hint: Any) -> str:
-    """In words what a key of the type `hint` may hold."""
+    """Describe the valid values of the type `hint`."""
     words = {float: "a number", int: "a whole number", bool: "true or false", str: "a text", Path: "a path, as a text"}
     if hint in words:
         return words[hint]

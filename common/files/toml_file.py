@@ -1,4 +1,4 @@
-"""TOML files that people name or write: read whole, without waiting, and refused in one line when they are no such."""
+"""Reading of TOML files: whole, without waiting, and with faults in one line."""
 
 import tomllib
 from pathlib import Path
@@ -7,19 +7,19 @@ from typing import Any, Final
 from common.files.regular_file import read_regular_file
 
 _LARGEST_INTEGER: Final = 2**63
-"""TOML's own range; larger ones are no numbers to whatever comes after."""
+"""Limit of TOML's integers; later readers cannot use larger ones."""
 _DEEPEST: Final = 50
-"""Levels of nesting: a handful would do, and what follows may descend into them."""
+"""Largest number of nested levels: a handful suffices, and later code may recurse into them."""
 _LONGEST_COMPLAINT: Final = 400
 _TOO_DEEP: Final = f"is nested too deeply; valid: {_DEEPEST} levels"
 _TOO_LARGE: Final = "has a whole number of more than 64 bits, which is no valid TOML"
 
 
 def read_toml(path: Path, largest_bytes: int) -> dict[str, Any]:
-    """The content of the regular file `path`.
+    """Return the content of the regular file `path`.
 
-    OSError when the system does not let us at it; ValueError, in one line without the path, for what is no regular
-    file (a pipe would be waited for without end), has more than `largest_bytes`, or is no valid TOML.
+    Raises OSError if the system refuses; ValueError, in one line without the path, if the file is not regular (a pipe
+    might never end), has more than `largest_bytes`, or is no valid TOML.
     """
     data = read_regular_file(path, largest_bytes)
     try:
@@ -29,7 +29,7 @@ def read_toml(path: Path, largest_bytes: int) -> dict[str, Any]:
     except RecursionError as error:
         raise ValueError(_TOO_DEEP) from error
     except ValueError as error:
-        # Python's own limit on the digits of a number, whose text is for programmers.
+        # Python's limit on the digits of a number, whose text is for programmers.
         raise ValueError(_TOO_LARGE) from error
     _refuse_extremes(content)
     return content
@@ -39,7 +39,7 @@ def _refuse_extremes(content: dict[str, Any]) -> None:
     waiting: list[tuple[Any, int]] = [(content, 0)]
     while waiting:
         value, depth = waiting.pop()
-        if depth > _DEEPEST:  # which dotted keys reach without the parser's minding
+        if depth > _DEEPEST:  # dotted keys pass the parser's limit
             raise ValueError(_TOO_DEEP)
         if isinstance(value, dict | list):
             waiting += [(part, depth + 1) for part in (value.values() if isinstance(value, dict) else value)]

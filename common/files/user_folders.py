@@ -1,4 +1,4 @@
-"""Where a person's settings live, and what is kept from one run to the next, by each system's custom."""
+"""Folders of a person's settings and of caches, by each system's convention."""
 
 import os
 import sys
@@ -9,11 +9,11 @@ from pathlib import Path
 def configuration_folder(
     platform: str = sys.platform, environment: Mapping[str, str] = os.environ, home: Path | None = None
 ) -> Path:
-    """The folder of feelahead's own configuration; it need not exist.
+    """Return the folder of feelahead's configuration; it need not exist.
 
-    Linux and others: $XDG_CONFIG_HOME/feelahead, else ~/.config/feelahead. macOS: the same where XDG_CONFIG_HOME is
-    set, else ~/Library/Application Support/feelahead. Windows: %APPDATA%\\feelahead, else that under AppData\\Roaming.
-    A relative path in a variable is passed over, as the XDG specification wants it.
+    Linux and others: $XDG_CONFIG_HOME/feelahead, else ~/.config/feelahead. macOS: the same if XDG_CONFIG_HOME is set,
+    else ~/Library/Application Support/feelahead. Windows: %APPDATA%\\feelahead, else that under AppData\\Roaming.
+    A relative path in a variable is ignored, as the XDG specification requires.
     """
     home = Path.home() if home is None else home
     if platform == "win32":
@@ -27,6 +27,6 @@ def configuration_folder(
 
 
 def cache_folder(environment: Mapping[str, str] = os.environ, home: Path | None = None) -> Path:
-    """The folder of what can be worked out again: $XDG_CACHE_HOME/feelahead, else ~/.cache/feelahead."""
+    """Return the folder of recomputable files: $XDG_CACHE_HOME/feelahead, else ~/.cache/feelahead."""
     given = Path(environment.get("XDG_CACHE_HOME", ""))
     return (given if given.is_absolute() else (Path.home() if home is None else home) / ".cache") / "feelahead"

@@ -1,1 +1,1 @@
-"""One loop and one process for both sides: each main is settings, parts, and `run`."""
+"""Loop and process of both sides: each main is settings, parts, and `run`."""

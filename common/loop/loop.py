@@ -1,4 +1,4 @@
-"""The loop of a side: turns at absolute deadlines, messages as they come, all that may wait after they have left."""
+"""Loop of a side: turns at absolute deadlines, messages as they come, all else after the sends."""
 
 from collections.abc import Mapping
 from typing import Any, Final, Protocol, TypeVar
@@ -12,49 +12,49 @@ from common.realtime.stages import Stages
 
 Received = TypeVar("Received")
 SOCKETS: Final = "sockets"
-"""The stage of receiving and sending."""
+"""Stage of receiving and sending."""
 
 
 class Side(Protocol[Received]):
-    """The work of one side; no call waits but `wait`."""
+    """Work of one side; no call waits but `wait`."""
 
     @property
     def resting(self) -> bool:
-        """Nothing moves: there is time to collect garbage."""
+        """Whether nothing moves: there is time to collect garbage."""
 
     def note(self, text: str) -> None:
-        """Tell one line to all people who look at this side."""
+        """Show one line to all people who watch this side."""
 
     def receive(self) -> Received:
-        """Return what has arrived."""
+        """Return the messages that have arrived."""
 
     def take(self, received: Received, now_s: float) -> None:
-        """Judge what has arrived."""
+        """Process the messages."""
 
     def turn(self, now_s: float) -> None:
-        """Do what is due once a period."""
+        """Do the work of one period."""
 
     def send(self) -> None:
-        """Let go of what is due to leave."""
+        """Send the messages that are due."""
 
     def rest(self, now_s: float, turned_s: float) -> None:
-        """Do all that no message should wait for, after the turn at `turned_s`."""
+        """Do the work that may follow the sends, after the turn at `turned_s`."""
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for a message; tell whether there is one."""
+        """Wait for a message; return whether there is one."""
 
     def next_due(self) -> float | None:
-        """Return when the next message has to leave; None while none waits."""
+        """Return when the next message must leave; None while none waits."""
 
 
 class Loop:
-    """Runs a side, and measures whether it keeps its period."""
+    """Loop that runs a side, and measures whether it keeps the period."""
 
     def __init__(self, period_s: float, helps: Mapping[str, str], seed: int, clock: Clock | None = None) -> None:
-        """helps: what makes each stage of a turn shorter, by its name, and "" for all else."""
+        """helps: remedy for each stage of a turn, by name; "" for the time outside of stages."""
         self.clock = MonotonicClock() if clock is None else clock
         self.computed = ThreadClock()
-        """Processor time of the thread that runs the loop"""
+        """Processor time of the loop's thread"""
         self.stages = Stages(tuple(filter(None, helps)), self.clock, self.computed, seed)
         self.start_s = self.clock.now()
         self.pacer = Pacer(period_s, self.start_s, seed)
@@ -62,7 +62,7 @@ class Loop:
         self._collection = IdleCollection(self.clock)
 
     def run(self, side: Side[Received], stop: StopSignal, duration_s: float | None) -> None:
-        """Go on until `stop`, or for `duration_s`; say once, in words, when the period cannot be kept."""
+        """Run until `stop`, or for `duration_s`; note once, in words, if the period cannot be kept."""
         receive, send = self.stages.timed(SOCKETS, side.receive), self.stages.timed(SOCKETS, side.send)
         pacer, clock = self.pacer, self.clock
         with self._collection:
@@ -71,7 +71,7 @@ class Loop:
             while not stop.is_set:
                 self._keeping_up.begin()
                 received = receive()
-                # Read after receiving: a process that was stopped in between must not take old messages for new.
+                # Read after receiving: a process that was paused in between must not take old messages for new.
                 now_s = clock.now()
                 if duration_s is not None and now_s - self.start_s >= duration_s:
                     break
@@ -90,7 +90,7 @@ class Loop:
                 wait_for_turn(pacer, clock, side.wait, side.next_due())
 
     def summary(self, side: str) -> dict[str, Any]:
-        """Return how long it ran, how its turns were kept, and what took time."""
+        """Return duration, pacing of the turns, and times of the stages."""
         return {
             "duration_s": self.clock.now() - self.start_s,
             "stages": {side: self.stages.summary()},

@@ -1,8 +1,8 @@
-"""The process of a side, from its settings to its exit code.
+"""Process of a side, from settings to exit code.
 
 Order of a start: settings, files and keys are checked; everything is built and compiled; then ports are bound, and the
 loop runs. Until then a stop signal ends the process at once, with code 0 and the summary of a run that never began.
-A run that failed has its summary, too; a start that is refused has none.
+A failed run has a summary, too; a refused start has none.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,17 +21,17 @@ Received = TypeVar("Received")
 
 
 class Summarized(Side[Received], Protocol[Received]):
-    """A side that has figures of its run."""
+    """Side with figures of the run."""
 
     def close(self) -> None:
-        """End what runs beside, and let devices go; safe to call again."""
+        """End companions and release devices; safe to call again."""
 
     def summary(self) -> Mapping[str, Any]:
         """Return the figures of the run, once it is closed."""
 
 
 class Process:
-    """What a side's process has around its loop: status, recording, and what is to be closed at the end."""
+    """Surroundings of a side's loop: status, recording, and a stack of contexts to close at the end."""
 
     def __init__(
         self, settings: SideOptions, side: Literal["robot", "operator"], status: Status, encoder: Encoder, loop: Loop
@@ -41,7 +41,7 @@ class Process:
         self.status, self.loop, self.stack = status, loop, ExitStack()
         """stack: closed at the end, last in first out"""
         self.recording: SideRecording | None = None
-        """The recording of the run; None without one"""
+        """Recording of the run; None without one"""
 
     def __enter__(self) -> Self:
         with ExitStack() as opened:
@@ -54,7 +54,7 @@ class Process:
         return self.stack.__exit__(*ended)
 
     def note(self, text: str) -> None:
-        """Tell a person one line, which stays."""
+        """Show a person one line, which stays."""
         self.status.note(text)
 
     def run(self, open_side: Callable[[], Summarized[Received]]) -> int:
@@ -69,11 +69,11 @@ class Process:
         side: Summarized[Received] | None = None
         failure: Exception | None = None
         try:
-            # Last: no crowd at a port takes what is still to be opened.
+            # Last: no crowd at a port can use up the descriptors that are still needed.
             side = open_side()
             self.loop.run(side, stop, self._settings.duration)
         except BrokenPipeError:
-            ignore_broken_output()  # no failure: the reader of our output has left
+            ignore_broken_output()  # no failure: the reader of our output has ended
         except Exception as error:
             failure = error
         summary = self.loop.summary(self._side)

@@ -1,1 +1,1 @@
-"""What crosses the wire, and who answers what."""
+"""Messages on the wire, and the session that each operator has with the robot side."""

@@ -1,7 +1,7 @@
 """Messages to bytes and back: MessagePack, from and into the frozen types of common.protocol.messages.
 
-A payload is `[version, message]`. The version is read first, so that a peer of another version is told apart
-from garbage. Stiffness and telemetry travel packed (common/protocol/compact.py).
+A payload is `[version, message]`. The version is read first: a peer of another version differs from garbage.
+Stiffness and telemetry travel packed (common/protocol/compact.py).
 """
 
 import struct
@@ -17,14 +17,13 @@ from common.protocol.view_messages import AnyViewMessage
 Kind = TypeVar("Kind")
 
 PROTOCOL_VERSION = 9
-"""2: the lease, with its token in every command. 3: predicted contact in each stiffness. 4: a field for
-each trigger in place of stiffness and contact, and in each command who reckons with the delay. 6: who watches what.
-7: stiffness and telemetry packed. 8: ways from around, and whether what is held stands. 9: how long joints take to
-change."""
+"""2: the lease, with its token in every command. 3: predicted contact in each stiffness. 4: a field for each
+trigger in place of stiffness and contact, and the compensating side in each command. 6: Watch. 7: stiffness and
+telemetry packed. 8: distances around, and whether the held object is supported. 9: the joints' times to change."""
 MAXIMUM_BYTES = 4096
-"""The largest message is an eighth of this; a longer payload is not looked into."""
+"""Longest payload that is decoded, in bytes: eight times the largest message."""
 VIEW_MAXIMUM_BYTES: Final = 4 * 1024 * 1024
-"""The largest view message; common/sockets refuses a longer one, too."""
+"""Longest view payload, in bytes; common/sockets refuses a longer one, too."""
 
 
 _ENCODER: Final = msgspec.msgpack.Encoder()
@@ -40,21 +39,21 @@ def encode(message: Message) -> bytes:
 
 
 class Prepared:
-    """A message packed once, to be sent again and again under other headers."""
+    """Message that is packed once and sent under many headers."""
 
     def __init__(self, message: Message) -> None:
-        # Nothing that comes before it looks like a header.
+        # No bytes before the header can equal it.
         self._before, _, self._after = encode(message).partition(_ENCODER.encode(message.header))
 
     def under(self, header: Header) -> bytes:
-        """Pack it under `header`."""
+        """Return the payload with this header."""
         return b"".join((self._before, _ENCODER.encode(header), self._after))
 
 
 def decode(payload: bytes) -> AnyMessage:
-    """Unpack and validate one message whole; RemoteProtocolError says what is wrong with the bytes.
+    """Unpack and validate one message whole. Raises RemoteProtocolError, which names the fault.
 
-    OtherVersionError, a kind of it, for a peer of another version, whatever else the bytes hold.
+    Its subclass OtherVersionError means a peer of another version, whatever else the bytes hold.
     """
     message = _decode(payload, _MESSAGE, MAXIMUM_BYTES)
     try:
@@ -69,8 +68,8 @@ def decode_view(payload: bytes) -> AnyViewMessage:
 
 
 def claims_to_be(tag: str, payload: bytes) -> bool:
-    """Whether `payload` says that it holds a message of this tag; told without unpacking it, so it may still be bad."""
-    # Behind a list's first byte, the version, and the first bytes of another list and of the tag.
+    """Return whether the first bytes of `payload` hold this tag; the rest is not unpacked and may be invalid."""
+    # The tag follows a list's first byte, the version, and the first bytes of another list and of the tag.
     return tag.encode() in payload[: 8 + len(tag)]
 
 

@@ -1,11 +1,11 @@
-"""Stiffness and telemetry packed: everything but the header and a name stands in one binary field.
+"""Stiffness and telemetry packed: all but the header and a name is in one binary field.
 
-    stiffness    [tag, header, field]            110 bytes of field, some 260 with ways from around
+    stiffness    [tag, header, field]            110 bytes of field, some 260 with distances around
     telemetry    [tag, header, name, field]      57 bytes
 
-Ways are whole steps of 2^-14 m, a sixteenth of a millimetre, in 16 bits. They are rounded towards the gripper: a way is
-never longer than it was. A step that is a power of two is exact, so that nothing is lost twice. Speeds, accelerations
-and shares are single precision; rumble is eighths, rounded up. All is little-endian.
+Onset distances are whole steps of 2^-14 m, a sixteenth of a millimetre, in 16 bits. They are rounded towards the
+gripper, never up. The step is a power of two, so that packing again loses nothing more. Speeds, accelerations and
+shares are single precision; rumble is eighths, rounded up. All is little-endian.
 """
 
 import math
@@ -36,27 +36,27 @@ _STEPS: Final = 2.0**14
 _IN_STEPS: Final = _STEPS.__mul__
 _IN_METRES: Final = STEP_M.__rmul__
 _BEYOND: Final = 2**15 - 1
-"""Stands for a way at the horizon or beyond it."""
+"""Code for a distance at or beyond the horizon."""
 _ALL_BEYOND: Final = [_BEYOND] * 8
 _NOTHING_NEAR: Final = tuple(_ALL_BEYOND)
 _FARTHEST: Final = _BEYOND - 1
-"""2 m; stands for a longer way that is short of the horizon, too."""
+"""Largest distance in steps, 2 m: longer ones below the horizon are clipped to it."""
 _PAST: Final = -(2**15)
-"""Stands for a way so far behind that 16 bits do not hold it."""
+"""Code for a negative distance that 16 bits cannot hold."""
 _PAST_M: Final = -100.0
 _STATES: Final[tuple[MotionState, ...]] = get_args(MotionState)
 _STANDS = 4
 _LARGEST_SINGLE: Final = (2.0 - 2.0**-23) * 2.0**127
 
 _STIFFNESS: Final = struct.Struct("<32h10fiBB")
-"""Ways of L2, fast and slow, and of R2; v_max, a, δ, s of each; v; told, NaN for none; horizon; rumble; state, and
-a bit for what stands."""
+"""Onset distances of L2, fast and slow, and of R2; v_max, a, δ, s of each; v; commanded speed, NaN for none;
+horizon; rumble; state, and a bit for `stands`."""
 _AROUND: Final = struct.Struct(f"<f{LISTS * PROBES}s")
-"""Behind it, in some: T, the map's steps, and then the map's changes."""
+"""Optional part behind it: T, `steps`, and then `changes` of an Around."""
 
 
 def _numbers(kind: inspect.Type) -> int:
-    """How many numbers a field of that type is."""
+    """Count the numbers that a field of that type holds."""
     match kind:
         case inspect.UnionType(types=types):
             return max(map(_numbers, types))
@@ -70,19 +70,19 @@ _NUMBERS: Final = {name: count for name, kind in _VIEW.items() if (count := _num
 _TRUE: Final = [name for name, kind in _VIEW.items() if isinstance(kind, inspect.BoolType)]
 _KNOWN: Final = [name for name in _NUMBERS if isinstance(_VIEW[name], inspect.UnionType)]
 _BITS: Final = {name: 4 << place for place, name in enumerate((*_TRUE, *_KNOWN))}
-"""Above the state's two: one for each field that is true, and for each that may be None and is not."""
+"""Bits above the state's two: one for each boolean, and one for each optional field that is present."""
 _TELEMETRY: Final = struct.Struct(f"<{sum(_NUMBERS.values())}fB")
-"""All numbers in the order of Telemetry's fields, zeros for None; state, and the bits."""
+"""All numbers in the order of Telemetry's fields, zeros for None; then state and bits."""
 
 
 class StiffnessOnWire(Message, frozen=True, tag="stiffness"):
-    """A StiffnessUpdate as it travels."""
+    """StiffnessUpdate in packed form."""
 
     field: bytes
 
 
 class TelemetryOnWire(Message, frozen=True, tag="telemetry"):
-    """A Telemetry as it travels."""
+    """Telemetry in packed form."""
 
     target: str | None
     field: bytes
@@ -92,7 +92,7 @@ AnyOnWire = Hello | MotionCommand | Watch | Tune | LeaseNotice | LinkReport | St
 
 
 def packed(message: Message) -> Message:
-    """Pack a message for its way."""
+    """Return the packed form of a message; kinds without one are returned unchanged."""
     if isinstance(message, StiffnessUpdate):
         return StiffnessOnWire(message.header, _pack_stiffness(message))
     if isinstance(message, Telemetry):
@@ -103,7 +103,7 @@ def packed(message: Message) -> Message:
 def unpacked(
     message: AnyOnWire,
 ) -> Hello | MotionCommand | Watch | Tune | LeaseNotice | LinkReport | StiffnessUpdate | Telemetry:
-    """Unpack a message that has travelled; ValueError or struct.error for a field that is no valid one."""
+    """Unpack a received message; raises ValueError or struct.error for an invalid field."""
     if isinstance(message, StiffnessOnWire):
         return _unpack_stiffness(message)
     return _unpack_telemetry(message) if isinstance(message, TelemetryOnWire) else message
@@ -191,7 +191,7 @@ def _pack_telemetry(view: Telemetry) -> bytes:
     try:
         return _TELEMETRY.pack(*numbers, bits)
     except OverflowError:
-        # A simulation about to become unstable shows wild figures, and must get as far as saying so.
+        # A simulation that becomes unstable has huge values, and must still be able to report that.
         return _TELEMETRY.pack(*(max(-_LARGEST_SINGLE, min(one, _LARGEST_SINGLE)) for one in numbers), bits)
 
 

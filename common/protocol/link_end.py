@@ -1,4 +1,4 @@
-"""One end of a link to one peer: stamps what leaves, and orders and measures what arrives."""
+"""One end of a link to one peer: stamps outgoing messages; orders and measures incoming ones."""
 
 import hashlib
 from collections import deque
@@ -14,35 +14,35 @@ from common.timing.clock_offset import ClockOffset
 
 _GAP_S = 0.1
 _REMEMBERED_EPOCHS = 64
-"""Epochs that have ended and may not come back; the oldest are forgotten so that memory stays bounded."""
+"""Number of ended epochs that are refused for good; the oldest are forgotten, so that memory stays bounded."""
 _MOST_RECENT = 4096
-"""Arrivals whose delays are kept for who looks at the last second."""
+"""Number of arrivals in `recent`; enough for the last second."""
 _MOST_UNMEASURED = 4096
-"""Arrivals that wait for the offset to settle: it takes a second, in which a thousand or so arrive."""
+"""Number of arrivals that wait for the offset to settle: it takes a second, in which about a thousand arrive."""
 
 
 @dataclass(frozen=True)
 class Arrival:
-    """What the stamps of one message say at the moment it arrived."""
+    """Delays of one message by its stamps, at its arrival."""
 
     fresh: bool
-    """Newer than all that came before of its kind, in the peer's present epoch: it may be applied."""
+    """Newer than all messages of the kind in the peer's present epoch: it may be applied."""
     queueing_age_s: float
-    """Its one-way delay beyond the sliding minimum: what a queue added, whatever the distance."""
+    """Queueing delay: one-way delay above the sliding minimum, whatever the distance."""
     one_way_s: float | None
-    """Its delay from the peer, as uncertain as the clock offset; None while that is unknown."""
+    """One-way delay from the peer, as uncertain as the clock offset; None while the offset is unknown."""
     loop_age_s: float | None
-    """Since we sent the stamp that it echoes: both ways, and of the holding what counts (common/silence.py). None
-    before the first echo."""
+    """Round trip of the echoed stamp, plus the counted part of the holding time (common/silence.py). None before the
+    first echo."""
     copy: bool = False
-    """The newest of its kind once more, by another connection."""
+    """Duplicate of the newest message of the kind, by another connection."""
 
 
 class LinkEnd:
     """Epoch, sequence numbers, echoes and delay statistics towards one peer.
 
-    Latest wins and never twice: of each kind of message only a higher sequence number of the present epoch is
-    fresh. An epoch begins with the peer's Hello; one that has ended is refused for good.
+    Latest wins: of each kind of message only a higher sequence number of the present epoch is fresh. An epoch begins
+    with the peer's Hello. An ended one is refused for good.
     """
 
     def __init__(
@@ -53,19 +53,19 @@ class LinkEnd:
         seed: int = 0,
         asymmetry_s: float = 0.0,
     ) -> None:
-        """`asymmetry_s`: the least delay to the robot minus that to the operator, where it is known otherwise."""
+        """`asymmetry_s`: least delay to the robot minus that to the operator, if known from elsewhere."""
         self.delay = RunningStatistics(seed)
-        """One-way delay from the peer in seconds, every arrival, before ordering; empty until the offset settles."""
+        """One-way delays from the peer in seconds, of all arrivals before ordering; empty until the offset settles."""
         self.round_trip = RunningStatistics(seed)
-        """Both ways without the peer's holding time, in seconds, every arrival that echoes a stamp."""
+        """Round trips without the peer's holding time, in seconds, of all arrivals that echo a stamp."""
         self.recent: deque[tuple[float, float | None, float | None]] = deque(maxlen=_MOST_RECENT)
-        """(now_s, one-way delay from the peer, round trip) of the newest arrivals in seconds, the oldest first."""
+        """(now_s, one-way delay from the peer, round trip) of the newest arrivals in seconds, oldest first."""
         self.outgoing = OutgoingQueue(seed)
-        """The queue in front of what we send to the peer."""
+        """Estimate of the queue in front of our messages to the peer."""
         self.stale = 0
-        """Messages that came too late to be applied, or of no known epoch."""
+        """Number of messages that came too late to be applied, or of no known epoch."""
         self.gaps = 0
-        """Silences of more than 100 ms that something newer ended."""
+        """Number of silences of more than 100 ms that a newer message ended."""
         self._side = side
         self._epoch = epoch
         self._clock_domain = clock_domain
@@ -77,7 +77,7 @@ class LinkEnd:
     def _forget_peer(self, epoch: int | None, *, shared_clock: bool) -> None:
         self.peer_epoch = epoch
         self.clock_offset = ClockOffset(shared_clock=shared_clock, asymmetry_s=self._to_peer_asymmetry_s)
-        """What the peer's clock is ahead of ours; another one in each of its epochs."""
+        """Clock offset to the peer; a new one for each of the peer's epochs."""
         self._jumps = 0
         self.outgoing.reset()
         self._unmeasured: deque[tuple[float, float]] = deque(maxlen=_MOST_UNMEASURED)
@@ -88,17 +88,17 @@ class LinkEnd:
         self._last_sent_s = self._last_received_s = 0.0
 
     def begin_anew(self) -> None:
-        """Another epoch of ours, after the peer took this one for ended; only who knows this one can guess it."""
+        """Begin our next epoch after the peer ended this one; the number is a hash, which strangers cannot guess."""
         self._epoch = int.from_bytes(hashlib.sha256(self._epoch.to_bytes(8)).digest()[:8]) >> 11
 
     def hello(self, now_s: float, sequence: int | None = None) -> Hello:
-        """The message that opens our epoch; `sequence` as for `stamp`."""
+        """Return the message that opens our epoch; `sequence` as for `stamp`."""
         return Hello(self.stamp(now_s, sequence), side=self._side, clock_domain=self._clock_domain)
 
     def stamp(self, now_s: float, sequence: int | None = None) -> Header:
-        """The header of the next message, to be made when it enters its delay line.
+        """Return the header of the next message, to be made when the message enters its delay line.
 
-        `sequence`: its number, of whoever counts over several ends of one epoch; None for the next of our own.
+        `sequence`: its number, if the caller counts over several ends of one epoch; None for our next.
         """
         if sequence is None:
             self._sequence = sequence = self._sequence + 1
@@ -119,7 +119,7 @@ class LinkEnd:
         )
 
     def expect_other_delay(self) -> None:
-        """The peer's link was changed on purpose: what queues is judged by what comes from now on."""
+        """Forget the least delays, after the peer's link was changed on purpose: new arrivals give new ones."""
         self._queueing.reset()
         self.outgoing.reset()
 
@@ -156,13 +156,13 @@ class LinkEnd:
         self._forget_peer(epoch, shared_clock=shared)
 
     def _measure_loop(self, header: Header, now_s: float) -> float | None:
-        """Take in the stamps that came with a message; the loop age that they give."""
+        """Use the stamps of a message; return its loop age."""
         sent_s, held_s = header.echo_sent_s, header.echo_held_s
         if sent_s is None or held_s is None:
             self.clock_offset.arrived(header.sent_s, now_s)
             return None
         last = header.last_sent_s is None
-        # A stamp from before our own restart, or a peer that invents one, says nothing about the link.
+        # A stamp from before our restart, or an invented one, says nothing about the link.
         if not self.clock_offset.update(sent_s, header.sent_s, held_s, now_s, arrived_last=last):
             return None
         self.outgoing.echoed(sent_s, header.sent_s - held_s)
@@ -174,7 +174,7 @@ class LinkEnd:
 
     def _measure_one_way(self, sent_s: float, now_s: float) -> float | None:
         if self.clock_offset.jumps != self._jumps:
-            # The peer's clock counts from another origin now, and old delays cannot be told any more.
+            # The peer's clock counts from another origin now: old delays are meaningless.
             self._jumps = self.clock_offset.jumps
             self._queueing.reset()
             self.outgoing.reset()
@@ -191,8 +191,8 @@ class LinkEnd:
         return one_way_s
 
     def offset_summary_ms(self) -> dict[str, Any]:
-        """What the peer's clock is ahead of ours: `value` and `bound` in ms, `skew_ppm`, the `estimator` behind it,
-        and how many stamps were `rejected` and clock `jumps` seen; None where unknown.
+        """Return the clock offset's `value` and `bound` in ms, its `skew_ppm` and `estimator`, and the numbers of
+        `rejected` stamps and of clock `jumps`; None where unknown.
         """
         offset = self.clock_offset
         value_s, bound_s, skew = offset.offset_s, offset.bound_s, offset.skew

@@ -1,7 +1,6 @@
-"""What one operator is to the robot side: one table of states, events and what follows, which the code runs from.
+"""State machine of one operator at the robot side, as a table that the code executes.
 
-docs/session.md shows this very table and its diagram.
-A pair of state and event that the table does not name changes nothing.
+docs/session.md shows the table and its diagram. A pair of state and event outside the table changes nothing.
 """
 
 from collections.abc import Iterable, Mapping
@@ -12,30 +11,30 @@ from typing import Final
 
 
 class SessionState(StrEnum):
-    """Where one operator (one epoch) stands; the values travel in LeaseNotice."""
+    """State of one operator (one epoch); the values travel in LeaseNotice."""
 
     UNKNOWN = "unknown"
-    """No Hello yet, or one that was refused."""
+    """No Hello yet, or a refused one."""
     OBSERVING = "observing"
-    """It sees and waits; another one owns the lease."""
+    """Waiting; another operator owns the lease."""
     DISARMED = "disarmed"
-    """It owns the lease, and the arm stands still."""
+    """Owner of the lease; the arm is still."""
     READY = "ready"
-    """As disarmed, after a healthy second with released triggers: the arming button arms."""
+    """Disarmed, after a healthy second with released triggers: the arming button arms."""
     ARMED = "armed"
-    """It owns the lease, and its commands reach the arm."""
+    """Owner of the lease, whose commands reach the arm."""
     STOPPED = "stopped"
-    """It owns the lease under an emergency stop."""
+    """Owner of the lease under an emergency stop."""
     STOPPED_READY = "stopped_ready"
-    """As stopped, after a healthy second with released triggers."""
+    """Stopped, after a healthy second with released triggers."""
     AWAY = "away"
-    """It fell silent, and lost the lease if it had it; remembered, so that it can come back."""
+    """Silent, without lease; remembered, so that it can return."""
     ENDED = "ended"
-    """Its epoch is over and never comes back."""
+    """Final state: an ended epoch is refused for good."""
 
 
 class SessionEvent(Enum):
-    """What can happen to an operator; the values are the words of the diagram."""
+    """Event of one operator; the values are the words of the diagram."""
 
     ASKED_WHILE_FREE = "Hello (or any message when away), lease free"
     ASKED_WHILE_HELD = "Hello (or any message when away), lease held"
@@ -64,12 +63,12 @@ OWNING: Final = frozenset(
         SessionState.STOPPED_READY,
     }
 )
-"""The states of the one that owns the lease."""
+"""States of the lease's owner."""
 
 
 @dataclass(frozen=True)
 class Transition:
-    """One row of the table."""
+    """Row of the table."""
 
     before: SessionState
     event: SessionEvent
@@ -80,7 +79,7 @@ class Transition:
 def _rows(
     before: Iterable[SessionState], event: SessionEvent, after: SessionState | None, why: str
 ) -> tuple[Transition, ...]:
-    """The same for each state, in the order of their definition; `after` None means that it stays as it is."""
+    """Return one row for each state, in the order of their definition; `after` None keeps the state."""
     return tuple(Transition(state, event, after or state, why) for state in SessionState if state in set(before))
 
 
@@ -114,7 +113,7 @@ def _build() -> tuple[Transition, ...]:
         *_rows(OWNING, event.HAND_OVER, state.OBSERVING, "the owner handed the lease over"),
         *_rows(known, event.SILENT, state.AWAY, "nothing heard for the lease limit"),
         *_rows((*known, state.AWAY), event.NEW_EPOCH, state.ENDED, "the operator side began a new epoch"),
-        *_rows([state.AWAY], event.FORGOTTEN, state.ENDED, "so many others are remembered"),
+        *_rows([state.AWAY], event.FORGOTTEN, state.ENDED, "too many are remembered"),
     )
 
 
@@ -125,20 +124,20 @@ TABLE: Final[Mapping[tuple[SessionState, SessionEvent], Transition]] = MappingPr
 
 
 class Session:
-    """One operator's walk through the table."""
+    """Present state of one operator."""
 
     def __init__(self) -> None:
         self.state = SessionState.UNKNOWN
         self.why = "no Hello yet"
-        """Of the last row that applied."""
+        """Reason of the last row that applied."""
 
     @property
     def owns(self) -> bool:
-        """Whether it has the lease."""
+        """Whether the operator has the lease."""
         return self.state in OWNING
 
     def handle(self, event: SessionEvent) -> Transition | None:
-        """Follow the table; the row that applied, or None when it names no such pair and nothing changes."""
+        """Apply the event; return its row, or None if the table has no such pair and nothing changes."""
         row = TABLE.get((self.state, event))
         if row is not None:
             self.state, self.why = row.after, row.why

@@ -1,4 +1,4 @@
-"""A trigger field that asks for the same strength in every zone, whatever is ahead and however fast it goes."""
+"""Trigger field of one strength in every zone, at every distance and speed."""
 
 from typing import Final
 
@@ -6,11 +6,11 @@ from common.protocol.messages import TriggerField, Ways
 
 STRENGTHS: Final = 8
 FAR_M: Final = 10.0
-"""Nothing goes so far within a reaction; the horizon of a field that knows no distances."""
+"""Horizon of a field without distances, in metres: out of reach within a reaction."""
 
 
 def uniform_field(strength: int, full_speed_m_s: float = 0.25, acceleration_m_s2: float = 3.0) -> TriggerField:
-    """Ask for `strength`, 0 to 8, at every speed; ValueError for any other."""
+    """Return a field of `strength`, 0 to 8, at every speed; raises ValueError for any other."""
     if not 0 <= strength <= STRENGTHS:
         raise ValueError(f"strength = {strength}; valid: 0 to {STRENGTHS}")
     near, far = (-FAR_M,) * strength, (FAR_M,) * (STRENGTHS - strength)

@@ -1,10 +1,10 @@
-"""What the robot side publishes to be looked at, beside Telemetry: camera frames, and the scene as it believes it is.
+"""View messages besides Telemetry: camera pictures, and the scene as the robot side perceives it.
 
-    operator ── Watch ──▶ robot                                 control: who looks at what, renewed
-    robot ── VideoFrame, VideoStep ──▶ whoever                  view, PUB/SUB, topic `video`
-    robot ── SceneShapes, SceneState ──▶ whoever                view, PUB/SUB, topic `scene`
+    operator ── Watch ──▶ robot                                 control: the views that it shows, renewed
+    robot ── VideoFrame, VideoStep ──▶ viewers                  view, PUB/SUB, topic `video`
+    robot ── SceneShapes, SceneState ──▶ viewers                view, PUB/SUB, topic `scene`
 
-Arrays travel as bytes, little-endian and row by row, as their docstrings say.
+Arrays travel as bytes, little-endian, row by row; their docstrings give the shapes.
 """
 
 from typing import Annotated, Final, Literal
@@ -31,38 +31,38 @@ class VideoFrame(Message, frozen=True, tag="video"):
 
     view: ViewName
     captured_s: Finite
-    """The moment that it shows, on the robot side's monotonic clock."""
+    """Time of capture, on the robot side's monotonic clock."""
     width: _Pixels
     height: _Pixels
     jpeg: bytes
 
 
 class VideoStep(Message, frozen=True, tag="step"):
-    """One picture of one camera in H.264: whole, or the changes since the picture before it."""
+    """One picture of one camera in H.264: whole, or its changes since the previous picture."""
 
     view: ViewName
     captured_s: Finite
-    """As VideoFrame's"""
+    """Time of capture, on the robot side's monotonic clock"""
     width: _Pixels
     height: _Pixels
     number: Annotated[int, Meta(ge=1, le=2**63 - 1)]
-    """Grows by one from picture to picture of a view"""
+    """Number of the picture in its view, counted up by one"""
     whole: bool
-    """Whether it can be shown without any other"""
+    """The picture can be shown without any other"""
     h264: bytes
-    """An access unit in Annex B's form"""
+    """Access unit in Annex B's form"""
 
 
 class Shape(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """One solid of a link or an object, in the frame of that."""
+    """One solid of a link or an object, in the owner's frame."""
 
     owner: int
-    """Which one it belongs to: index into SceneShapes.links or .objects"""
+    """Index into SceneShapes.links or .objects"""
     of_robot: bool
     kind: ShapeKind
     size_m: Vector3
     """box: half sizes; sphere: radius, 0, 0; cylinder, capsule: radius, half length, 0; ellipsoid: half axes; plane:
-    half sizes, 0 for endless; mesh: 1, 1, 1"""
+    half sizes, 0 for infinite; mesh: 1, 1, 1"""
     pose: tuple[float, float, float, float, float, float, float]
     """x, y, z and the quaternion w, x, y, z, in the owner's frame"""
     color: tuple[float, float, float, float] = (0.6, 0.6, 0.6, 1.0)
@@ -73,18 +73,18 @@ class Shape(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=
 
 
 class SceneShapes(Message, frozen=True, tag="shapes"):
-    """What there is, in shape: sent anew when somebody begins to look, and every few seconds."""
+    """Shapes of links and objects: sent when somebody begins to watch, and every few seconds."""
 
     version: int
-    """Of the links and objects below, which SceneState's indices mean"""
+    """Version of the lists below, to which SceneState's indices refer"""
     links: tuple[str, ...]
     objects: tuple[str, ...]
     shapes: tuple[Shape, ...]
     left_out: int = 0
-    """Objects that there was no room for; they are felt all the same"""
+    """Number of objects without room in the message; they are felt all the same"""
     object_poses: bytes = b""
-    """(objects, 7) float32, rows as in SceneState: where each stands unless SceneState says otherwise; empty where
-    SceneState says it of all"""
+    """(objects, 7) float32, rows as in SceneState: poses of the objects that SceneState leaves out; empty if it has
+    all"""
 
     def __post_init__(self) -> None:
         if len(self.object_poses) not in (0, _POSE_BYTES * len(self.objects)):
@@ -92,7 +92,7 @@ class SceneShapes(Message, frozen=True, tag="shapes"):
 
 
 class EnlargementTerms(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """What eq. 8-10 are made of along one trigger, of the sphere with the largest D_σ."""
+    """Terms of eq. 8-10 along one trigger, for the sphere with the largest D_σ."""
 
     sigma_m: float
     """D_σ (eq. 9-10)"""
@@ -112,25 +112,25 @@ class EnlargementTerms(msgspec.Struct, frozen=True, array_like=True, forbid_unkn
 
 
 class SceneState(Message, frozen=True, tag="scene"):
-    """Where everything is, as the robot side believes, and what it makes of it; 30 times a second while watched."""
+    """Perceived poses and the law's result, published at 30 Hz while somebody watches."""
 
     version: int
     taken_s: float
-    """On the robot side's monotonic clock"""
+    """Time of the state, on the robot side's monotonic clock"""
     link_poses: bytes
     """(n, 7) float32: x, y, z, and the quaternion w, x, y, z of each link"""
     object_index: bytes
-    """(k,) uint32: the objects whose poses follow: those that have moved since SceneShapes was made, or may move"""
+    """(k,) uint32: objects whose poses follow: those that may move, or have moved since SceneShapes was made"""
     object_poses: bytes
     """(k, 7) float32"""
     roles: bytes
-    """(objects,) uint8: places in common/roles.py"""
+    """(objects,) uint8: indices of roles in common/roles.py"""
     tool_pose: tuple[float, float, float, float, float, float, float]
-    """Of the tool, whose z axis is the approach"""
+    """Pose of the tool, whose z axis is the approach axis"""
     spheres: bytes
-    """(m, 4) float32: centre and radius of the gripper's spheres and those of what it holds"""
+    """(m, 4) float32: centre and radius of the spheres of the gripper and of the held object"""
     overlaps: tuple[tuple[int, float, float], ...]
-    """(object, by L2, by R2): m³ of the gripper inflated by D_σ and moved by the robot side's δ, where there is any"""
+    """(object, by L2, by R2): overlap in m³ of the gripper inflated by D_σ and moved by the robot side's δ, if any"""
     l2: EnlargementTerms
     r2: EnlargementTerms
     tick_p50_us: float

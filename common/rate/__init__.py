@@ -1,1 +1,1 @@
-"""The amount that a side may send, and its order, so that no queue of our own making stands in the link."""
+"""Amount and order of a side's messages, so that they cause no queue in the link."""

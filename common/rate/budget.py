@@ -1,4 +1,4 @@
-"""One budget for all that a side sends: what must go is counted, what can wait gets what is left, in pieces."""
+"""Budget of all that a side sends: urgent messages are counted, others get the rest, in pieces."""
 
 import math
 from collections import deque
@@ -14,23 +14,23 @@ _HEADERS_BYTES: Final = 90
 """Headers of a packet and its acknowledgement: Ethernet, IP, TCP, ZeroMQ."""
 _PACKET_BYTES: Final = 1400
 SLICE_S: Final = 0.006
-"""A piece is at most what the rate carries in this time, so that it stands no longer in front of a stiffness."""
+"""Transmission time of the largest piece, in seconds: it delays a stiffness no longer."""
 _LEAST_PIECE_BYTES: Final = 2 * LEAST_BYTES
 _DEBT_S: Final = 0.05
-"""A burst of what must go keeps all else back for no longer than this."""
+"""Longest time for which a burst of urgent messages holds back all else, in seconds."""
 _WAITING: Final = 2
-"""Wholes of a stream that wait and have not begun; the oldest gives way to a newer one."""
+"""Number of a stream's waiting wholes that have not begun; the oldest gives way to a newer one."""
 _SHARE: Final = 0.6
-"""Haptics slow down where they would take more of the rate than this."""
+"""Share of the rate above which haptics slow down."""
 _TYPICAL_BYTES: Final = 200.0
 _SMOOTHING_S: Final = 0.5
 _URGENCY: Final = {"haptics": Urgency.MUST, "telemetry": Urgency.SOON}
 _SELDOM_S: Final = 0.2
-"""Telemetry leaves that often even where there is no room for it: a screen that stands still looks like a fault."""
+"""Longest time between telemetry, in seconds, even without room: a frozen screen looks like a fault."""
 
 
 def on_the_wire(size_bytes: int) -> int:
-    """Bytes that a payload takes of the link, headers and acknowledgements included."""
+    """Return the bytes of a payload on the link, with headers and acknowledgements."""
     return size_bytes + _HEADERS_BYTES * max(1, math.ceil(size_bytes / _PACKET_BYTES))
 
 
@@ -38,7 +38,7 @@ Name = TypeVar("Name", bound=str)
 
 
 class Leaving(NamedTuple, Generic[Name]):
-    """A payload that leaves now: a whole one of `stream`, or a piece."""
+    """Payload that leaves now: a whole one of `stream`, or a piece."""
 
     stream: Name
     payload: bytes
@@ -46,7 +46,7 @@ class Leaving(NamedTuple, Generic[Name]):
 
 
 class _Stream:
-    """The waiting wholes of one stream; the first may have begun to leave."""
+    """Waiting wholes of one stream; the first may have begun to leave."""
 
     def __init__(self) -> None:
         self.begun: bytes | None = None
@@ -56,7 +56,7 @@ class _Stream:
 
     @property
     def left_bytes(self) -> int:
-        """Bytes that have not left yet."""
+        """Number of bytes that have not left yet."""
         begun = 0 if self.begun is None else len(self.begun) - self.offset
         return begun + sum(map(len, self.waiting))
 
@@ -64,31 +64,31 @@ class _Stream:
 class Budget(Generic[Name]):
     """Token bucket (its rate is the controller's) with strict priority: haptics, telemetry, then the `paced` streams.
 
-    Haptics always leave and may put the bucket into debt. What is paced leaves where there is room. A whole that
-    has begun is finished, one that has not gives way to a newer one.
+    Haptics always leave and may put the bucket into debt. Paced streams leave if there is room. A whole that has
+    begun is finished; one that has not gives way to a newer one.
     """
 
     def __init__(self, paced: Sequence[Name] = (), first_number: int = 0) -> None:
-        """paced: streams that leave in pieces, the more urgent first. first_number: of the wholes."""
+        """paced: streams that leave in pieces, most urgent first. first_number: number before the first whole's."""
         self.controller = RateController()
         self._streams: dict[Name, _Stream] = {name: _Stream() for name in paced}
         self._number: dict[Name, int] = dict.fromkeys(paced, first_number)
         self._dropped = {"telemetry": {"rate": 0, "queue": 0}}
         self.level_bytes = 0.0
-        """Bytes that may leave at once; below 0 a debt."""
+        """Level of the bucket: bytes that may leave at once; below 0 a debt."""
         self._now_s: float | None = None
         self._telemetry_s = -math.inf
         self._flows_s = math.inf
-        """When nothing waited for the rate last"""
+        """Last time at which nothing waited for the rate"""
         self._haptic_bytes = _TYPICAL_BYTES
         self._must_bit_s = 0.0
-        """Bits a second of haptics and telemetry, smoothed."""
+        """Smoothed rate of haptics and telemetry."""
         self._heard_from: OutgoingQueue | None = None
         self._measured: OutgoingQueue | None = None
-        """The last peer's queue."""
+        """Queue of the last peer."""
 
     def hear(self, queue: OutgoingQueue | None, now_s: float) -> None:
-        """Take the echoes that have arrived from the present peer; None: there is no peer that echoes."""
+        """Process the present peer's new echoes; None: no peer echoes."""
         if queue is not self._heard_from:
             self._heard_from, self._measured = queue, queue or self._measured
             self.controller = RateController()
@@ -96,7 +96,7 @@ class Budget(Generic[Name]):
             self.controller.heard(echo, now_s)
 
     def spend(self, stream: Name | Literal["haptics", "telemetry"], size_bytes: int, now_s: float) -> None:
-        """Count a payload that leaves now, whatever the budget says."""
+        """Count a payload that leaves now, regardless of the budget."""
         self._fill(now_s)
         taken = on_the_wire(size_bytes)
         self.controller.sent(taken, now_s, _URGENCY.get(stream, Urgency.PACED))
@@ -107,7 +107,7 @@ class Budget(Generic[Name]):
             self._haptic_bytes += (taken - self._haptic_bytes) / 64.0
 
     def may_tell(self, size_bytes: int, now_s: float) -> bool:
-        """Return True and count it if telemetry of that size leaves now; if not, the next one is newer."""
+        """Return whether telemetry of that size may leave now, and count it if so; if not, the next one is newer."""
         self._fill(now_s)
         flows = self.controller.may_send(now_s)
         if (flows and self.level_bytes > 0.0) or now_s - self._telemetry_s >= _SELDOM_S:
@@ -118,7 +118,7 @@ class Budget(Generic[Name]):
         return False
 
     def offer(self, stream: Name, payload: bytes, now_s: float) -> None:
-        """Let a payload of a paced stream wait for its turn."""
+        """Queue a payload of a paced stream."""
         one = self._streams[stream]
         one.waiting.append(payload)
         if len(one.waiting) > _WAITING:
@@ -126,17 +126,17 @@ class Budget(Generic[Name]):
             one.held_back["rate" if self.controller.may_send(now_s) else "queue"] += 1
 
     def take(self, now_s: float) -> list[Leaving[Name]]:
-        """Take what leaves at `now_s` of the paced streams. To be called every millisecond or so."""
+        """Return the paced payloads that leave at `now_s`. Call it about every millisecond."""
         self._fill(now_s)
         leaving: list[Leaving[Name]] = []
         for name, stream in self._streams.items():
             while (size_bytes := self._next_bytes(stream)) and self.controller.may_send(now_s):
-                # A piece may be larger than the bucket by a quarter; then a full one will do.
+                # A piece may exceed the bucket's depth by a quarter; then a full bucket suffices.
                 if self.level_bytes < min(on_the_wire(size_bytes), self._depth_bytes):
                     break
                 leaving.append(self._next(name, stream, size_bytes))
                 self.spend(name, len(leaving[-1].payload), now_s)
-        # Only now: where haptics leave in every turn, the bucket would never be full.
+        # Cut the level only now: with haptics in every turn the bucket would never be full.
         self.level_bytes = min(self.level_bytes, self._depth_bytes)
         if not self.controller.may_send(now_s) or not any(stream.left_bytes for stream in self._streams.values()):
             self._flows_s = now_s
@@ -144,7 +144,7 @@ class Budget(Generic[Name]):
         return leaving
 
     def _next_bytes(self, stream: _Stream) -> int:
-        """Bytes of the next piece; 0 while nothing waits. A last one would be no crumb: it goes with the one before."""
+        """Return the bytes of the next piece, 0 for none; a short last piece is joined to the one before it."""
         if stream.begun is None:
             if not stream.waiting:
                 return 0
@@ -178,10 +178,10 @@ class Budget(Generic[Name]):
         self._must_bit_s *= math.exp(-elapsed_s / _SMOOTHING_S)
 
     def waiting_s(self, stream: Name) -> float:
-        """How long what is offered to `stream` now would wait; endless where a whole of it has not begun to leave.
+        """Return the queueing delay of a payload offered now; infinite if a whole of `stream` has not begun to leave.
 
-        Who waits for less before making another one never sees one give way: of pictures that each say what has
-        changed since the one before, all have to arrive.
+        A sender that waits for a finite delay loses no whole: of pictures that hold only the changes since the previous
+        one, all must arrive.
         """
         if self._streams[stream].waiting:
             return math.inf
@@ -194,13 +194,13 @@ class Budget(Generic[Name]):
 
     @property
     def left_bit_s(self) -> float:
-        """Bits a second that haptics and telemetry leave of the rate, at least a twentieth of it."""
+        """Rate left by haptics and telemetry, at least a twentieth of the whole."""
         rate_bit_s = self.controller.rate_bit_s
         return max(rate_bit_s - self._must_bit_s, 0.05 * rate_bit_s)
 
     @property
     def haptic_interval_s(self) -> float:
-        """The least time between two haptic messages to a peer: 0 until the link shows a limit, 20 ms in a queue."""
+        """Least time between two haptic messages to a peer: 0 until the link shows a limit, 20 ms in a queue."""
         if self.controller.drains:
             return KEEP_ALIVE_S
         if self.controller.begins:
@@ -208,16 +208,16 @@ class Budget(Generic[Name]):
         return min(8.0 * self._haptic_bytes / (_SHARE * self.controller.rate_bit_s), KEEP_ALIVE_S)
 
     def held_back(self) -> dict[str, dict[str, int]]:
-        """Count the messages of each stream that gave way to the `rate`, or while a `queue` went away."""
+        """Count each stream's messages that gave way to the `rate`, or while a `queue` drained."""
         paced: dict[str, dict[str, int]] = {name: dict(stream.held_back) for name, stream in self._streams.items()}
         return self._dropped | paced
 
     def status(self) -> dict[str, float]:
-        """`queue_ms` and `rate_kbit_s` as they are now."""
+        """Return the present `queue_ms` and `rate_kbit_s`."""
         return {"queue_ms": 1e3 * self.controller.queue_s, "rate_kbit_s": 1e-3 * self.controller.rate_bit_s}
 
     def summary(self) -> dict[str, Any]:
-        """`allowed_kbit_s`, `queue_ms` with p50 and p95, and what was `held_back`."""
+        """Return `allowed_kbit_s`, `queue_ms` with p50 and p95, and `held_back`."""
         queue = {"p50": None, "p95": None} if self._measured is None else self._measured.summary_ms()
         return {
             "allowed_kbit_s": 1e-3 * self.controller.rate_bit_s,

@@ -1,6 +1,6 @@
-"""The rate that one direction of a link carries without a queue, found by the delay that our own messages have.
+"""Rate that one direction of a link carries without a queue, found by the delay of our messages.
 
-Delay-based congestion control as in GCC (Carlucci et al. 2017). The rate falls to 0.85 of what got through.
+Delay-based congestion control as in GCC (Carlucci et al. 2017). The rate falls to 0.85 of the delivered rate.
 It grows by 5 % a second near the last known capacity. The target is SCReAM's (RFC 8298), much shortened. The threshold
 rises with the jitter of RFC 3550. Silence is noticed by the timeout of RFC 6298.
 """
@@ -16,79 +16,79 @@ LEAST_BIT_S: Final = 100e3
 MOST_BIT_S: Final = 1e9
 START_BIT_S: Final = 1e6
 TARGET_S: Final = 0.010
-"""A queue of our own that stands above this is overuse."""
+"""Standing queue of our messages, in seconds, above which the link is overused."""
 _JITTER_S: Final = 0.003
-"""Supposed until it is measured."""
+"""Jitter assumed until it is measured, in seconds."""
 _CALM_S: Final = 0.001
 _SLACK: Final = 5.0
-"""The target rises by this multiple of the jitter above _CALM_S: the least of several delays stands that far out."""
+"""Multiple of the jitter above _CALM_S by which the target rises: the least of several delays varies as much."""
 _AFTER: Final = 2
-"""Echoes after a burst that see what is left of it, and no jitter."""
+"""Number of echoes after a burst that measure its rest, not jitter."""
 _MOST_APART_S: Final = 0.03
-"""A single loss tells nothing about jitter."""
+"""Largest difference that counts as jitter, in seconds: a single loss is no jitter."""
 _WINDOW_S: Final = 0.09
-"""The least queue over this counts: jitter and a lost packet hold up single messages, a standing queue all."""
+"""Window of the least queue, in seconds: jitter and a lost packet delay single messages, a standing queue all."""
 _FEWEST: Final = 5
 _DELIVERY_S: Final = 0.15
-"""The delivered rate is measured over this time of arrivals."""
+"""Span of arrivals over which the delivered rate is measured, in seconds."""
 _DECREASE: Final = 0.85
 _LARGEST_DECREASE: Final = 0.5
-"""By one echo: a process that stood still for a moment sent little, and little got through."""
+"""Largest decrease by one echo: a process that paused for a moment sent little, and little was delivered."""
 _DOUBLING_S: Final = 0.5
 _FAR_DOUBLING_S: Final = 1.5
 _NEAR_GROWTH: Final = 1.05
 _NEAR: Final = (0.8, 1.1)
-"""Near the last known capacity, as shares of it."""
+"""Range near the last known capacity, as shares of it."""
 _LIMITED_S: Final = 0.25
 _BURST_S: Final = 0.003
-"""A burst is at least what the rate carries in this time."""
+"""Least transmission time of a burst, in seconds."""
 _BURSTS_S: Final = 0.005
-"""This mean queue behind bursts means that they leave as fast as the link carries them."""
+"""Mean queue behind bursts, in seconds, that means that they leave as fast as the link carries them."""
 _EASING: Final = 0.5
-"""In a second, of a rate whose bursts make half as much queue again."""
+"""Factor per second for a rate whose bursts cause 1.5 times that queue."""
 _SILENT_S: Final = 1.0
 _MOST_UNDER_WAY: Final = 8192
 
 
 class Urgency(IntEnum):
-    """The patience of a message."""
+    """Urgency of a message."""
 
     MUST = 0
-    """Not at all: haptics, stops, leases."""
+    """Never waits: haptics, stops, leases."""
     SOON = 1
     """Telemetry: the next one is newer."""
     PACED = 2
-    """It waits until there is room: pictures, the scene."""
+    """Waits for room: pictures, the scene."""
 
 
 class RateController:
-    """Takes in what is sent and what has arrived; says how much may be sent, and when nothing more should be.
+    """Controller of the allowed rate and of pauses, from sent messages and their echoes.
 
-    A queue that does not go away while nothing that can wait is sent is not ours. It counts no more until it shrinks.
+    A queue that stays while nothing that can wait is sent is not ours; it is ignored until it shrinks.
     """
 
     def __init__(self, start_bit_s: float = START_BIT_S) -> None:
-        """ValueError for a start outside of LEAST_BIT_S to MOST_BIT_S."""
+        """Raises ValueError for a start outside of LEAST_BIT_S to MOST_BIT_S."""
         if not LEAST_BIT_S <= start_bit_s <= MOST_BIT_S:
             raise ValueError(f"start_bit_s = {start_bit_s}; valid: {LEAST_BIT_S:g} to {MOST_BIT_S:g}")
         self.rate_bit_s = start_bit_s
-        """Allowed, all streams together, with what headers take."""
+        """Allowed rate of all streams together, headers included."""
         self._limited_s = -math.inf
         self._updated_s = -math.inf
         self.begin_anew()
 
     def begin_anew(self) -> None:
-        """Forget the link, as there is another peer or none; the rate stays."""
+        """Forget the link, for another peer or none; keep the rate."""
         self._capacity_bit_s: float | None = None
-        """The delivered rate at the last queue; None before the first."""
+        """Delivered rate at the last queue; None before the first."""
         self._under_way: deque[tuple[float, int, Urgency]] = deque(maxlen=_MOST_UNDER_WAY)
         self._arrived_bytes = 0
         self._arrivals: deque[tuple[float, int]] = deque(maxlen=_MOST_UNDER_WAY)
         self._recent: deque[tuple[float, float]] = deque()
         self._behind_s = 0.0
-        """Mean queue of what left right after a burst."""
+        """Mean queue of messages right after a burst."""
         self.queue_s = 0.0
-        """The newest measurement."""
+        """Newest measured queueing delay."""
         self._jitter_s = _JITTER_S
         self._calm = 0
         self._calm_queue_s = 0.0
@@ -100,11 +100,11 @@ class RateController:
         self._answer_s = self._answer_deviation_s = 0.0
 
     def sent(self, size_bytes: int, now_s: float, urgency: Urgency) -> None:
-        """Note what has left, headers included."""
+        """Note a sent message, headers included."""
         self._under_way.append((now_s, size_bytes, urgency))
 
     def heard(self, echo: Echo, now_s: float) -> None:
-        """Take in one message of ours that has arrived; of later ones `sent_s` grows."""
+        """Process the echo of one of our messages, in ascending order of `sent_s`."""
         before, paced_bytes = Urgency.MUST, 0
         while self._under_way and self._under_way[0][0] <= echo.sent_s:
             _, size_bytes, urgency = self._under_way.popleft()
@@ -127,7 +127,7 @@ class RateController:
             self._judge(echo, min(queue_s for _, queue_s in self._recent), now_s)
 
     def _follow_jitter(self, queue_s: float, before: Urgency) -> None:
-        """Tell what bursts of ours do to the queue from what the link does. before: what left right before."""
+        """Separate the link's jitter from the queue of our bursts. before: urgency of the message before."""
         if before is Urgency.PACED or self._draining is not None:
             self._calm = 0
         elif before is Urgency.MUST:
@@ -163,7 +163,7 @@ class RateController:
                 self._draining = now_s, least_s
                 self._decrease()
             elif own_s < 0.5 * self._limit_s and (through_bit_s := self.delivered_bit_s) is not None:
-                # Haptics may well take more than is allowed; what gets through without a queue is carried.
+                # Haptics may exceed the allowed rate; a delivered rate without a queue is within the capacity.
                 self.rate_bit_s = min(max(self.rate_bit_s, _DECREASE * through_bit_s), MOST_BIT_S)
             return
         began_s, most_s = self._draining
@@ -185,14 +185,14 @@ class RateController:
 
     @property
     def delivered_bit_s(self) -> float | None:
-        """Bits a second that arrived lately; None while too few echoes are known."""
+        """Delivered rate of the last arrivals; None while too few echoes are known."""
         if len(self._arrivals) < _FEWEST:
             return None
         (first_s, first_bytes), (last_s, last_bytes) = self._arrivals[0], self._arrivals[-1]
         return 8.0 * (last_bytes - first_bytes) / (last_s - first_s) if last_s > first_s else None
 
     def may_send(self, now_s: float) -> bool:
-        """Whether what can wait may leave: no queue of ours drains or begins, and answers come as usual."""
+        """Return whether messages that can wait may leave: no queue of ours drains or begins, echoes are on time."""
         if self._draining is not None or self.queue_s - self._others_s > 2.0 * self._limit_s:
             return False
         if self._newest_sent_s is None:
@@ -207,13 +207,13 @@ class RateController:
 
     @property
     def drains(self) -> bool:
-        """Whether a queue of ours is waited for to go away."""
+        """Whether a queue of ours is draining."""
         return self._draining is not None
 
     def update(self, now_s: float, *, limited: bool) -> None:
-        """Let the rate grow while it is the limit. To be called every few milliseconds.
+        """Let the rate grow while it is the limit. Call it every few milliseconds.
 
-        limited: something waits for the rate. Without it nobody knows that the link would carry more.
+        limited: messages wait for the rate. Otherwise the capacity is not tested.
         """
         elapsed_s = min(max(0.0, now_s - self._updated_s), 0.1)
         self._updated_s = now_s

@@ -1,4 +1,4 @@
-"""The queue in front of our own messages, from our stamps that the peer echoes."""
+"""Queue in front of our messages, from our stamps that the peer echoes."""
 
 import math
 from collections import deque
@@ -7,43 +7,43 @@ from typing import Final, NamedTuple
 from common.statistics import RunningStatistics
 
 _DRIFT: Final = 600e-6
-"""The base delay rises by this share of time: two clocks drift apart no faster (common/timing/clock_offset.py)."""
+"""Rise of the base delay per time: two clocks drift apart no faster (common/timing/clock_offset.py)."""
 _LONGEST_S: Final = 1000.0
-"""No queue is longer: stamps that say so mean another clock."""
+"""Longest possible queue, in seconds: more means another clock."""
 _MOST_ECHOES: Final = 256
-"""Echoes that wait to be taken; the oldest are forgotten."""
+"""Number of echoes that wait to be taken; the oldest are forgotten."""
 
 
 class Echo(NamedTuple):
-    """One message of ours that has arrived at the peer."""
+    """Message of ours that has arrived at the peer."""
 
     sent_s: float
-    """Our clock when it left."""
+    """Time of sending, on our clock."""
     arrived_s: float
-    """The peer's clock when it arrived."""
+    """Time of arrival, on the peer's clock."""
     queue_s: float
-    """The one-way delay above the base delay."""
+    """One-way delay above the base delay."""
 
 
 class OutgoingQueue:
-    """One-way delay from us to the peer above its base delay (LEDBAT, RFC 6817), the clocks' offset unknown.
+    """One-way delay from us to the peer above the base delay (LEDBAT, RFC 6817), with unknown clock offset.
 
-    The base delay is a minimum that rises by 600 ppm: it outlives no drift, and forgets an old route in minutes.
+    The base delay is a minimum that rises by 600 ppm: it follows any drift, and forgets an old route in minutes.
     """
 
     def __init__(self, seed: int = 0) -> None:
         self.delay = RunningStatistics(seed)
-        """Seconds in the queue, of every echo."""
+        """Queueing delays of all echoes, in seconds."""
         self._echoes: deque[Echo] = deque(maxlen=_MOST_ECHOES)
         self.reset()
 
     def reset(self) -> None:
-        """Forget the base delay: the peer's clock counts from another origin, or the link was changed on purpose."""
+        """Forget the base delay: the peer's clock has another origin, or the link was changed on purpose."""
         self._base_s = math.inf
         self._newest_s = -math.inf
 
     def echoed(self, sent_s: float, arrived_s: float) -> None:
-        """Take in that our message of `sent_s` arrived when the peer's clock showed `arrived_s`; each counts once."""
+        """Add the echo of our message of `sent_s`, received at `arrived_s` on the peer's clock; each counts once."""
         if sent_s <= self._newest_s:
             return
         delay_s = arrived_s - sent_s
@@ -55,12 +55,12 @@ class OutgoingQueue:
         self._echoes.append(Echo(sent_s, arrived_s, delay_s - self._base_s))
 
     def take(self) -> list[Echo]:
-        """Take the echoes since the last call, the oldest first."""
+        """Return the echoes since the last call, oldest first."""
         taken = list(self._echoes)
         self._echoes.clear()
         return taken
 
     def summary_ms(self) -> dict[str, float | None]:
-        """`p50` and `p95` of the queue in milliseconds; None before the first echo."""
+        """Return `p50` and `p95` of the queue in milliseconds; None before the first echo."""
         quantiles = {f"p{percent}": self.delay.quantile(percent / 100.0) for percent in (50, 95)}
         return {name: None if value_s is None else 1e3 * value_s for name, value_s in quantiles.items()}

@@ -1,6 +1,6 @@
 """Large view messages in pieces: `number, offset, total` (u32 each, little-endian), then bytes.
 
-The topic of a piece is the whole's with `.piece` behind it, which a subscription to the whole's receives, too.
+The topic of a piece is the whole's plus `.piece`, so that a subscription to the whole's receives it, too.
 """
 
 import struct
@@ -8,17 +8,17 @@ from dataclasses import dataclass, field
 from typing import Final
 
 PIECE: Final = b".piece"
-"""Behind the topic of a piece."""
+"""End of a piece's topic."""
 _HEAD: Final = struct.Struct("<III")
 HEAD_BYTES: Final = _HEAD.size
 LEAST_BYTES: Final = 128
-"""Only the last piece of a whole is shorter, so that no flood of crumbs fills our memory."""
+"""Least bytes of a piece, except the last of a whole: a flood of tiny pieces must not fill our memory."""
 _UNDER_WAY: Final = 2
-"""Wholes that are put together at once; the one begun first is forgotten for a third."""
+"""Number of wholes that are joined at once; the one begun first is forgotten for a third."""
 
 
 def piece_of(whole: bytes, number: int, offset: int, size_bytes: int) -> bytes:
-    """Make the piece of `whole` that begins at `offset`; `number` tells wholes apart, modulo 2**32."""
+    """Make the piece of `whole` that begins at `offset`; `number` identifies the whole, modulo 2**32."""
     return _HEAD.pack(number & 0xFFFFFFFF, offset, len(whole)) + whole[offset : offset + size_bytes]
 
 
@@ -30,19 +30,19 @@ class _Whole:
 
 
 class Joining:
-    """Puts the pieces of one topic together, in any order; memory is bounded by twice `limit_bytes`."""
+    """Joiner of one topic's pieces, in any order; memory is bounded by twice `limit_bytes`."""
 
     def __init__(self, limit_bytes: int) -> None:
-        """limit_bytes: of a whole."""
+        """limit_bytes: largest size of a whole."""
         self.rejected = 0
-        """Pieces that fit no whole."""
+        """Number of pieces that fit no whole."""
         self.incomplete = 0
-        """Wholes of which something was lost."""
+        """Number of wholes with a lost piece."""
         self._limit_bytes = limit_bytes
         self._begun: dict[int, _Whole] = {}
 
     def take(self, piece: bytes) -> bytes | None:
-        """Take one piece; the whole, if it was the last one missing."""
+        """Add one piece; return the whole if it is complete now."""
         if len(piece) <= HEAD_BYTES:
             self.rejected += 1
             return None
@@ -71,7 +71,7 @@ class Joining:
         at = 0
         for offset in sorted(parts):
             if offset != at:
-                # They overlap: nobody knows which one is right.
+                # They overlap, and either may be right.
                 self.rejected += 1
                 return None
             at += len(parts[offset])

@@ -1,1 +1,1 @@
-"""Being on time: deadlines, priority, garbage collection."""
+"""Real-time parts of a loop: deadlines, priority, garbage collection."""

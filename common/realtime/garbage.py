@@ -1,4 +1,4 @@
-"""Garbage collection out of the way of the ticks: never by itself, only when there is time for it."""
+"""Garbage collection outside of the ticks: only in idle time."""
 
 import gc
 
@@ -6,23 +6,23 @@ from common.clock import Clock
 from common.statistics import RunningStatistics
 
 _RESTING_PERIOD_S = 10.0
-"""While nothing moves, so often at most."""
+"""Time between collections while nothing moves, in seconds."""
 _PRESSING_OBJECTS = 50_000
-"""So many new objects that are still alive are looked at even while the arm moves, lest memory grow without end."""
+"""Number of new live objects that are collected even while the arm moves: it bounds memory."""
 
 
 class IdleCollection:
-    """Freezes what exists, switches the collector off while it is open, and collects when told that there is time."""
+    """Collection in idle time: freezes existing objects, and disables the automatic collector while open."""
 
     def __init__(self, clock: Clock) -> None:
         self.pauses = RunningStatistics()
-        """How long each collection took, in seconds."""
+        """Durations of collections, in seconds."""
         self._clock = clock
         self._next_s = clock.now() + _RESTING_PERIOD_S
 
     def __enter__(self) -> "IdleCollection":
         gc.collect()
-        # What was built until now stays to the end: no later collection has to look at it again.
+        # Objects made until now live to the end: later collections skip them.
         gc.freeze()
         gc.disable()
         return self
@@ -32,7 +32,7 @@ class IdleCollection:
         gc.unfreeze()
 
     def idle(self, now_s: float, *, resting: bool) -> None:
-        """Collect if it is time: while `resting`, every ten seconds; else only when much has gathered."""
+        """Collect if due: every ten seconds while `resting`, otherwise only after _PRESSING_OBJECTS."""
         if (resting and now_s >= self._next_s) or gc.get_count()[0] > _PRESSING_OBJECTS:
             self._next_s = now_s + _RESTING_PERIOD_S
             began_s = self._clock.now()
@@ -40,6 +40,6 @@ class IdleCollection:
             self.pauses.add(self._clock.now() - began_s)
 
     def summary(self) -> dict[str, float | int | None]:
-        """`collections`, and the longest pause as `max_ms`."""
+        """Return the number of `collections`, and the longest pause as `max_ms`."""
         longest_s = self.pauses.maximum
         return {"collections": self.pauses.count, "max_ms": None if longest_s is None else 1e3 * longest_s}

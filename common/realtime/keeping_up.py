@@ -1,4 +1,4 @@
-"""Whether a loop keeps its period on this machine; if not, why, and what would help: said once, in words."""
+"""Check that a loop keeps its period; if not, cause and remedy in one sentence, once a run."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Final
@@ -10,15 +10,15 @@ from common.realtime.taken import Taken, read_taken
 
 WINDOW_S: Final = 5.0
 _LEFT_OUT: Final = 0.05
-"""A share of the turns; fewer is a hiccup, which every machine has."""
+"""Least share of left-out turns that counts; less is a hiccup, which every machine has."""
 _FULL: Final = 0.8
-"""Of the period: whoever computes for so long on average has no room for what varies."""
+"""Highest mean load, as a share of the period; above it there is no headroom."""
 _UNDISTURBED: Final = 1.25
-"""Turns that last no longer than this times what they compute were left alone."""
+"""Ratio of wall time to processor time below which turns were undisturbed."""
 
 
 class KeepingUp:
-    """Looks at one loop in windows of 5 s; only turns that its pacer is due for count as left out."""
+    """Monitor of one loop, in windows of 5 s; the pacer's overruns count as left out."""
 
     def __init__(
         self,
@@ -29,23 +29,23 @@ class KeepingUp:
         helps: Mapping[str, str],
         taken: Callable[[], Taken] = read_taken,
     ) -> None:
-        """`helps`: what makes each stage shorter, by its name, and "" for what is no stage's."""
+        """`helps`: remedy for each stage, by name; "" for the time outside of stages."""
         self.said: str | None = None
-        """The sentence, once there was one."""
+        """The sentence, once there is one."""
         self.stages = stages
         self._pacer, self._wall, self._processor, self._helps, self._taken = pacer, wall, processor, helps, taken
         self._began_s = self._computed_s = 0.0
         self._worked_s = [0.0, 0.0]
-        """In this window, without waiting: wall time and processor time."""
+        """Wall time and processor time in this window, without waiting."""
         self._first: tuple[float, Taken] | None = None
         self._window: tuple[float, Taken, int, int, list[float]] | None = None
 
     def begin(self) -> None:
-        """The loop has something to do."""
+        """Note that the loop begins to work."""
         self._began_s, self._computed_s = self._wall.now(), self._processor.now()
 
     def end(self, *, turned: bool) -> str | None:
-        """It will wait now. `turned`: the pacer's turn was among it. What is to be said, once a run at most."""
+        """Note that the loop will wait. `turned`: it took the pacer's turn. Return the sentence, at most once a run."""
         now_s = self._wall.now()
         self._worked_s[0] += now_s - self._began_s
         self._worked_s[1] += self._processor.now() - self._computed_s
@@ -66,7 +66,7 @@ class KeepingUp:
         return said
 
     def summary(self) -> dict[str, Any]:
-        """`said`, and what share of the run other programs (`waited`) and the host (`stolen`) took; None: unknown."""
+        """Return `said`, and the shares of the run that other programs (`waited`) and the host (`stolen`) took."""
         waited = stolen = None
         if self._first is not None:
             since_s, taken = self._first
@@ -103,7 +103,7 @@ class KeepingUp:
         )
 
     def _longest(self, before_s: list[float], computed_s: float) -> tuple[str, float]:
-        """The stage with the most processor time since, and its share of all; "" where most is no stage's."""
+        """Return the stage with the most processor time since, and its share; "" if most time is outside of stages."""
         spent_s = [now_s - then_s for now_s, then_s in zip(self.stages.spent_s[1::2], before_s[1::2], strict=True)]
         longest_s = max(spent_s)
         if longest_s < computed_s - sum(spent_s):

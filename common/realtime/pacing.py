@@ -1,4 +1,4 @@
-"""Turns at absolute deadlines: a late one is counted and the ones missed are skipped, never made up for."""
+"""Turns at absolute deadlines: missed ones are counted and skipped, never made up for."""
 
 import math
 from collections.abc import Callable
@@ -8,41 +8,41 @@ from common.clock import Clock
 from common.statistics import RunningStatistics
 
 SPIN_S = 200e-6
-"""Before a deadline the processor is kept busy for so long: a sleep ends 70 us late on average and 300 us late once
-in twenty, a busy loop 0.1 us late, for a fifth of a core at 1 kHz."""
+"""Time of the busy loop before a deadline, in seconds. A sleep ends 70 us late on average and 300 us late once in
+twenty; a busy loop ends 0.1 us late, for a fifth of a core at 1 kHz."""
 
 _SHORTEST_SLEEP_S = 1e-6
 
 
 class Pacer:
-    """Deadlines at `start_s + k period_s`, k = 0, 1, 2, ..., whatever happened to the turns before."""
+    """Deadlines at `start_s + k period_s`, k = 0, 1, 2, ..., independent of earlier turns."""
 
     def __init__(self, period_s: float, start_s: float, seed: int = 0) -> None:
         if not (math.isfinite(period_s) and period_s > 0.0 and math.isfinite(start_s)):
             raise ValueError(f"period_s = {period_s}, start_s = {start_s}; valid: finite seconds, the period above 0")
         self.period_s = period_s
         self.deadline_s: float
-        """When the next turn is due."""
+        """Deadline of the next turn."""
         self.turns = 0
-        """Turns that were taken."""
+        """Number of turns taken."""
         self.overruns = 0
-        """Turns that were not taken because their time had passed."""
+        """Number of turns skipped because their time had passed."""
         self.wake_error = RunningStatistics(seed)
-        """How long after its deadline each turn began, in seconds."""
+        """Delays of the turns' begins after their deadlines, in seconds."""
         self._latest_s = 0.0
         self.restart(start_s)
 
     def restart(self, start_s: float) -> None:
-        """The first deadline is at `start_s`, as if nothing had been before; the counts stay."""
+        """Set the first deadline to `start_s`; keep the counts."""
         self._start_s = self.deadline_s = start_s
         self._deadline = 0
 
     def due(self, now_s: float) -> bool:
-        """Whether it is time for a turn."""
+        """Return whether it is time for a turn."""
         return now_s >= self.deadline_s
 
     def begin(self, now_s: float) -> None:
-        """A turn begins at `now_s`; the next is due at the first deadline after that. ValueError before its time."""
+        """Begin a turn at `now_s`; the next is due at the first later deadline. Raises ValueError before its time."""
         if not now_s >= self.deadline_s:
             raise ValueError(f"now_s = {now_s} lies before the deadline {self.deadline_s}")
         self.turns += 1
@@ -56,12 +56,12 @@ class Pacer:
         self.deadline_s = self._start_s + following * self.period_s
 
     def take_latest_s(self) -> float:
-        """The largest wake error since the last call, in seconds."""
+        """Return the largest wake error since the last call, in seconds."""
         latest_s, self._latest_s = self._latest_s, 0.0
         return latest_s
 
     def summary(self) -> dict[str, Any]:
-        """`overruns`, and `wake_error_us` with `p50`, `p99` and `max` (None before the first turn)."""
+        """Return `overruns`, and `wake_error_us` with `p50`, `p99` and `max` (None before the first turn)."""
         values_s = {
             "p50": self.wake_error.quantile(0.50),
             "p99": self.wake_error.quantile(0.99),
@@ -76,10 +76,10 @@ class Pacer:
 def wait_for_turn(
     pacer: Pacer, clock: Clock, wait: Callable[[float], bool], other_s: float | None = None, spin_s: float = SPIN_S
 ) -> bool:
-    """Return when a message has come, at the pacer's deadline, or at `other_s` if that is earlier; whether one has.
+    """Wait for a message, the pacer's deadline, or `other_s` if that is earlier; return whether a message came.
 
-    `wait(timeout_s)` waits for a message and says whether there is one; it may end early. The last `spin_s` are spent
-    asking it without waiting, so that what is due happens in time and a message is still noticed at once.
+    `wait(timeout_s)` waits for a message and returns whether there is one; it may end early. For the last `spin_s` it
+    is polled without waiting, so that the turn is in time and a message is still noticed at once.
     """
     due_s = pacer.deadline_s if other_s is None else min(pacer.deadline_s, other_s)
     while (asleep_s := due_s - spin_s - clock.now()) > _SHORTEST_SLEEP_S:

@@ -1,4 +1,4 @@
-"""A running side goes before other work on the machine, as far as the system permits."""
+"""Priority of a running side over other work on the machine, as far as the system permits."""
 
 import contextlib
 import ctypes
@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 _NICENESS = -10
-"""Before ordinary programs, behind what the system itself needs."""
+"""Above ordinary programs, below the system's needs."""
 _REALTIME_PRIORITY = 20
-"""Before every ordinary program, behind the kernel's own interrupt threads (50)."""
+"""Above every ordinary program, below the kernel's interrupt threads (50)."""
 _PR_SET_TIMERSLACK = 29
 _CAP_IPC_LOCK = 14
 """linux/capability.h"""
@@ -19,19 +19,19 @@ _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
 
 
 def raise_priority() -> bool:
-    """Ask for exact sleeps and a higher priority; whether the latter was granted, which takes CAP_SYS_NICE."""
-    _libc().prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)  # by default sleeps may end 50 us late to save power
+    """Request exact sleeps and a higher priority; return whether the latter was granted, which needs CAP_SYS_NICE."""
+    _libc().prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)  # by default sleeps may end 50 us late, to save power
     for thread in _threads():
         with contextlib.suppress(OSError):
             os.setpriority(os.PRIO_PROCESS, thread, _NICENESS)
-    # A thread's niceness counts only within its session where Linux groups processes by session (autogroup).
+    # If Linux groups processes by session (autogroup), a thread's niceness counts only within its session.
     with contextlib.suppress(OSError):
         Path("/proc/self/autogroup").write_text(str(_NICENESS), encoding="ascii")
     return os.getpriority(os.PRIO_PROCESS, 0) <= _NICENESS
 
 
 def make_realtime() -> list[str]:
-    """First-in-first-out scheduling for every thread so far, and memory that stays; a note for what is not permitted.
+    """Set first-in-first-out scheduling for the present threads, and lock memory; return a note for each refusal.
 
     Each note is one line that ends with the command that permits it.
     """
@@ -46,29 +46,29 @@ def make_realtime() -> list[str]:
 
 
 def schedule_realtime() -> None:
-    """First-in-first-out scheduling for every thread so far; PermissionError where that takes more rights."""
+    """Set first-in-first-out scheduling for the present threads; raises PermissionError if that needs more rights."""
     for thread in _threads():
         os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(_REALTIME_PRIORITY))
 
 
 def raise_descriptor_limit() -> None:
-    """Allow as many open connections as the system does, so that a crowd of strangers cannot lock others out."""
+    """Raise the limit of descriptors to the system's, so that a crowd of strangers cannot lock others out."""
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     with contextlib.suppress(OSError, ValueError):
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
 
 
 def _lock_memory() -> bool:
-    # With a limit, memory that is wanted later could not be had at all: worse than being swapped out.
+    # With a limit, later allocations would fail: worse than being swapped out.
     unlimited = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
     if not (unlimited or _may_lock_without_limit()):
         return False
-    # Only what is used: the stacks of all threads would be hundreds of megabytes.
+    # Only used pages: the stacks of all threads would be hundreds of megabytes.
     return bool(_libc().mlockall(_MCL_CURRENT | _MCL_FUTURE | _MCL_ONFAULT) == 0)
 
 
 def _may_lock_without_limit() -> bool:
-    """Whether this process has CAP_IPC_LOCK, for which the limit does not count."""
+    """Return whether this process has CAP_IPC_LOCK, to which the limit does not apply."""
     for line in Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines():
         if line.startswith("CapEff:"):
             return bool(int(line.split()[1], 16) >> _CAP_IPC_LOCK & 1)

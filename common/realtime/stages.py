@@ -1,7 +1,7 @@
-"""Measure the time of each stage of a loop's turns, in wall time and in processor time.
+"""Times of the stages of a loop's turns, in wall time and in processor time.
 
-Reading four clocks takes a microsecond and a half, so one turn in seven is looked at: no period of the loop's own work,
-such as 4, 10 or 33 turns, is a multiple of that.
+Reading four clocks takes a microsecond and a half, so that one turn in seven is sampled. The periods of the loop's
+work, such as 4, 10 or 33 turns, are no multiples of seven.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,31 +11,31 @@ from common.clock import Clock
 from common.statistics import BLOCK, RunningStatistics
 
 EVERY: Final = 7
-"""One turn in so many is looked at."""
+"""Sampling interval, in turns."""
 Given = ParamSpec("Given")
 Result = TypeVar("Result")
 
 
 class Stages:
-    """Adds up within a turn, and keeps statistics over the turns; a stage may lie within another one's time."""
+    """Sums within a turn, and statistics over the turns; a stage may lie within another's time."""
 
     def __init__(self, names: Sequence[str], wall: Clock, processor: Clock, seed: int = 0, every: int = EVERY) -> None:
-        """`processor`: what the thread that runs the loop has computed."""
+        """`processor`: processor time of the loop's thread."""
         self.names = tuple(names)
         self.spent_s = [0.0] * (2 * len(self.names))
-        """Since the start, of each stage: wall time, then processor time, as many turns as were looked at stand for."""
+        """Wall time, then processor time of each stage since the start, scaled up from sampled turns."""
         self._wall, self._processor = wall, processor
         self._every, self._until_next = every, 0
         self.looks = True
-        """This turn is looked at."""
+        """This turn is sampled."""
         self._turn_s = [0.0] * len(self.spent_s)
         self._begun: tuple[int, float, float] | None = None
-        """The stage that was begun: its place, and both clocks then"""
+        """Stage that was begun: its index in `spent_s`, and both clocks then"""
         self._turns_s: list[list[float]] = []
         self._statistics = [RunningStatistics(seed) for _ in self.spent_s]
 
     def timed(self, name: str, function: Callable[Given, Result]) -> Callable[Given, Result]:
-        """`function`, whose time counts to the stage `name`; ValueError for one that there is not."""
+        """Wrap `function` so that its time counts for the stage `name`; raises ValueError for an unknown one."""
         place = 2 * self.names.index(name)
         wall, processor = self._wall.now, self._processor.now
 
@@ -52,9 +52,9 @@ class Stages:
         return measured
 
     def begin(self, name: str | None) -> None:
-        """Count what follows to the stage `name`, until this is called again; None: to none.
+        """Count the time until the next call for the stage `name`; None: for none.
 
-        Only in a turn that `looks`.
+        Call it only in a turn that `looks`.
         """
         if name is None and self._begun is None:
             return
@@ -66,7 +66,7 @@ class Stages:
         self._begun = None if name is None else (2 * self.names.index(name), wall_s, processor_s)
 
     def end_turn(self) -> None:
-        """Count the time since the last call to one turn."""
+        """Count the time since the last call as one turn."""
         if self.looks:
             self._until_next = self._every
             self._turns_s.append(self._turn_s)
@@ -77,7 +77,7 @@ class Stages:
         self.looks = self._until_next == 0
 
     def take_in(self) -> None:
-        """Reckon with the turns that wait, which costs each of them less."""
+        """Add the waiting turns to the statistics; a batch costs less per turn."""
         if not self._turns_s:
             return
         for place, values_s in enumerate(zip(*self._turns_s, strict=True)):
@@ -86,13 +86,13 @@ class Stages:
         self._turns_s.clear()
 
     def summary(self) -> dict[str, dict[str, dict[str, float | None]]]:
-        """Give `wall_us` and `cpu_us` of each stage in a turn, each with `p50`, `p99` and `max`."""
+        """Return `wall_us` and `cpu_us` of each stage in a turn, each with `p50`, `p99` and `max`."""
         self.take_in()
         wall, processor = ([microseconds(one) for one in self._statistics[which::2]] for which in (0, 1))
         return {name: {"wall_us": wall[place], "cpu_us": processor[place]} for place, name in enumerate(self.names)}
 
 
 def microseconds(time_s: RunningStatistics) -> dict[str, float | None]:
-    """`p50`, `p99` and `max` in microseconds, of samples in seconds."""
+    """Return `p50`, `p99` and `max` in microseconds, of samples in seconds."""
     values_s = {"p50": time_s.quantile(0.50), "p99": time_s.quantile(0.99), "max": time_s.maximum}
     return {name: None if value is None else 1e6 * value for name, value in values_s.items()}

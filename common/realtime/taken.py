@@ -1,4 +1,4 @@
-"""What the machine took away from a thread that had something to do: Linux counts it."""
+"""Processor time that the machine took from a runnable thread, as counted by Linux."""
 
 import contextlib
 from dataclasses import dataclass
@@ -8,22 +8,22 @@ from typing import Final
 _WAITED: Final = Path("/proc/thread-self/schedstat")
 _PROCESSORS: Final = Path("/proc/stat")
 _STOLEN: Final = 7
-"""The place of `steal` among the processors' times; those behind it are counted in others, too."""
+"""Index of `steal` among the processors' times; later ones are contained in earlier ones."""
 
 
 @dataclass(frozen=True)
 class Taken:
-    """Counts since some start; None where the system does not tell."""
+    """Counters since some start; None if the system gives none."""
 
     waited_s: float | None
-    """This thread could have run, and other programs had the processor."""
+    """Time in which this thread was runnable and other programs had the processor."""
     stolen: float | None
-    """The processors could have run, and their host ran something else; in units of `whole`."""
+    """Time in which the host ran something else, in units of `whole`."""
     whole: float | None
-    """All processors' time together."""
+    """Time of all processors together."""
 
     def shares_since(self, earlier: "Taken", passed_s: float) -> tuple[float | None, float | None]:
-        """Of the `passed_s` between: the share that this thread waited, and the share that was stolen."""
+        """Return the waited share of `passed_s`, and the stolen share of the processors' time."""
         whole = None if self.whole is None or earlier.whole is None else self.whole - earlier.whole
         return _share(self.waited_s, earlier.waited_s, passed_s), _share(self.stolen, earlier.stolen, whole)
 
@@ -33,7 +33,7 @@ def _share(now: float | None, earlier: float | None, whole: float | None) -> flo
 
 
 def read_taken() -> Taken:
-    """What is counted now, for the thread that asks."""
+    """Read the counters of the calling thread."""
     waited_s = stolen = whole = None
     with contextlib.suppress(OSError, ValueError, IndexError):
         waited_s = 1e-9 * int(_WAITED.read_text(encoding="ascii").split()[1])

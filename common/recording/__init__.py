@@ -1,1 +1,1 @@
-"""What an experiment keeps: every input of the cores and what people look at, in one MCAP file, without waiting."""
+"""Recording of a run: every input of the cores and all views, in one MCAP file, without waiting."""

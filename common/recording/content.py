@@ -1,4 +1,4 @@
-"""Sort each message of a side: inputs stay as they are, and beside them stands what people and tools read."""
+"""Sorting of a side's messages: inputs are kept unchanged, and decoded for people and tools."""
 
 import json
 import math
@@ -18,7 +18,7 @@ _OTHER: Final = {"robot": "operator", "operator": "robot"}
 
 
 class Content:
-    """Sorts messages of one or both sides into topics."""
+    """Sorter of one or both sides' messages into topics."""
 
     def __init__(self, file: RecordingFile) -> None:
         self._file = file
@@ -30,7 +30,7 @@ class Content:
         self._objects: tuple[str, ...] = ()
 
     def take(self, source: int, message: bytes) -> None:
-        """One message from one side; ValueError, or KeyError before its header, for what is none."""
+        """Write one message of one side; raises ValueError if it is invalid, KeyError if it precedes the header."""
         kind, content = message[:1], message[1:]
         if kind == HEADER:
             self._begin(source, content)
@@ -74,12 +74,12 @@ class Content:
 
     def _view(self, side: str, now_s: float, payload: bytes) -> None:
         if side == "operator" and "robot" in self._decoders:
-            return  # it is in the file as it was sent
+            return  # the robot side has recorded it as sent
         message = view_message(payload)
         if message is None:
             return
         if isinstance(message, VideoFrame):
-            # The picture itself is in its own topic, at the same time.
+            # The picture has a separate topic, at the same time.
             self._drawing.image(message, now_s)
             payload = _without_picture(payload)
         elif isinstance(message, SceneShapes):

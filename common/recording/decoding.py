@@ -1,4 +1,4 @@
-"""From what happened to a core to what people and tools read: one JSON message a topic, in the recorder's process."""
+"""Decoding of a core's entries for people and tools: one JSON message a topic, in the recorder's process."""
 
 import math
 import struct
@@ -18,7 +18,7 @@ AGES_PERIOD_S: Final = 0.01
 
 
 class Shown(NamedTuple):
-    """One message for people."""
+    """Message for people."""
 
     topic: str
     now_s: float
@@ -26,24 +26,24 @@ class Shown(NamedTuple):
 
 
 class Decoder:
-    """Of one side: keeps what ages are measured from.
+    """Decoder of one side, with the stamps from which ages are measured.
 
-    Where both sides are recorded, the robot side tells of fields and the operator side of commands, as each sent
-    them; a side that is recorded alone tells of both, of the other's as they arrived.
+    If both sides are recorded, fields come from the robot side and commands from the operator side, as sent. A side
+    recorded alone gives both, the other's as they arrived.
     """
 
     def __init__(self, side: str) -> None:
         self.alone = True
-        """Whether the other side is not in this file."""
+        """Whether only this side is recorded in the file."""
         self.offset_s = math.nan
-        """What the other side's clock is ahead of this one's, by its status; NaN while unknown, as all here."""
+        """Clock offset of the other side, by this side's status; NaN while unknown, as all values here."""
         self._side = side
         self._ages_s = -math.inf
         self._field_sent_s = self._frame_s = math.nan
         self._field_number = 0
 
     def shown(self, block: Block) -> Iterator[Shown]:
-        """What the entries of a block tell; what cannot be decoded is left to the inputs."""
+        """Yield the messages of a block's entries; undecodable ones remain only in the inputs."""
         for entry in block.unpacked():
             try:
                 yield from self._shown(entry)
@@ -89,12 +89,12 @@ class Decoder:
             yield _shown("/command", entry.now_s, stamps, msgspec.structs.asdict(message))
 
     def _since_ms(self, now_s: float, sent_s: float) -> float:
-        """How long ago the other side's clock showed `sent_s`."""
+        """Return the time since the other side's stamp `sent_s`, in milliseconds."""
         return 1e3 * (now_s - (sent_s - self.offset_s))
 
 
 def view_message(payload: bytes) -> AnyViewMessage | Telemetry | None:
-    """What a view payload says; None for what is no valid message."""
+    """Decode a view payload; None for an invalid one."""
     try:
         return decode_view(payload)
     except RemoteProtocolError:
@@ -107,7 +107,7 @@ def view_message(payload: bytes) -> AnyViewMessage | Telemetry | None:
 
 
 def shown_view(message: AnyViewMessage | Telemetry, now_s: float, objects: tuple[str, ...]) -> Iterator[Shown]:
-    """The terms and overlaps of a state, or a telemetry; `objects`: the names of the newest SceneShapes."""
+    """Yield the terms and overlaps of a state, or a telemetry; `objects`: the names of the newest SceneShapes."""
     stamps = {"time_s": now_s, "sequence": message.header.sequence, "sent_s": message.header.sent_s}
     if isinstance(message, Telemetry):
         yield _shown("/telemetry", now_s, stamps, msgspec.structs.asdict(message))

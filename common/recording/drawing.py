@@ -1,4 +1,4 @@
-"""Foxglove's own messages: pictures, the scene with its transforms, and the log."""
+"""Foxglove's messages: pictures, the scene with transforms, and the log."""
 
 from typing import Any, Final
 
@@ -13,7 +13,7 @@ _POSE: Final = 7
 
 
 class Drawing:
-    """Draws into a file what is seen, where everything is, and what was said."""
+    """Writer of pictures, scene and log as Foxglove's messages."""
 
     def __init__(self, file: RecordingFile) -> None:
         self._file = file
@@ -23,20 +23,20 @@ class Drawing:
         self._version: int | None = None
 
     def log(self, side: str, now_s: float, text: str, *, warning: bool = False) -> None:
-        """A line that a person was told."""
+        """Write a line that a person was shown."""
         level = messages.LogLevel.Warning if warning else messages.LogLevel.Info
         entry = messages.Log(timestamp=self._stamp(now_s), level=level, message=text, name=side)
         self._file.draw("/log", now_s, entry)
 
     def image(self, frame: VideoFrame, now_s: float) -> None:
-        """A picture of one of the cameras, as it came."""
+        """Write a camera's picture unchanged."""
         image = messages.CompressedImage(
             timestamp=self._stamp(now_s), frame_id=frame.view, data=frame.jpeg, format="jpeg"
         )
         self._file.draw(f"/camera/{frame.view}", now_s, image)
 
     def shapes(self, scene: SceneShapes, now_s: float) -> None:
-        """Draw the shapes, each time that they have changed."""
+        """Write the shapes if they have changed."""
         self._links, self._objects, self._version = scene.links, scene.objects, scene.version
         if self._drawn == (scene.links, scene.objects, scene.shapes):
             return
@@ -50,7 +50,7 @@ class Drawing:
         self._file.draw("/scene", now_s, update)
 
     def state(self, scene: SceneState, now_s: float) -> None:
-        """Draw where everything is."""
+        """Write the poses of links, objects and tool."""
         if scene.version != self._version:
             return
         stamp = self._stamp(now_s)

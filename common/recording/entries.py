@@ -1,12 +1,12 @@
-"""What happened to a core, one entry after another, in blocks of bytes: all that is needed to do it again.
+"""Entries of a core's inputs and outputs, in blocks of bytes: all that a replay needs.
 
 A block is one message of the file, little-endian throughout:
 
     block   number u32, dropped u32, first f64, last f64, then entries
     entry   kind u8, length u32, now f64, then `length` bytes
 
-`number` counts the blocks of one side from 0. One that is missing was dropped, as the recorder did not keep up;
-`dropped` says how many were, so far. `first` and `last` are seconds on the side's monotonic clock.
+`number` counts the blocks of one side from 0. A missing one was dropped because the recorder did not keep up;
+`dropped` counts them. `first` and `last` are seconds on the side's monotonic clock.
 """
 
 import struct
@@ -20,23 +20,23 @@ _ENTRY: Final = struct.Struct("<BId")
 
 
 class Kind(IntEnum):
-    """What an entry tells. Text before bytes is a length u8 and the text in UTF-8."""
+    """Kind of an entry. Text before bytes is a length u8 and the text in UTF-8."""
 
     RECEIVED = 1
-    """A control payload came in: peer (text; its bytes), payload."""
+    """A control payload was received: peer (text; its bytes), payload."""
     SENT = 2
-    """A payload went out: stream (text), peer (text; its bytes), payload."""
+    """A payload was sent: stream (text), peer (text; its bytes), payload."""
     TICK = 3
-    """A turn of the robot side, after its STATE and FRAME: applied f64, when the command was sent that moves the arm,
-    on the operator side's clock, NaN for none."""
+    """A turn of the robot side, after its STATE and FRAME: applied f64, stamp of the command that moves the arm, on the
+    operator side's clock, NaN for none."""
     STATE = 4
-    """What the arm measured (robot_side/recording/inputs.py), where it is not what it was in the tick before."""
+    """The arm's measurement (robot_side/recording/inputs.py), if it differs from the previous tick's."""
     FRAME = 5
-    """What the camera saw (the same file), where it is not what it was in the tick before."""
+    """The camera's frame (the same file), if it differs from the previous tick's."""
     SEEN = 6
-    """The operator side got a view payload; those longer than a control payload go elsewhere, as no core heeds them."""
+    """The operator side got a view payload; no core uses those longer than a control payload, which go elsewhere."""
     REPORT = 7
-    """An input report of a DualSense, in recordings made before HANDS."""
+    """Input report of a DualSense, in recordings older than HANDS."""
     CALIBRATED = 8
     """The controller's travel, as JSON."""
     FOUND = 9
@@ -44,45 +44,45 @@ class Kind(IntEnum):
     LOST = 10
     """The controller was lost."""
     MOTION = 11
-    """The operator side was asked what to send; what it sent follows as SENT."""
+    """The operator side was polled for messages; those follow as SENT."""
     OUTPUT = 12
-    """It was asked what to tell the controller; what it told follows as TOLD, in earlier recordings as WRITTEN."""
+    """The operator side was polled for feel; that follows as TOLD, in older recordings as WRITTEN."""
     WRITTEN = 13
-    """An output report for a DualSense on USB, in recordings made before TOLD."""
+    """Output report for a DualSense on USB, in recordings older than TOLD."""
     STOPPED = 14
     """The emergency stop was pressed away from the controller."""
     TUNED = 15
-    """A wish for other settings of the run, as JSON."""
+    """Wanted settings of the run, as JSON."""
     WATCHED = 16
-    """The operator side told what it looks at, under the next of its core's sequence numbers."""
+    """The operator side reported its watched views, under the core's next sequence number."""
     HANDS = 17
     """The controller's state (operator_side/controller/state.py), in MessagePack."""
     TOLD = 18
-    """What the controller was told to let feel (operator_side/controller/feel.py), in MessagePack."""
+    """The feel sent to the controller (operator_side/controller/feel.py), in MessagePack."""
 
 
 class Entry(NamedTuple):
-    """One thing that happened."""
+    """Event of a core."""
 
     kind: int
     now_s: float
-    """On the side's monotonic clock, as its core was given it"""
+    """Time on the side's monotonic clock, as passed to the core"""
     content: bytes
 
 
 @dataclass(frozen=True)
 class Block:
-    """Some entries of one side, in order."""
+    """Block of one side's entries, in order."""
 
     number: int
     dropped: int
-    """Blocks of this side that were dropped before this one, over the run"""
+    """Number of this side's blocks that were dropped before this one, over the run"""
     first_s: float
     last_s: float
     entries: bytes
 
     def unpacked(self) -> Iterator[Entry]:
-        """Read its entries; ValueError where it is no block of ours."""
+        """Yield the entries; raises ValueError if the block is invalid."""
         position, end = 0, len(self.entries)
         while position < end:
             if end - position < _ENTRY.size:
@@ -96,18 +96,18 @@ class Block:
 
 
 def entry(kind: Kind, now_s: float, *parts: bytes) -> bytes:
-    """One entry as bytes."""
+    """Pack one entry."""
     content = b"".join(parts)
     return _ENTRY.pack(kind, len(content), now_s) + content
 
 
 def pack_block(number: int, dropped: int, first_s: float, last_s: float, entries: bytes) -> bytes:
-    """One block as bytes."""
+    """Pack one block."""
     return _BLOCK.pack(number, dropped, first_s, last_s) + entries
 
 
 def unpack_block(content: bytes) -> Block:
-    """The block that `pack_block` made; ValueError for what is none."""
+    """Unpack a block of `pack_block`; raises ValueError if it is invalid."""
     if len(content) < _BLOCK.size:
         raise ValueError(f"a block of {len(content)} bytes; valid: {_BLOCK.size} or more")
     number, dropped, first_s, last_s = _BLOCK.unpack_from(content)
@@ -115,12 +115,12 @@ def unpack_block(content: bytes) -> Block:
 
 
 def text(value: bytes) -> bytes:
-    """A short text before bytes."""
+    """Pack a short text, to precede bytes."""
     return bytes([len(value)]) + value
 
 
 def split_text(content: bytes) -> tuple[bytes, bytes]:
-    """The short text and what follows it; ValueError where it ends within."""
+    """Split off the short text; raises ValueError if it is cut."""
     if not content or len(content) < 1 + content[0]:
         raise ValueError("a text that ends within itself")
     return content[1 : 1 + content[0]], content[1 + content[0] :]

@@ -1,4 +1,4 @@
-"""Camera pictures as they are in a file: a CompressedImage's bytes, told apart without a schema compiler."""
+"""Camera pictures in a file: decoding of a CompressedImage without a schema compiler."""
 
 from typing import Final, NamedTuple
 
@@ -15,7 +15,7 @@ class Image(NamedTuple):
 
 
 def read_image(content: bytes) -> Image:
-    """The picture in a CompressedImage in protobuf's encoding; ValueError for what is none."""
+    """Decode a CompressedImage in protobuf's encoding; raises ValueError if it is invalid."""
     fields = _fields(content)
     if _DATA not in fields:
         raise ValueError("a picture without its data")
@@ -23,7 +23,7 @@ def read_image(content: bytes) -> Image:
 
 
 def _fields(content: bytes) -> dict[int, bytes]:
-    """Every field that holds bytes, by number; nothing else is in such a message at its top."""
+    """Return the fields of bytes by number; the message has no others at its top level."""
     found: dict[int, bytes] = {}
     position = 0
     while position < len(content):

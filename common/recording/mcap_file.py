@@ -1,4 +1,4 @@
-"""The file itself, through foxglove-sdk: a chunk a second, each complete on the disk before the next begins."""
+"""MCAP file, through foxglove-sdk: a chunk a second, each complete on the disk before the next begins."""
 
 import json
 import logging
@@ -15,20 +15,20 @@ from common.recording.wire import BINARY, ENCODING, PROFILE, schema_of
 
 _NANOSECONDS: Final = 1e9
 
-# A failure to write is kept in `error`, and told once by the recorder.
+# A failure to write is kept in `error`; the recorder reports it once.
 logging.getLogger("foxglove").setLevel(logging.CRITICAL)
 
 
 class RecordingFile:
-    """One new file. A failure to write is kept in `error`; from then on nothing is written, and nothing raises."""
+    """New file. A failure to write is kept in `error`; from then on nothing is written, and nothing raises."""
 
     def __init__(self, path: Path, wall_offset_s: float) -> None:
-        """`wall_offset_s`: what the wall clock is ahead of the stamps. FileExistsError for a file that is there."""
+        """`wall_offset_s`: wall clock minus stamps, in seconds. Raises FileExistsError if the file exists."""
         self.error: str | None = None
         self.kept_bytes = 0
-        """Up to the end of the last whole chunk"""
+        """Length up to the end of the last whole chunk"""
         self.kept_s = 0.0
-        """The time from the first message to the last one of that chunk"""
+        """Time from the first message to the last one of that chunk"""
         self._first_s: float | None = None
         self._last_s = 0.0
         self._offset_s = wall_offset_s
@@ -41,7 +41,7 @@ class RecordingFile:
             writer_options=MCAPWriteOptions(
                 profile=PROFILE,
                 compression=MCAPCompression.Zstd,
-                # We say where a chunk ends.
+                # `flush` ends each chunk.
                 chunk_size=None,
                 compression_threads=0,
             ),
@@ -49,21 +49,21 @@ class RecordingFile:
         self._closed = False
 
     def describe(self, name: str, values: Mapping[str, str]) -> None:
-        """Keep what holds for the whole file."""
+        """Write values of the whole file."""
         if self.error is None:
             self._attempt(lambda: self._writer.write_metadata(name, dict(values)))
 
     def write(self, topic: str, now_s: float, content: bytes) -> None:
-        """One message of a topic of ours."""
+        """Write a message of one of our topics."""
         self._log(topic, now_s, content, lambda: self._own_channel(topic, content))
 
     def draw(self, topic: str, now_s: float, content: Any) -> None:
-        """One message of one of Foxglove's own types."""
+        """Write a message of one of Foxglove's types."""
         kind = getattr(channels, f"{type(content).__name__}Channel")
         self._log(topic, now_s, content, lambda: kind(topic, context=self._context))
 
     def _log(self, topic: str, now_s: float, content: Any, make: Callable[[], Any]) -> None:
-        """Write a message; `make` makes the topic's channel when it is the first."""
+        """Write a message; `make` makes the topic's channel for its first one."""
         if self.error is not None:
             return
         if topic not in self._channels:
@@ -73,11 +73,11 @@ class RecordingFile:
         self._attempt(lambda: self._channels[topic].log(content, log_time=self.wall_ns(now_s)))
 
     def wall_ns(self, now_s: float) -> int:
-        """The wall clock's nanoseconds at a stamp."""
+        """Return the wall clock's nanoseconds at a stamp."""
         return max(0, round((now_s + self._offset_s) * _NANOSECONDS))
 
     def flush(self) -> None:
-        """End the chunk: what was written so far survives us."""
+        """End the chunk: all that was written survives the process."""
         if self.error is None and self._attempt(self._writer.flush):
             self.kept_bytes = self._output.end
             self.kept_s = 0.0 if self._first_s is None else self._last_s - self._first_s
@@ -97,7 +97,7 @@ class RecordingFile:
         self._output.finish(None if self.error is None else self.kept_bytes)
 
     def figures(self) -> dict[str, Any]:
-        """Tell what is known to be on the disk."""
+        """Return seconds and bytes that are known to be on the disk, and the error if any."""
         return {"kept_s": self.kept_s, "bytes": self.kept_bytes, "error": self.error}
 
     def _own_channel(self, topic: str, first: bytes) -> foxglove.Channel:
@@ -109,26 +109,26 @@ class RecordingFile:
     def _attempt(self, write: Any) -> bool:
         try:
             write()
-        # The library says OSError as RuntimeError, in its own words.
+        # The library turns OSError into RuntimeError, in its words.
         except (RuntimeError, OSError) as error:
             if self.error is None:
                 self.error = self._output.error or str(error)
             return False
-        # A message within a chunk may fail without a word to us, and each after it once more.
+        # The library may swallow the failure of a message within a chunk, and fail again at each later one.
         if self.error is None:
             self.error = self._output.error
         return self._output.error is None
 
 
 class _Output:
-    """The file as the library writes it; remembers why a write failed."""
+    """File for the library to write to; remembers why a write failed."""
 
     def __init__(self, path: Path) -> None:
         self.error: str | None = None
         self.end = 0
         self._given_up = False
         self._position = 0
-        """The library's own idea of its place: it panics where it is wrong"""
+        """Position that the library expects: it panics at any other"""
         self._file = path.open("xb", buffering=0)
 
     def write(self, data: bytes | bytearray) -> int:
@@ -140,12 +140,12 @@ class _Output:
     def _write(self, data: bytes | bytearray) -> None:
         left = memoryview(data)
         try:
-            # A part may find room; what comes next says why the rest does not.
+            # A part may fit; the next write raises the reason why the rest does not.
             while left:
                 left = left[self._file.write(left) :]
         except OSError as error:
             self.error = error.strerror or str(error)
-            # All of it comes again: a part that found room is not to stand before it.
+            # The library writes all of it again: the part that fitted must not precede it.
             self._file.seek(self._position)
             raise
         self.end = max(self.end, self._position + len(data))
@@ -158,7 +158,7 @@ class _Output:
         return self._position
 
     def flush(self) -> None:
-        """Nothing waits here."""
+        """Do nothing: the file is unbuffered."""
 
     def give_up(self) -> None:
         self._given_up = True

@@ -1,4 +1,4 @@
-"""The packages of extras, which are not needed to run."""
+"""Check for the packages of extras, which a run does not need."""
 
 from importlib.util import find_spec
 
@@ -6,7 +6,7 @@ from common.errors import ConfigurationError
 
 
 def require_packages(what: str, *modules: str, extra: str = "record") -> None:
-    """ConfigurationError with the command that mends it, unless every one of `modules` is there; none is imported."""
+    """Raise ConfigurationError, with the command to install them, if `modules` are missing; imports none."""
     missing = [module for module in modules if find_spec(module) is None]
     if missing:
         raise ConfigurationError(f"{what}: {missing[0]} is not installed; pip install 'feelahead[{extra}]'")

@@ -1,4 +1,4 @@
-"""What a run was made from: settings, versions and the machine's kind, so that the same can be made again."""
+"""Provenance of a run: settings, versions and the kind of machine, for replay."""
 
 import dataclasses
 import importlib.metadata
@@ -15,11 +15,11 @@ Settings = TypeVar("Settings")
 
 _PACKAGES: Final = ("feelahead", "numpy", "scipy", "msgpack", "msgspec", "mujoco-core", "mujoco", "numba")
 _OF_THIS_RUN: Final = ("summary", "record", "config", "keys")
-"""Settings that make no difference to a core, and whose files need not be there later."""
+"""Settings without effect on a core; their files may be gone later."""
 
 
 def provenance(settings: Any, epoch: int, clock_domain: str) -> dict[str, Any]:
-    """Everything that a core was made from, as plain values."""
+    """Return all values from which a core was made, as plain ones."""
     told = dataclasses.replace(settings, **{name: None for name in _OF_THIS_RUN if hasattr(settings, name)})
     return {
         "epoch": epoch,
@@ -32,7 +32,7 @@ def provenance(settings: Any, epoch: int, clock_domain: str) -> dict[str, Any]:
 
 
 def settings_from(values: Mapping[str, Any], kind: type[Settings]) -> Settings:
-    """The settings that `provenance` told; ConfigurationError where this version does not take them."""
+    """Restore the settings from `provenance`; raises ConfigurationError if this version rejects them."""
     try:
         return msgspec.convert(dict(values), kind, dec_hook=lambda want, value: want(value))
     except (msgspec.ValidationError, ValueError) as error:
@@ -56,7 +56,7 @@ def _versions() -> dict[str, str]:
 
 
 def processor_name() -> str:
-    """What the machine calls its processor: other ones may round otherwise."""
+    """Return the processor's name: another one may round differently."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -1,6 +1,6 @@
-"""Recordings read, whole or cut off anywhere: up to the last complete second.
+"""Reading of recordings, whole or cut off anywhere: up to the last complete second.
 
-The file is gone through record by record, as an index stands at the end, where a cut file has none.
+The file is read record by record: its index is at the end, where a cut file has none.
 """
 
 import json
@@ -17,7 +17,7 @@ _SIDES: Final = {f"{PROFILE}.{side}": side for side in ("robot", "operator")}
 
 
 class Message(NamedTuple):
-    """One message of the file."""
+    """Message of the file."""
 
     topic: str
     log_ns: int
@@ -27,28 +27,28 @@ class Message(NamedTuple):
 
 @dataclass(frozen=True)
 class Recording:
-    """A file that has been looked through."""
+    """Recording whose records have been scanned."""
 
     path: Path
     headers: Mapping[str, Mapping[str, Any]]
-    """Settings and versions that each recorded side's core was made from, by side"""
+    """Settings and versions of each recorded core, by side"""
     whole: bool
-    """Whether it was finished; else it ends at the last complete second"""
+    """Whether the file was finished; else it ends at the last complete second"""
     damaged: bool = False
-    """Whether a chunk is not as it was written; what follows it is left"""
+    """Whether a chunk is damaged; the rest of the file is not read"""
     end_ns: int = 0
-    """The last stamp of the chunks before that, nanoseconds on the wall clock"""
+    """Last stamp of the intact chunks, nanoseconds on the wall clock"""
 
     def began_ns(self) -> int:
-        """The first message's stamp on the wall clock, nanoseconds; 0 without one."""
+        """Return the first message's stamp, nanoseconds on the wall clock; 0 without messages."""
         return next((message.log_ns for message in self.messages()), 0)
 
     def length_s(self) -> float:
-        """From the first message to the last one in a chunk that is there, seconds."""
+        """Return the time from the first message to the last one in an intact chunk, in seconds."""
         return 1e-9 * (self.end_ns - self.began_ns()) if self.end_ns else 0.0
 
     def messages(self, topics: Collection[str] = ()) -> Iterator[Message]:
-        """Every message in the file's order, which is nearly that of time; of `topics` only, if any are named."""
+        """Yield the messages, of `topics` if any are named, in the file's order, which is nearly that of time."""
         from mcap.records import Channel  # noqa: PLC0415
         from mcap.records import Message as Logged  # noqa: PLC0415
 
@@ -66,7 +66,7 @@ class Recording:
 
 
 def open_recording(path: Path) -> Recording:
-    """Look through the file at `path`; ConfigurationError, in one line, for what is no recording of ours."""
+    """Scan the file at `path`; raises ConfigurationError, in one line, if it is no recording of ours."""
     require_packages("a recording", "foxglove", "mcap")
     from mcap.records import Chunk, DataEnd, Metadata  # noqa: PLC0415
 
@@ -80,7 +80,7 @@ def open_recording(path: Path) -> Recording:
             end_ns = max(end_ns, record.message_end_time)
         whole |= isinstance(record, DataEnd)
     if not headers and damaged:
-        raise ConfigurationError(f"{path}: what it says of itself is damaged; valid: a file as --record made it")
+        raise ConfigurationError(f"{path}: its header is damaged; valid: a file as --record made it")
     if not headers:
         raise ConfigurationError(
             f"{path}: holds nothing that feelahead recorded; valid: a file that --record made, of a second or more"
@@ -102,7 +102,7 @@ def _value(text: str) -> Any:
 
 
 def _records(path: Path) -> Iterator[tuple[Any, list[Any]]]:
-    """Each whole record with what a chunk has inside; last a None where one is not as it was written."""
+    """Yield each whole record with the contents of a chunk; for a damaged one a last None."""
     from mcap.exceptions import EndOfFile, InvalidMagic, RecordLengthLimitExceeded  # noqa: PLC0415
     from mcap.records import Chunk, DataEnd  # noqa: PLC0415
     from mcap.stream_reader import StreamReader, breakup_chunk  # noqa: PLC0415
@@ -114,15 +114,15 @@ def _records(path: Path) -> Iterator[tuple[Any, list[Any]]]:
             for record in StreamReader(file, emit_chunks=True, record_size_limit=path.stat().st_size).records:
                 yield record, breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else []
                 if isinstance(record, DataEnd):
-                    return  # what follows repeats
+                    return  # the rest repeats
     except OSError as error:
         raise ConfigurationError(f"{path}: cannot be read: {error.strerror}; valid: a recording") from error
     except InvalidMagic as error:
         raise ConfigurationError(f"{path}: is no MCAP file; valid: a file that --record made") from error
     except (EndOfFile, RecordLengthLimitExceeded):
-        return  # it was being written
+        return  # cut off while being written
     except ConfigurationError:
         raise
-    # What a flipped bit does is said by readers and decompressors in classes of their own.
+    # Readers and decompressors report flipped bits by various classes.
     except Exception:
         yield None, []

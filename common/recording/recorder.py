@@ -1,9 +1,9 @@
-"""The recorder: a process that takes what the sides tell, decodes it for people, and writes the file.
+"""Recorder process: receives the sides' events, decodes them for people, and writes the file.
 
     python -m common.recording.recorder FD FILE.mcap [SOCKET]
 
-It lives until its starter's channel ends and every side is through, whoever was killed how. Once every three quarters
-of a second all that came is complete on the disk.
+It runs until its starter's channel and every side's have ended, even by a kill. Every 0.75 s all received events are
+complete on the disk.
 """
 
 import os
@@ -23,15 +23,15 @@ from common.recording.mcap_file import RecordingFile
 from common.recording.wire import END, as_json
 
 FLUSH_PERIOD_S: Final = 0.75
-"""With the blocks' own 40 ms and a loaded machine, a second is what can be lost."""
+"""Time between flushes, in seconds: with the blocks' 40 ms and a loaded machine, at most a second is lost."""
 _NICENESS: Final = 5
 _SIDES_LIMIT: Final = 8
 
 
 def main() -> None:
-    """Record until nobody is left."""
+    """Record until all channels have ended."""
     owner, arguments = companion_channel(sys.argv[1:])
-    # A file that may not grow is an error to tell, not an end.
+    # A file at its size limit is an error to report, and must not end the process.
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     os.nice(_NICENESS)
     try:
@@ -91,14 +91,14 @@ class _Recorder:
             try:
                 self._content.take(id(channel), message)
             except (ValueError, KeyError, TypeError, struct.error) as error:
-                # What one side tells wrongly must not cost what the other tells.
+                # One side's invalid messages must not lose the other's.
                 print(f"feelahead recorder: passed over: {error!r}", file=sys.stderr)
 
     def _tell(self) -> None:
         figures = self._file.figures()
         for channel in self._open:
             channel.send(as_json(figures))
-        # The owner ends the whole, and is told when that is done.
+        # The owner ends the recording, and gets the answer when the file is finished.
         ended = [one for one in self._through if one is not self._owner or not self._open]
         for channel in ended:
             channel.send(as_json(figures | {"ended": True}))

@@ -1,4 +1,4 @@
-"""A side's end of a recording: what it notes in a turn costs an append; all else waits for its idle time.
+"""A side's end of a recording: a note in a turn costs an append; all else waits for idle time.
 
 core ── notes ──▶ list ── idle ──▶ blocks ── channel ──▶ recorder process ──▶ FILE.mcap
 """
@@ -34,19 +34,19 @@ KILLED: Final = "the recorder was killed"
 
 
 class Encoder(Protocol):
-    """Turns what a core noted into entries."""
+    """Encoder of a core's notes as entries."""
 
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
-        """When it happened, and its entries; a payload for who looks goes to `views` with when."""
+        """Return the note's time and entries; pass view payloads to `views`, with their times."""
 
     def begin_anew(self) -> None:
-        """What was told so far may be lost: tell the next thing whole."""
+        """Encode the next values whole: earlier ones may be lost."""
 
 
 def require_recordable(path: Path | None) -> None:
-    """ValueError for what cannot become a recording; ConfigurationError without the packages for it.
+    """Raise ValueError if `path` cannot become a recording, ConfigurationError if packages are missing.
 
-    A file that is there stays: a run that is over cannot be recorded again, and `rm` is one word.
+    An existing file is never overwritten: its run cannot be recorded again.
     """
     if path is None or path.is_socket():
         return
@@ -55,22 +55,22 @@ def require_recordable(path: Path | None) -> None:
     if not path.absolute().parent.is_dir():
         raise ValueError(f"--record {path}: its folder is not there; valid: a file's path")
     if path.exists() or path.is_symlink():
-        raise ValueError(f"--record {path}: is there already; valid: a path where nothing is yet")
+        raise ValueError(f"--record {path}: exists already; valid: a new file's path")
     require_packages("--record", "foxglove", "mcap")
 
 
 class SideRecording:
-    """Sends what happened to the recorder. Nothing here ever waits but the start and `close`."""
+    """Sender of a side's events to the recorder. Only the start and `close` wait."""
 
     def __init__(self, path: Path, side: str, encoder: Encoder) -> None:
         """Record into the new file `path`, or through the recorder that listens at the socket `path`.
 
-        ConfigurationError when that cannot be.
+        Raises ConfigurationError if that fails.
         """
         self.noted: list[Any] = []
-        """What happened since the last idle time: whoever notes appends, and pays no more."""
+        """Notes since the last idle time; a note costs one append."""
         self.dropped = 0
-        """Blocks that the recorder had no room for."""
+        """Number of blocks for which the recorder had no room."""
         self._side = side
         self._channel, self._recorder = connect(path)
         self._clock = MonotonicClock()
@@ -84,11 +84,11 @@ class SideRecording:
         self._gone = self._closed = False
 
     def begin(self, header: Mapping[str, Any]) -> None:
-        """Tell first what the core was made from, so that it can be made again."""
+        """Send first the values from which the core was made, for replay."""
         self._channel.send(HEADER, as_json({"side": self._side, **header}))
 
     def idle(self, now_s: float, status: Callable[[], msgspec.Struct] | None = None) -> list[str]:
-        """Hand over what was noted; `status` is asked for a few times a second. What a person has to know now."""
+        """Send the notes, and ten times a second the `status`. Return lines for a person."""
         noted, self.noted[:] = self.noted[:], []
         for one in noted:
             self._last_s, entries = self._encoder.encode(one, self.view)
@@ -105,15 +105,15 @@ class SideRecording:
         return notes
 
     def view(self, now_s: float, payload: bytes) -> None:
-        """Keep a view payload: what people looked at."""
+        """Record a view payload."""
         self._channel.send(VIEW, stamped(now_s), payload)
 
     def facts(self, now_s: float, facts: msgspec.Struct) -> None:
-        """Keep what the operator side showed at one moment."""
+        """Record the facts that the operator side showed at one moment."""
         self._channel.send(FACTS, stamped(now_s), msgspec.json.encode(facts))
 
     def note(self, text: str) -> None:
-        """Keep a line that a person is told now."""
+        """Record a line that is shown to a person now."""
         self._channel.send(NOTE, stamped(self._clock.now()), text.encode())
 
     def _send_block(self) -> None:
@@ -140,7 +140,7 @@ class SideRecording:
         return f"kept: {self._said['kept_s']:.1f} s, {self._said['bytes'] / 1e6:.1f} MB"
 
     def close(self) -> dict[str, Any]:
-        """Hand over what is left and let the file be finished; for the summary, what is known to be in it.
+        """Send the rest and let the recorder finish; return figures of the file for the summary.
 
         Safe to call again.
         """
@@ -164,7 +164,7 @@ class SideRecording:
 
 @contextmanager
 def recording_to(path: Path | None, side: str, encoder: Encoder) -> Iterator[SideRecording | None]:
-    """A recording, where one was asked for, that ends with the context."""
+    """Open a recording, unless `path` is None; it ends with the context."""
     recording = None if path is None else SideRecording(path, side, encoder)
     try:
         yield recording
@@ -174,10 +174,10 @@ def recording_to(path: Path | None, side: str, encoder: Encoder) -> Iterator[Sid
 
 
 class Recorder:
-    """The recorder process that writes one file: for one side, or for all that connect to `socket_path`."""
+    """Recorder process that writes one file: for one side, or for all that connect to `socket_path`."""
 
     def __init__(self, path: Path, socket_path: Path | None = None) -> None:
-        """Start it and wait until the file is there; ConfigurationError when it cannot be."""
+        """Start the process and wait for the file; raises ConfigurationError if it cannot be made."""
         listening = [] if socket_path is None else [str(socket_path)]
         self._companion = Companion(_RECORDER, [str(path), *listening])
         self.channel = self._companion.channel
@@ -189,13 +189,13 @@ class Recorder:
 
     @property
     def process_id(self) -> int:
-        """The operating system's number for it."""
+        """Process id."""
         return self._companion.process_id
 
     def finish(self) -> dict[str, Any]:
-        """Let the file be finished once every side is through; what is in it."""
+        """Finish the file once every side has ended; return its figures."""
         said, ended = dict(_NOTHING), False
-        # What it said up to now comes first: to send something to one that is gone would lose it.
+        # Read its earlier messages first: a send to an ended process would lose them.
         for message in self.channel.receive():
             said |= json.loads(message)
         self.channel.send(END)
@@ -208,13 +208,13 @@ class Recorder:
         return said
 
     def close(self) -> None:
-        """Let go of it: it ends by itself as soon as nobody speaks to it any more."""
-        # It may still have much to write on a busy machine: what would be lost by killing it is the end of the run.
+        """Release the process: it ends by itself once all channels are closed."""
+        # On a busy machine it may still have much to write: killing it would lose the end of the run.
         self._companion.close(_FINISH_LIMIT_S)
 
 
 def connect(path: Path) -> tuple[Channel, Recorder | None]:
-    """A channel to the recorder that listens at the socket `path`, or to a new one that writes the file `path`."""
+    """Connect to the recorder that listens at the socket `path`, or to a new one that writes the file `path`."""
     if not path.is_socket():
         recorder = Recorder(path)
         return recorder.channel, recorder
@@ -228,7 +228,7 @@ def connect(path: Path) -> tuple[Channel, Recorder | None]:
 
 
 def _wait_until_sent(channel: Channel, limit_s: float) -> None:
-    """Let leave what waits, as long as some of it leaves every so often."""
+    """Send the waiting messages, as long as some leave within each `limit_s`."""
     while channel.waiting and not channel.ended:
         if not select.select([], [channel], [], limit_s)[1]:
             return
@@ -236,7 +236,7 @@ def _wait_until_sent(channel: Channel, limit_s: float) -> None:
 
 
 def _wait_for_answer(channel: Channel, limit_s: float) -> bytes | None:
-    """The first message from the other end; None when it is gone or silent."""
+    """Return the newest message from the other end; None if it is gone or silent."""
     while not channel.ended and select.select([channel], [], [], limit_s)[0]:
         if messages := channel.receive():
             return messages[-1]

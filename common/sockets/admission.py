@@ -1,31 +1,31 @@
-"""How many payloads are worth a look in one tick: all of the operator's, a few of anybody else's."""
+"""Limit of payloads that one tick decodes: all of the operator's, a few of the others'."""
 
 from collections.abc import Iterable, Iterator
 
 OTHERS_PER_TICK = 8
-"""Payloads of all others together: enough for eight observers at 250 Hz four times over, and 80 us to decode."""
+"""Payloads of all others together: four times the traffic of eight observers at 250 Hz, and 80 us to decode."""
 EACH_OTHER_PER_TICK = 2
-"""Payloads of any one of them, so that one who floods leaves room for the rest."""
+"""Payloads of each other peer, so that a flood leaves room for the rest."""
 
 
 class Admission:
-    """Counts within a tick; what is too much is dropped unread and counted, never queued."""
+    """Counters of one tick; surplus payloads are dropped unread and counted, never queued."""
 
     def __init__(self) -> None:
         self.unread = 0
-        """Payloads of others than the operator that were dropped unread."""
+        """Number of payloads that were dropped unread; none are the operator's."""
         self._looked_at = 0
         self._by_peer: dict[bytes, int] = {}
 
     def begin_tick(self) -> None:
-        """The counts begin anew."""
+        """Reset the counters."""
         self._looked_at = 0
         self._by_peer.clear()
 
     def admitted(
         self, messages: Iterable[tuple[bytes, bytes]], operator: bytes | None
     ) -> Iterator[tuple[bytes, bytes]]:
-        """Those of `messages` (peer, payload) that are worth a look, in their order; `operator` has no limit here."""
+        """Yield the `messages` (peer, payload) within the limits, in order; `operator` has no limit here."""
         for peer, payload in messages:
             if peer != operator:
                 seen = self._by_peer.get(peer, 0)

@@ -1,4 +1,4 @@
-"""Whom a running robot side lets in: the folder of keys, looked at again and again."""
+"""Peers that a running robot side admits, from the folder of keys."""
 
 from dataclasses import dataclass, field
 
@@ -8,22 +8,22 @@ from common.sockets.keys import SHORTAGES, KeyFolder
 
 @dataclass
 class AllowList:
-    """Whom a running side lets in: the folder's peers, read again whenever the folder has changed."""
+    """Admitted peers: those of the folder, read again when the folder changes."""
 
     folder: KeyFolder
     names: dict[str, str] = field(default_factory=dict)
-    """The name of each key."""
+    """Peers' names by key."""
     unreadable: str | None = None
-    """Why the folder cannot be read at the moment; None while it can."""
+    """Reason why the folder cannot be read at present; None while it can."""
     faults: tuple[str, ...] = ()
-    """What is wrong with single files, which let nobody in, a line each."""
+    """Faults of single files, which admit nobody; a line each."""
     _fingerprint: tuple[tuple[str, int, int], ...] | None = None
 
     def refresh(self) -> set[str]:
-        """Look at the folder, a few stat calls; the keys that were let in before and are no more.
+        """Read the folder if it has changed; return the keys that were revoked. Costs a few stat calls.
 
-        A folder that cannot be read lets nobody in, unless that is for want of descriptors or memory: nobody who can
-        use those up is to throw others out.
+        An unreadable folder admits nobody, unless descriptors or memory are short: a peer that exhausts these must not
+        throw others out.
         """
         before = set(self.names)
         try:
@@ -32,7 +32,7 @@ class AllowList:
                 return set()
             peers = self.folder.peers()
         except (ConfigurationError, OSError) as error:
-            # Without a fingerprint the next look reads again.
+            # Without a fingerprint the next call reads again.
             self.unreadable, self._fingerprint = str(error), None
             if getattr(error, "errno", None) not in SHORTAGES:
                 self.names = {}

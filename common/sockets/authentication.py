@@ -1,7 +1,7 @@
-"""Who may connect: CURVE key pairs, and the answers to ZeroMQ's question whether a handshake may succeed.
+"""Authentication: CURVE key pairs, and the answers to ZeroMQ's handshake requests.
 
-ZeroMQ asks over a socket of its own (ZAP, rfc.zeromq.org/spec/27). It is served by whoever waits for messages, so
-that there is no thread that could die unnoticed: while nobody serves, nobody gets in.
+ZeroMQ asks over a separate socket (ZAP, rfc.zeromq.org/spec/27). The thread that waits for messages serves it, so that
+no other thread can die unnoticed. While nobody serves, nobody gets in.
 """
 
 from dataclasses import dataclass
@@ -20,32 +20,32 @@ from common.sockets.readable import readable
 _ZAP_ENDPOINT = "inproc://zeromq.zap.01"
 _ZAP_DOMAIN = b"feelahead"
 _ANSWERS_PER_CALL = 4
-"""A bound, lest a storm of handshakes hold the caller."""
+"""Number of answers per call: a storm of handshakes must not block the caller."""
 _EVENTS_PER_CALL = 16
 _REMEMBERED_REFUSALS = 64
 
 
 def make_key_pair() -> tuple[str, str]:
-    """A new (public, secret) pair of keys, as hexadecimal digits."""
+    """Make a (public, secret) pair of keys, as hexadecimal digits."""
     public, secret = zmq.curve_keypair()
     return z85.decode(public).hex(), z85.decode(secret).hex()
 
 
 def public_part(secret: str) -> str:
-    """The public key that belongs to `secret`."""
+    """Return the public key of `secret`."""
     return z85.decode(zmq.curve_public(z85.encode(bytes.fromhex(secret)))).hex()
 
 
 @dataclass(frozen=True)
 class RobotKeys:
-    """Keys of the robot side: the own secret one, and those that are let in."""
+    """Keys of the robot side: its secret one, and those that it admits."""
 
     secret: str
     allowed: AllowList
 
     @classmethod
     def load(cls, folder: Path) -> "RobotKeys":
-        """Load a folder of keys; ConfigurationError with the command that mends it."""
+        """Load a folder of keys. Raises ConfigurationError, which names the command that mends it."""
         keys = KeyFolder(folder)
         secret = keys.secret("robot")
         allowed = AllowList(keys)
@@ -55,14 +55,14 @@ class RobotKeys:
         return cls(secret, allowed)
 
     def notes(self) -> list[str]:
-        """Name the peers that are let in, for a person at the start."""
+        """Name the admitted peers, for a person at the start."""
         folder, names = self.allowed.folder, ", ".join(sorted(self.allowed.names.values()))
         change = folder.command("allow NAME KEY")
         who = f"lets in {names}" if names else f"nobody is let in yet; to change that: {change}"
         return [f"keys: {who}"]
 
     def secure(self, part: "zmq.Socket[bytes]") -> None:
-        """Let nobody into `part` but who has an allowed key; before it is bound."""
+        """Admit only allowed keys to `part`; call before it is bound."""
         part.setsockopt(zmq.CURVE_SERVER, 1)
         part.setsockopt(zmq.CURVE_SECRETKEY, bytes.fromhex(self.secret))
         part.setsockopt(zmq.ZAP_DOMAIN, _ZAP_DOMAIN)
@@ -71,14 +71,14 @@ class RobotKeys:
 
 @dataclass(frozen=True)
 class OperatorKeys:
-    """Keys of the operator side: the own secret one, and the robot side's public one."""
+    """Keys of the operator side: its secret one, and the robot side's public one."""
 
     secret: str
     robot: str
 
     @classmethod
     def load(cls, folder: Path, robot_key: str | None) -> "OperatorKeys":
-        """Load a folder of keys and the robot side's public key; ConfigurationError with the command that mends it."""
+        """Load a folder of keys and the robot side's public key; errors as in RobotKeys.load."""
         secret = KeyFolder(folder).secret("operator")
         if robot_key is None:
             raise ConfigurationError(
@@ -88,18 +88,18 @@ class OperatorKeys:
         return cls(secret, read_public_key(robot_key, "--robot-key"))
 
     def secure(self, part: "zmq.Socket[bytes]") -> None:
-        """Let `part` talk to nobody but the owner of the robot side's key; before it is connected."""
+        """Connect `part` only to the owner of the robot side's key; call before it is connected."""
         part.setsockopt(zmq.CURVE_SERVERKEY, bytes.fromhex(self.robot))
         part.setsockopt(zmq.CURVE_PUBLICKEY, bytes.fromhex(public_part(self.secret)))
         part.setsockopt(zmq.CURVE_SECRETKEY, bytes.fromhex(self.secret))
 
 
 class Authenticator:
-    """Answers the handshakes of one context from an allow-list; it must exist before any socket is bound."""
+    """Answers to the handshakes of one context from an allow-list; must exist before any socket is bound."""
 
     def __init__(self, context: "zmq.Context[zmq.Socket[bytes]]", allowed: AllowList) -> None:
         self.refused = 0
-        """Handshakes with a key that is not allowed."""
+        """Number of handshakes with a key that is not allowed."""
         self._allowed = allowed
         self._refused_keys: dict[str, bool] = {}
         self._questions = context.socket(zmq.REP)
@@ -107,11 +107,11 @@ class Authenticator:
         self._questions.bind(_ZAP_ENDPOINT)
 
     def fileno(self) -> int:
-        """A descriptor that becomes readable when there is something to serve."""
+        """Return a descriptor that becomes readable when a handshake waits."""
         return self._questions.fileno()
 
     def serve(self) -> bool:
-        """Answer what was asked since the last call, a few at most; whether more may wait. Never blocks."""
+        """Answer a few waiting handshakes; return whether more may wait. Never blocks."""
         for _ in range(_ANSWERS_PER_CALL):
             if not readable(self._questions):
                 return False
@@ -120,7 +120,7 @@ class Authenticator:
         return True
 
     def news(self) -> list[str]:
-        """A line for each key refused for the first time since the last call: somebody may want to allow it."""
+        """Return a line for each key first refused since the last call: a person may want to allow it."""
         new = [key for key, is_new in self._refused_keys.items() if is_new]
         self._refused_keys.update(dict.fromkeys(new, False))
         command = self._allowed.folder.command
@@ -140,16 +140,16 @@ class Authenticator:
 
 
 class HandshakeWatch:
-    """Sees how the handshakes of a connecting socket end, and says in words why one failed."""
+    """Monitor of a connecting socket's handshakes; explains failures in words."""
 
     def __init__(self, part: "zmq.Socket[bytes]", keys: OperatorKeys | None, unsent_bytes: int) -> None:
-        """`unsent_bytes` as for hold_little, which each connection is told."""
+        """`unsent_bytes` as for hold_little, which is applied to each connection."""
         self.trouble: str | None = None
-        """Why the newest handshake failed, with what to do about it; None after one that succeeded."""
+        """Reason why the newest handshake failed, with a remedy; None after a success."""
         self.failed = False
-        """Whether one has failed since the caller last cleared this: ZeroMQ does not try again by itself."""
+        """Whether one has failed since the caller last cleared this; ZeroMQ does not retry."""
         self.key_refused = False
-        """Whether the newest ended because the robot side does not let our key in."""
+        """Whether the newest failed because the robot side does not allow our key."""
         self._keys = keys
         self._unsent_bytes = unsent_bytes
         self._part = part
@@ -162,7 +162,7 @@ class HandshakeWatch:
         )
 
     def look(self) -> None:
-        """Take note of what has happened since the last call; never blocks."""
+        """Process the events since the last call; never blocks."""
         for _ in range(_EVENTS_PER_CALL):
             try:
                 told = parse_monitor_message(self._events.recv_multipart(zmq.NOBLOCK))
@@ -177,8 +177,8 @@ class HandshakeWatch:
             self.key_refused = event == zmq.EVENT_HANDSHAKE_FAILED_AUTH
 
     def close(self) -> None:
-        """Look no more; before the watched socket is closed."""
-        # In this order: ZeroMQ's own thread would wait forever to tell an event to a watcher that is gone.
+        """Stop watching; call before the watched socket is closed."""
+        # In this order: ZeroMQ's thread would block forever on an event for a closed watcher.
         self._part.disable_monitor()
         self._events.close(linger=0)
 

@@ -1,47 +1,47 @@
-"""Bound the connections of one port: those that were introduced stay, and of the others the newest."""
+"""Bound on the connections of one port: introduced ones stay; of the others the newest."""
 
 from collections.abc import Iterator
 
 
 class Crowd:
-    """The connections of one port by their descriptors; without I/O."""
+    """Connections of one port by descriptor; without I/O."""
 
     def __init__(self, limit: int, introduced_s: float) -> None:
-        """At most `limit` at once; one that is `introduced_s` old has been introduced, or else would be gone."""
+        """Allow `limit` at once. One older than `introduced_s` counts as introduced: ZeroMQ would have ended it."""
         self.hung_up = 0
-        """Connections that were one too many."""
+        """Number of connections that were ended as surplus."""
         self.limit = limit
         self._introduced_s = introduced_s
         self._newcomers: dict[int, float] = {}
-        """When each came, the oldest first."""
+        """Time of each one's arrival, oldest first."""
         self._known: set[int] = set()
         self._numbers: dict[int, int] = {}
         self._accepted = 0
 
     def came(self, descriptor: int, now_s: float) -> None:
-        """A connection was accepted."""
+        """Add an accepted connection."""
         self.went(descriptor)
         self._newcomers[descriptor] = now_s
         self._accepted += 1
         self._numbers[descriptor] = self._accepted
 
     def spoke(self, descriptor: int) -> None:
-        """A message came by it that only who has been introduced can send."""
+        """Count the connection as introduced: it carried a message that only introduced peers can send."""
         if self._newcomers.pop(descriptor, None) is not None:
             self._known.add(descriptor)
 
     def number(self, descriptor: int) -> int:
-        """Which connection the descriptor stands for, counted from 1 in the order of coming; 0 for none."""
+        """Return the number of the descriptor's connection, counted from 1 in order of arrival; 0 for none."""
         return self._numbers.get(descriptor, 0)
 
     def went(self, descriptor: int) -> None:
-        """The connection ended; the descriptor may stand for another one next."""
+        """Remove an ended connection; its descriptor may be used again."""
         self._newcomers.pop(descriptor, None)
         self._known.discard(descriptor)
         self._numbers.pop(descriptor, None)
 
     def surplus(self, now_s: float) -> Iterator[int]:
-        """The connections to end: the oldest newcomers, so that a quick one gets in in any crowd."""
+        """Yield the connections to end: the oldest newcomers, so that a quick handshake succeeds in any crowd."""
         while self._newcomers:
             descriptor, came_s = next(iter(self._newcomers.items()))
             if now_s - came_s >= self._introduced_s:

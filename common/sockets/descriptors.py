@@ -1,4 +1,4 @@
-"""Connections that ZeroMQ owns, reached by their descriptors: ZeroMQ has no option or call for this."""
+"""Operations on ZeroMQ's connections by descriptor: ZeroMQ has no option or call for them."""
 
 import contextlib
 import socket
@@ -11,15 +11,15 @@ def shut_down(descriptor: int) -> None:
 
 
 def hold_little(descriptor: int, unsent_bytes: int) -> None:
-    """Let the kernel take no more than `unsent_bytes` ahead of what the network takes (TCP_NOTSENT_LOWAT).
+    """Limit the unsent bytes in the kernel's buffer (TCP_NOTSENT_LOWAT).
 
-    That bounds what grows old there without bounding what is under way, as a small send buffer would.
+    That bounds queueing there without bounding the bytes under way, as a small send buffer would.
     """
     _with(descriptor, lambda each: each.setsockopt(socket.IPPROTO_TCP, socket.TCP_NOTSENT_LOWAT, unsent_bytes))
 
 
 def _with(descriptor: int, act: Callable[[socket.socket], None]) -> None:
-    """Act without a descriptor more, as there may be none left; the connection may go at any moment."""
+    """Act without another descriptor, as none may be left; the connection may end at any moment."""
     with contextlib.suppress(OSError):
         connection = socket.socket(socket.AF_INET, socket.SOCK_STREAM, fileno=descriptor)
         try:

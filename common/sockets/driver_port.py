@@ -1,4 +1,4 @@
-"""A port of the robot side for one program of its user's: an arm's driver, or what perceives objects."""
+"""Port of the robot side for one program of the user: an arm's driver, or perception."""
 
 from typing import Final, NamedTuple
 
@@ -16,7 +16,7 @@ _HANDSHAKE_S: Final = 5.0
 
 
 class Received(NamedTuple):
-    """A message, and when it was taken from the socket, by our monotonic clock."""
+    """Message, and when it was taken from the socket, on our monotonic clock."""
 
     peer: bytes
     payload: bytes
@@ -24,7 +24,7 @@ class Received(NamedTuple):
 
 
 class DriverPort(SocketShell):
-    """It binds, so that the program may come and go; keys and what is refused are those of the control port."""
+    """Bound socket, so that the program may come and go; keys and refusals as for the control port."""
 
     def __init__(
         self, bind: str, flag: str, limit_bytes: int, *, insecure: bool = False, keys: RobotKeys | None = None
@@ -38,7 +38,7 @@ class DriverPort(SocketShell):
         if keys is None and not insecure:
             refuse_open(endpoint, bind, flag)
         self.revoked = 0
-        """Messages under keys that were allowed at the handshake, and are no more"""
+        """Number of messages under keys revoked since their handshake"""
         self._keys = keys
         super().__init__(_HEARTBEAT_S, _HANDSHAKE_S)
         try:
@@ -46,20 +46,20 @@ class DriverPort(SocketShell):
             self._part = self._open_control(zmq.ROUTER)
             self._part.setsockopt(zmq.MAXMSGSIZE, limit_bytes)
             self._part.setsockopt(zmq.ROUTER_MANDATORY, 1)
-            # A program that was killed may come back under its old name before its end is noticed.
+            # A killed program may come back under its old name before its end is noticed.
             self._part.setsockopt(zmq.ROUTER_HANDOVER, 1)
             if keys is not None:
                 keys.secure(self._part)
             bind_socket(self._part, endpoint, flag)
             self._inbox = Inbox(self._part, frames=2)
             self.endpoint = self._part.getsockopt_string(zmq.LAST_ENDPOINT)
-            """The address that it is bound to, with the port that the system chose"""
+            """Bound address, with the port that the system chose"""
         except BaseException:
             self.close()
             raise
 
     def receive(self) -> list[Received]:
-        """Take what has arrived, the oldest first; never waits."""
+        """Return the messages that have arrived, oldest first; never waits."""
         if self._authenticator is not None:
             self._authenticator.serve()
         received = []
@@ -73,20 +73,20 @@ class DriverPort(SocketShell):
         return received
 
     def send(self, peer: bytes, payload: bytes) -> bool:
-        """Send at once or not at all; False, and counted in `dropped`, where it is gone or does not keep up."""
+        """Send at once; False, and counted in `dropped`, if the peer is gone or does not keep up."""
         self._inbox.used()
         taken = self.offer(self._part, peer, payload) is Offered.TAKEN
         self.dropped += not taken
         return taken
 
     def refresh_keys(self) -> list[str]:
-        """Look at the allow-list before anybody else does; return a line for each unknown key that was refused."""
+        """Refresh the allow-list, before its other users; return a line for each unknown key that was refused."""
         if self._keys is None or self._authenticator is None:
             return []
         self._keys.allowed.refresh()
         return self._authenticator.news()
 
     def wait(self, timeout_s: float) -> float:
-        """Wait for a message, at most `timeout_s`; the time by our monotonic clock then."""
+        """Wait for a message, at most `timeout_s`; return the time on our monotonic clock."""
         self.wait_for(timeout_s, [self._inbox], self._authenticator)
         return self._clock.now()

@@ -15,10 +15,10 @@ _HIGHEST_PORT = 65535
 
 @dataclass(frozen=True)
 class Endpoint:
-    """Where to bind or connect to."""
+    """Address to bind or to connect to."""
 
     host: str
-    """A host name, an IP address without brackets, or * for every address of this machine."""
+    """Host name, IP address without brackets, or * for every address of this machine."""
     port: int
     """0 lets the system choose a free one."""
     ipv6: bool
@@ -26,7 +26,7 @@ class Endpoint:
 
     @property
     def address(self) -> str:
-        """As tcp://HOST:PORT."""
+        """The address in the form tcp://HOST:PORT."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"tcp://{host}:{'*' if self.port == _EPHEMERAL else self.port}"
 
@@ -67,7 +67,7 @@ def split_connect(text: str, flag: str) -> tuple[str, int]:
 
 
 def resolve(host: str, text: str, flag: str) -> tuple[str, bool]:
-    """The first numeric address, IPv4 if there is one, and whether there is none of IPv4; ConfigurationError."""
+    """Return the first numeric address, preferably IPv4, and whether it is IPv6; raises ConfigurationError."""
     try:
         found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError) as error:
@@ -83,7 +83,7 @@ def resolve(host: str, text: str, flag: str) -> tuple[str, bool]:
 
 
 def following(control: Endpoint, text: str, flag: str) -> Endpoint:
-    """The view's endpoint where none is given: the port after the control port, or any if that is any."""
+    """Return the view's default endpoint: the port after the control port, or any port if that is any."""
     if control.port == _HIGHEST_PORT:
         raise ConfigurationError(
             f"{flag}: the control address {text!r} leaves no port after it for the view; "
@@ -94,7 +94,7 @@ def following(control: Endpoint, text: str, flag: str) -> Endpoint:
 
 
 def refuse_open(endpoint: Endpoint, text: str, flag: str) -> None:
-    """ConfigurationError with the way out when others than this machine's users could reach `endpoint`."""
+    """Raise ConfigurationError, with remedies, if other machines could reach `endpoint`."""
     if not endpoint.is_loopback():
         raise ConfigurationError(
             f"{flag}: {text!r} would be open to anyone on the network; valid: --keys {default_folder()} "

@@ -1,4 +1,4 @@
-"""Who comes to a bound socket and who goes."""
+"""Arrivals and ends of a bound socket's connections."""
 
 import resource
 
@@ -11,7 +11,7 @@ from common.sockets.readable import readable
 
 
 class Gate:
-    """Watches the connections to one bound socket, to tell which are too many; before it is bound."""
+    """Monitor of one socket's connections, to find the surplus ones; made before the socket is bound."""
 
     def __init__(
         self,
@@ -21,7 +21,7 @@ class Gate:
         introduced_s: float,
         unsent_bytes: int,
     ) -> None:
-        """At most `most` connections, and never more than a quarter of the descriptors that this process may open.
+        """Allow `most` connections, at most a quarter of the descriptors that this process may open.
 
         `introduced_s` as for Crowd, `unsent_bytes` as for hold_little.
         """
@@ -31,12 +31,12 @@ class Gate:
         address = f"inproc://gate-{id(part)}"
         part.monitor(address, zmq.EVENT_ACCEPTED | zmq.EVENT_DISCONNECTED)
         self.events = context.socket(zmq.PAIR)
-        """Where ZeroMQ tells it; nobody else asks it anything, so that its descriptor tells all that is new."""
-        self.events.setsockopt(zmq.RCVHWM, 0)  # at a mark ZeroMQ's own thread would wait for us
+        """Socket of ZeroMQ's events; only the gate reads it, so that its descriptor signals each new one."""
+        self.events.setsockopt(zmq.RCVHWM, 0)  # at a mark ZeroMQ's thread would wait for us
         self.events.connect(address)
 
     def look(self, now_s: float) -> bool:
-        """Take note of the next that has come or gone; False when there is none; never blocks."""
+        """Process the next arrival or end; return False if there is none. Never blocks."""
         if not readable(self.events):
             return False
         event = parse_monitor_message(self.events.recv_multipart())
@@ -48,7 +48,7 @@ class Gate:
         return True
 
     def close(self) -> None:
-        """Look no more; before the watched socket is closed."""
-        # In this order: ZeroMQ's own thread would wait forever to tell an event to a watcher that is gone.
+        """Stop watching; call before the watched socket is closed."""
+        # In this order: ZeroMQ's thread would block forever on an event for a closed watcher.
         self._part.disable_monitor()
         self.events.close(linger=0)

@@ -1,4 +1,4 @@
-"""What has arrived at one socket: asked for as seldom as it can be, read frame by frame."""
+"""Receiving side of one socket: polled as seldom as possible, read frame by frame."""
 
 import select
 from collections.abc import Iterator
@@ -8,20 +8,20 @@ import zmq
 from common.sockets.readable import readable
 
 MESSAGES_PER_RECEIVE = 64
-"""At most so many messages in one call of `receive`, so that a flood cannot hold the caller."""
+"""Messages per `read`, so that a flood cannot block the caller."""
 _NOBLOCK = int(zmq.NOBLOCK)
 
 
 class Inbox:
-    """One socket's receiving side.
+    """Receiving side of one socket.
 
-    Its descriptor signals changes only, and only until somebody asks the socket anything: EVENTS has the last word.
-    Asking for EVENTS takes four times as long as looking at the descriptor, so that is done only where it may have
-    news: from the moment that EVENTS said no until the descriptor signals, or somebody else uses the socket.
+    Its descriptor signals only changes, and any call of the socket clears the signal: EVENTS is decisive. It takes
+    four times as long as polling the descriptor. After a no, EVENTS is read again only when the descriptor signals or
+    somebody else has used the socket.
     """
 
     def __init__(self, part: "zmq.Socket[bytes]", frames: int) -> None:
-        """`part` carries messages of so many frames."""
+        """`part` carries messages of `frames` frames."""
         self.descriptor = part.fileno()
         self._part = part
         self._frames = frames
@@ -33,7 +33,7 @@ class Inbox:
         """Whether EVENTS said yes, and nothing has been read since."""
 
     def has_some(self) -> bool:
-        """Whether something can be received at once."""
+        """Return whether a frame can be received at once."""
         if self._waiting or (self._settled and not self._signals.poll(0)):
             return self._waiting
         self._waiting = readable(self._part)
@@ -41,17 +41,17 @@ class Inbox:
         return self._waiting
 
     def used(self) -> None:
-        """Somebody else has used the socket: sending may have taken the signal of what came meanwhile."""
+        """Note that the socket was used: sending may have cleared the signal of an arrival."""
         self._settled = False
 
     def read(self) -> Iterator[list[zmq.Frame]]:
-        """What has arrived, oldest first, each at most one frame longer than it should be.
+        """Yield the messages that have arrived, oldest first, each cut to one frame more than valid.
 
-        Frame by frame: one of a million frames must not hold the caller either.
+        Reads frame by frame: a message of a million frames must not block the caller either.
         """
         more = bool(self._begun)
         for _ in range(MESSAGES_PER_RECEIVE * self._frames):
-            # Asked first: an exception takes four times as long.
+            # Checked first: an exception takes four times as long.
             if not more and not self.has_some():
                 return
             self._waiting = False

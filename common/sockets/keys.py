@@ -1,8 +1,8 @@
 """Keys as files that people can read: this side's own pair, and the peers that it lets in.
 
-    FOLDER/robot.secret        the robot side's own key, for nobody else's eyes (mode 0600)
+    FOLDER/robot.secret        the robot side's secret key (mode 0600)
     FOLDER/robot.public        its public part, to be given to the operators
-    FOLDER/allowed/NAME.public the public key of a peer that is let in; deleting the file revokes it
+    FOLDER/allowed/NAME.public the public key of an admitted peer; deleting the file revokes it
 
 A key is 64 hexadecimal digits (32 bytes, Curve25519), so that no shell needs quotes around it. Lines that begin
 with # are for people.
@@ -23,21 +23,21 @@ from common.files.user_folders import configuration_folder
 Side = Literal["robot", "operator"]
 
 PEER_LIMIT = 256
-"""Peers in one folder: far more than operators of one robot, and still read in a few milliseconds."""
+"""Number of peers in one folder: far more than operators of one robot, and read in a few milliseconds."""
 _FILE_LIMIT_BYTES = 4096
 SHORTAGES = (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
-"""Errors that say nothing of a file or folder: this process or the machine is short of something."""
+"""Errors without meaning for a file or folder: this process or the machine lacks a resource."""
 _KEY = re.compile(r"[0-9a-f]{64}")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 
 
 def default_folder() -> Path:
-    """The folder of keys unless another one is named."""
+    """Return the default folder of keys."""
     return configuration_folder() / "keys"
 
 
 def checked_key(text: str, what: str) -> str:
-    """`text` as a key in lower case; ConfigurationError names `what`."""
+    """Return `text` as a key in lower case; raises ConfigurationError, which names `what`."""
     key = text.strip().lower()
     if _KEY.fullmatch(key) is None:
         raise ConfigurationError(f"{what}: {text.strip()[:80]!r} is no key; valid: 64 hexadecimal digits")
@@ -45,7 +45,7 @@ def checked_key(text: str, what: str) -> str:
 
 
 def checked_name(name: str) -> str:
-    """`name` as a peer's name, and hence a file's; ConfigurationError when it could be anything else."""
+    """Return `name` if it is a valid name of a peer, and hence of a file; else raise ConfigurationError."""
     if _NAME.fullmatch(name) is None:
         raise ConfigurationError(
             f"name {name[:80]!r}: valid: 1 to 32 letters, digits, - and _, the first a letter or digit"
@@ -54,7 +54,7 @@ def checked_name(name: str) -> str:
 
 
 def read_public_key(key_or_file: str, what: str) -> str:
-    """A public key given as such or as the path of a file that holds one; ConfigurationError names `what`."""
+    """Return a public key, given as digits or as a file's path; raises ConfigurationError, which names `what`."""
     if _KEY.fullmatch(key_or_file.strip().lower()):
         return key_or_file.strip().lower()
     path = Path(key_or_file).expanduser()
@@ -71,17 +71,17 @@ def read_public_key(key_or_file: str, what: str) -> str:
 
 @dataclass(frozen=True)
 class Peers:
-    """The peers that are let in, and the files that let nobody in."""
+    """Admitted peers, and files that admit nobody."""
 
     names: dict[str, str]
-    """The name of each key."""
+    """Peers' names by key."""
     faults: tuple[str, ...]
-    """The faults of files that hold no key, a line each."""
+    """Faults of files that hold no key, a line each."""
 
 
 @dataclass(frozen=True)
 class KeyFolder:
-    """One folder of keys; nothing is kept in memory."""
+    """Folder of keys; nothing is kept in memory."""
 
     path: Path = field(default_factory=default_folder)
 
@@ -89,20 +89,20 @@ class KeyFolder:
         object.__setattr__(self, "path", self.path.expanduser())
 
     def secret_path(self, side: Side) -> Path:
-        """The file of the side's own secret key."""
+        """Return the path of the side's secret key."""
         return self.path / f"{side}.secret"
 
     def public_path(self, side: Side) -> Path:
-        """The file of the public part."""
+        """Return the path of the side's public key."""
         return self.path / f"{side}.public"
 
     @property
     def allowed_path(self) -> Path:
-        """The folder of the peers that are let in."""
+        """Folder of the admitted peers."""
         return self.path / "allowed"
 
     def write_pair(self, side: Side, public: str, secret: str, *, replace: bool = False) -> None:
-        """Write a side's own pair; ConfigurationError when there is one already and `replace` is not said."""
+        """Write a side's pair; raises ConfigurationError if there is one already, unless `replace`."""
         path = self.secret_path(side)
         if path.exists() and not replace:
             raise ConfigurationError(
@@ -113,14 +113,14 @@ class KeyFolder:
         whose = f"this {side} side"
         _write(
             path,
-            f"# The secret key of {whose}: whoever reads it can pass for it. It never leaves this machine.\n{secret}\n",
+            f"# The secret key of {whose}: its readers can act as it. It never leaves this machine.\n{secret}\n",
         )
         _write(
             self.public_path(side), f"# The public key of {whose}, to be given to its peers.\n{public}\n", mode=0o644
         )
 
     def secret(self, side: Side) -> str:
-        """The side's own secret key; ConfigurationError with the command that mends it."""
+        """Return the side's secret key. Raises ConfigurationError, which names the command that mends it."""
         path = self.secret_path(side)
         if not path.is_file():
             raise ConfigurationError(
@@ -136,13 +136,13 @@ class KeyFolder:
         return _read_key(path, "--keys")
 
     def allow(self, name: str, public: str) -> None:
-        """Let a peer in; ConfigurationError when the name, the key, or the folder's last place is taken."""
+        """Admit a peer; raises ConfigurationError if the name or key is taken, or the folder is full."""
         peers = self.allowed()
         if peers.get(public, name) != name:
             raise ConfigurationError(f"this key is allowed already, as {peers[public]!r}")
         if name in peers.values() and public not in peers:
             raise ConfigurationError(
-                f"name {name!r}: stands for another key; valid: another name, "
+                f"name {name!r}: belongs to another key; valid: another name, "
                 f"or `{self.command(f'revoke {name}')}` first"
             )
         if len(peers) >= PEER_LIMIT:
@@ -152,7 +152,7 @@ class KeyFolder:
         _write(self.peer_path(name), f"# A peer that is let in as {name}; deleting this file revokes it.\n{public}\n")
 
     def revoke(self, name: str) -> None:
-        """Let a peer in no more; ConfigurationError when there is none of that name."""
+        """Revoke a peer; raises ConfigurationError if there is none of that name, or another has the same key."""
         path = self.peer_path(name)
         if not path.is_file():
             names = ", ".join(sorted(self.allowed().values())) or "none is allowed"
@@ -166,14 +166,14 @@ class KeyFolder:
             )
 
     def allowed(self) -> dict[str, str]:
-        """The name of each key that is let in; errors as in `peers`."""
+        """Return the admitted peers' names by key; errors as in `peers`."""
         return self.peers().names
 
     def peers(self) -> Peers:
-        """The peers that are let in: a file that cannot be read, or is gone by now, excludes its own key alone.
+        """Read the admitted peers: a file that cannot be read, or has vanished, excludes only its key.
 
-        ConfigurationError for a folder that others may write to or that cannot be read; OSError when nothing can be
-        read at present, whatever it is.
+        Raises ConfigurationError for a folder that is unreadable or writable for others, OSError during a shortage
+        (SHORTAGES).
         """
         names: dict[str, str] = {}
         faults = []
@@ -191,24 +191,24 @@ class KeyFolder:
         return Peers(names, tuple(faults))
 
     def fingerprint(self) -> tuple[tuple[str, int, int], ...]:
-        """A value that changes whenever the peers do: each file's name, time of change and number, without reading any.
+        """Return a value that changes with the peers: each file's name, time of change and inode, unread.
 
         Errors as in `peers`.
         """
         return tuple((path.name, *_stand(path)) for path in self._allowed_files())
 
     def command(self, rest: str) -> str:
-        """The command line that does `rest` to this folder."""
+        """Return the command line `feelahead keys REST` for this folder."""
         folder = "" if self.path == default_folder() else f" --folder {self.path}"
         return f"feelahead keys {rest}{folder}"
 
     def peer_path(self, name: str) -> Path:
-        """The file of the public key of the peer of that name; ConfigurationError for what is no name."""
+        """Return the path of a peer's public key; raises ConfigurationError for an invalid name."""
         return self.allowed_path / f"{checked_name(name)}.public"
 
     def _allowed_files(self) -> list[Path]:
         try:
-            # glob would take a folder that may not be read for an empty one.
+            # glob would treat an unreadable folder as an empty one.
             paths = sorted(self.allowed_path.iterdir())
         except FileNotFoundError:
             return []
@@ -250,7 +250,7 @@ def _read_key(path: Path, what: str) -> str:
 
 
 def _stand(path: Path) -> tuple[int, int]:
-    """Numbers that change when a file or its permissions do, or why they cannot be known."""
+    """Return a file's time of change and inode; for an unreadable one, -1 and the error's number."""
     try:
         found = path.stat()
     except OSError as error:
@@ -268,7 +268,7 @@ def _refuse_writable(path: Path) -> None:
 
 
 def _write(path: Path, content: str, mode: int = 0o600) -> None:
-    """Whole or not at all: a side that runs must never read half a key."""
+    """Write the file atomically: a running side must never read half a key."""
     partial = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         descriptor = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)

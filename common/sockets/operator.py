@@ -1,4 +1,4 @@
-"""The operator side's end: it connects, and reconnects by itself."""
+"""Sockets of the operator side: they connect, and reconnect by themselves."""
 
 import contextlib
 import threading
@@ -22,23 +22,23 @@ from common.sockets.turns import CONNECTIONS, MOST_CONNECTIONS_EACH, Offered, Tu
 
 _RETRY_S = 0.5
 _ATTEMPT_LIMIT_S = 3.0
-"""An attempt to connect that nobody has answered by then is made anew, by the host's address of then. The system by
-itself asks again after 1, 2, 4... 64 s: a network that is back after a minute would stay unnoticed for another."""
+"""Time limit of an attempt to connect, in seconds; then the host's address is resolved again. The system alone retries
+after 1, 2, 4... 64 s: a network that is back after a minute would stay unnoticed for another."""
 _CLOSE_LIMIT_S = 0.5
 _HANDSHAKE_LIMIT_S = 10.0
-"""A CURVE handshake takes three round trips, seen from here, and the robot side may still be starting."""
+"""Time limit of a handshake: CURVE takes three round trips from here, and the robot side may still be starting."""
 
 
 @dataclass(eq=False)
 class _Connection(Way):
-    """One of the control connections."""
+    """Control connection."""
 
     part: "zmq.Socket[bytes]"
     inbox: Inbox
 
 
 class OperatorSockets(SocketShell):
-    """The operator side's end: it connects, and reconnects by itself."""
+    """Sockets of the operator side: they connect, and reconnect by themselves."""
 
     def __init__(
         self,
@@ -52,9 +52,9 @@ class OperatorSockets(SocketShell):
     ) -> None:
         """Connect control to `connect`, `connections` times, and view to `view_connect`, by default the port after.
 
-        `topics` are prefixes of the topics to receive; the empty one means all. The robot side need not be
-        there yet. `heartbeat_timeout_s` as in RobotSockets. ConfigurationError when an address is malformed
-        or its host unknown; ValueError for fewer than 1 or more than 16 connections.
+        `topics` are prefixes of the topics to receive; the empty one means all. The robot side need not run yet.
+        `heartbeat_timeout_s` as in RobotSockets. Raises ConfigurationError for a malformed address or unknown host,
+        ValueError for fewer than 1 or more than 16 connections.
         """
         if not 1 <= connections <= MOST_CONNECTIONS_EACH:
             raise ValueError(f"connections = {connections}; valid: 1 to {MOST_CONNECTIONS_EACH}")
@@ -75,7 +75,7 @@ class OperatorSockets(SocketShell):
             for index in range(connections):
                 part = self._open_control(zmq.DEALER)
                 part.setsockopt(zmq.ROUTING_ID, routing_id(group, index))
-                # Nothing is queued for a robot that is not there: it would be replayed when it comes back.
+                # Queue nothing for an absent robot: old messages would arrive when it comes back.
                 part.setsockopt(zmq.IMMEDIATE, 1)
                 self._connections.append(_Connection(part, Inbox(part, frames=1)))
                 self._join(part, control, "--connect", keys, CONTROL_UNSENT_BYTES)
@@ -92,30 +92,30 @@ class OperatorSockets(SocketShell):
 
     @property
     def trouble(self) -> str | None:
-        """Why the robot side does not let us in, and what to do about it; None as far as we know."""
+        """Reason why the robot side refuses us, with a remedy; None if unknown."""
         return next((watch.trouble for _, _, watch in self._watched if watch.trouble is not None), None)
 
     @property
     def key_refused(self) -> bool:
-        """Whether `trouble` is that our key is not let in."""
+        """Whether `trouble` is a refused key."""
         return any(watch.key_refused for _, _, watch in self._watched)
 
     def receive(self) -> list[bytes]:
-        """Every control message that has arrived, the oldest of each connection first."""
+        """Return the control messages that have arrived, the oldest of each connection first."""
         self._look_after_handshakes()
         return [
             payload.bytes for connection in self._connections for (payload,) in self._whole(connection.inbox.read(), 1)
         ]
 
     def receive_view(self) -> list[tuple[bytes, bytes]]:
-        """(topic, payload) of every view message that has arrived, oldest first."""
+        """Return (topic, payload) of the view messages that have arrived, oldest first."""
         messages = self._whole(self._view_inbox.read(), 2)
         return [(topic.bytes, payload.bytes) for topic, payload in messages]
 
     def send(self, payload: bytes, *, everywhere: bool = False) -> bool:
-        """Send to the robot side; False, and counted in `dropped`, when it is gone or does not keep up.
+        """Send to the robot side; False, and counted in `dropped`, if it is gone or does not keep up.
 
-        everywhere: over each connection and not over the next one. ValueError for more than CONTROL_LIMIT_BYTES.
+        everywhere: over each connection, not only the next. Raises ValueError for more than CONTROL_LIMIT_BYTES.
         """
         check_size(payload, CONTROL_LIMIT_BYTES)
         taken = self._turns.send(payload, self._clock.now(), everywhere=everywhere)
@@ -123,14 +123,14 @@ class OperatorSockets(SocketShell):
         return taken
 
     def wait(self, timeout_s: float | None) -> bool:
-        """Wait for a control or view message, at most `timeout_s` (None: no limit); whether there is one."""
+        """Wait for a control or view message, at most `timeout_s` (None: no limit); return whether there is one."""
         return self.wait_for(timeout_s, self._awaited)
 
     def close(self) -> None:
-        """Close at once, whatever has not left yet; closing twice does no harm."""
+        """Close at once and drop unsent messages; closing twice does no harm."""
         if self._closing is not None:
             return
-        # ZeroMQ would wait for its own threads, and they for a name server that does not answer.
+        # ZeroMQ would wait for its threads, and they for a name server that does not answer.
         self._closing = threading.Thread(target=self._end, daemon=True)
         self._closing.start()
         self._closing.join(_CLOSE_LIMIT_S)
@@ -154,7 +154,7 @@ class OperatorSockets(SocketShell):
         return self.offer(connection.part, payload)
 
     def _whole(self, messages: Iterator[list[zmq.Frame]], frames: int) -> Iterator[list[zmq.Frame]]:
-        """The messages of that many frames; others are rejected and counted."""
+        """Yield the messages of `frames` frames; others are counted in `rejected`."""
         for message in messages:
             if len(message) == frames:
                 yield message
@@ -162,7 +162,7 @@ class OperatorSockets(SocketShell):
                 self.rejected += 1
 
     def _look_after_handshakes(self) -> None:
-        """After a refused handshake ZeroMQ gives up; we knock again, for the key may be allowed by then."""
+        """Connect again after a refused handshake: ZeroMQ gives up, but the key may be allowed by now."""
         now_s = self._clock.now()
         if now_s < self._next_look_s:
             return

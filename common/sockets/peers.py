@@ -13,19 +13,19 @@ _REMEMBERED_CONNECTIONS: Final = 1024
 
 @dataclass(eq=False)
 class Connection(Way):
-    """The memory of one connection."""
+    """State of one connection."""
 
     name: bytes
-    """The routing id."""
+    """Routing id."""
     peer: "Peer"
     descriptor: int = -1
-    """The descriptor that the last message came by; -1 where it is not known."""
+    """Descriptor by which the last message came; -1 if unknown."""
     number: int | None = None
-    """The number of that connection in the crowd; 0 for one that ended, None while unknown."""
+    """Number of that connection in the crowd; 0 for an ended one, None while unknown."""
     hung_up: bool = False
 
     def stands_for(self, descriptor: int, number: int | None) -> None:
-        """Messages come by another TCP connection than before."""
+        """Note that messages come by another TCP connection than before."""
         self.descriptor, self.number, self.hung_up = descriptor, number, False
 
 
@@ -35,29 +35,29 @@ class Peer:
 
     name: bytes
     key: str
-    """Whom it authenticated as; empty without keys."""
+    """Authenticated key; empty without keys."""
     turns: Turns[Connection]
 
 
 class Peers:
-    """Peers and their connections, the newest of them; without I/O."""
+    """Peers and their newest connections; without I/O."""
 
     def __init__(self, offer: Callable[[Connection, bytes], Offered]) -> None:
         """`offer` as for Turns; a connection that is gone is forgotten."""
         self.connections: dict[bytes, Connection] = {}
-        """By routing id; the one that was silent for longest gives way."""
+        """Connections by routing id; beyond the limit the longest silent is forgotten."""
         self._offer = offer
         self._peers: dict[bytes, Peer] = {}
         self._received: Counter[bytes | str] = Counter()
 
     def get(self, name: bytes) -> Peer | None:
-        """The peer of that name, as long as it has a connection."""
+        """Return the peer of that name while it has a connection."""
         return self._peers.get(name)
 
     def connection(self, name: bytes, key: str) -> Connection:
-        """The connection by its routing id, whose messages come with `key`: met before, or new.
+        """Return the connection of a routing id and `key`, a new one if needed.
 
-        A routing id that another key takes over leaves its peer: no name is within reach of two keys.
+        A routing id that another key takes over leaves its peer: no two keys share a name.
         """
         known = self.connections.get(name)
         if known is not None and known.peer.key == key:
@@ -74,13 +74,13 @@ class Peers:
         return connection
 
     def count(self, peer: Peer) -> int:
-        """Count a message, and return the count of this second: of the key, or without keys of the peer."""
+        """Count a message; return this second's count of the key, or of the peer without keys."""
         account = peer.key or peer.name
         self._received[account] += 1
         return self._received[account]
 
     def begin_second(self) -> None:
-        """Count from nothing again."""
+        """Reset the counts."""
         self._received.clear()
 
     def _peer(self, name: bytes, key: str) -> Peer:

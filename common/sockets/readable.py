@@ -1,16 +1,16 @@
-"""What ZeroMQ tells thousands of times a second: whether a socket has something, and who sent a frame."""
+"""Frequent queries to ZeroMQ: whether a socket has a message, and who sent a frame."""
 
 from typing import Final
 
 import zmq
 
-# Plain numbers: pyzmq takes longer to look up one of its own than ZeroMQ to answer.
+# Plain numbers: pyzmq's look-up of an enum takes longer than ZeroMQ's answer.
 EVENTS: Final = int(zmq.EVENTS)
 _POLLIN: Final = int(zmq.POLLIN)
 
 
 def readable(part: "zmq.Socket[bytes]") -> bool:
-    """Whether something can be received from it at once; it takes note of whatever else has happened to it, too."""
+    """Return whether a frame can be received at once. ZeroMQ processes the socket's pending events, too."""
     return int(part.getsockopt(EVENTS)) & _POLLIN != 0
 
 
@@ -18,7 +18,7 @@ _SOURCE: Final = int(zmq.SRCFD)
 
 
 def user_of(frame: zmq.Frame) -> str:
-    """The key that the connection authenticated with; empty where ZeroMQ knows none."""
+    """Return the key that the connection authenticated with; empty if ZeroMQ knows none."""
     try:
         return str(frame.get("User-Id"))
     except zmq.ZMQError:
@@ -26,7 +26,7 @@ def user_of(frame: zmq.Frame) -> str:
 
 
 def descriptor_of(frame: zmq.Frame) -> int:
-    """The descriptor of the connection; -1 where ZeroMQ knows none."""
+    """Return the descriptor of the connection; -1 if ZeroMQ knows none."""
     try:
         return int(frame.get(_SOURCE))
     except zmq.ZMQError:

@@ -1,4 +1,4 @@
-"""The robot side's end: it binds, tells its peers apart, and sends floods and revoked keys away."""
+"""Sockets of the robot side: they distinguish peers, and cut off floods and revoked keys."""
 
 import contextlib
 import select
@@ -26,19 +26,18 @@ from common.sockets.tcp_figures import TcpFigures, tcp_figures
 from common.sockets.turns import Offered
 
 PEER_LIMIT_PER_S = 5000
-"""A key, or without keys a peer, that sends more is cut off: 20 times what an operator sends, and twice a backlog of
-ten seconds."""
+"""Messages a second at which a key, or without keys a peer, is cut off: 20 times an operator's rate, and twice a
+backlog of ten seconds."""
 HANDSHAKE_LIMIT_S = 5.0
-"""A connection that has not introduced itself by then ends. A CURVE handshake takes two round trips, seen from here, of
-2 s at most in a session."""
+"""Time limit of a handshake, in seconds: CURVE takes two round trips from here, of 2 s at most in a session."""
 MOST_CONNECTIONS = 1024
-"""To each port, and never more than a quarter of the descriptors that this process may open."""
+"""Connections to each port; at most a quarter of the descriptors that this process may open."""
 _EVENTS_PER_CALL = 256
-"""Events of each port, 5 us each: connections that come and go cannot hold the caller."""
+"""Events of each port, 5 us each: a storm of connections cannot block the caller."""
 
 
 class RobotSockets(SocketShell):
-    """The robot side's end: it binds, tells its peers apart, and with keys lets nobody in but who is allowed."""
+    """Sockets of the robot side: they bind, distinguish peers, and with keys admit only allowed ones."""
 
     def __init__(
         self,
@@ -51,9 +50,9 @@ class RobotSockets(SocketShell):
     ) -> None:
         """Bind control to `bind` and view to `view_bind`, by default the port after.
 
-        A silent connection ends after `heartbeat_timeout_s`, which must exceed the link's real one-way delay.
-        ConfigurationError when an address is malformed, in use, not this machine's, or open to the network
-        with neither `keys` nor `insecure`.
+        A silent connection ends after `heartbeat_timeout_s`, which must exceed the link's real one-way delay. Raises
+        ConfigurationError for an address that is malformed, in use, not this machine's, or open to the network with
+        neither `keys` nor `insecure`.
         """
         control = parse_bind(bind, "--bind")
         view = following(control, bind, "--view-bind") if view_bind is None else parse_bind(view_bind, "--view-bind")
@@ -61,16 +60,16 @@ class RobotSockets(SocketShell):
             refuse_open(control, bind, "--bind")
             refuse_open(view, view_bind or bind, "--view-bind")
         self.flooding = 0
-        """Messages of peers that sent more than anybody may."""
+        """Number of messages above PEER_LIMIT_PER_S."""
         self.revoked = 0
-        """Messages of peers that were allowed when they connected, and are no more."""
+        """Number of messages under keys revoked since their handshake."""
         self._keys = keys
         self.crowded = 0
-        """Connections that were ended because there were too many at once."""
+        """Number of connections that were ended as surplus."""
         self._told: list[str] = []
         self._peers = Peers(self._offer)
         self._all_seen = False
-        """Whether what the gates know of the connections was all there was to know."""
+        """Whether the gates had processed all events of connections."""
         self._second = 0
         self._view_endpoint: Endpoint | None = None
         self._view_outdated = False
@@ -82,44 +81,44 @@ class RobotSockets(SocketShell):
             self._listen()
             self._authenticator = None if keys is None else Authenticator(self._context, keys.allowed)
             self._control.setsockopt(zmq.ROUTER_MANDATORY, 1)
-            # A connection that breaks off may come back before its end is noticed here.
+            # A broken connection may come back before its end is noticed here.
             self._control.setsockopt(zmq.ROUTER_HANDOVER, 1)
             for part, endpoint, flag in ((self._control, control, "--bind"), (self._view, view, "--view-bind")):
                 if keys is not None:
                     keys.secure(part)
                 bind_socket(part, endpoint, flag)
             self.control_endpoint = self._control.getsockopt_string(zmq.LAST_ENDPOINT)
-            """The address that control is bound to, with the port that the system chose."""
+            """Bound address of control, with the port that the system chose."""
             self.view_endpoint = self._view.getsockopt_string(zmq.LAST_ENDPOINT)
-            """The address that view is bound to, with the port that the system chose."""
+            """Bound address of view, with the port that the system chose."""
         except BaseException:
             self.close()
             raise
 
     @property
     def refused(self) -> int:
-        """Handshakes with a key that is not allowed."""
+        """Number of handshakes with a key that is not allowed."""
         return 0 if self._authenticator is None else self._authenticator.refused
 
     def news(self) -> list[str]:
-        """News of strangers and keys since the last call, a line each."""
+        """Return news of strangers and keys since the last call, a line each."""
         news: list[str] = []
         wrong = []
         if self.crowded:
             limit = self._gates[0].crowd.limit
-            wrong.append(f"more than {limit} connections at once: strangers are hung up on; who is in stays in")
+            wrong.append(f"more than {limit} connections at once: new strangers are cut off, admitted peers stay")
         if self._keys is not None and self._authenticator is not None:
             allowed = self._keys.allowed
             news = self._authenticator.news()
             wrong += [f"passed over, so that it lets nobody in: {fault}" for fault in allowed.faults]
             if allowed.unreadable is not None:
-                who = "whoever was let in stays so" if allowed.names else "nobody is let in any more"
+                who = "admitted peers stay" if allowed.names else "nobody is let in any more"
                 wrong.append(f"{who}: {allowed.unreadable}")
         told, self._told = self._told, wrong
         return news + [text for text in wrong if text not in told]
 
     def refresh_keys(self) -> None:
-        """Look whether the allow-list has changed, and cut off whoever it names no more; a few times a second."""
+        """Refresh the allow-list, and cut off revoked peers; call a few times a second."""
         if self._keys is None:
             return
         revoked = self._keys.allowed.refresh()
@@ -130,12 +129,12 @@ class RobotSockets(SocketShell):
                     self._hang_up(connection)
             self._view_outdated = True
         if self._view_outdated:
-            with contextlib.suppress(zmq.ZMQError):  # while no descriptor is to be had, the next look tries again
+            with contextlib.suppress(zmq.ZMQError):  # no descriptor left: the next call tries again
                 self._replace_view(self._keys)
         self._bind_view_again()
 
     def receive(self) -> list[tuple[bytes, bytes]]:
-        """(peer, payload) of every control message that has arrived, oldest first."""
+        """Return (peer, payload) of the control messages that have arrived, oldest first."""
         if self._authenticator is not None:
             self._authenticator.serve()
         now_s = self._clock.now()
@@ -156,10 +155,9 @@ class RobotSockets(SocketShell):
         return received
 
     def send(self, peer: bytes, payload: bytes, *, everywhere: bool = False) -> bool:
-        """Send to `peer`; False, and counted in `dropped`, when it is gone, revoked, or does not keep up.
+        """Send to `peer`; False, and counted in `dropped`, if it is gone, revoked, or does not keep up.
 
-        everywhere: over each of its connections and not over the next one. ValueError for more than
-        CONTROL_LIMIT_BYTES.
+        everywhere: over each connection, not only the next. Raises ValueError for more than CONTROL_LIMIT_BYTES.
         """
         check_size(payload, CONTROL_LIMIT_BYTES)
         known = self._peers.get(peer)
@@ -172,42 +170,42 @@ class RobotSockets(SocketShell):
         return taken
 
     def tcp_figures(self, peer: bytes) -> TcpFigures:
-        """The kernel's figures of the connections to `peer`, added up."""
+        """Return the sum of the kernel's figures of the connections to `peer`."""
         known = self._peers.get(peer)
         return tcp_figures([] if known is None else [each.descriptor for each in known.turns.ways if each.number])
 
     def publish(self, topic: bytes, payload: bytes) -> None:
-        """Send to whoever subscribed to `topic`; a viewer that does not keep up loses it, alone.
+        """Send to the subscribers of `topic`; only a viewer that does not keep up loses the message.
 
-        ValueError for more than VIEW_LIMIT_BYTES.
+        Raises ValueError for more than VIEW_LIMIT_BYTES.
         """
         check_size(payload, VIEW_LIMIT_BYTES)
         self._bind_view_again()
         self.dropped += self.offer(self._view, topic, payload) is not Offered.TAKEN
 
     def wait(self, timeout_s: float | None) -> bool:
-        """Wait for a control message, at most `timeout_s` (None: no limit); whether there is one."""
+        """Wait for a control message, at most `timeout_s` (None: no limit); return whether there is one."""
         return self.wait_for(timeout_s, [self._inbox], self._authenticator)
 
     def _watch(self, part: "zmq.Socket[bytes]", unsent_bytes: int) -> Gate:
         return Gate(self._context, part, MOST_CONNECTIONS, HANDSHAKE_LIMIT_S, unsent_bytes)
 
     def _listen(self) -> None:
-        """Be told when there is something at the gates or the view; whatever is there already is looked at anyway."""
+        """Poll the gates and the view from now on; present events are processed anyway."""
         self._comings = select.poll()
         for part in (self._view, *(gate.events for gate in self._gates)):
             self._comings.register(part.fileno(), select.POLLIN)
         self._all_seen = False
 
     def _watch_connections(self) -> None:
-        """Take note of who has come and gone at both ports since it was last looked, and hang up on who is too many.
+        """Process both ports' arrivals and ends since the last call, and end surplus connections.
 
-        A descriptor may stand for another connection by now, at the other port, too: only when a last look has found
-        nothing new at either is each known to be whose it is. With more than one call takes in, nobody is hung up on.
+        A descriptor may belong to another connection by now, even at the other port. The owners are known only when
+        neither gate has another event. After more events than one call takes, nobody is hung up on.
         """
         if self._all_seen and not self._comings.poll(0):
             return
-        # Connections that come and go at the view pile up until its socket is asked anything.
+        # Events of the view's connections pile up until its socket is used.
         self._view.getsockopt(EVENTS)
         now_s = self._clock.now()
         self._all_seen = False
@@ -224,7 +222,7 @@ class RobotSockets(SocketShell):
                 self.crowded += 1
 
     def _replace_view(self, keys: RobotKeys) -> None:
-        """Nothing can be sent to some viewers and not to others: all of them have to shake hands anew."""
+        """Make another view socket: a PUB socket cannot cut off single viewers, so that all must authenticate again."""
         view = self._open_view(zmq.PUB)
         try:
             keys.secure(view)
@@ -239,7 +237,7 @@ class RobotSockets(SocketShell):
         self._view_endpoint = parse_bind(self.view_endpoint, "--view-bind")
 
     def _bind_view_again(self) -> None:
-        """After a revocation: the old socket's port is free only when ZeroMQ's own thread has closed it."""
+        """Bind the new view: after a revocation the port is free only when ZeroMQ's thread has closed the old one."""
         if self._view_endpoint is not None:
             with contextlib.suppress(ConfigurationError):
                 bind_socket(self._view, self._view_endpoint, "--view-bind")
@@ -253,13 +251,13 @@ class RobotSockets(SocketShell):
         return self.offer(self._control, connection.name, payload)
 
     def _admitted(self, name: bytes, frame: zmq.Frame) -> Connection | None:
-        """The connection of one message, if it may be looked into; who sent it stands with each frame."""
+        """Return the connection of one message if it may be decoded; each frame names its sender."""
         key = "" if self._keys is None else user_of(frame)
         descriptor = descriptor_of(frame)
         connection, crowd = self._peers.connection(name, key), self._gates[0].crowd
         if descriptor != connection.descriptor or connection.number is None:
             self._watch_connections()
-            # The one before, whose routing id was taken over: ZeroMQ reads no more from it, and does not end it.
+            # The previous connection, whose routing id was taken over: ZeroMQ neither reads nor ends it.
             self._hang_up(connection)
             connection.stands_for(descriptor, crowd.number(descriptor) if self._all_seen else None)
         peer, is_allowed = connection.peer, self._allows(key)
@@ -279,15 +277,15 @@ class RobotSockets(SocketShell):
         return None
 
     def _is_there(self, connection: Connection) -> bool:
-        """Whether it has come back by a descriptor that it had before, or only left messages behind.
+        """Return whether the connection is back under an old descriptor, and has not only left messages behind.
 
-        ZeroMQ sends nothing to who has left, be it nothing at all.
+        ZeroMQ refuses even an empty message to a peer that has left.
         """
         return self.offer(self._control, connection.name, b"") is not Offered.GONE
 
     def _hang_up(self, connection: Connection) -> None:
-        """End a connection, so that it does not go on to fill our memory; ZeroMQ has no call for that."""
-        # A message may be read long after its sender left: the descriptor may stand for another connection by now.
+        """End a connection, so that it does not fill our memory; ZeroMQ has no call for that."""
+        # A message may be read long after its sender left: the descriptor may belong to another connection by now.
         number, now_number = connection.number, self._gates[0].crowd.number(connection.descriptor)
         if self._all_seen and not connection.hung_up and number and number == now_number:
             connection.hung_up = True

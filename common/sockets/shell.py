@@ -1,4 +1,4 @@
-"""What both processes' sockets have in common: their options, waiting, sending, closing."""
+"""Base of both processes' sockets: options, waiting, sending, closing."""
 
 import os
 import select
@@ -16,42 +16,42 @@ from common.sockets.readable import EVENTS
 from common.sockets.turns import Offered
 
 CONTROL_HIGH_WATER_MARK = 2
-"""Control messages that wait to leave by each connection: over four, a burst of eight after a hiccup passes whole."""
+"""Send queue of each control connection, in messages: over four, a burst of eight after a hiccup passes whole."""
 VIEW_HIGH_WATER_MARK = 8
-"""View messages that wait on either side: both cameras' pictures, the scene and telemetry of one tick. ZeroMQ counts
-what has left in steps of half the mark, so that with 4 the telemetry was lost, and with 2 the scene, too."""
+"""View queue on either side, in messages: both cameras' pictures, the scene and telemetry of one tick. ZeroMQ counts
+sent messages in steps of half the mark: 4 lost the telemetry, and 2 the scene, too."""
 CONTROL_UNSENT_BYTES = 1024
-"""The kernel takes no more ahead of the network, by each connection: some messages."""
+"""Bound on unsent bytes in the kernel, of each connection: a few messages."""
 VIEW_UNSENT_BYTES = 16 * 1024
 RECEIVE_HIGH_WATER_MARK = 100_000
-"""Control messages that wait to be received: out of reach for whoever drains once per tick.
+"""Receive queue of control, in messages: never reached by a caller that drains it once per tick.
 
-A low mark would not keep them fresh (the kernel's buffers hold thousands more, and a drain would end at the
-mark instead of at the newest), and libzmq up to 4.3.5 aborts the process when a socket at its mark finds a
+A low mark would not keep messages fresh: the kernel's buffers hold thousands more, and a drain would end at the
+mark instead of at the newest. libzmq up to 4.3.5 aborts the process when a socket at its mark finds a
 heartbeat before the end of the connection (libzmq issues 3937, 4364 and 4767).
 """
 CONTROL_LIMIT_BYTES = 4096
-"""The codec looks into nothing larger."""
+"""Largest control payload, in bytes; the codec decodes no larger one."""
 VIEW_LIMIT_BYTES = 4 * 1024 * 1024
 _CONTROL_THREAD, _VIEW_THREAD = 0b01, 0b10
-"""Masks of ZeroMQ's own threads."""
+"""Masks of ZeroMQ's threads."""
 _NOBLOCK, _NOBLOCK_AND_MORE = int(zmq.NOBLOCK), int(zmq.NOBLOCK | zmq.SNDMORE)
 
 
 class SocketShell:
-    """A context for control and view sockets; no call but `wait_for` blocks."""
+    """Context of control and view sockets; no call but `wait_for` blocks."""
 
     def __init__(self, heartbeat_timeout_s: float, handshake_limit_s: float) -> None:
-        """A connection that has not introduced itself within `handshake_limit_s` ends."""
+        """End a connection without a handshake after `handshake_limit_s`."""
         if not 0.03 <= heartbeat_timeout_s <= 60.0:
             raise ValueError(f"heartbeat_timeout_s = {heartbeat_timeout_s}; valid: 0.03 to 60 seconds")
         self.dropped = 0
-        """Messages that could not leave at once: the peer is gone, or does not keep up."""
+        """Number of messages that could not leave at once: the peer is gone, or does not keep up."""
         self.rejected = 0
-        """Messages received with a wrong number of frames."""
+        """Number of messages received with a wrong number of frames."""
         self._clock = MonotonicClock()
-        # A thread each: the view's connection resolves its host's name whenever it is made, and a name server that
-        # does not answer holds up the thread that asks.
+        # A thread each: each connection of the view resolves its host's name, and a silent name server blocks the
+        # thread that asks.
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context(io_threads=2)
         self._heartbeat_ms = round(1e3 * heartbeat_timeout_s)
         self._handshake_ms = round(1e3 * handshake_limit_s)
@@ -78,10 +78,10 @@ class SocketShell:
         for option, value in (
             (zmq.AFFINITY, _VIEW_THREAD),
             (zmq.SNDHWM, VIEW_HIGH_WATER_MARK),
-            # What viewers send, subscriptions, is little, but hitting the mark could end the process.
+            # Viewers send few subscriptions, but reaching the mark could abort the process.
             (zmq.RCVHWM, RECEIVE_HIGH_WATER_MARK if publishes else VIEW_HIGH_WATER_MARK),
             (zmq.MAXMSGSIZE, CONTROL_LIMIT_BYTES if publishes else VIEW_LIMIT_BYTES),
-            # Not heartbeats: a viewer may well stay at its mark, and a frame can hold up an answer for long.
+            # No heartbeats: a viewer may stay at its mark, and a frame can delay an answer for long.
             (zmq.TCP_KEEPALIVE, 1),
             (zmq.TCP_KEEPALIVE_IDLE, 1),
             (zmq.TCP_KEEPALIVE_INTVL, 1),
@@ -99,13 +99,13 @@ class SocketShell:
         self.close()
 
     def close(self) -> None:
-        """Close at once, whatever has not left yet; closing twice does no harm."""
+        """Close at once and drop unsent messages; closing twice does no harm."""
         self._context.destroy(linger=0)
 
     def wait_for(self, timeout_s: float | None, awaited: Sequence[Inbox], served: Authenticator | None = None) -> bool:
-        """Whether one of `awaited` has something before the time is up; `served` gets its answers meanwhile.
+        """Wait for a message in one of `awaited`; return whether there is one in time. Serves `served` meanwhile.
 
-        zmq's own poll counts whole milliseconds, hence select on the descriptors.
+        zmq's poll counts whole milliseconds, hence select on the descriptors.
         """
         if timeout_s is not None and not timeout_s >= 0.0:
             raise ValueError(f"timeout_s = {timeout_s}; valid: 0 or more seconds, or None for no limit")
@@ -137,7 +137,7 @@ class SocketShell:
                     part.send(frame, _NOBLOCK_AND_MORE)
                 part.send(frames[-1], _NOBLOCK)
             except zmq.Again:
-                # The socket may only not have noticed yet what has left: that happens when EVENTS is read.
+                # The queue may be emptier than the socket knows: it counts sent messages when EVENTS is read.
                 part.getsockopt(EVENTS)
             except zmq.ZMQError as error:
                 if error.errno != zmq.EHOSTUNREACH:
@@ -149,13 +149,13 @@ class SocketShell:
 
 
 def check_size(payload: bytes, limit_bytes: int) -> None:
-    """Raise a ValueError when it is too long to send."""
+    """Raise ValueError if the payload is too long to send."""
     if len(payload) > limit_bytes:
         raise ValueError(f"payload of {len(payload)} bytes; valid: up to {limit_bytes} bytes")
 
 
 def bind_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> None:
-    """Bind, or say in one line of `flag` why that cannot be (ConfigurationError)."""
+    """Bind; raises ConfigurationError, one line that names `flag`, if that fails."""
     part.setsockopt(zmq.IPV6, endpoint.ipv6)
     try:
         part.bind(endpoint.address)
@@ -169,7 +169,7 @@ def bind_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> Non
 
 
 def connect_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> None:
-    """Connect, now or when the other side is there; ConfigurationError, in one line of `flag`, when it never can."""
+    """Connect, now or when the other side is up; raises ConfigurationError, which names `flag`, if it never can."""
     part.setsockopt(zmq.IPV6, endpoint.ipv6)
     try:
         part.connect(endpoint.address)

@@ -1,4 +1,4 @@
-"""The kernel's figures of a TCP connection: how much it had to send again."""
+"""The kernel's figures of a TCP connection: packets sent, and sent again."""
 
 import contextlib
 import socket
@@ -13,16 +13,16 @@ _ROUND_TRIP, _SENT_AGAIN, _SENT = 68, 100, 156
 
 
 class TcpFigures(NamedTuple):
-    """Packets with data that one or more connections sent since they began."""
+    """Number of packets with data that one or more connections sent since they began."""
 
     sent: int = 0
     sent_again: int = 0
-    """Those among them that repeat a lost one."""
+    """Number of retransmissions among them."""
     round_trip_s: float | None = None
-    """The kernel's smoothed estimate, the least of the connections; None where it has none."""
+    """The kernel's smoothed estimate, the least of the connections; None for none."""
 
     def since(self, before: Self) -> "TcpFigures":
-        """What was sent after `before` was taken."""
+        """Return the figures of the time since `before`."""
         sent, again = self.sent - before.sent, self.sent_again - before.sent_again
         return TcpFigures(max(sent, 0), max(again, 0), self.round_trip_s)
 
@@ -33,7 +33,7 @@ class TcpFigures(NamedTuple):
 
 
 def tcp_figures(descriptors: Collection[int]) -> TcpFigures:
-    """Add up the figures of the connections with these `descriptors`; one that has ended counts nothing."""
+    """Add up the figures of the connections with these `descriptors`; ended ones count nothing."""
     sent = again = 0
     trips_s = []
     for descriptor in descriptors:
@@ -47,7 +47,7 @@ def tcp_figures(descriptors: Collection[int]) -> TcpFigures:
 
 
 def connected_to(port: int) -> list[int]:
-    """Descriptors of this process's TCP connections to `port` of another; ZeroMQ names none of its own."""
+    """Find the descriptors of this process's TCP connections to a peer's `port`; ZeroMQ does not name them."""
     found = []
     for name in Path("/proc/self/fd").iterdir():
         with contextlib.suppress(OSError):

@@ -1,7 +1,7 @@
-"""Messages over several connections in turn: what a lost packet holds up on one is overtaken on the others.
+"""Rotation of messages over several connections: newer ones overtake those behind a lost packet.
 
-TCP delivers in order, so that a lost packet holds up a connection for a round trip. Over eight connections that is
-every eighth message, and a newer one has overtaken it. Eight outlast a burst of losses of 50 ms; four do barely.
+TCP delivers in order, so that a lost packet blocks a connection for a round trip. Over eight connections that is
+every eighth message, which newer ones overtake. Eight outlast a burst of losses of 50 ms; four barely do.
 """
 
 import secrets
@@ -12,36 +12,36 @@ from enum import Enum, auto
 from typing import Final, Generic, TypeVar
 
 CONNECTIONS: Final = 8
-"""Control connections of an operator side, unless it is told another number."""
+"""Default number of control connections of an operator side."""
 MOST_CONNECTIONS_EACH: Final = 16
-"""At most so many of one peer."""
+"""Largest number of connections of one peer."""
 SILENCE_S: Final = 0.5
-"""Pass over a connection that has been silent this much longer than its peer."""
+"""Silence beyond its peer's, in seconds, after which a connection is passed over."""
 _REST_S: Final = 1e-3
-"""Leave a full connection alone this long, times the number of connections: trying all of them costs what one did."""
+"""Rest of a full connection, in seconds times the number of connections: trying all of them costs as much as one."""
 _GROUPED: Final = 0x01
-"""The first byte of a routing id that names a group. ZeroMQ's own begin with 0x00."""
+"""First byte of a routing id with a group. ZeroMQ's ids begin with 0x00."""
 _GROUP_BYTES: Final = 16
 
 
 def new_group() -> bytes:
-    """A group that nobody else has: 0x01 and 15 random bytes."""
+    """Return a unique group: 0x01 and 15 random bytes."""
     return bytes([_GROUPED]) + secrets.token_bytes(_GROUP_BYTES - 1)
 
 
 def routing_id(group: bytes, index: int) -> bytes:
-    """The routing id of one of a group's connections."""
+    """Return the routing id of a group's connection."""
     return group + bytes([index])
 
 
 def group_of(name: bytes) -> bytes:
-    """The group that a routing id belongs to; any that `routing_id` did not make is a group of its own."""
+    """Return the group of a routing id; an id that `routing_id` did not make is a separate group."""
     is_grouped = len(name) == _GROUP_BYTES + 1 and name[0] == _GROUPED and name[-1] < MOST_CONNECTIONS_EACH
     return name[:-1] if is_grouped else name
 
 
 class Offered(Enum):
-    """The answer of a connection that a message was offered to."""
+    """Answer of a connection to an offered message."""
 
     TAKEN = auto()
     FULL = auto()
@@ -51,42 +51,42 @@ class Offered(Enum):
 
 @dataclass(eq=False, kw_only=True)
 class Way:
-    """One of a peer's connections."""
+    """Connection of a peer."""
 
     heard_s: float = 0.0
-    """The newest message by it."""
+    """Time of the newest message from it."""
     full_until_s: float = 0.0
-    """The connection is not tried before then."""
+    """Time before which the connection is not tried."""
     tried_s: float = 0.0
-    """A message was offered to it last, everything that goes everywhere aside."""
+    """Time of the last message offered to it; those sent everywhere do not count."""
 
 
 AnyWay = TypeVar("AnyWay", bound=Way)
 
 
 class Turns(Generic[AnyWay]):
-    """A peer's connections, the next in turn first."""
+    """Connections of a peer, the next in turn first."""
 
     def __init__(self, offer: Callable[[AnyWay, bytes], Offered]) -> None:
-        """`offer` sends without waiting, and forgets what is gone."""
+        """`offer` sends without waiting, and forgets connections that are gone."""
         self.ways: deque[AnyWay] = deque()
         self._heard_s = 0.0
         self._offer = offer
 
     def heard(self, way: AnyWay, now_s: float) -> None:
-        """A message came by `way`."""
+        """Note a message from `way`."""
         way.heard_s = self._heard_s = now_s
 
     def forget(self, way: AnyWay) -> None:
-        """Take out what is gone; the others are held against those that are left."""
+        """Remove a lost connection; silence is measured against the remaining ones."""
         self.ways.remove(way)
         self._heard_s = max((each.heard_s for each in self.ways), default=0.0)
 
     def send(self, payload: bytes, now_s: float, *, everywhere: bool) -> bool:
-        """Send over the next connection that takes it, or over each; whether any did.
+        """Send over the next connection that takes the payload, or over each; return whether any did.
 
-        Passed over unless `everywhere`: one that was full a moment ago, or has been silent for long while others were
-        not. Twice a second such a silent one gets a copy: it may be back, and the peer waits to hear from it, too.
+        Unless `everywhere`, passes over a connection that was full a moment ago, or silent while others were not.
+        Twice a second a silent one gets a copy: it may be back, and the peer waits to hear from it, too.
         """
         taken = False
         for _ in range(len(self.ways)):

@@ -1,1 +1,1 @@
-"""What a side says of itself: codes and figures in one struct a side. Words for them are made where people read."""
+"""Status of each side: codes and figures in one struct a side. Words are made where people read them."""

@@ -1,53 +1,53 @@
-"""Codes of a status: short and stable, so that programs compare them; `common/command/words.py` has the words."""
+"""Codes of a status: short and stable, for programs to compare; `common/command/words.py` has the words."""
 
 from enum import StrEnum
 
 
 class LinkState(StrEnum):
-    """The link to the other side, as one side sees it."""
+    """State of the link, as one side sees it."""
 
     WAITING = "waiting"
-    """Nothing has been heard yet."""
+    """No message has arrived yet."""
     UP = "up"
     OBSERVING = "observing"
     """Another operator owns the robot."""
     REFUSED = "refused"
-    """The other side does not let us in, or is of another version."""
+    """The other side refuses us, or is of another version."""
     LOST = "lost"
-    """Something was heard once, and nothing is now."""
+    """Messages arrived once, and none do now."""
 
 
 class ConnectionState(StrEnum):
-    """Whether there is a controller."""
+    """State of the controller's connection."""
 
     ABSENT = "absent"
     """No controller has been found yet."""
     CONNECTED = "connected"
     LOST = "lost"
-    """There was one."""
+    """A controller was connected, and is gone."""
 
 
 class Sight(StrEnum):
-    """Whether what is ahead is known."""
+    """State of the trigger field at the operator side."""
 
     SEEING = "seeing"
     BLIND = "blind"
-    """The field has expired: hands move nothing."""
+    """The field has expired: intent is zero."""
     WAITING = "waiting"
-    """The field is back, and both triggers have to be released first."""
+    """The field is back, but both triggers must be released first."""
 
 
 class Hands(StrEnum):
-    """Whose hands move the arm."""
+    """Source of the hands that move the arm."""
 
     CONTROLLER = "controller"
     PERSON = "person"
-    """The scripted one's."""
+    """The simulated person."""
     BROWSER = "browser"
 
 
 class Doing(StrEnum):
-    """What the hands at the controller, or at a page that drives, do."""
+    """Action of the hands at the controller, or at a page that drives."""
 
     RESTING = "resting"
     ARMING = "arming"
@@ -62,19 +62,19 @@ class Doing(StrEnum):
     PULLING = "pulling"
     DONE = "done"
     NO_TARGET = "no_target"
-    """They would advance, and there is no target."""
+    """The hands would advance, but there is no target."""
     AT_REST_FIRST = "at_rest_first"
-    """A page's: all but hold-to-run has to be let go of before anything moves."""
+    """A page's: all keys but hold-to-run must be released before the arm moves."""
     NOBODY_DRIVES = "nobody_drives"
     """This and the next three are a page's, too."""
     ALL_KEYS_UP_FIRST = "all_keys_up_first"
     READY = "ready"
-    """Hold-to-run counts."""
+    """Hold-to-run takes effect."""
     RUNNING = "running"
 
 
 class Phase(StrEnum):
-    """Where a run stands; `common/status/phase.py` has their order."""
+    """Phase of a run; `common/status/phase.py` has the order of severity."""
 
     LINK_LOST = "link_lost"
     REFUSED = "refused"
@@ -87,13 +87,13 @@ class Phase(StrEnum):
     NO_CONTROLLER = "no_controller"
     ARMED = "armed"
     BUSY = "busy"
-    """The hands are at what `Doing` says."""
+    """The hands act; `Doing` tells how."""
     READY_TO_ARM = "ready_to_arm"
     STARTING = "starting"
 
 
 class Look(StrEnum):
-    """How a run looks from afar: the page's border."""
+    """Colour of the page's border: a run's state, seen from afar."""
 
     LOST = "lost"
     STOPPED = "stopped"

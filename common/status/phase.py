@@ -1,4 +1,4 @@
-"""Where a run stands, of all that both sides say: the one place that knows what is more severe than what."""
+"""Phase of a run from both sides' status: the only place with the order of severity."""
 
 import msgspec
 
@@ -7,26 +7,26 @@ from common.status.codes import ConnectionState, Doing, LinkState, Look, Phase, 
 from common.status.statuses import OperatorStatus, RobotStatus
 
 _UP_TO_ARMED = (None, Doing.RESTING, Doing.ARMING)
-"""What the simulated person does before they have seen that it is armed."""
+"""Actions of the simulated person until they have seen that the arm is armed."""
 _LOST = (Phase.LINK_LOST, Phase.REFUSED, Phase.CONTROLLER_LOST)
 _NOBODY = OperatorStatus()
 
 
 class PhaseFacts(msgspec.Struct, frozen=True):
-    """Where a run stands."""
+    """Phase of a run, with reason and look."""
 
     phase: Phase = Phase.STARTING
     doing: Doing | None = None
-    """Where the phase is BUSY"""
+    """Action, if the phase is BUSY"""
     reason: str | None = None
-    """Why, for people, where a side says so"""
+    """Reason of the phase, for people, if a side gives one"""
     alarm: bool = False
-    """Whether that keeps the arm from moving against somebody's will"""
+    """Whether the phase keeps the arm from moving against somebody's will"""
     look: Look = Look.STARTING
 
 
 def phase_of(robot: RobotStatus | None, operator: OperatorStatus | None) -> PhaseFacts:
-    """The phase by what is known of either side."""
+    """Return the phase by what is known of either side."""
     side, hands = operator or robot, operator or _NOBODY
     if side is None:
         return PhaseFacts()

@@ -1,1 +1,1 @@
-"""How old a message is, and how far apart two clocks are."""
+"""Ages of messages, and the offset of two clocks."""

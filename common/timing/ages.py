@@ -1,4 +1,4 @@
-"""How old what arrives is, without knowing the offset of two clocks: loop age (eq. 8) and queueing age."""
+"""Ages of arrivals without knowledge of the clock offset: loop age (eq. 8) and queueing age."""
 
 import math
 
@@ -6,11 +6,11 @@ from common.statistics import SlidingMinimum, SlidingQuantile
 
 
 class LoopAge:
-    """t_d of eq. 8: how old the world is by the time a reaction to it arrives, in seconds.
+    """t_d of eq. 8: age of the robot's report when the reaction to it arrives, in seconds.
 
-    A quantile of the loop age, held so that it rises at once and falls exponentially: stopping does not make
-    it chatter. As long as no sample is known it is the worst case, and from there it falls like from any
-    peak. Update it in every tick, not only on arrivals: then a link that falls silent ages, too.
+    A quantile of the loop age with peak hold: it rises at once and falls exponentially, so that stopping does not
+    make it chatter. Without samples it is the worst case, from which it falls as from any peak. Update it in every
+    tick, not only on arrivals: then a silent link ages, too.
     """
 
     def __init__(
@@ -30,9 +30,9 @@ class LoopAge:
         self._held_since_s = 0.0
 
     def update(self, age_s: float, now_s: float) -> float:
-        """Take in a loop age measured at `now_s`; the delay to reckon with from now on.
+        """Add a loop age measured at `now_s`; return t_d.
 
-        ValueError when it is negative or not finite.
+        Raises ValueError if the age is negative or not finite.
         """
         if not 0.0 <= age_s < math.inf:
             raise ValueError(f"age_s = {age_s}; valid: a finite time of 0 s or more")
@@ -42,17 +42,17 @@ class LoopAge:
         return self._held_s
 
     def reset(self) -> None:
-        """Forget every sample: the worst case holds until there is one again."""
+        """Forget all samples: the worst case holds until the next one."""
         self._quantile.clear()
         self._held_s = self._worst_case_s
 
     @property
     def known(self) -> bool:
-        """Whether a sample has been taken in since the start or the last reset."""
+        """Whether there is a sample since the start or the last reset."""
         return self._quantile.value is not None
 
     def value(self, now_s: float) -> float:
-        """The delay to reckon with at `now_s`, in seconds; never 0 for want of samples."""
+        """Return t_d at `now_s`, in seconds; without samples the worst case."""
         quantile_s = self._quantile.value
         if quantile_s is None:
             return self._worst_case_s
@@ -62,11 +62,11 @@ class LoopAge:
 
 
 class QueueingAge:
-    """How long a message waited beyond the link's own delay: its one-way delay above the sliding minimum.
+    """Queueing delay of a message: its one-way delay above the sliding minimum.
 
-    A constant clock offset cancels, and so does a steady delay, however long. The window counts the time in
-    which messages flow, at a resolution of a hundredth: silence does not wear out the minimum, or the backlog
-    after a long pause would pass for fresh.
+    A constant clock offset cancels, and so does a steady delay of any length. The window counts only time in which
+    messages flow, at a resolution of a hundredth. Otherwise the minimum would expire in a long pause, and the backlog
+    after it would pass for fresh.
     """
 
     _RESOLUTION = 100
@@ -78,15 +78,15 @@ class QueueingAge:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the peer's clock, because a new one counts from another origin."""
+        """Forget the minimum, because the peer's clock has another origin."""
         self._least_delay_s = SlidingMinimum(self._RESOLUTION)
         self._flowing_s = 0.0
         self._last_received_s: float | None = None
 
     def update(self, sent_s: float, received_s: float) -> float:
-        """The age of a message stamped `sent_s` by the peer's clock and `received_s` by ours; seconds, >= 0.
+        """Return the queueing delay, in seconds, >= 0; `sent_s` is on the peer's clock, `received_s` on ours.
 
-        ValueError when the stamps are not finite.
+        Raises ValueError if the stamps are not finite.
         """
         one_way_s = received_s - sent_s
         if not math.isfinite(one_way_s):

@@ -1,4 +1,4 @@
-"""What the peer's clock is ahead of ours, from the stamps that ordinary traffic carries."""
+"""Clock offset of the peer, from the stamps of ordinary traffic."""
 
 import math
 from typing import Literal
@@ -9,29 +9,28 @@ from common.timing.offset_tracking import OffsetTracking
 Estimator = Literal["shared clock", "interval", "lower envelope", "mean"]
 
 MAX_SKEW = 600e-6
-"""Two clocks drift apart by at most this share of time: 500 ppm while a time daemon slews one (adjtime), and 100 ppm
-by which quartz crystals differ."""
+"""Largest skew of two clocks: 500 ppm while a time daemon slews one (adjtime), and 100 ppm between quartz crystals."""
 _CONTRADICTIONS = 8
-"""As many in a row in one direction mean that a clock has jumped."""
+"""Number of contradictions in a row, in one direction, that mean a clock jump."""
 _LONGEST_S = 1000.0
-"""No delay is longer; what seems so are stamps that a peer invented, and must not reach any sum."""
+"""Longest possible delay, in seconds; beyond it stamps are invented, and must not enter any sum."""
 _REMEMBERED_ECHOES = 1024
-"""A second's stamps at 1 kHz; one that is echoed again after that counts twice, which does little harm."""
+"""Number of remembered stamps: a second's at 1 kHz. One echoed again later counts twice, which does little harm."""
 _ROUNDING = 1e-15
-"""Of the stamps, relative: what four operations on them lose."""
+"""Relative rounding error of four operations on stamps."""
 
 
 class ClockOffset:
     """Offset, skew and one-way delays, with a bound on the offset that holds while the clocks run within `max_skew`.
 
-    The lower envelope of the delays both ways decides, or the mean where both directions look symmetric: queues
-    leave a floor alone, symmetric jitter has none. Neither sees how much longer one way is than the other: half of
-    that difference goes into the offset, unless `asymmetry_s` says it: the least delay to the peer minus that from
-    it. The bound does not trust it. Two processes that read the same clock (`shared_clock`) differ by exactly 0.
+    The estimate uses the lower envelope of the delays both ways, or the mean if both directions look symmetric: queues
+    leave a minimum unchanged, symmetric jitter has none. Neither sees an asymmetry of the delays, half of which enters
+    the offset. `asymmetry_s` corrects that: the least delay to the peer minus that from it. The bound ignores it.
+    Two processes that read the same clock (`shared_clock`) differ by exactly 0.
 
-    A clock that jumps, as after a suspend, starts the estimate anew: as soon as messages seem to arrive before they
-    were sent, or within three blocks of time (2.4 s on a link that has been up for a minute) when both directions
-    shift against each other by less than that. Only until then the bound may be wrong.
+    A clock jump, as after a suspend, restarts the estimate. It is found at once if messages seem to arrive before
+    they were sent. A smaller shift of both directions against each other takes three blocks of time (2.4 s on a link
+    that has been up for a minute). Only until then may the bound be wrong.
     """
 
     def __init__(self, *, shared_clock: bool, asymmetry_s: float = 0.0, max_skew: float = MAX_SKEW) -> None:
@@ -40,12 +39,11 @@ class ClockOffset:
         if not 0.0 < max_skew < 0.01:
             raise ValueError(f"max_skew = {max_skew}; valid: above 0 to below 0.01")
         self.round_trip_s: float | None = None
-        """The newest exchange's time both ways without the peer's holding time, of the stamp that arrived last; None
-        before the first."""
+        """Newest round trip without the peer's holding time, of the stamp that arrived last; None before the first."""
         self.rejected = 0
-        """Stamps that contradict each other or all that was known."""
+        """Number of stamps that contradict each other or all earlier ones."""
         self.jumps = 0
-        """How often a clock was found to have jumped."""
+        """Number of clock jumps found."""
         self._shared_clock = shared_clock
         self._asymmetry_s = asymmetry_s
         self._max_skew = max_skew
@@ -53,7 +51,7 @@ class ClockOffset:
 
     def _start_anew(self, now_s: float) -> None:
         self._since_s = now_s
-        # Clocks may lie days apart, and jitter is microseconds: all sums are taken from an origin on each clock.
+        # Clocks may differ by days, and jitter is microseconds: all sums count from an origin on each clock.
         self._origin_s: float | None = None
         self._peer_origin_s = 0.0
         self._now_s = 0.0
@@ -72,12 +70,11 @@ class ClockOffset:
         *,
         arrived_last: bool = True,
     ) -> bool:
-        """Take in one exchange: our stamp, echoed by the peer in what it sent after holding it.
+        """Add one exchange: our stamp, held by the peer and echoed in a message.
 
-        `peer_sent_s` is by the peer's clock, `local_sent_s` and `local_received_s` are by ours. `arrived_last` is
-        False when the peer chose the stamp for being our newest, while an older one arrived after it: then it is
-        early, and no fair sample of the delay. False, and counted in `rejected`, when the holding time is negative
-        or longer than the whole exchange.
+        `peer_sent_s` is on the peer's clock, `local_sent_s` and `local_received_s` are on ours. `arrived_last` is False
+        if an older stamp of ours arrived after this newest one: then it is early, and no fair sample of the delay.
+        Return False, and count it in `rejected`, if the holding time is negative or longer than the whole exchange.
         """
         round_trip_s = local_received_s - local_sent_s - peer_held_s
         if not self._is_possible(round_trip_s, peer_sent_s, peer_held_s, local_received_s):
@@ -90,10 +87,10 @@ class ClockOffset:
         return True
 
     def overtaken(self, local_sent_s: float, peer_sent_s: float, peer_held_s: float, local_received_s: float) -> bool:
-        """Take in the stamp of ours that arrived last at the peer, where it is not the newest; as for `update`.
+        """Add the stamp of ours that arrived last at the peer, if it is not the newest; as for `update`.
 
-        Comes after `update` with the same message's newest stamp. Without it, every delay to the peer would seem
-        shorter than it is on a link that reorders, because a message that was overtaken would never be echoed.
+        Call it after `update` with the same message's newest stamp. Otherwise delays to the peer would be biased low on
+        a link that reorders, because overtaken messages would never be echoed.
         """
         round_trip_s = local_received_s - local_sent_s - peer_held_s
         if not self._is_possible(round_trip_s, peer_sent_s, peer_held_s, local_received_s):
@@ -104,7 +101,7 @@ class ClockOffset:
         return True
 
     def _is_possible(self, round_trip_s: float, peer_sent_s: float, held_s: float, received_s: float) -> bool:
-        # Two clocks measure the round trip and the holding, and may differ by their skew.
+        # Two clocks measure the round trip and the holding time, and differ by their skew.
         allowed_s = self._max_skew * held_s + 2.0 * _ROUNDING * abs(received_s)
         if math.isfinite(peer_sent_s) and held_s >= 0.0 and -allowed_s <= round_trip_s < _LONGEST_S:
             return True
@@ -112,7 +109,7 @@ class ClockOffset:
         return False
 
     def arrived(self, peer_sent_s: float, local_received_s: float) -> None:
-        """Take in the stamps of a message that echoes none of ours; `update` does so by itself."""
+        """Add the stamps of a message without an echo; `update` does so by itself."""
         if self._shared_clock:
             return
         if not (math.isfinite(peer_sent_s) and math.isfinite(local_received_s)):
@@ -138,14 +135,14 @@ class ClockOffset:
 
     def _take_to_peer(self, local_sent_s: float, peer_received_s: float, now_s: float, *, fair: bool) -> None:
         if fair:
-            # Each of our stamps counts once, however many messages echo it and in whatever order they come.
+            # Each of our stamps counts once, for any number and order of messages that echo it.
             seen = self._echoed_fairly_s
             if local_sent_s in seen:
                 return
             seen[local_sent_s] = None
             if len(seen) > _REMEMBERED_ECHOES:
                 del seen[next(iter(seen))]
-        # Our clock may have jumped since we sent what is still on its way.
+        # Our clock may have jumped since we sent a message that is still under way.
         if self._origin_s is None or local_sent_s < self._since_s:
             return
         sent_s = local_sent_s - self._origin_s
@@ -169,7 +166,7 @@ class ClockOffset:
         self._start_anew(now_s)
 
     def _relative_offset_s(self, now_s: float) -> float | None:
-        """The offset between the origins, `now_s` from ours; None while unknown or in doubt."""
+        """Return the offset between the origins, `now_s` from ours; None while unknown or in doubt."""
         if self._contradictions_to or self._contradictions_from:
             return None
         least_s, greatest_s = self._interval.at(now_s)
@@ -183,7 +180,7 @@ class ClockOffset:
         return greatest_s if likeliest_s > greatest_s else likeliest_s
 
     def offset_at(self, now_s: float) -> float | None:
-        """The peer's clock minus ours at `now_s` by ours, in seconds; None while unknown or in doubt."""
+        """Return the peer's clock minus ours at `now_s` on ours, in seconds; None while unknown or in doubt."""
         if self._shared_clock:
             return 0.0
         if self._origin_s is None:
@@ -192,9 +189,9 @@ class ClockOffset:
         return None if offset_s is None else self._peer_origin_s - self._origin_s + offset_s
 
     def bound_at(self, now_s: float) -> float | None:
-        """How far `offset_at` can be from the truth, in seconds, whatever the delays were; None while unknown.
+        """Return the largest possible error of `offset_at`, in seconds, for any delays; None while unknown.
 
-        Half the least round trip where the offset lies in the middle of what is possible, and more where not.
+        Half the least round trip if the offset lies in the middle of the possible interval, otherwise more.
         """
         if self._shared_clock:
             return 0.0
@@ -205,23 +202,23 @@ class ClockOffset:
         if offset_s is None:
             return None
         least_s, greatest_s = self._interval.at(elapsed_s)
-        # What the caller's own sums with stamps lose comes on top.
+        # Add the rounding error of the caller's sums with stamps.
         rounding_s = self._margin(self._peer_origin_s + elapsed_s, now_s)
         return max(greatest_s - offset_s, offset_s - least_s) + rounding_s
 
     @property
     def offset_s(self) -> float | None:
-        """`offset_at` the newest arrival."""
+        """Offset at the newest arrival."""
         return self.offset_at(self._now_s + (self._origin_s or 0.0))
 
     @property
     def bound_s(self) -> float | None:
-        """`bound_at` the newest arrival."""
+        """Bound at the newest arrival."""
         return self.bound_at(self._now_s + (self._origin_s or 0.0))
 
     @property
     def skew(self) -> float | None:
-        """What the peer's clock gains on ours, in seconds a second; None while unknown."""
+        """Skew: gain of the peer's clock on ours, in seconds a second; None while unknown."""
         if self._shared_clock:
             return 0.0
         line = self._tracking.line
@@ -229,7 +226,7 @@ class ClockOffset:
 
     @property
     def estimator(self) -> Estimator | None:
-        """What the offset comes from; None while it is unknown."""
+        """Source of the offset; None while unknown."""
         if self._shared_clock:
             return "shared clock"
         if self.offset_s is None:
@@ -238,13 +235,13 @@ class ClockOffset:
 
     @property
     def settled(self) -> bool:
-        """Whether the offset rests on a second or so of messages both ways."""
+        """Whether the offset rests on about a second of messages both ways."""
         return self._shared_clock or self._tracking.settled
 
     def one_way_from_peer_s(self, peer_sent_s: float, local_received_s: float) -> float | None:
-        """The delay of a message from the peer, in seconds; None while the offset is unknown.
+        """Return the one-way delay of a message from the peer, in seconds; None while the offset is unknown.
 
-        As uncertain as the offset. Never below 0 for stamps that were taken in.
+        The delay is as uncertain as the offset. Never below 0 for stamps that were accepted.
         """
         if self._shared_clock:
             return local_received_s - peer_sent_s

@@ -1,7 +1,6 @@
-"""Clock differences of one direction of a link, gathered into blocks of time in bounded memory.
+"""Clock differences of one direction of a link, summed over blocks of time in bounded memory.
 
-A clock difference is when a message was received, by the receiver's clock, less when it was sent, by the sender's:
-its delay plus what the receiver's clock is ahead.
+A clock difference is the receiver's stamp of a message minus the sender's: delay plus clock offset.
 """
 
 import math
@@ -9,21 +8,21 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 MOST_BLOCKS = 64
-"""Blocks kept of one direction."""
+"""Number of blocks kept of one direction."""
 _LEAST_COUNT_FOR_SHAPE = 8
 _LEAST_VARIANCE_FOR_SHAPE_S2 = 0.1e-3**2
-"""Jitter below a tenth of a millisecond has the shape of the clocks' own drift within a block, not of the link."""
+"""Least variance for a shape, in s²: jitter below 0.1 ms has the shape of the clocks' drift, not of the link."""
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """What a block of time keeps of its samples; times in seconds from the estimator's origin."""
+    """Summary of the samples in a block of time; times in seconds from the estimator's origin."""
 
     least_s: float
-    """The least difference, and when it was."""
+    """Least difference; the next field is its time."""
     least_at_s: float
     count: int
-    """Samples drawn fairly from all that arrived, which the moments describe; 0 where there was none."""
+    """Number of fair samples of all arrivals, which the moments describe."""
     mean_at_s: float
     mean_s: float
     squares_s2: float
@@ -31,10 +30,10 @@ class Block:
     cubes_s3: float
     """Sum of the cubed deviations from the mean."""
     skewness: float | None
-    """Third standardised moment: 0 where symmetric, 2 for an exponential; None for too few or too alike samples."""
+    """Third standardised moment: 0 if symmetric, 2 for an exponential; None for too few or too similar samples."""
 
     def merged(self, later: "Block") -> "Block":
-        """Both as one block. Combining central moments: Chan, Golub and LeVeque 1979; Terriberry 2007 for the third."""
+        """Merge two blocks. Combining central moments: Chan, Golub and LeVeque 1979; Terriberry 2007 for the third."""
         least = self if self.least_s <= later.least_s else later
         if not self.count or not later.count:
             full = self if self.count else later
@@ -72,7 +71,7 @@ def _skewness(count: int, squares_s2: float, cubes_s3: float) -> float | None:
 
 
 class BlockTrack:
-    """The blocks of one direction, oldest first, and the open one that samples enter."""
+    """Blocks of one direction, oldest first, and the open one that samples enter."""
 
     def __init__(self) -> None:
         self.blocks: deque[Block] = deque()
@@ -86,9 +85,9 @@ class BlockTrack:
         self._times_s = self._sum_s = self._squares_s2 = self._cubes_s3 = 0.0
 
     def add(self, at_s: float, difference_s: float, *, fair: bool = True) -> None:
-        """Take in one sample at `at_s`.
+        """Add one sample at `at_s`.
 
-        `fair` is False for one that was chosen for being early: it counts for the least, not for the moments.
+        `fair` is False for a sample that was selected as early: it enters the least difference, not the moments.
         """
         if difference_s < self._least_s:
             self._least_s, self._least_at_s = difference_s, at_s
@@ -104,7 +103,7 @@ class BlockTrack:
             self._cubes_s3 += square_s2 * deviation_s
 
     def close(self) -> Block | None:
-        """The open block, which is not kept yet; a new one is open. None when it was empty."""
+        """Close the open block and open another; return the closed one, not kept yet, or None if it was empty."""
         if self._least_s == math.inf:
             return None
         count = self._count
@@ -125,7 +124,7 @@ class BlockTrack:
         return block
 
     def keep(self, block: Block, oldest_s: float) -> None:
-        """Append `block`; forget those whose least sample is before `oldest_s`, and what exceeds `MOST_BLOCKS`."""
+        """Append `block`; forget those whose least sample is before `oldest_s`, and the oldest beyond `MOST_BLOCKS`."""
         blocks = self.blocks
         blocks.append(block)
         while len(blocks) > MOST_BLOCKS or blocks[0].least_at_s < oldest_s:
@@ -134,7 +133,7 @@ class BlockTrack:
                 return
 
     def coarsen(self) -> None:
-        """Merge the blocks two by two; the last stays alone where their number is odd."""
+        """Merge the blocks two by two; of an odd number the last is kept."""
         blocks = list(self.blocks)
         merged = [one.merged(other) for one, other in zip(blocks[::2], blocks[1::2], strict=False)]
         self.blocks = deque(merged + blocks[2 * len(merged) :])

@@ -1,7 +1,7 @@
 """Straight lines through two directions' clock differences: offset and skew of the peer's clock.
 
-Both directions see the same line, one from above and one from below: what goes to the peer differs by delay + offset,
-what comes from it by delay − offset. The lower envelope takes the least delays for alike, the mean the average ones.
+Both directions see the same line, one from above and one from below. Messages to the peer differ by delay + offset,
+those from it by delay − offset. The lower envelope assumes equal least delays, the mean equal average ones.
 """
 
 import math
@@ -13,7 +13,7 @@ from statistics import median
 from common.timing.difference_blocks import Block
 
 TYPICAL_SKEW = 50e-6
-"""Standard deviation of the skew before anything is known: quartz crystals are specified to 20 to 100 ppm."""
+"""Prior standard deviation of the skew: quartz crystals are specified to 20 to 100 ppm."""
 _LEAST_SCALE_S = 1e-6
 _HALVINGS = 24
 
@@ -23,34 +23,34 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class OffsetLine:
-    """An offset in seconds that changes by `skew` seconds a second."""
+    """Offset in seconds that changes by `skew` seconds a second."""
 
     at_s: float
     offset_s: float
     skew: float
 
     def value(self, at_s: float) -> float:
-        """The offset at `at_s`."""
+        """Return the offset at `at_s`."""
         return self.offset_s + self.skew * (at_s - self.at_s)
 
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """The line under one direction's differences, and how far above it the blocks' least ones lie on average."""
+    """Line under one direction's differences, and the mean height of the blocks' least differences above it."""
 
     difference_s: float
-    """At time 0."""
+    """Difference at time 0."""
     slope: float
     scale_s: float
 
     def excess(self, block: Block) -> float:
-        """How far above the line a block's least difference lies."""
+        """Return the height of a block's least difference above the line."""
         return block.least_s - self.difference_s - self.slope * block.least_at_s
 
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """A line fitted to the least delays both ways."""
+    """Line fitted to the least delays both ways."""
 
     line: OffsetLine
     to_peer: Floor
@@ -58,7 +58,7 @@ class Envelope:
 
 
 class _Hull:
-    """The lower convex hull of points, asked for the lowest line of a given slope."""
+    """Lower convex hull of points, with the supporting line of a given slope."""
 
     def __init__(self, points: Iterable[Point], slope: float) -> None:
         ordered = sorted(points)
@@ -70,17 +70,17 @@ class _Hull:
         self.mean_at_s = sum(at_s for at_s, _ in ordered) / len(ordered)
         mean_s = sum(value_s for _, value_s in ordered) / len(ordered)
         at_s, value_s = self.lowest(slope)
-        # How far the points lie above a line under them, and how firmly that holds it: both of an exponential.
+        # Mean height of the points above the supporting line, and its weight in the likelihood, both of an exponential.
         self.scale_s = max(mean_s - value_s - slope * (self.mean_at_s - at_s), _LEAST_SCALE_S)
         self.firmness = len(ordered) / self.scale_s
 
     def lowest(self, slope: float) -> Point:
-        """The point on which a line of `slope` from below comes to rest."""
+        """Return the vertex on the supporting line of `slope`."""
         return self.vertices[bisect_left(self._slopes, slope)]
 
 
 def _lower_hull(ordered: Sequence[Point]) -> list[Point]:
-    """Andrew's monotone chain over points in ascending order."""
+    """Return the hull by Andrew's monotone chain over points in ascending order."""
     hull: list[Point] = []
     for at_s, value_s in ordered:
         if hull and hull[-1][0] == at_s:  # ascending, hence not lower
@@ -95,11 +95,10 @@ def _lower_hull(ordered: Sequence[Point]) -> list[Point]:
 
 
 def fit_envelope(to_peer: Sequence[Block], from_peer: Sequence[Block], max_skew: float, skew: float) -> Envelope:
-    """The line that is likeliest if the blocks' least delays exceed one floor each way exponentially.
+    """Fit the likeliest line if the blocks' least delays exceed one floor each way exponentially.
 
-    That makes it a hull's supporting line (Moon, Skelly and Towsley 1999), here for both directions at once, with
-    a normal prior of `TYPICAL_SKEW` on the skew, within ± `max_skew`. `skew` is a first guess at it. Neither
-    sequence may be empty.
+    That is a hull's supporting line (Moon, Skelly and Towsley 1999), here for both directions at once, with a normal
+    prior of `TYPICAL_SKEW` on the skew, within ± `max_skew`. `skew` is a first guess. Neither sequence may be empty.
     """
     upper = _Hull(((block.least_at_s, block.least_s) for block in to_peer), skew)
     lower = _Hull(((block.least_at_s, block.least_s) for block in from_peer), -skew)
@@ -126,7 +125,7 @@ def fit_envelope(to_peer: Sequence[Block], from_peer: Sequence[Block], max_skew:
 
 
 class Average:
-    """One direction's blocks as a whole; every block has a count above 0, and there is one at least."""
+    """Averages of one direction's blocks; at least one block, each with a count above 0."""
 
     def __init__(self, blocks: Sequence[Block]) -> None:
         self._blocks = blocks
@@ -140,18 +139,18 @@ class Average:
         self.at_s = times_s / count
         self.mean_s = values_s / count
         self.variance_s2 = max(squares_s2 / count, _LEAST_SCALE_S**2)
-        """Of one sample, about its block's mean."""
+        """Variance of a sample about its block's mean."""
         self.spread_s2 = self.tilt_s2 = 0.0
-        """Sums over the samples of their times from `at_s`, squared, and multiplied with their differences."""
+        """Sums over the samples: squared time from `at_s`, and time multiplied with the difference."""
         for block in blocks:
             weight_s = block.count * (block.mean_at_s - self.at_s)
             self.spread_s2 += weight_s * (block.mean_at_s - self.at_s)
             self.tilt_s2 += weight_s * (block.mean_s - self.mean_s)
 
     def wander(self, slope: float) -> float:
-        """How far the blocks' means stray from a line of `slope`, in standard errors; the median.
+        """Return the median deviation of the blocks' means from a line of `slope`, in standard errors.
 
-        0.67 for independent delays. Much more means that something slower than a block moves them, such as a queue.
+        Independent delays give 0.67. Much more means a cause slower than a block, such as a queue.
         """
         strays = [
             abs(block.mean_s - self.mean_s - slope * (block.mean_at_s - self.at_s)) * math.sqrt(block.count)
@@ -161,7 +160,7 @@ class Average:
 
 
 def fit_mean(to_peer: Average, from_peer: Average, max_skew: float) -> OffsetLine:
-    """The least-squares line through the blocks' means, with the same prior on the skew, within ± `max_skew`."""
+    """Fit the least-squares line through the blocks' means, with the same prior on the skew, within ± `max_skew`."""
     information = to_peer.spread_s2 / to_peer.variance_s2 + from_peer.spread_s2 / from_peer.variance_s2
     tilt = to_peer.tilt_s2 / to_peer.variance_s2 - from_peer.tilt_s2 / from_peer.variance_s2
     skew = min(max(tilt / (information + TYPICAL_SKEW**-2), -max_skew), max_skew)
@@ -169,6 +168,6 @@ def fit_mean(to_peer: Average, from_peer: Average, max_skew: float) -> OffsetLin
 
 
 def typical_skewness(blocks: Iterable[Block], least_blocks: int) -> float | None:
-    """The median skewness of blocks, untouched by a few with a stall; None below `least_blocks` that have one."""
+    """Return the blocks' median skewness, robust to a few stalls; None for fewer than `least_blocks` values."""
     found = [block.skewness for block in blocks if block.skewness is not None]
     return median(found) if len(found) >= least_blocks else None

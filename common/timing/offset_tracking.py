@@ -1,4 +1,4 @@
-"""The likeliest offset and skew of two clocks, kept up to date block by block."""
+"""Likeliest offset and skew of two clocks, updated block by block."""
 
 from typing import Literal
 
@@ -8,23 +8,23 @@ from common.timing.offset_fits import Average, Envelope, OffsetLine, fit_envelop
 _FIRST_BLOCK_S = 0.1
 _LAST_BLOCK_S = 0.8
 _HORIZON_S = 60.0
-"""Blocks are forgotten after this, because the skew itself changes with the temperature."""
+"""Age at which blocks are forgotten, in seconds: the skew changes with the temperature."""
 _SETTLED_BLOCKS = 10
 _SYMMETRIC = (0.5, 0.8)
-"""Skewness below which the mean is taken to, and above which it is given up; an exponential has 2, a normal 0."""
+"""Skewness below which the mean is used, and above which it is left; an exponential has 2, a normal 0."""
 _STEADY = (2.0, 3.0)
-"""Likewise for the wander of the blocks' means; independent delays have 0.67."""
+"""Like limits for the wander of the blocks' means; independent delays have 0.67."""
 _SHIFT_SCALES = 8.0
 _LEAST_SHIFT_S = 1e-3
 _SHIFTED_BLOCKS = 2
 _DOUBTFUL_BLOCKS = 5
-"""One way may have become shorter after all, once that many blocks say so."""
+"""Number of doubtful blocks after which a shorter delay is believed."""
 
 
 class OffsetTracking:
     """Blocks of both directions and the line through them.
 
-    The lower envelope decides, or the mean where both directions look symmetric: queues leave a floor alone,
+    The line is the lower envelope, or the mean if both directions look symmetric: queues leave a minimum unchanged,
     symmetric jitter has none. Blocks last 0.1 s at first, for an early answer, and 0.8 s in the end. All times and
     differences are in seconds from origins that the caller chose near them.
     """
@@ -33,9 +33,9 @@ class OffsetTracking:
         self.to_peer = BlockTrack()
         self.from_peer = BlockTrack()
         self.line: OffsetLine | None = None
-        """The offset; None until both directions have a block."""
+        """Offset line; None until both directions have a block."""
         self.estimator: Literal["lower envelope", "mean"] = "lower envelope"
-        """What `line` is."""
+        """Kind of `line`."""
         self._envelope: Envelope | None = None
         self._block_s = _FIRST_BLOCK_S
         self._block_ends_s = _FIRST_BLOCK_S
@@ -44,13 +44,13 @@ class OffsetTracking:
 
     @property
     def settled(self) -> bool:
-        """Whether there are blocks enough in both directions to judge their shape."""
+        """Whether both directions have enough blocks to judge their shape."""
         return min(len(self.to_peer.blocks), len(self.from_peer.blocks)) >= _SETTLED_BLOCKS
 
     def advance(self, now_s: float, max_skew: float) -> bool:
-        """Close the block that has ended, if one has; True when a clock has jumped, after which this is of no use.
+        """Close the block if its time is over; return True on a clock jump, after which the object is useless.
 
-        That is when block after block one way is shorter and the other longer by alike amounts, which no route does.
+        Sign of a jump: in successive blocks one delay falls by as much as the other rises, which no route causes.
         """
         if now_s < self._block_ends_s:
             return False
@@ -69,7 +69,7 @@ class OffsetTracking:
         return False
 
     def _is_doubtful(self, to_peer: Block | None, from_peer: Block | None) -> bool:
-        """Whether the newest blocks lie so far below the envelope that a clock may have jumped: wait for the next."""
+        """Return whether the newest blocks lie so far below the envelope that a clock may have jumped."""
         if self._envelope is None or not self.settled or to_peer is None or from_peer is None:
             return False
         to_floor, from_floor = self._envelope.to_peer, self._envelope.from_peer
@@ -95,7 +95,7 @@ class OffsetTracking:
             self.line, self.estimator = mean, "mean"
 
     def _fit_mean(self, max_skew: float) -> OffsetLine | None:
-        """The line through the means; None where the delays look as if they had a floor."""
+        """Fit the line through the means; None if the delays seem to have a floor."""
         leaving = self.estimator == "mean"  # hysteresis: harder to leave than to enter
         tracks = self.to_peer, self.from_peer
         for track in tracks:

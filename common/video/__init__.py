@@ -1,1 +1,1 @@
-"""Pictures that say what has changed since the one before: from H.264 to JPEG, through PyAV."""
+"""Decoding of H.264 pictures, each the changes since the previous one, to JPEG, through PyAV."""

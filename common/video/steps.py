@@ -1,4 +1,4 @@
-"""Follow a view's pictures in H.264, and make JPEG of each, which pages and files hold."""
+"""Conversion of a view's H.264 pictures to JPEG, for pages and files."""
 
 from fractions import Fraction
 from typing import Final
@@ -11,26 +11,26 @@ from common.protocol.view_messages import VIEW_NAMES, VideoFrame, VideoStep, Vie
 
 _MOST_PIXELS: Final = 4096 * 4096
 _JPEG_SCALE: Final = 2
-"""The scale of FFmpeg's MJPEG, 1 to 31: 2 is about JPEG 90. These bytes never see a link."""
+"""Scale of FFmpeg's MJPEG, 1 to 31: 2 is about JPEG 90. These bytes never cross a link."""
 
 
 class Steps:
-    """Decodes the steps of every view, in the order in which they come."""
+    """Decoder of every view's steps, in order of arrival."""
 
     def __init__(self) -> None:
-        """av.FFmpegError, ValueError: where this FFmpeg has no H.264 or no JPEG."""
+        """Raises av.FFmpegError or ValueError if this FFmpeg has no H.264 or no JPEG."""
         _decoder()
         _jpeg_encoder(16, 16)
         self._views: dict[ViewName, _View] = {}
 
     @property
     def lacks(self) -> tuple[int, int]:
-        """The newest picture of each view that came without the one before it, for `Watch`; 0 for none."""
+        """Newest picture of each view that could not be shown, for `Watch`; 0 for none."""
         first, second = (view.lacks if (view := self._views.get(name)) else 0 for name in VIEW_NAMES)
         return first, second
 
     def follow(self, step: VideoStep) -> VideoFrame | None:
-        """Return the picture as JPEG; None where the picture before it is not here, or the bytes hold none."""
+        """Return the picture as JPEG; None if the previous picture is missing, or the bytes are invalid."""
         jpeg = self._views.setdefault(step.view, _View()).follow(step)
         if jpeg is None:
             return None

@@ -1,7 +1,7 @@
 """Both sides in one process in virtual time: the same cores, bytes and delay lines; no sockets, no sleeps.
 
-Everything happens at the instant when it is due, in order of time, so that the same settings and seed give
-the same numbers on every machine.
+Events happen exactly when they are due, in order of time, so that the same settings and seed give the same
+numbers on every machine.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,35 +35,35 @@ from robot_side.parts import SceneParts, build_parts
 from robot_side.settings import RobotSettings
 
 _WALL = MonotonicClock()
-"""For how long a tick takes, and nothing else."""
+"""Clock for the durations of ticks, and nothing else."""
 _PEER = b"loopback"
 VIRTUAL_CLOCK = "virtual"
 _STREAMS: tuple[Stream, ...] = ("haptics", "telemetry")
-"""Nobody looks here."""
+"""Streams to the operator; nobody watches views here."""
 
 
 @dataclass(frozen=True)
 class LoopbackSettings:
-    """What each side is set to; the links, seeds and durations of the two need not agree."""
+    """Settings of each side; the two may differ in links, seeds and durations."""
 
     robot: RobotSettings = field(default_factory=RobotSettings)
     operator: OperatorSettings = field(default_factory=OperatorSettings)
 
 
 def robot_parts(settings: RobotSettings, scene: Scene | None = None) -> SceneParts:
-    """Make the robot side's parts for a virtual clock, in this scene or the one that the settings name."""
+    """Make the robot side's parts for a virtual clock, in `scene` or the one of the settings."""
     return build_parts(settings, 1, VIRTUAL_CLOCK, scene)
 
 
 class Person(Protocol):
-    """Whoever has the controller in their hands."""
+    """Person with the controller in their hands."""
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Look at the screen and move the hands; `delay_s` is the round trip that the person has got used to."""
+        """Look at the screen and move the hands; `delay_s` is the round trip to which the person is accustomed."""
 
 
 class Loopback:
-    """Two cores, a controller with a person, and the link between them, driven by one virtual clock."""
+    """Two cores, a controller with a person, and the link between the cores, on one virtual clock."""
 
     def __init__(
         self,
@@ -77,18 +77,18 @@ class Loopback:
         operator_listeners: Sequence[operator_events.Listener] = (),
         tick_period_s: float = TICK_PERIOD_S,
     ) -> None:
-        """parts: the robot side's, instead of those that the settings name (see `robot_parts`).
+        """parts: the robot side's, instead of those of the settings (see `robot_parts`).
 
-        person: instead of the scripted one.
+        person: replaces the scripted one.
 
-        tick_period_s: of the robot side; the physics keeps its own steps, and its fields come each 10 ms at most.
+        tick_period_s: period of the robot side; the physics keeps its steps, and fields come at most each 10 ms.
 
-        pages: of the console, as the person knows them.
-        listeners, operator_listeners: hear what happens to the two cores.
+        pages: pages of the console, as the person knows them.
+        listeners, operator_listeners: receive the events of the two cores.
         """
         self.clock = VirtualClock()
         self.robot = RobotSide(parts or robot_parts(settings.robot), listeners)
-        # After the scene, which decides what kernels there are.
+        # After the scene, which decides which kernels exist.
         warm_up()
         self.operator = build_operator_side(settings.operator, 2, VIRTUAL_CLOCK, operator_listeners)
         self.device = device or SimulatedDualSense()
@@ -116,7 +116,7 @@ class Loopback:
         self._motions = 0
 
     def run_until(self, end_s: float) -> None:
-        """Let time pass up to `end_s`, on the virtual clock."""
+        """Run until `end_s`, on the virtual clock."""
         while (due_s := self._next_event()) <= end_s:
             self.clock.advance_to(due_s)
             self._deliver(due_s)
@@ -132,7 +132,7 @@ class Loopback:
         self.clock.advance_to(end_s)
 
     def summary(self) -> dict[str, Any]:
-        """As the demo's, but for the tick times, which are real and differ from run to run."""
+        """Return the demo's summary; only the tick times are real and differ from run to run."""
         merged = merge_summaries(self.robot.summary(), self.operator.summary(), [])
         merged["duration_s"] = self.clock.now()
         merged["tick_us"] = microseconds(self.tick_time)
@@ -144,7 +144,7 @@ class Loopback:
     def _next_event(self) -> float:
         dues = [self._ticks * self._tick_period_s, self._motions * MOTION_PERIOD_S]
         dues += [due for line in (self._to_robot, *self._to_operator.values()) if (due := line.next_due()) is not None]
-        # A message that was due at once, in the middle of an instant, must not turn the clock back.
+        # A message that is due at once, within an instant, must not turn the clock back.
         return max(min(dues), self.clock.now())
 
     def _deliver(self, now_s: float) -> None:

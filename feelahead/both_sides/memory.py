@@ -1,4 +1,4 @@
-"""Memory and descriptors of a process, as Linux tells of them."""
+"""Memory and descriptors of a process, as reported by Linux."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from common.errors import FeelaheadError
 
 
 def resident_mb(process_id: int | str = "self") -> float:
-    """Return the resident memory in MB; FeelaheadError where the system does not say."""
+    """Return the resident memory in MB; raises FeelaheadError if the system does not report it."""
     try:
         for line in Path(f"/proc/{process_id}/status").read_text(encoding="ascii").splitlines():
             if line.startswith("VmRSS:"):

@@ -1,4 +1,4 @@
-"""Both sides as child processes that report to this one by lines of JSON."""
+"""Sides as child processes that report to this one by lines of JSON."""
 
 import json
 import queue
@@ -18,14 +18,14 @@ _STOP_PERIOD_S = 0.05
 
 
 class SideFailedError(FeelaheadError):
-    """A side ended by itself with an error; the text is what it said."""
+    """A side ended by itself with an error; the text is the side's."""
 
 
 class StartedSide:
-    """One side with `--status json`, by the command that starts it; a thread reads its events: none blocks it."""
+    """Side with `--status json`, started by a command; a thread reads the events, so that the side never blocks."""
 
     def __init__(self, name: str, command: Sequence[str]) -> None:
-        """Start it."""
+        """Start the command."""
         self.name = name
         self._errors = tempfile.TemporaryFile(mode="w+", encoding="utf-8", errors="replace")  # noqa: SIM115  # closed by __exit__
         self._process = subprocess.Popen(
@@ -34,7 +34,7 @@ class StartedSide:
             stderr=self._errors,
             stdin=subprocess.DEVNULL,
             text=True,
-            # Ctrl-C reaches this process alone, which then ends the sides in order.
+            # Ctrl-C reaches only this process, which then ends the sides in order.
             start_new_session=True,
         )
         self._interrupted = False
@@ -56,25 +56,25 @@ class StartedSide:
 
     @property
     def process_id(self) -> int:
-        """The operating system's number for it."""
+        """Process id."""
         return self._process.pid
 
     @property
     def running(self) -> bool:
-        """Whether it has not ended yet."""
+        """Whether the process has not ended yet."""
         return self._process.poll() is None
 
     def events(self) -> list[dict[str, Any]]:
-        """Return what it has said since the last call."""
+        """Return the events since the last call."""
         said, self._passed_over = self._passed_over, []
         while not self._events.empty():
             said.append(self._events.get_nowait())
         return said
 
     def wait_for(self, kind: str, timeout_s: float) -> dict[str, Any]:
-        """The next event of this kind; SideFailedError when the side ends or says nothing for so long."""
+        """Return the next event of this kind; raises SideFailedError if the side ends or is silent too long."""
         event = self.wait_unless(kind, timeout_s, None)
-        assert event is not None  # noqa: S101  # there is nothing to stop it
+        assert event is not None  # noqa: S101  # no stop signal
         return event
 
     def wait_unless(
@@ -107,32 +107,32 @@ class StartedSide:
             (meanwhile or self._passed_over.append)(event)
 
     def check(self) -> None:
-        """SideFailedError when it has ended with an error, in its own words; ConfigurationError for bad input."""
+        """Raise SideFailedError, with the side's text, if it ended with an error; ConfigurationError for bad input."""
         code = self._process.poll()
         if self._interrupted and not self._has_spoken:
-            # Our own interrupt met the interpreter before any handler of ours stood, which no side can help.
+            # Our interrupt came before the side had its handlers, which no side can prevent.
             return
         if code not in (None, 0):
             self._errors.seek(0)
             said = self._errors.read().strip().splitlines()
             reason = said[-1] if said else "without a word"
             if code == _BAD_INPUT:
-                # It is ours that was bad: what we were given went on to the side.
+                # The bad input is ours: our arguments went on to the side.
                 raise ConfigurationError(reason.partition(": ")[2] or reason)
             raise SideFailedError(f"the {self.name} side ended with code {code}: {reason}")
 
     def interrupt(self) -> None:
-        """Ask it to end, as Ctrl-C would, once: a second signal could hit it while it writes its summary."""
+        """Interrupt the side like Ctrl-C, only once: a second signal could come while it writes the summary."""
         if self.running and not self._interrupted:
             self._interrupted = True
             self._process.send_signal(signal.SIGINT)
 
     def wait(self, timeout_s: float) -> int:
-        """Return its exit code, once it has ended; subprocess.TimeoutExpired when it does not."""
+        """Wait for the end and return the exit code; raises subprocess.TimeoutExpired."""
         return self._process.wait(timeout=timeout_s)
 
     def stop(self, timeout_s: float = 10.0) -> int:
-        """End it as Ctrl-C would, wait, and kill it only if it does not; its exit code."""
+        """Interrupt the side, wait, kill it only after `timeout_s`, and return the exit code."""
         self.interrupt()
         try:
             return self._process.wait(timeout=timeout_s)
@@ -150,14 +150,14 @@ class StartedSide:
                 try:
                     self._events.put_nowait(json.loads(line))
                 except json.JSONDecodeError:
-                    continue  # a library wrote to standard output; not ours to interpret
+                    continue  # a library wrote to standard output
         self._events.put({"event": "end"})
 
 
 class SideProcess(StartedSide):
-    """A side as a process of this machine, in this Python."""
+    """Side as a process of this machine, in this Python."""
 
     def __init__(self, module: str, name: str, arguments: Sequence[str], before: Sequence[str] = ()) -> None:
-        """Run `module` with `arguments`; `before` is a command in whose surroundings it is to run."""
+        """Run `module` with `arguments`; `before` is a command that runs it."""
         # -P: a folder named `common` in the working directory must not shadow the package.
         super().__init__(name, [*before, sys.executable, "-P", "-m", module, "--status", "json", *arguments])

@@ -1,4 +1,4 @@
-"""Both sides in real time, in processes anywhere: from the link's coming up to their end."""
+"""Both sides in real time, as processes anywhere: from the start of the link to the end."""
 
 import tempfile
 import threading
@@ -14,9 +14,9 @@ from feelahead.both_sides.processes import SideProcess, StartedSide
 from feelahead.both_sides.summary import read_summary
 
 START_S: Final = 600.0
-"""The first start compiles kernels, which a busy machine takes minutes for."""
+"""Time limit of a start, in seconds: the first one compiles kernels, which takes minutes on a busy machine."""
 LINK_S: Final = 30.0
-"""Within which a link has to come up."""
+"""Time limit for the link to come up, in seconds."""
 _PAUSE_S: Final = 0.1
 
 
@@ -27,17 +27,17 @@ class Both(NamedTuple):
     operator: SideProcess
     control: str
     view: str
-    """The robot side's two addresses."""
+    """Both are addresses of the robot side."""
     folder: Path
 
     def summaries(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Read what each has written at its end."""
+        """Read the summaries that both have written at the end."""
         return read_summary(self.folder / "robot.json"), read_summary(self.folder / "operator.json")
 
 
 @contextmanager
 def started(robot: Sequence[str], operator: Sequence[str], program: str = "robot_side") -> Iterator[Both]:
-    """Start both on 127.0.0.1 with these flags and a simulated controller; `program` is the robot side's module."""
+    """Start both on 127.0.0.1 with these flags and a simulated controller; `program`: the robot side's module."""
     with tempfile.TemporaryDirectory(prefix="feelahead-") as name, ExitStack() as stack:
         folder = Path(name)
         ours = ["--bind=tcp://127.0.0.1:0", f"--summary={folder / 'robot.json'}", *robot]
@@ -50,7 +50,7 @@ def started(robot: Sequence[str], operator: Sequence[str], program: str = "robot
 
 
 def run_for(robot: StartedSide, operator: StartedSide, duration_s: float) -> None:
-    """Let them run for `duration_s` once their link is up, and end both; SideFailedError where one fails."""
+    """Run both for `duration_s` once the link is up, then end them; raises SideFailedError if one fails."""
     clock, pause = MonotonicClock(), threading.Event()
     limit_s = clock.now() + LINK_S
     while operator.wait_for("status", LINK_S).get("link") != LinkState.UP:
@@ -69,7 +69,7 @@ def run_for(robot: StartedSide, operator: StartedSide, duration_s: float) -> Non
 
 
 def end(robot: StartedSide, operator: StartedSide) -> None:
-    """End both at once, lest one takes the other's end for a fault of the link; SideFailedError where one fails."""
+    """End both at once, so that neither takes the other's end for a link fault; raises SideFailedError if one fails."""
     for side in (operator, robot):
         side.interrupt()
     for side in (operator, robot):

@@ -1,4 +1,4 @@
-"""One summary of a run from what each side saw of it."""
+"""Summary of a run from both sides' summaries."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def merge_summaries(robot: Mapping[str, Any], operator: Mapping[str, Any], errors: Sequence[str]) -> dict[str, Any]:
-    """The robot side's summary with the operator side's part of the figures that both sides know.
+    """Merge both sides' summaries; the robot side's value wins where both have one.
 
     Counts that both sides have (`rejected`, `stale`, `dropped_blocks`) are added; nested tables are joined.
     """
@@ -29,7 +29,7 @@ def _joined(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def read_summary(path: Path) -> dict[str, Any]:
-    """A side's summary; empty when it did not live to write one, which `errors` then says."""
+    """Read a side's summary; empty if the side has not written one."""
     try:
         content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, json.JSONDecodeError):

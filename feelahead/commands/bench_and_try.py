@@ -1,4 +1,4 @@
-"""`feelahead bench NAME` and `feelahead try NAME`: the questions of feelahead/lab, imported only when asked for."""
+"""`feelahead bench NAME` and `feelahead try NAME`: questions of feelahead/lab, imported only on demand."""
 
 import ast
 import sys
@@ -14,14 +14,14 @@ _QUESTIONS = Path(__file__).parents[1] / "lab" / "questions"
 
 @dataclass(frozen=True)
 class Menu:
-    """One command whose first argument names a question."""
+    """Command whose first argument names a question."""
 
     name: str
     questions: Mapping[str, str]
-    """Each question's name, with the extras that it needs."""
+    """Needed extras by question's name."""
 
     def __call__(self, arguments: Sequence[str]) -> int:
-        """Answer the question that the first argument names, or that a file of one's own holds."""
+        """Answer the question that the first argument names, by name or by a user's file."""
         if not arguments or arguments[0] in ("-h", "--help", "--list"):
             lines = "\n".join(f"  {name:<10}{_sentence(name)}" for name in self.questions)
             sys.stdout.write(
@@ -43,7 +43,7 @@ class Menu:
             raise ConfigurationError(f"{self.name} {name!r}: no such question; valid: {valid}")
         if not Path(name).is_file():
             raise ConfigurationError(f"{self.name} {name}: there is no such file; valid: a question's file")
-        sys.path.insert(0, str(Path(name).absolute().parent))  # worker processes are given the same path
+        sys.path.insert(0, str(Path(name).absolute().parent))  # worker processes get the same path
         return self._ask(Path(name).stem, name, rest)
 
     def _ask(self, module: str, name: str, arguments: Sequence[str]) -> int:
@@ -65,7 +65,7 @@ class Menu:
 
 
 def _sentence(name: str) -> str:
-    """Read the question that begins a question's file, without importing what it needs."""
+    """Read the sentence that begins a question's file, without imports."""
     text = ast.get_docstring(ast.parse((_QUESTIONS / f"{name}.py").read_text(encoding="utf-8"))) or ""
     return text.partition("\n\n")[0].replace("\n", " ")
 

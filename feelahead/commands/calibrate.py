@@ -1,4 +1,4 @@
-"""`feelahead calibrate`: measure where a controller's triggers and sticks begin and end, and keep it."""
+"""`feelahead calibrate`: measure the ranges of a controller's triggers and sticks, and store them."""
 
 import sys
 import time
@@ -39,21 +39,21 @@ _SILENT_S = 5.0
 class CalibrateSettings:
     """Measure one controller's triggers and sticks: half a minute with the controller in your hands.
 
-    It says what to do, and shows what the controller reports. What it finds is kept for that controller, on USB and
-    Bluetooth, in your configuration folder, where feelahead-operator looks for it.
+    It tells what to do, and shows the controller's reports. The result is stored for this controller, on USB and
+    Bluetooth, in your configuration folder, where feelahead-operator finds it.
     """
 
     device: Literal["hid", "simulated"] = "hid"
-    """A real controller, or a simulated one with simulated hands, of which nothing is kept but with --out."""
+    """A real controller, or a simulated one with simulated hands, stored only with --out."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """Write it there instead: a new file in a folder that is there, or one that is replaced."""
+    """Store the result in this file instead: a new one in an existing folder, or one to replace."""
 
     def __post_init__(self) -> None:
         require_output_file("--out", self.out)
 
 
 def calibrate(arguments: Sequence[str]) -> int:
-    """Run the calibration; exit code 1 when it was given up, and nothing is stored."""
+    """Run the calibration; exit code 1 if it was given up, and nothing is stored."""
     settings = parse_settings(CalibrateSettings, "feelahead calibrate", arguments)
     clock: Clock
     if settings.device == "simulated":
@@ -107,9 +107,9 @@ def _measure(
     stop: StopSignal,
     show: Show,
 ) -> bool:
-    """Feed the procedure until it is done; False when it was stopped. CalibrationError and DeviceError say why not."""
+    """Feed the procedure until it is done; False if it was stopped. Raises CalibrationError or DeviceError."""
     start_s = heard_s = clock.now()
-    # An effect that somebody left on would count as travel that cannot be reached.
+    # An effect that was left on would make travel unreachable.
     device.write(RELEASED, start_s)
     while procedure.step is not Step.DONE:
         if stop.is_set:
@@ -133,7 +133,7 @@ def _measure(
 
 
 class _Screen:
-    """Live bars on a terminal; elsewhere one line for each step and complaint."""
+    """Live bars on a terminal; elsewhere a line for each step and complaint."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -164,7 +164,7 @@ class _Screen:
 
 _BAR = 40
 _STEPS = len(Step) - 1
-"""The steps that a person has to do."""
+"""Number of steps that a person must do."""
 
 
 def calibration_screen(procedure: CalibrationProcedure, state: ControllerState) -> RenderableType:
@@ -182,7 +182,7 @@ def calibration_screen(procedure: CalibrationProcedure, state: ControllerState) 
 
 
 def calibration_lines(calibration: TravelCalibration) -> list[str]:
-    """The result for people, a line each."""
+    """Return the result for people, a line each."""
     return [
         _trigger_line("L2", calibration.l2),
         _trigger_line("R2", calibration.r2),

@@ -34,57 +34,57 @@ from operator_side.viewing.terminal.status import TerminalStatus
 from robot_side.laws.named import LawName
 
 _START_TIMEOUT_S = 600.0
-"""The first start compiles the overlap kernels, which a busy machine takes minutes for."""
+"""Time limit of a start, in seconds: the first one compiles kernels, which takes minutes on a busy machine."""
 _LINK_TIMEOUT_S = 30.0
 _SENT: tuple[tuple[Direction, Stream], ...] = (
     ("to_robot", "haptics"),
     ("to_operator", "haptics"),
     ("to_operator", "telemetry"),
 )
-"""The streams between the two sides."""
+"""Streams between the two sides."""
 _SHARED = ("link", "link_model", "asymmetry", "full_rate", "seed", "realtime")
 """Flags of both sides."""
-_ELSEWHERE = "; the sides' own keys stand in files of their own: --robot-config FILE.toml, --operator-config FILE.toml"
+_ELSEWHERE = "; each side's keys have a separate file: --robot-config FILE.toml, --operator-config FILE.toml"
 
 
 @dataclass(frozen=True)
 class DemoSettings(RunOptions):
     """Both sides on this machine: a simulated arm, a simulated DualSense, and a scripted person.
 
-    The person arms the arm and pulls R2 to advance towards the target. They feel the trigger stiffen as things come
-    near. Then they grasp the target, lift it, and set it down again. Nothing is needed but this machine.
+    The person arms the arm and pulls R2 to advance towards the target. They feel the trigger stiffen near objects.
+    Then they grasp the target, lift it, and set it down again. Nothing is needed but this machine.
 
     Try: feelahead demo --link "delay 50ms 10ms distribution normal", and the same with --no-haptics.
     """
 
     scene: Literal["table", "wall", "slot", "shelf"] | None = None
-    """The things around the built-in arm's target. table: a cluttered table, unless given. wall: a wall 10 to 60 mm
-    behind it. slot: two posts on the way to it, 15 to 40 mm to spare on each side. shelf: a shelf whose raised front
-    edge has to be reached over. The last three are drawn from the seed."""
+    """Objects around the built-in arm's target. table: a cluttered table (default). wall: a wall 10 to 60 mm behind it.
+    slot: two posts in front of it, 15 to 40 mm to spare on each side. shelf: a shelf with a raised front edge to reach
+    over. The last three are drawn from the seed."""
     duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = 30.0
-    """The run's length, from the moment that the link is up."""
+    """Duration of the run with the link up."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
-    """The share of contacts that a warning must precede, between 0 and 1 (eq. 10)."""
+    """Share of contacts that a warning must precede, between 0 and 1 (eq. 10)."""
     assist: Literal["none", "speed"] = "none"
-    """speed: the robot side caps the speed along the triggers, so that the arm stops where full strength is due."""
+    """speed: the robot side caps the speed along the triggers, so that the arm stops where full strength begins."""
     law: LawName = "swept"
-    """The law of what is felt ahead. swept: in time to let go, along each trigger; paper: the paper's plain law."""
+    """Law of the stiffness. swept: early enough to release, along each trigger; paper: the paper's plain law."""
     compensation: Compensation = "operator"
-    """The side that reckons with the delay: operator, by the commands under way; robot, by v t_d (eq. 8)."""
+    """Side that compensates the delay: operator, by the commands under way; robot, by v t_d (eq. 8)."""
     haptics: bool = True
-    """Whether the triggers are stiffened; without, the same person sees only."""
+    """Whether the triggers are stiffened; without, the same person only sees."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
-    """Any MJCF arm with actuators instead of the built-in one."""
+    """MJCF arm with actuators, instead of the built-in one."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """The model's site between the fingertips, its z axis along the approach."""
+    """Site of the model between the fingertips, with the z axis along the approach."""
     realtime: bool = False
-    """Real-time scheduling and locked memory for both sides, where that is permitted."""
+    """Real-time scheduling and locked memory for both sides, if permitted."""
     console: bool = True
-    """The browser console, at an address that is shown; from a terminal with a display it opens by itself."""
+    """Browser console, at an address that is shown; from a terminal with a display it opens by itself."""
     console_port: Annotated[int, Meta(ge=0, le=65535), tyro.conf.arg(metavar="PORT")] = 0
-    """The port of the console's page on this machine; 0: any that is free."""
+    """Port of the console's page on this machine; 0: any free one."""
     tui: bool = False
-    """The whole terminal instead of a line, for machines without a browser."""
+    """Full-screen terminal instead of a line, for machines without a browser."""
     robot_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """More settings for the robot side: see feelahead-robot --help."""
     operator_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
@@ -100,7 +100,7 @@ class DemoSettings(RunOptions):
 
 
 def demo(arguments: Sequence[str]) -> int:
-    """Run the demo; exit code 0 also after Ctrl-C, 1 when a side failed while running."""
+    """Run the demo; exit code 0 also after Ctrl-C, 1 if a side failed during the run."""
     settings = parse_settings(DemoSettings, "feelahead demo", arguments, _ELSEWHERE)
     if (complaint := _too_slow(settings)) is not None:
         raise ConfigurationError(complaint)
@@ -118,7 +118,7 @@ def demo(arguments: Sequence[str]) -> int:
                 merged = merge_summaries(read_summary(summaries["robot"]), read_summary(summaries["operator"]), errors)
                 if recorder is not None:
                     merged["recording"] = merged.get("recording", {}) | recorder.finish()
-            # Before the report, which waits for its reader.
+            # Before the report, which waits for a reader.
             if settings.summary is not None:
                 write_json("--summary", settings.summary, merged)
         for line in [*_report(merged), *report_lines(merged.get("link", {}))]:
@@ -132,7 +132,7 @@ def demo(arguments: Sequence[str]) -> int:
 def _run_both(
     settings: DemoSettings, given: Collection[str], summaries: Mapping[str, Path], stop: StopSignal, status: Status
 ) -> list[str]:
-    """Start both sides, watch them, and end them; what went wrong."""
+    """Start both sides, watch them, and end them; return the errors."""
     status.note("starting the robot side")
     with SideProcess("robot_side", "robot", _robot_arguments(settings, given, summaries["robot"])) as robot:
         status.event("started", side="robot", process_id=robot.process_id)
@@ -145,9 +145,9 @@ def _run_both(
         with SideProcess("operator_side", "operator", operator_arguments) as operator:
             status.event("started", side="operator", process_id=operator.process_id)
             errors: list[str] = []
-            with contextlib.suppress(BrokenPipeError):  # whoever read our status has seen enough
+            with contextlib.suppress(BrokenPipeError):  # the reader of our status has ended
                 errors = _watch(settings, robot, operator, stop, status)
-            # Both at once: neither is to take the other's end for a fault of the link.
+            # Both at once: neither must take the other's end for a link fault.
             operator.interrupt()
             robot.interrupt()
             operator.stop()
@@ -162,19 +162,19 @@ def _run_both(
 
 
 def _too_slow(settings: DemoSettings) -> str | None:
-    """Why the sides cannot find each other in time over the link that was asked for; None where they can."""
+    """Return why the sides cannot find each other in time over the given link; None if they can."""
     link = settings.link_spec()
     there_s, back_s = (link.profile(direction).mean_delay_s() for direction in ("to_robot", "to_operator"))
     if there_s + back_s < _LINK_TIMEOUT_S:
         return None
     return (
         f"--link {settings.link!r}: a message and its answer take {there_s + back_s:g} s;"
-        f" valid: below {_LINK_TIMEOUT_S:g} s, within which the two sides have to find each other"
+        f" valid: below {_LINK_TIMEOUT_S:g} s, within which the two sides must find each other"
     )
 
 
 def _robot_arguments(settings: DemoSettings, given: Collection[str], summary: Path) -> list[str]:
-    # A file says itself whether it permits that.
+    # A file decides by itself.
     config = "--permit-tuning" if settings.robot_config is None else f"--config={settings.robot_config}"
     own = _flags(settings, given, *_SHARED, "scene", "model", "site", "probability", "assist", "law")
     return [*_files(settings, summary), "--bind=tcp://127.0.0.1:0", config, *own]
@@ -194,13 +194,13 @@ def _operator_arguments(
 
 
 def _files(settings: DemoSettings, summary: Path) -> list[str]:
-    """The files that a side writes; one recorder listens to both."""
+    """Return the flags of a side's output files; one recorder listens to both."""
     recorded = [] if settings.record is None else [f"--record={summary.with_name('recorder')}"]
     return [*recorded, f"--summary={summary}"]
 
 
 def _flags(settings: DemoSettings, given: Collection[str], *names: str) -> Iterator[str]:
-    """Pass on the flags that were given: elsewhere the sides' own files count."""
+    """Yield the given flags; for all others the sides' files count."""
     for name in names:
         if name in given:
             flag, value = name.replace("_", "-"), getattr(settings, name)
@@ -211,7 +211,7 @@ def _flags(settings: DemoSettings, given: Collection[str], *names: str) -> Itera
 def _watch(
     settings: DemoSettings, robot: SideProcess, operator: SideProcess, stop: StopSignal, status: Status
 ) -> list[str]:
-    """Show both sides' status until the time is over, Ctrl-C, or a side ends; what went wrong."""
+    """Show both sides' status until the time is over, Ctrl-C, or a side's end; return the errors."""
     waiting_since_s, linked_s = 0.0, None
     said = _Said()
     while not stop.is_set:
@@ -226,7 +226,7 @@ def _watch(
                 return [f"the {side.name} side ended early"]
         if linked_s is None:
             if said.operator is None:
-                # A busy machine may take long to start a process, which says nothing about the link.
+                # A busy machine may start a process slowly, which is no fault of the link.
                 waiting_since_s = now_s
             elif said.operator.link is LinkState.UP:
                 linked_s = now_s
@@ -243,14 +243,14 @@ def _watch(
 
 @dataclass
 class _Said:
-    """The newest status of each side."""
+    """Newest status of each side."""
 
     robot: RobotStatus | None = None
     operator: OperatorStatus | None = None
 
 
 def _take_events(side: SideProcess, said: _Said, status: Status) -> None:
-    """Keep the newest status of `side`, and show the notes that it has sent."""
+    """Keep the newest status of `side`, and show its notes."""
     for event in side.events():
         if event["event"] == "status" and side.name == "robot":
             said.robot = msgspec.convert(event, RobotStatus)
@@ -271,7 +271,7 @@ def _show_note(side: SideProcess, event: Mapping[str, Any], status: Status) -> N
 
 
 def _report(summary: dict[str, Any]) -> list[str]:
-    """The run in a few lines for people."""
+    """Return a few lines on the run for people."""
     if not summary.get("ticks"):
         return ["nothing to report: the robot side left no figures"]
     delays = summary.get("delay_ms", {})
@@ -296,7 +296,7 @@ def _report(summary: dict[str, Any]) -> list[str]:
 
 
 def _placed(placing: Mapping[str, Any]) -> str:
-    """Say how the target was set down."""
+    """Describe how the target was set down."""
     if not placing["placed"]:
         return "not placed"
     felt = "not felt before it was touched"

@@ -1,4 +1,4 @@
-"""`feelahead keys`: make a side's key pair, and say whom the robot side lets in."""
+"""`feelahead keys`: make a side's key pair, and choose whom the robot side admits."""
 
 import argparse
 import sys
@@ -30,7 +30,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def keys(arguments: Sequence[str]) -> int:
-    """Run one of the subcommands; ConfigurationError for bad input."""
+    """Run a subcommand; raises ConfigurationError for bad input."""
     parsed = _parser().parse_args(list(arguments))
     folder = KeyFolder(parsed.folder)
     said: list[str] = []
@@ -45,7 +45,7 @@ def keys(arguments: Sequence[str]) -> int:
             said = [f"{name} is let in; to end that: {folder.command(f'revoke {name}')}"]
         case "revoke":
             folder.revoke(parsed.name)
-            said = [f"{parsed.name} is let in no more; a robot side that runs cuts the connection within a second"]
+            said = [f"{parsed.name} is revoked; a running robot side cuts the connection within a second"]
         case "list":
             said = _listed(folder)
     sys.stdout.write("\n".join(said) + "\n")
@@ -56,7 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     default = default_folder()
     common = _Parser(add_help=False)
     common.add_argument(
-        "--folder", type=Path, default=default, metavar="FOLDER", help=f"where the keys are ({default})"
+        "--folder", type=Path, default=default, metavar="FOLDER", help=f"the folder of keys ({default})"
     )
     parser = _Parser(
         prog="feelahead keys",
@@ -68,14 +68,14 @@ def _parser() -> argparse.ArgumentParser:
     sides = get_args(Side)
     make = actions.add_parser("make", parents=[common], help="make this side's key pair, and print the public part")
     make.add_argument("side", choices=sides)
-    make.add_argument("--replace", action="store_true", help="even though there is one already")
+    make.add_argument("--replace", action="store_true", help="replace an existing pair")
     show = actions.add_parser("show", parents=[common], help="print the public part again")
     show.add_argument("side", choices=sides)
     allow = actions.add_parser("allow", parents=[common], help="let an operator in (on the robot's machine)")
-    allow.add_argument("name", metavar="NAME", help="what to call it: up to 32 letters, digits, - and _")
-    allow.add_argument("key", metavar="KEY|FILE", help="its public key, or the .public file")
-    actions.add_parser("list", parents=[common], help="what is in the folder, and who is let in")
-    revoke = actions.add_parser("revoke", parents=[common], help="let an operator in no more")
+    allow.add_argument("name", metavar="NAME", help="a name for it: up to 32 letters, digits, - and _")
+    allow.add_argument("key", metavar="KEY|FILE", help="the public key, or the .public file")
+    actions.add_parser("list", parents=[common], help="list the keys in the folder, and the admitted peers")
+    revoke = actions.add_parser("revoke", parents=[common], help="revoke an operator's key")
     revoke.add_argument("name", metavar="NAME")
     return parser
 

@@ -1,4 +1,4 @@
-"""`feelahead replay`, `export` and `plot`: what can be done with a recording."""
+"""`feelahead replay`, `export` and `plot`: commands on recordings."""
 
 import struct
 import sys
@@ -23,7 +23,7 @@ _BOTH_SIDES = "pip install 'feelahead[robot,operator,record]'"
 
 @dataclass(frozen=True)
 class ReplaySettings(Limited):
-    """Show a recording in the console, or compute its cores again.
+    """Show a recording in the console, or recompute it.
 
     Try: feelahead demo --record run.mcap, then feelahead replay run.mcap --check.
     """
@@ -31,30 +31,30 @@ class ReplaySettings(Limited):
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
     """The recording."""
     check: bool = False
-    """Compute every stiffness, command and report to the controller again from the recorded inputs, and compare. Exit
-    code 1 where they differ by more than another processor may: 1 of 8 in strength, 1e-12 m in ways."""
+    """Recompute every stiffness, command and report to the controller from the recorded inputs, and compare. Exit
+    code 1 if they differ by more than processors do: 1 of 8 in strength, 1e-12 m in distances."""
     speed: Annotated[float, Meta(ge=0.01, le=1000.0)] = 1.0
-    """The playing speed, 1 being the recorded one."""
+    """Playing speed; 1 is the recorded one."""
     tui: bool = False
-    """On the whole terminal, instead of the console's page."""
+    """Full-screen terminal, instead of the console's page."""
     console_port: Annotated[int, Meta(ge=0, le=65535)] = 0
-    """The page's port on this machine; 0: any that is free."""
+    """Port of the page on this machine; 0: any free one."""
 
 
 @dataclass(frozen=True)
 class ExportSettings:
     """Turn a recording into files that other programs read.
 
-    csv, parquet: a folder with a file for each topic at its own rate, and one of everything joined at 100 Hz.
+    csv, parquet: a folder with a file for each topic at the original rate, and one with all joined at 100 Hz.
     lerobot: a LeRobot dataset, v3.0, of one episode at 30 Hz.
     """
 
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
     """The recording."""
     format: Literal["csv", "parquet", "lerobot"] = "csv"
-    """The format to write."""
+    """Format of the files."""
     out: Path | None = None
-    """A new or empty folder; unless given, beside the recording, named after it."""
+    """A new or empty folder; by default beside the recording, named after it."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class PlotSettings:
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
     """The recording."""
     out: Path | None = None
-    """A file that ends in .png, .svg or .pdf; beside the recording as .png unless given."""
+    """A file that ends in .png, .svg or .pdf; by default .png beside the recording."""
 
 
 def _open(path: Path | None) -> Recording:
@@ -79,7 +79,7 @@ def _open(path: Path | None) -> Recording:
 
 @contextmanager
 def _recording(path: Path | None) -> Iterator[Recording]:
-    """A recording to work with: whatever cannot be made of its content is one line."""
+    """Open a recording; faults of the content become one line."""
     recording = _open(path)
     try:
         yield recording
@@ -87,11 +87,11 @@ def _recording(path: Path | None) -> Iterator[Recording]:
         raise
     except (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError, struct.error) as error:
         what = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise ConfigurationError(f"{path}: holds what no recording of ours does ({what:.200})") from error
+        raise ConfigurationError(f"{path}: is no valid recording ({what:.200})") from error
 
 
 def replay(arguments: Sequence[str]) -> int:
-    """Show or check."""
+    """Show or check a recording."""
     settings = parse_settings(ReplaySettings, "feelahead replay", arguments)
     with _recording(settings.file) as recording:
         require_protocol(recording)
@@ -115,7 +115,7 @@ def _check(recording: Recording) -> int:
     said = [line for one in compared for line in one.lines()]
     within = all(one.within for one in compared)
     if not sum(one.made for one in compared):
-        said.append("nothing was compared: it holds nothing to make again")
+        said.append("nothing was compared: it holds nothing to recompute")
         within = False
     else:
         said.append("the same, within what is promised" if within else "NOT the same")
@@ -124,7 +124,7 @@ def _check(recording: Recording) -> int:
 
 
 def export(arguments: Sequence[str]) -> int:
-    """Write the files."""
+    """Export a recording."""
     settings = parse_settings(ExportSettings, "feelahead export", arguments)
     with _recording(settings.file) as recording:
         if settings.format != "csv":
@@ -137,7 +137,7 @@ def export(arguments: Sequence[str]) -> int:
 
 
 def _export(kind: str, recording: Recording, folder: Path) -> str:
-    """Write a folder of tables, and say what was written."""
+    """Write a folder of tables; return a description."""
     from feelahead.recordings.lerobot import export_lerobot  # noqa: PLC0415
     from feelahead.recordings.tables import export_csv, export_parquet, read_tables  # noqa: PLC0415
 
@@ -159,7 +159,7 @@ def _empty_folder(path: Path) -> Path:
 
 
 def plot(arguments: Sequence[str]) -> int:
-    """Draw the page."""
+    """Draw a recording on one page."""
     settings = parse_settings(PlotSettings, "feelahead plot", arguments)
     with _recording(settings.file) as recording:
         out = recording.path.with_suffix(".png") if settings.out is None else settings.out

@@ -1,4 +1,4 @@
-"""A recording shown once more: on the console's page, or on the whole terminal."""
+"""Player of recordings: on the console's page, or on the full terminal."""
 
 import select
 import threading
@@ -22,12 +22,12 @@ from operator_side.viewing.viewing import SceneFigures
 _PROGRAM: Final = "feelahead replay"
 _STEP_S: Final = 0.01
 _LONGEST_S: Final = 0.25
-"""The longest step: a machine that was suspended misses nothing."""
+"""Longest step, in seconds: a suspended machine misses nothing."""
 _STATE_PERIOD_S: Final = 0.1
 
 
 def play_on_page(recording: Recording, speed: float, port: int) -> int:
-    """From the moment when a page is open, until Ctrl-C; 1 without a console."""
+    """Play once a page is open, until Ctrl-C; return 1 if the console has ended."""
     title = f"{recording.path.name}, replayed"
     with StopSignal() as stop, Status("line", _PROGRAM) as status, Console(title, port=port, live=False) as console:
         facts = msgspec.json.Decoder(OperatorFacts)
@@ -71,7 +71,7 @@ def play_on_page(recording: Recording, speed: float, port: int) -> int:
 
 
 def play_in_terminal(recording: Recording, speed: float) -> int:
-    """To the end, or until Ctrl-C. ConfigurationError unless standard output is a terminal."""
+    """Play to the end, or until Ctrl-C. Raises ConfigurationError unless standard output is a terminal."""
     decoder, pause = msgspec.json.Decoder(OperatorFacts), threading.Event()
     with TerminalStatus(_PROGRAM) as status, StopSignal() as stop:
         robot: RobotStatus | None = None
@@ -101,7 +101,7 @@ def play_in_terminal(recording: Recording, speed: float) -> int:
 
 
 def _passing(goes_on: Callable[[float], bool]) -> Iterator[float]:
-    """Yield the time passed at each step, as long as `goes_on(seconds)` holds; it waits that long."""
+    """Yield the time passed at each step while `goes_on(seconds)`, which waits as long, is true."""
     clock = MonotonicClock()
     before_s = clock.now()
     while goes_on(_STEP_S):

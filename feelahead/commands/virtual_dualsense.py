@@ -23,9 +23,9 @@ from operator_side.dualsense.uhid.controller import UhidController, UhidIdentity
 from operator_side.dualsense.uhid.file import UhidFile, offer
 
 PULL_PERIOD_S = 4.0
-"""R2 and then L2 go down and up in this time, and the left stick once round."""
+"""Period, in seconds, in which R2 and then L2 go down and up, and the left stick once round."""
 DRIVER_PATIENCE_S = 5.0
-"""A driver that is there takes the controller long before."""
+"""Time, in seconds, within which an installed driver takes the controller."""
 _STICK_RADIUS = 0.8
 
 Say = Callable[[str], None]
@@ -35,21 +35,21 @@ Say = Callable[[str], None]
 class VirtualDualSenseSettings(Limited):
     """A virtual DualSense through /dev/uhid (Linux): games, drivers and feelahead-operator see it as a real one.
 
-    It prints what it is told to do. Ctrl-C unplugs it.
+    It prints the commands that it gets. Ctrl-C unplugs it.
     """
 
     transport: Literal["usb", "bluetooth"] = "usb"
-    """The transport that it seems to use."""
+    """Simulated transport."""
     edge: bool = False
-    """A DualSense Edge."""
+    """DualSense Edge instead of a DualSense."""
     duration: Annotated[Annotated[float, Meta(gt=0.0, lt=1e6)] | None, tyro.conf.arg(metavar="SECONDS")] = None
-    """Unplug it after this long; without it, at Ctrl-C."""
+    """Unplug it after this time; by default at Ctrl-C."""
     hands: Literal["none", "pulling"] = "none"
     """none: no hands; pulling: R2 and L2 in turn, and the left stick round."""
 
 
 def virtual_dualsense(arguments: Sequence[str]) -> int:
-    """Offer a controller until --duration, Ctrl-C or SIGTERM; ConfigurationError where /dev/uhid cannot be used."""
+    """Offer a controller until --duration, Ctrl-C or SIGTERM; raises ConfigurationError if /dev/uhid is unusable."""
     settings = parse_settings(VirtualDualSenseSettings, "feelahead virtual-dualsense", arguments)
     try:
         with UhidFile() as file, StopSignal() as stop:
@@ -62,7 +62,7 @@ def virtual_dualsense(arguments: Sequence[str]) -> int:
 def live(
     settings: VirtualDualSenseSettings, file: UhidFile, clock: Clock, stopped: Callable[[], bool], say: Say
 ) -> None:
-    """One controller from plug to unplug; DeviceError when the kernel lets it go."""
+    """Run one controller from plug to unplug; raises DeviceError if the kernel removes it."""
     transport = Transport.USB if settings.transport == "usb" else Transport.BLUETOOTH
     controller = _Narrated(transport, Model.EDGE if settings.edge else Model.DUALSENSE, say)
     told = UhidIdentity(transport, controller.model, controller.address)
@@ -91,7 +91,7 @@ def live(
 
 
 class _Narrated(SimulatedDualSense):
-    """A controller that says what every output report changes."""
+    """Controller that reports the changes by every output report."""
 
     def __init__(self, transport: Transport, model: Model, say: Say) -> None:
         super().__init__(transport, model)
@@ -100,7 +100,7 @@ class _Narrated(SimulatedDualSense):
         self._last_words = self._state_in_words()
 
     def take_report(self, report: bytes, now_s: float) -> None:
-        """Take it, and say the changes."""
+        """Apply a report, and report the changes."""
         super().take_report(report, now_s)
         l2, r2 = encoded_effects(report)
         self._effects = {"L2": l2 or self._effects["L2"], "R2": r2 or self._effects["R2"]}
@@ -119,7 +119,7 @@ class _Narrated(SimulatedDualSense):
 
 
 def pulling(time_s: float) -> tuple[float, float, tuple[float, float]]:
-    """The hands at `time_s`: forces on L2 and R2 in N, and the left stick (x, y)."""
+    """Return the hands at `time_s`: forces on L2 and R2 in N, and the left stick (x, y)."""
     turns = time_s / PULL_PERIOD_S
     pull_n = NORMAL_FINGER_FORCE_N * (1.0 - math.cos(2.0 * math.tau * turns)) / 2.0
     stick = (_STICK_RADIUS * math.cos(math.tau * turns), _STICK_RADIUS * math.sin(math.tau * turns))
@@ -127,7 +127,7 @@ def pulling(time_s: float) -> tuple[float, float, tuple[float, float]]:
 
 
 def described(encoded: bytes) -> str:
-    """An effect for people: "Off", "strengths 0 0 0 6 6 6 6 6 6 6", or the bytes of one that feelahead never sends."""
+    """Describe an effect: "Off", "strengths 0 0 0 6 6 6 6 6 6 6", or the bytes of one that feelahead never sends."""
     if (strengths := decode_effect(encoded)) is None:
         return f"another effect, {encoded.hex(' ')}"
     return f"strengths {' '.join(map(str, strengths))}" if any(strengths) else "Off"

@@ -1,1 +1,1 @@
-"""Robot side, operator side and a router between them in containers: what docker/ starts, and what drives it."""
+"""Robot side, operator side and a router between them in containers, with the programs that docker/ starts."""

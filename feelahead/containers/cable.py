@@ -1,4 +1,4 @@
-"""The cable between the two networks: which interface leads where, and what has to be said to the kernel about it."""
+"""Cable between the two networks: the interfaces, and the commands that configure the kernel."""
 
 import ipaddress
 from collections.abc import Iterable, Mapping
@@ -8,38 +8,38 @@ from typing import Any, Final, get_args
 from common.emulation.spec import Direction
 
 PORTS: Final = "5555, 5556"
-"""Control and view."""
+"""Ports of control and view."""
 _SEGMENTING: Final = "tbf rate 2gbit burst {burst} limit 10mb"
-"""Cuts what a sender left to its interface to cut: netem is to see packets as a wire has them."""
+"""Queue that segments what a sender left to the interface: netem must see packets as on a wire."""
 _HEADERS_BYTES: Final = 100
-"""The frame's bytes that the interface's limit does not count."""
+"""Bytes of a frame that the interface's limit does not count."""
 HANDLES: Final[Mapping[Direction, str]] = {direction: f"{n}:" for n, direction in enumerate(get_args(Direction), 2)}
-"""Handles that distinguish the two directions' netem."""
+"""Handles of the two directions' netem."""
 
 
 @dataclass(frozen=True)
 class End:
-    """One of the router's interfaces."""
+    """Interface of the router."""
 
     name: str
     number: int
-    """The kernel's; another one when the interface went and came back."""
+    """The kernel's number; it changes when the interface is removed and added again."""
     address: str
-    """The address with the network's prefix length."""
+    """Address with the network's prefix length."""
     mtu: int = 1500
 
 
 @dataclass(frozen=True)
 class Cable:
-    """The way between the networks, as it is at the moment."""
+    """Present connection between the networks."""
 
     robot: End
     operator: End
     robot_address: str
-    """The robot side's own address."""
+    """Address of the robot side."""
 
     def rules(self) -> str:
-        """For nft, which applies all or nothing: pass the ports on, under our own address, and nothing else."""
+        """Return rules for nft, which applies all or none: forward only the ports, under our address."""
         return f"""
             table ip feelahead
             delete table ip feelahead
@@ -61,14 +61,14 @@ class Cable:
             """
 
     def delays(self, words: Mapping[Direction, str]) -> list[list[str]]:
-        """The commands that delay what leaves towards each side."""
+        """Return the commands that delay the packets to each side."""
         ends: Mapping[Direction, End] = {"to_robot": self.robot, "to_operator": self.operator}
         mtu = max(self.robot.mtu, self.operator.mtu)
         return [line for direction, end in ends.items() for line in delay(end.name, direction, words[direction], mtu)]
 
 
 def delay(interface: str, direction: Direction, words: str, mtu: int = 1500) -> list[list[str]]:
-    """The commands that delay what leaves by an interface: a cutter, and netem behind it."""
+    """Return the commands that delay the packets of an interface: segmentation, then netem."""
     queue = ["tc", "qdisc", "replace", "dev", interface]
     cutter = _SEGMENTING.format(burst=mtu + _HEADERS_BYTES).split()
     netem = ["parent", "1:", "handle", HANDLES[direction], "netem", *words.split()]
@@ -76,7 +76,7 @@ def delay(interface: str, direction: Direction, words: str, mtu: int = 1500) -> 
 
 
 def find_cable(interfaces: Iterable[Mapping[str, Any]], robot_address: str) -> Cable | None:
-    """The cable among what `ip -json address` shows; None unless there is one interface with an address each way."""
+    """Find the cable in the output of `ip -json address`; None unless each side has exactly one interface address."""
     ends: dict[bool, list[End]] = {True: [], False: []}
     for shown in interfaces:
         for held in shown["addr_info"]:

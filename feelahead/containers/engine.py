@@ -1,4 +1,4 @@
-"""Docker and its compose, driven by their commands: either generation of compose, whichever is installed."""
+"""Docker and compose, driven by their commands: either generation of compose."""
 
 import json
 import os
@@ -13,18 +13,18 @@ from common.errors import ConfigurationError, FeelaheadError
 COMPOSE_FILE: Final = Path(__file__).parents[2] / "docker" / "compose.yaml"
 _LIMIT_S: Final = 60.0
 _LAST_WORDS: Final = 3
-"""Lines: compose ends with a summary, below the reason."""
+"""Number of quoted lines: compose ends with a summary, below the reason."""
 
 
 class EngineError(FeelaheadError):
-    """The engine could not do it; the text is what it said."""
+    """A command of the engine failed; the text is the engine's."""
 
 
 class Engine:
-    """One project of compose: containers, networks and volumes under a name of their own."""
+    """Project of compose: containers, networks and volumes under a separate name."""
 
     def __init__(self, project: str, environment: Mapping[str, str] | None = None) -> None:
-        """`environment`: on top of this process's, as DOCKER_HOST; ConfigurationError where there is no engine."""
+        """`environment`: added to this process's, such as DOCKER_HOST. Raises ConfigurationError without an engine."""
         self.project = project
         self._environment = os.environ | dict(environment or {})
         if not COMPOSE_FILE.is_file():
@@ -38,7 +38,7 @@ class Engine:
         self._compose = self._find_compose()
 
     def docker(self, *words: str) -> str:
-        """Run `docker WORDS` and return its output; EngineError when it fails."""
+        """Run `docker WORDS` and return the output; raises EngineError if it fails."""
         return self._run(["docker", *words], self._environment, _LIMIT_S)
 
     def compose(self, *words: str, settings: Mapping[str, str] | None = None, limit_s: float = _LIMIT_S) -> str:
@@ -47,11 +47,11 @@ class Engine:
         return self._run([*self._compose, *project, *words], self._environment | dict(settings or {}), limit_s)
 
     def remove(self) -> None:
-        """End and remove whatever the project has: containers, networks and volumes."""
+        """Stop and remove the project's containers, networks and volumes."""
         self.compose("down", "--volumes", "--timeout", "2")
 
     def container(self, service: str) -> str:
-        """The container of a service; EngineError where it has none."""
+        """Return the container of a service; raises EngineError unless there is exactly one."""
         labels = {"project": self.project, "service": service}
         filters = [
             word for name, value in labels.items() for word in ("--filter", f"label=com.docker.compose.{name}={value}")
@@ -67,19 +67,19 @@ class Engine:
         return dict(known)
 
     def read_json(self, container: str, path: str) -> dict[str, Any]:
-        """A file of JSON out of a container, which need not run."""
+        """Read a file of JSON from a container, which need not run."""
         packed = self.docker("cp", f"{container}:{path}", "-")
-        # A tar of one file, whose text goes from the first brace to the last.
+        # A tar of one file, whose text reaches from the first brace to the last.
         content: dict[str, Any] = json.loads(packed[packed.index("{") : packed.rindex("}") + 1])
         return content
 
     def attached(self, container: str) -> list[str]:
-        """The command that starts a container, shows what it prints, hands signals on and ends with its exit code."""
+        """Return a command that starts a container, shows its output, forwards signals and returns its exit code."""
         return ["docker", "start", "--attach", container]
 
     @property
     def environment(self) -> Mapping[str, str]:
-        """The environment of the engine's commands."""
+        """Environment of the engine's commands."""
         return self._environment
 
     def _find_compose(self) -> list[str]:
@@ -101,7 +101,7 @@ class Engine:
                 timeout=limit_s,
                 check=False,
                 stdin=subprocess.DEVNULL,
-                # Ctrl-C is ours to answer: what was begun, such as removing it all, is to be finished.
+                # Ctrl-C is ours to handle: a command that has begun, such as `down`, must finish.
                 start_new_session=True,
             )
         except (OSError, subprocess.TimeoutExpired) as error:

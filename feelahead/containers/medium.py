@@ -1,4 +1,4 @@
-"""Trials in containers: the sides in networks of their own, and the router's link between them."""
+"""Trials in containers: the sides in separate networks, with the router's link between them."""
 
 import json
 import shlex
@@ -16,19 +16,19 @@ from feelahead.containers.engine import Engine
 from feelahead.containers.netem import Counted, count_packets
 
 PROJECT: Final = "feelahead-latency"
-"""The prefix of the projects' names, one project a link."""
+"""Prefix of the projects' names, one project a link."""
 _BUILD_LIMIT_S: Final = 1500.0
 _SIDES: Final = ("robot", "operator")
 
 
 class ContainerMedium:
-    """Two networks and a router for each link, which stay; both sides again for each trial."""
+    """Medium of trials: two networks and a router are kept for each link; both sides are new for each trial."""
 
     def __init__(self, stack: ExitStack, number: int) -> None:
-        """Build the images where they are not built.
+        """Build the missing images.
 
-        `stack` removes it all at the end; `number`: for names that no other run of ours uses. ConfigurationError where
-        there is no engine, EngineError where an image cannot be built.
+        `stack` removes all containers at the end; `number` makes names unique among our runs. Raises ConfigurationError
+        without an engine, EngineError if an image cannot be built.
         """
         self._stack = stack
         self._number = number
@@ -38,9 +38,9 @@ class ContainerMedium:
         Engine(PROJECT).compose("build", limit_s=_BUILD_LIMIT_S)
 
     def run(self, trial: Trial) -> dict[str, Any]:
-        """Do it in real time; SideFailedError where a side fails, EngineError where the engine does.
+        """Run a trial in real time; raises SideFailedError if a side fails, EngineError if the engine does.
 
-        Where there is no netem for this link, the sides emulate it as on loopback, and standard error says so.
+        If netem cannot emulate this link, the sides emulate it as on loopback, and standard error reports that.
         """
         engine = self._cables.get(trial.link) or self._lay_cable(trial)
         self._trials += 1

@@ -1,4 +1,4 @@
-"""The kernel's netem for a link: which words it gets, and whether it can do what is asked at all."""
+"""Arguments of the kernel's netem for a link, and links that are beyond netem."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -10,16 +10,16 @@ from common.errors import FeelaheadError
 from feelahead.containers.cable import HANDLES
 
 CARRIED: tuple[Literal["haptics", "telemetry"], ...] = ("haptics", "telemetry")
-"""The streams that travel between the sides, over one cable here."""
+"""Streams between the sides, over one cable here."""
 _NOTHING = "delay 0ms"
 
 
 class BeyondNetemError(FeelaheadError):
-    """The link asks for something that the kernel's netem does not do; the text says for what."""
+    """The link asks for something that the kernel's netem cannot do; the text names it."""
 
 
 def netem_words(link: LinkSpec) -> dict[Direction, str]:
-    """Return each direction's arguments of `tc qdisc ... netem`; BeyondNetemError where netem cannot do it.
+    """Return each direction's arguments of `tc qdisc ... netem`; raises BeyondNetemError if netem cannot do it.
 
     netem sees packets, not messages and not streams: both ports of a direction share one cable.
     """
@@ -28,13 +28,13 @@ def netem_words(link: LinkSpec) -> dict[Direction, str]:
 
 @dataclass(frozen=True)
 class Counted:
-    """Packets, since netem was set up."""
+    """Numbers of packets since netem was set up."""
 
     sent: int
     dropped: int
 
     def lost_share_since(self, before: "Counted") -> float | None:
-        """The share lost since `before`; None where nothing came, or netem was set up again."""
+        """Return the share lost since `before`; None if no packet came, or netem was set up again."""
         if self.sent < before.sent or self.dropped < before.dropped:
             return None
         dropped = self.dropped - before.dropped

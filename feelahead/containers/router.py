@@ -1,11 +1,11 @@
-"""The router between the two networks of docker/compose.yaml: `python -m feelahead.containers.router`.
+"""Router between the two networks of docker/compose.yaml: `python -m feelahead.containers.router`.
 
-It passes what arrives at its ports 5555 and 5556 from the operator's network on to the robot side, under its own
-address, so that neither side needs a route or a right of its own; and it applies the link, one netem for each
-direction, to what leaves it. Where the kernel has no netem, or the link asks for more than netem can do, the sides
-emulate the link themselves: they wait for the file `--said`, which has what they are to emulate. The log says which.
+It forwards ports 5555 and 5556 from the operator's network to the robot side, under its own address, so that neither
+side needs a route or a right. It applies the link to outgoing packets, with one netem for each direction. If the
+kernel has no netem, or the link is beyond netem, the sides emulate the link themselves: they wait for the file
+`--said`, which holds the link to emulate. The log reports which.
 
-Containers come and go, and so do addresses and interfaces: it looks twice a second, and sets up again what changed.
+Containers, addresses and interfaces come and go: the router checks twice a second, and sets up again what changed.
 """
 
 import json
@@ -31,33 +31,33 @@ from feelahead.containers.netem import BeyondNetemError, netem_words
 PROGRAM = "feelahead-router"
 _PERIOD_S: Final = 0.5
 _MOST_FAILED: Final = 10
-"""Looks in a row."""
+"""Number of failed checks in a row that end the router."""
 _LIMIT_S: Final = 10.0
 
 
 class CommandFailedError(FeelaheadError):
-    """ip, tc or nft ended with an error; the text is what it said."""
+    """ip, tc or nft ended with an error; the text is the command's."""
 
 
 @dataclass(frozen=True)
 class RouterSettings:
-    """Pass the robot side's ports on from one network to another, over a link that netem emulates."""
+    """Forward the robot side's ports from one network to another, over a link that netem emulates."""
 
     link: Annotated[str, tyro.conf.arg(metavar="NAME|SPEC")] = ""
-    """The link, by name or in netem's words, as for feelahead-robot."""
+    """Link, by name or in netem's words, as for feelahead-robot."""
     robot: Annotated[str, tyro.conf.arg(metavar="HOST")] = "robot-side"
-    """The robot side's name or address in its own network."""
+    """Name or address of the robot side in its network."""
     said: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("/link/emulated")
-    """The file that tells the sides what to emulate themselves: nothing, or the link."""
+    """File for the link that the sides must emulate themselves; empty if netem does."""
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """These settings from a file."""
+    """File with these settings."""
 
     def __post_init__(self) -> None:
         LinkSpec.parse(self.link)
 
 
 def command(arguments: Sequence[str]) -> int:
-    """Route until SIGTERM; an error where the network may not be changed."""
+    """Route until SIGTERM; raises CommandFailedError if the network cannot be changed."""
     router, failed = Router(parse_settings(RouterSettings, PROGRAM, arguments)), 0
     with StopSignal() as stop:
         while not stop.is_set:
@@ -65,7 +65,7 @@ def command(arguments: Sequence[str]) -> int:
                 router.look()
                 failed = 0
             except CommandFailedError as error:
-                # As when a network goes in the middle of it.
+                # For example, a network was removed meanwhile.
                 failed += 1
                 _say(str(error))
                 if failed == _MOST_FAILED:
@@ -75,13 +75,13 @@ def command(arguments: Sequence[str]) -> int:
 
 
 class Router:
-    """The routing and the link, set up again after each change."""
+    """Routing and link, set up again after each change."""
 
     def __init__(self, settings: RouterSettings) -> None:
         self._settings = settings
         self._cable: Cable | None = None
         self._words: Mapping[Direction, str] | None = None
-        """The words for netem; None: the sides emulate the link."""
+        """Arguments for netem; None: the sides emulate the link."""
         try:
             words = netem_words(LinkSpec.parse(settings.link))
             for direction, said in words.items():
@@ -93,8 +93,8 @@ class Router:
             _say(f"NO netem ({reason}): the sides emulate the link themselves: {settings.link!r}")
 
     def look(self) -> None:
-        """Set up again what has changed; CommandFailedError where it may not."""
-        cable = self._find() or self._cable  # a side that is away comes back, most often to the same place
+        """Set up again what has changed; raises CommandFailedError if that fails."""
+        cable = self._find() or self._cable  # an absent side mostly comes back at the same address
         if cable is None:
             return
         if cable != self._cable:
@@ -104,7 +104,7 @@ class Router:
             if self._cable is None:
                 _say(f"{cable.operator.name} to {cable.robot_address} over {cable.robot.name}")
             self._cable = cable
-        if not self._settings.said.exists():  # the service `keys`, which each `up` runs again, takes it away
+        if not self._settings.said.exists():  # the service `keys`, which each `up` runs again, removes it
             with output_file("--said", self._settings.said) as file:
                 file.write("" if self._words is not None else self._settings.link)
 
@@ -117,7 +117,7 @@ class Router:
 
 
 def run_system(words: Sequence[str], given: str | None = None) -> str:
-    """Run a system's command; `given`: its input. CommandFailedError when it fails."""
+    """Run a command of the system with the input `given`; raises CommandFailedError if it fails."""
     try:
         done = subprocess.run(words, input=given, capture_output=True, text=True, timeout=_LIMIT_S, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:

@@ -1,1 +1,1 @@
-"""Recordings computed again, shown, exported, drawn."""
+"""Replay, display, export and plots of recordings."""

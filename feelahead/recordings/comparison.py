@@ -1,4 +1,4 @@
-"""Compare a core's second output with the first: equal bit for bit, or the largest difference."""
+"""Comparison of a core's recomputed output with the recorded one: equal bit for bit, or the largest difference."""
 
 import contextlib
 import math
@@ -22,30 +22,30 @@ _NEEDED: Final = ("settings", "epoch", "clock_domain")
 
 @dataclass
 class Comparison:
-    """One side's comparison."""
+    """Comparison of one side."""
 
     side: str
     counted: str
-    """The name of the things that `made` counts"""
+    """Name of the items that `made` counts"""
     made: int = 0
     equal: int = 0
     others: int = 0
-    """Messages of other kinds, of which `others_equal` were the same"""
+    """Number of other messages, of which `others_equal` were the same"""
     others_equal: int = 0
     worst_eighths: float = 0.0
-    """The largest difference of a strength; infinite where a message is missing or another one"""
+    """Largest difference of a strength; infinite if a message is missing or different otherwise"""
     worst_m: float = 0.0
-    """The largest difference of a distance"""
+    """Largest difference of a distance"""
     notes: list[str] = field(default_factory=list)
     """Notes for people"""
 
     @property
     def within(self) -> bool:
-        """Whether it is what another processor may make of it, or better."""
+        """Whether the differences are at most those between processors."""
         return self.worst_eighths <= WITHIN_EIGHTHS and self.worst_m <= WITHIN_M
 
     def take(self, first: bytes | None, second: bytes | None, told: int | None = None) -> None:
-        """One message as recorded and as made again; None for one that is missing. `told`: kind, for the controller."""
+        """Compare a recorded message with the recomputed one; None if missing. `told`: kind of an entry of FEELS."""
         counts = told is not None or _is_stiffness(first if second is None else second) or self.side == "operator"
         same = first == second
         if counts:
@@ -63,20 +63,20 @@ class Comparison:
         self.worst_m = max(self.worst_m, metres)
 
     def missed(self, made: deque[Any], told: int | None = None) -> None:
-        """Take, and empty, what had not been recorded: messages, or values for the controller."""
+        """Compare, and remove, items that had not been recorded: messages, or values for the controller."""
         while made:
             one = made.popleft()
             self.take(None, one if isinstance(one, bytes) else b"", told)
 
     def lines(self) -> list[str]:
-        """Lines for people."""
+        """Return lines for people."""
         difference = "none"
         if not math.isfinite(self.worst_eighths):
-            difference = "messages that are missing or say something else"
+            difference = "missing or different messages"
         elif self.worst_eighths or self.worst_m or self.equal < self.made:
-            difference = f"{self.worst_eighths:g} of 8 in strength, {self.worst_m:.3g} m in ways"
+            difference = f"{self.worst_eighths:g} of 8 in strength, {self.worst_m:.3g} m in distances"
         lines = [
-            f"{self.side}: {self.made} {self.counted} made again, {self.equal} of them equal bit for bit;"
+            f"{self.side}: {self.made} {self.counted} recomputed, {self.equal} of them equal bit for bit;"
             f" largest difference: {difference}"
         ]
         if self.others:
@@ -85,7 +85,7 @@ class Comparison:
 
 
 def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Iterator[Entry]:
-    """Every entry of a side in order, up to the first gap: a core cannot be made again beyond one."""
+    """Yield a side's entries in order, up to the first gap: a core cannot be replayed beyond."""
     began_s = None
     for expected, message in enumerate(recording.messages([f"/{side}/inputs"])):
         block: Block = unpack_block(message.content)
@@ -104,7 +104,7 @@ def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Itera
 
 
 def differing_origin(recorded: Mapping[str, object], present: Mapping[str, object]) -> list[str]:
-    """Name the origins in which this run differs from the recorded one: then bits may differ."""
+    """Name the differences of origin between this run and the recorded one: with any, bits may differ."""
     notes = []
     for name, here in present.items():
         there = recorded.get(name)
@@ -117,7 +117,7 @@ def differing_origin(recorded: Mapping[str, object], present: Mapping[str, objec
 
 
 def require_side(recording: Recording, side: str) -> Mapping[str, Any]:
-    """The header of a side; ConfigurationError where it was not recorded."""
+    """Return the header of a side; raises ConfigurationError if the side was not recorded."""
     if side not in recording.headers:
         raise ConfigurationError(
             f"{recording.path}: the {side} side was not recorded; valid: {', '.join(recording.headers)}"
@@ -136,7 +136,7 @@ def _is_stiffness(payload: bytes | None) -> bool:
 
 
 def _difference(first: bytes, second: bytes, told: int | None) -> tuple[float, float]:
-    """Eighths of strength and metres; infinite eighths where more differs than these."""
+    """Return the difference in eighths of strength and in metres; infinite eighths if anything else differs."""
     with contextlib.suppress(RemoteProtocolError):
         if told is not None:
             return _feel_difference(recorded_feel(told, first), recorded_feel(told, second))

@@ -1,4 +1,4 @@
-"""A recording as one episode of a LeRobot dataset, v3.0, for learning from demonstrations.
+"""Export of a recording as one episode of a LeRobot dataset, v3.0, for learning from demonstrations.
 
 data/chunk-000/file-000.parquet            one row a frame, pictures as encoded bytes
 meta/info.json, stats.json, tasks.parquet
@@ -27,7 +27,7 @@ _TASK: Final = "reach the target, grasp it, lift it and set it down"
 _STRENGTHS: Final = 8
 _ZONES: Final = 10
 _SAMPLED_PICTURES: Final = 20
-"""The number of pictures in the statistics."""
+"""Largest number of pictures, roughly, in the statistics."""
 _ENLARGED_QUALITY: Final = 90
 _ACTION: Final = {
     "l2": "command.l2",
@@ -41,15 +41,15 @@ _ACTION: Final = {
 
 
 class Picture(NamedTuple):
-    """One of a camera's."""
+    """Picture of a camera."""
 
     time_s: float
-    """Since the recording began"""
+    """Time since the recording began"""
     jpeg: bytes
 
 
 def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
-    """Write the dataset; how many frames. ConfigurationError for a recording without an arm or commands."""
+    """Write the dataset; return the number of frames. Raises ConfigurationError without an arm or commands."""
     import pyarrow  # noqa: PLC0415
     from pyarrow import parquet  # noqa: PLC0415
 
@@ -64,7 +64,7 @@ def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
     stats: dict[str, Any] = {}
     for name, parts in vectors.items():
         values = np.stack([joined.numbers(column)[first:] for column in parts.values()], axis=1).astype(np.float32)
-        # A value that comes and goes, as a field does, keeps its last one: the format knows no gaps.
+        # A value with gaps, such as a field, keeps the last one: the format has no gaps.
         values = _held(values)
         features[name] = {"dtype": "float32", "shape": [len(parts)], "names": list(parts)}
         columns[name] = pyarrow.FixedSizeListArray.from_arrays(pyarrow.array(values.ravel()), len(parts))
@@ -102,14 +102,14 @@ def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
 
 
 def pictures(recording: Recording, view: str) -> list[Picture]:
-    """All that a camera took, in order."""
+    """Return a camera's pictures, in order."""
     first_ns = recording.began_ns()
     messages = recording.messages([f"/camera/{view}"])
     return [Picture(1e-9 * (message.log_ns - first_ns), read_image(message.content).jpeg) for message in messages]
 
 
 def _of_one_size(shown: list[Picture]) -> tuple[list[Picture], tuple[int, int]]:
-    """Enlarge what a narrow link made smaller: the format knows one size; with that size, width and height."""
+    """Enlarge pictures that a narrow link made smaller, as the format has one size; return them and (width, height)."""
     from PIL import Image  # noqa: PLC0415
 
     opened = [Image.open(io.BytesIO(picture.jpeg)) for picture in shown]
@@ -126,7 +126,7 @@ def _of_one_size(shown: list[Picture]) -> tuple[list[Picture], tuple[int, int]]:
 
 
 def _vectors(joined: Table) -> dict[str, dict[str, str]]:
-    """Each feature's parts by name, with their columns."""
+    """Return each feature's parts by name, with their columns."""
     joints = [column for column in joined.columns() if column.startswith("arm.position_rad.")]
     if not joints or "command.r2" not in joined.columns():
         raise ConfigurationError("--format lerobot: no arm or no commands in it; valid: a recording of the demo")
@@ -153,7 +153,7 @@ def _vectors(joined: Table) -> dict[str, dict[str, str]]:
 
 
 def _first_whole_row(vectors: Mapping[str, Mapping[str, str]], seen: Mapping[str, list[Picture]], joined: Table) -> int:
-    """Find the first row that has every column which the format requires."""
+    """Return the first row that has every required column."""
     needed = [*vectors["observation.state"].values(), *vectors["action"].values()]
     if "observation.stiffness" in vectors:
         needed += vectors["observation.stiffness"].values()
@@ -166,7 +166,7 @@ def _first_whole_row(vectors: Mapping[str, Mapping[str, str]], seen: Mapping[str
 
 
 def _held(values: Any) -> Any:
-    """Fill each gap with what was before it, and what was never there with 0."""
+    """Fill each gap with the last value before it, or 0 for none."""
     filled = values.copy()
     rows = np.where(np.isfinite(filled), np.arange(len(filled))[:, None], -1)
     newest = np.maximum.accumulate(rows, axis=0)
@@ -186,7 +186,7 @@ def _statistics(values: FloatArray) -> dict[str, Any]:
 
 
 def _picture_statistics(shown: list[Picture]) -> dict[str, Any]:
-    """Statistics of each colour, 0 to 1, (3, 1, 1)."""
+    """Return statistics of each colour, 0 to 1, (3, 1, 1)."""
     from PIL import Image  # noqa: PLC0415
 
     step = max(1, len(shown) // _SAMPLED_PICTURES)
@@ -198,7 +198,7 @@ def _picture_statistics(shown: list[Picture]) -> dict[str, Any]:
 
 
 def _hint(feature: Mapping[str, Any]) -> dict[str, Any]:
-    """The `datasets` library's description of a column."""
+    """Return the `datasets` library's description of a column."""
     if feature["dtype"] == "image":
         return {"_type": "Image"}
     if feature["shape"] == [1]:
@@ -208,7 +208,7 @@ def _hint(feature: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _tasks(pyarrow: Any) -> Any:
-    """The tasks' texts are the index of a data frame, as the format's own reader takes them."""
+    """Return the table of tasks; the texts are the index of a data frame, as the format's reader expects."""
     table = pyarrow.table({"task_index": np.zeros(1, dtype=np.int64), "task": [_TASK]})
     frame = {
         "index_columns": ["task"],

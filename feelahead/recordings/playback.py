@@ -1,4 +1,4 @@
-"""A recording that is played: the facts and views that people saw, in order, at any speed and from any moment."""
+"""Playback of a recording: the facts and views that people saw, in order, at any speed and from any moment."""
 
 from collections.abc import Iterable, Iterator
 from itertools import chain
@@ -25,19 +25,19 @@ _TOPICS: Final = (_ROBOT, _FACTS, "/view", "/camera/overview", "/camera/first_pe
 
 
 class Seen(NamedTuple):
-    """One thing for the console."""
+    """Item for the console."""
 
     time_s: float
     """Since the recording began"""
     kind: bytes
     """FACTS: OperatorFacts as JSON. VIEW: a view payload. ROBOT: the robot side's status as JSON."""
     name: str
-    """The name: the newest of each replaces all earlier ones"""
+    """Name; the newest item of a name replaces earlier ones"""
     content: bytes
 
 
 def require_protocol(recording: Recording) -> None:
-    """Raise a ConfigurationError where the first message that a side sent is of another protocol than ours."""
+    """Raise ConfigurationError if the first message sent is of another protocol version."""
     for message in recording.messages([f"/{side}/inputs" for side in recording.headers]):
         for entry in unpack_block(message.content).unpacked():
             if entry.kind == Kind.SENT:
@@ -49,7 +49,7 @@ def require_protocol(recording: Recording) -> None:
 
 
 def require_statuses(recording: Recording) -> None:
-    """Raise a ConfigurationError where a side's first status is of a release that said other things."""
+    """Raise ConfigurationError if a side's first status is of a release with other fields."""
     for topic, struct in ((_FACTS, OperatorFacts), (_ROBOT, RobotStatus)):
         for message in recording.messages((topic,)):
             try:
@@ -61,7 +61,7 @@ def require_statuses(recording: Recording) -> None:
 
 
 def seen(recording: Recording) -> Iterator[Seen]:
-    """All that can be shown, in order; pictures are put back into their payloads."""
+    """Yield all items that can be shown, in order; pictures are put back into their payloads."""
     began_ns = recording.began_ns()
     pictures: dict[tuple[str, int], bytes] = {}
     for message in recording.messages(_TOPICS):
@@ -92,7 +92,7 @@ FASTEST: Final = 1000.0
 
 
 class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A person's wish; None: no change."""
+    """Wish of a person; None: no change."""
 
     paused: bool | None = None
     speed: float | None = None
@@ -100,20 +100,20 @@ class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Playback:
-    """Begins at the first moment, paused."""
+    """Playback; begins at the first moment, paused."""
 
     def __init__(self, recording: Recording, speed: float = 1.0) -> None:
         self.at_s = 0.0
-        """Since the recording began"""
+        """Position, counted from the recording's begin"""
         self.length_s = recording.length_s()
         self.speed = speed
-        """The playing speed, 1 being the recorded one"""
+        """Playing speed; 1 is the recorded one"""
         self.paused = True
         self._recording = recording
         self._coming = seen(recording)
         self._jumped: list[Seen] = []
         self._newest: dict[str, Seen] = {}
-        """The things on show, by name"""
+        """Items on show, by name"""
 
     @property
     def over(self) -> bool:
@@ -121,7 +121,7 @@ class Playback:
         return self.at_s >= self.length_s
 
     def wish(self, content: Any) -> None:
-        """Do what a page says; what is no Wish, or out of range, is passed over."""
+        """Apply a page's wish; ignore an invalid one and values out of range."""
         try:
             wish = msgspec.convert(content, Wish)
         except msgspec.ValidationError:
@@ -136,7 +136,7 @@ class Playback:
             self.paused = wish.paused
 
     def advance(self, passed_s: float) -> list[Seen]:
-        """Advance by `passed_s` seconds; return what is due. After a jump that is the newest of each name."""
+        """Advance by `passed_s` seconds; return the due items. After a jump these are the newest of each name."""
         due, self._jumped = self._jumped, []
         if not self.paused:
             self.at_s = min(self.at_s + self.speed * passed_s, self.length_s)
@@ -146,11 +146,11 @@ class Playback:
         return due
 
     def show_again(self) -> None:
-        """Give the present moment once more with the next step: somebody came to look who has not seen it."""
+        """Return the present items again at the next step, for a new viewer."""
         self._jumped = _newest((*self._newest.values(), *self._jumped))
 
     def state(self) -> dict[str, Any]:
-        """The state for the page."""
+        """Return the state for the page."""
         return {"at_s": self.at_s, "length_s": self.length_s, "speed": self.speed, "paused": self.paused}
 
     def _jump(self, to_s: float) -> None:

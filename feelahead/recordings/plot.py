@@ -1,4 +1,4 @@
-"""A run on one page: what lay ahead, what the fingers did and felt, and what the link did, over one time axis."""
+"""Plot of a run on one page: onset distances, travel and strengths, and delays, over one time axis."""
 
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -15,7 +15,7 @@ from feelahead.recordings.tables import Table, Tables
 PLOT_HZ: Final = 100.0
 _INCHES: Final = (8.27, 11.69)
 _BLUE, _ORANGE, _GREEN, _PURPLE, _GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#666666"
-"""Told apart by eyes that do not tell red from green."""
+"""Colours that remain distinct with red-green blindness."""
 _STATES: Final = {"armed": "#DDEEDD", "stopped": "#F6D5CC", "disarmed": "#EEEEEE"}
 _FULL: Final = 8.0
 _HEIGHTS: Final = (1.3, 1.1, 1.1, 1.0, 1.0, 1.0, 1.0)
@@ -28,7 +28,7 @@ _SIDES: Final = (("r2", "R2 (advances)", _ORANGE), ("l2", "L2 (retreats)", _BLUE
 
 
 def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
-    """Draw it into `out`, PNG, SVG or PDF by its ending."""
+    """Draw the page into `out`, PNG, SVG or PDF by the ending."""
     import matplotlib as mpl  # noqa: PLC0415
 
     mpl.use("Agg")
@@ -74,7 +74,7 @@ def _title(recording: Recording, tables: Tables) -> str:
 
 
 def _bands(axis: Any, joined: Table, times_s: FloatArray) -> None:
-    """The states as colours behind everything."""
+    """Draw the states as coloured bands in the background."""
     states = [row.get("stiffness.state") or row.get("telemetry.state") for row in joined.rows]
     begins = [0, *(i for i in range(1, len(states)) if states[i] != states[i - 1]), len(states)]
     for start, end in pairwise(begins):
@@ -93,7 +93,7 @@ def _ways(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
         delta = 1e3 * joined.numbers(f"stiffness.{side}.displacement_m")
         axis.plot(times_s, delta, color=color, lw=0.7, ls=":", label=f"δ of {side.upper()}")
     axis.axhline(0.0, color=_GREY, lw=0.5)
-    axis.set(ylabel="way (mm)", title="Free ways until strengths are due; nothing drawn beyond the horizon")
+    axis.set(ylabel="distance (mm)", title="Onset distances of the strengths; nothing drawn beyond the horizon")
 
 
 def _felt(side: str, name: str) -> Callable[[Any, Any, Table, FloatArray], None]:
@@ -104,7 +104,7 @@ def _felt(side: str, name: str) -> Callable[[Any, Any, Table, FloatArray], None]
         extent = 0.0, end_s, 0.0, 1.0
         shown = axis.imshow(np.where(zones > 0, zones, np.nan), aspect="auto", origin="lower", extent=extent, **look)
         travel = joined.numbers(f"controller.{side}_raw")
-        # Seen on light and on dark.
+        # Visible on light and on dark.
         axis.plot(times_s, travel, color="white", lw=2.4)
         axis.plot(times_s, travel, color="black", lw=1.0)
         title = f"{name}: the finger's travel, and the strength of its tenths as written to the controller"
@@ -116,7 +116,7 @@ def _felt(side: str, name: str) -> Callable[[Any, Any, Table, FloatArray], None]
 
 
 def _curves(axis: Any, joined: Table, times_s: FloatArray, *curves: tuple[str, float, str, str]) -> None:
-    """Draw columns, each with its factor, colour and label; one that a recording does not have is left out."""
+    """Draw columns, each with factor, colour and label; missing columns are left out."""
     for column, factor, color, label in curves:
         values = factor * joined.numbers(column)
         if np.isfinite(values).any():
@@ -151,7 +151,7 @@ def _enlargement(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
     other.set(ylim=(0.0, 1.05), ylabel="s(δ)")
     handles, labels = axis.get_legend_handles_labels()
     more, names = other.get_legend_handles_labels()
-    # Of the upper one of the two, else its curves would run through the words; before it is armed there are none.
+    # The upper axes draw the legend, else curves would cross it; before arming there are no strengths.
     other.legend([*handles, *more], [*labels, *names], loc="upper left", ncols=2)
 
 
@@ -170,12 +170,12 @@ def _delays(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
         ("ages.command_ms", 1.0, _ORANGE, "command that moves the arm"),
         ("ages.field_ms", 1.0, _BLUE, "field that is felt"),
         ("ages.frame_ms", 1.0, _GREEN, "camera frame"),
-        ("robot_status.loop_age_ms", 1.0, "black", "loop age that is reckoned with"),
+        ("robot_status.loop_age_ms", 1.0, "black", "loop age that the law assumes"),
     )
-    # From the worst case that is reckoned with at first one sees nothing.
+    # The worst case, which is assumed at first, would hide all else.
     armed = np.array([row.get("stiffness.state") == "armed" for row in joined.rows], dtype=bool)
     settled = joined.numbers("robot_status.loop_age_ms")[armed]
     if np.isfinite(settled).any():
         axis.set_ylim(top=2.0 * float(np.nanmedian(settled)) + 10.0)
     axis.set_ylim(bottom=0.0)
-    axis.set(ylabel="age (ms)", title="How old what is used is")
+    axis.set(ylabel="age (ms)", title="Ages of the data in use")

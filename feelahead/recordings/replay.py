@@ -1,4 +1,4 @@
-"""The cores once more, with the inputs that were recorded: the same stiffness bit for bit, or by how much not."""
+"""Replay of the cores with the recorded inputs: the same stiffness bit for bit, or the difference."""
 
 import contextlib
 from collections import deque
@@ -31,7 +31,7 @@ from robot_side.surroundings.perceived import PerceivedObjects
 
 
 class _Given(Arm):
-    """An Arm and an ObjectSource that give what was recorded; what they are told goes nowhere."""
+    """Arm and ObjectSource that return recorded values and ignore commands."""
 
     joint_count = 0
 
@@ -41,35 +41,35 @@ class _Given(Arm):
         self.newest_frame: PerceivedObjects | None = None
 
     def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
-        """Nothing moves."""
+        """Do nothing."""
 
     def command_gripper(self, closing: float, valid_until_s: float) -> None:
-        """Nothing moves."""
+        """Do nothing."""
 
     def state(self, now_s: float) -> ArmState:
-        """Return the recorded one."""
+        """Return the recorded state."""
         if self.newest_state is None:
             raise ConfigurationError(f"no state of the arm was recorded before {now_s}")
         return self.newest_state
 
     def perceive(self, now_s: float) -> PerceivedObjects:
-        """Return the recorded one."""
+        """Return the recorded frame."""
         if self.newest_frame is None:
             raise ConfigurationError(f"no frame was recorded before {now_s}")
         return self.newest_frame
 
     def set_role(self, name: str, role: Role) -> None:
-        """The frames that were recorded have it."""
+        """Do nothing: the recorded frames contain the roles."""
 
 
 def replay_robot(recording: Recording) -> Comparison:
-    """Make every stiffness message of the robot side again; ConfigurationError where it was not recorded."""
+    """Recompute the robot side's stiffness messages; raises ConfigurationError if the side was not recorded."""
     header = require_side(recording, "robot")
     settings = settings_from(header["settings"], RobotSettings)
     parts = build_parts(settings, header["epoch"], header["clock_domain"])
     given = _Given(parts.arm.joint_count)
     frames = FrameUnpacker(parts.camera.perceive(0.0))
-    # Nobody observes what is true: nothing moves in the simulation.
+    # No truth is observed: nothing moves in the simulation.
     core = RobotSide(replace(parts, arm=given, camera=given, truth=None))
     compared, recorded = Comparison("robot", "stiffness messages"), _by_last_names(header.get("kernels", {}))
     if not recorded.keys() <= _by_last_names(kernel_digests()).keys():
@@ -79,7 +79,7 @@ def replay_robot(recording: Recording) -> Comparison:
     if gone := [name for name in recorded if name not in here]:
         raise ConfigurationError(
             f"recorded by an older version, with {len(gone)} kernels that are gone, such as {gone[0]}: its robot side"
-            " cannot be computed anew; valid: feelahead replay without --check, export and plot"
+            " cannot be replayed; valid: feelahead replay without --check, export and plot"
         )
     kernels = {name: here.get(name) for name in recorded}
     origin = {"processor": processor_name(), "kernels": kernels}
@@ -105,7 +105,7 @@ def replay_robot(recording: Recording) -> Comparison:
 
 
 def _by_last_names(digests: Mapping[str, str]) -> dict[str, str]:
-    """Kernels by file and function: one that only moved to another room is the same."""
+    """Return kernels by file and function: one that only moved to another package is the same."""
     return {".".join(name.split(".")[-2:]): digest for name, digest in digests.items()}
 
 
@@ -119,13 +119,13 @@ _INPUTS: Final[Mapping[int, Callable[[OperatorSide, bytes, float], object]]] = {
     Kind.STOPPED: lambda core, _, now_s: core.press_stop(now_s),
     Kind.TUNED: lambda core, content, now_s: core.tune(**msgspec.json.decode(content), now_s=now_s),
 }
-"""Inputs of the operator side's core, by the kind of entry."""
+"""Inputs of the operator side's core, by kind of entry."""
 
 
 def replay_operator(recording: Recording) -> Comparison:
-    """Make every motion command, and all that the controller was told, again.
+    """Recompute the motion commands and all feel for the controller.
 
-    ConfigurationError where the side was not recorded.
+    Raises ConfigurationError if the side was not recorded.
     """
     header = require_side(recording, "operator")
     settings = settings_from(header["settings"], OperatorSettings)
@@ -138,7 +138,7 @@ def replay_operator(recording: Recording) -> Comparison:
         if (give := _INPUTS.get(entry.kind)) is not None:
             give(core, content, now_s)
         elif entry.kind in STATES:
-            with contextlib.suppress(RemoteProtocolError):  # as the core passed over what a controller garbled
+            with contextlib.suppress(RemoteProtocolError):  # the core ignored invalid reports, too
                 core.read_state(recorded_state(entry.kind, content), now_s)
         elif entry.kind in FEELS:
             compared.take(content, as_recorded(entry.kind, told.popleft()) if told else None, entry.kind)

@@ -1,7 +1,7 @@
-"""A recording as tables: one for each thing that was kept, at its own rate, and one of all of them joined.
+"""Tables of a recording: one for each topic or kind of input, at the original rate, and one with all joined.
 
-A researcher wants both, as CSV or Parquet too: rates and stamps as they were, to compute delays from; and one table on
-one clock, to load and plot in a line. The joined one holds at each moment the newest of everything.
+Researchers want both, also as CSV or Parquet: original rates and stamps, to compute delays; and one table on one
+clock, to load and plot in a line. The joined one holds the newest of everything at each moment.
 """
 
 import csv
@@ -37,52 +37,52 @@ _JOINED: Final = (
 
 @dataclass
 class Table:
-    """Rows in order of time; every row has every column, with None where there was nothing."""
+    """Rows in order of time; a missing column of a row counts as None."""
 
     times_s: list[float] = field(default_factory=list)
-    """Since the recording began"""
+    """Times since the recording began"""
     rows: list[dict[str, Any]] = field(default_factory=list)
 
     def add(self, time_s: float, row: dict[str, Any]) -> None:
-        """One row."""
+        """Append a row."""
         self.times_s.append(time_s)
         self.rows.append(row)
 
     def columns(self) -> list[str]:
-        """Every name that any row has, in the order in which they came up."""
+        """Return the names of all rows' columns, in order of first use."""
         return list(dict.fromkeys(name for row in self.rows for name in row))
 
     def numbers(self, name: str) -> FloatArray:
-        """One column as numbers, NaN where there are none."""
+        """Return a column as numbers, NaN for all else."""
         values = [row.get(name) for row in self.rows]
         return np.array([value if isinstance(value, int | float) else np.nan for value in values], dtype=np.float64)
 
     def sorted(self) -> "Table":
-        """Sort by time: two sides' messages arrive slightly out of order."""
+        """Return the table sorted by time: two sides' messages arrive slightly out of order."""
         order = np.argsort(np.array(self.times_s), kind="stable")
         return Table([self.times_s[i] for i in order], [self.rows[i] for i in order])
 
     def before(self, times_s: FloatArray) -> list[dict[str, Any]]:
-        """The newest row at each time; empty before the first."""
+        """Return the newest row at each time; empty before the first."""
         found = np.searchsorted(np.array(self.times_s), times_s + 1e-9, side="right") - 1
         return [self.rows[index] if index >= 0 else {} for index in found]
 
 
 @dataclass
 class Tables:
-    """All of a recording, but its pictures."""
+    """Tables of a recording, without pictures and scenes."""
 
     began_s: float
-    """The recording's start on the wall clock"""
+    """Start of the recording on the wall clock"""
     duration_s: float
     by_name: Mapping[str, Table]
 
     def table(self, name: str) -> Table:
-        """One of them; an empty one where there is none."""
+        """Return the table of that name; an empty one for none."""
         return self.by_name.get(name) or Table()
 
     def joined(self, rate_hz: float = JOINED_HZ) -> Table:
-        """One table at an even rate: at each moment the newest of everything, as someone looking then would see."""
+        """Return one table at an even rate, with the newest of everything at each moment."""
         times_s = np.arange(0.0, self.duration_s, 1.0 / rate_hz)
         rows: list[dict[str, Any]] = [{} for _ in times_s]
         for name in _JOINED:
@@ -97,7 +97,7 @@ class Tables:
 
 
 def read_tables(recording: Recording) -> Tables:
-    """Read everything but pictures and scenes."""
+    """Read all but pictures and scenes."""
     tables: dict[str, Table] = {}
     first_ns = last_ns = recording.began_ns()
     zones: dict[str, tuple[float, ...]] = {"l2": _NO_ZONES, "r2": _NO_ZONES}
@@ -111,7 +111,7 @@ def read_tables(recording: Recording) -> Tables:
             continue
         block = unpack_block(message.content)
         for entry in block.unpacked():
-            # A block is stamped with its begin.
+            # A block is stamped with the time of its first entry.
             if (found := _row(entry, zones)) is not None:
                 tables.setdefault(found[0], Table()).add(time_s + entry.now_s - block.first_s, found[1])
     sorted_tables = {name: table.sorted() for name, table in sorted(tables.items())}
@@ -120,7 +120,7 @@ def read_tables(recording: Recording) -> Tables:
 
 
 def _row(entry: Entry, zones: dict[str, tuple[float, ...]]) -> tuple[str, dict[str, Any]] | None:
-    """The table and the row that an input makes; None for one that other topics tell of."""
+    """Return the table and the row of an input; None for inputs that other topics contain."""
     try:
         if entry.kind == Kind.STATE:
             state = unpack_state(entry.content)
@@ -143,7 +143,7 @@ def _row(entry: Entry, zones: dict[str, tuple[float, ...]]) -> tuple[str, dict[s
 
 
 def _flat(values: Any, name: str = "") -> Iterator[tuple[str, Any]]:
-    """`{"l2": {"fast_m": [1, 2]}}` as `l2.fast_m.0`, `l2.fast_m.1`; overlaps by their objects' names."""
+    """Flatten `{"l2": {"fast_m": [1, 2]}}` to `l2.fast_m.0`, `l2.fast_m.1`; overlaps by their objects' names."""
     if isinstance(values, dict):
         if "object" in values:
             thing = values["object"]
@@ -162,7 +162,7 @@ JOINED: Final = "joined"
 
 
 def export_csv(tables: Tables, folder: Path) -> list[str]:
-    """Write the tables; the files' names. What is not there is an empty field."""
+    """Write the tables; return the files' names. Missing values are empty fields."""
     written = []
     for name, table in _all(tables):
         columns = table.columns()
@@ -176,7 +176,7 @@ def export_csv(tables: Tables, folder: Path) -> list[str]:
 
 
 def export_parquet(tables: Tables, folder: Path) -> list[str]:
-    """Write the tables; the files' names. What is not there is null."""
+    """Write the tables; return the files' names. Missing values are null."""
     import pyarrow  # noqa: PLC0415
     from pyarrow import parquet  # noqa: PLC0415
 
@@ -200,7 +200,7 @@ def _text(value: Any) -> Any:
 
 
 def _one_kind(values: list[Any]) -> list[Any]:
-    """Numbers as floats, and everything as text where there is any text: a column has one type."""
+    """Convert a column to one type: numbers to floats, or all to text if there is any text."""
     kinds = {type(value) for value in values if value is not None}
     if kinds <= {bool} or kinds <= {int} or kinds <= {str}:
         return values

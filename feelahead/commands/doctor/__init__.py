@@ -1,1 +1,1 @@
-"""`feelahead doctor`: what is missing on this machine, and the command that mends it."""
+"""`feelahead doctor`: checks of this machine and of the path to a robot side."""

@@ -1,4 +1,4 @@
-"""`feelahead doctor`: what is missing on this machine or on the way to a robot side, and what mends it."""
+"""`feelahead doctor`: find what is missing on this machine or wrong on the path to a robot side."""
 
 import dataclasses
 import json
@@ -28,19 +28,19 @@ _WIDTH_WITHOUT_TERMINAL: Final = 120
 
 @dataclass(frozen=True)
 class DoctorSettings:
-    """Say what is missing on this machine, and the command that mends it.
+    """Report what is missing on this machine, and the command that mends it.
 
-    Ends with code 0 when everything is there that `feelahead demo` needs, else with 1. "note" is what works
-    without, "missing" is what does not work as it is.
+    Ends with code 0 if all that `feelahead demo` needs is present, else with 1. "note": optional, works without.
+    "missing": does not work as it is.
 
-    With --connect: look at the way from here to a robot side instead. Code 1: the first thing that is wrong with it
-    and what mends it. Code 0: how long a round trip takes, and whether somebody has the arm. Then the path is measured
-    for five seconds: delay, queue, losses, and what will work on it (the arm, one view, both). For that the doctor
-    observes, or holds a free arm, disarmed. The person who drives notices nothing. Wall clocks do not matter.
+    With --connect: check the path to a robot side instead. Code 1: the first fault and its remedy. Code 0: the round
+    trip, and whether somebody has the arm. Then the path is measured for five seconds: delay, queue, losses, and what
+    will work on it (the arm, one view, both). For that the doctor observes, or holds a free arm, disarmed. The person
+    who drives notices nothing. Wall clocks do not matter.
 
-    With --compile: compile all that any scene may need, for this machine's processor, instead of at the first start:
-    about half a minute on two processors. It is kept in $NUMBA_CACHE_DIR, else ~/.cache/feelahead/kernels; what is
-    there already stays. Code 1 where it cannot be kept.
+    With --compile: compile the kernels of all scenes for this machine's processor, instead of at the first start: about
+    half a minute on two processors. They are kept in $NUMBA_CACHE_DIR, else ~/.cache/feelahead/kernels; existing ones
+    stay. Code 1 if they cannot be kept.
     """
 
     json: bool = False
@@ -48,15 +48,15 @@ class DoctorSettings:
     compile: bool = False
     """Compile the robot side's kernels now."""
     connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """Look at the way to a robot side that should listen there."""
+    """Check the path to a robot side at this address."""
     path: bool = True
     """With --connect: measure the path for five seconds, too."""
     view_connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """The robot side's view port; the port after the control port unless given."""
+    """View port of the robot side; by default the port after the control port."""
     keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """The folder with the operator's key, like feelahead-operator's."""
+    """Folder with the operator's key, like feelahead-operator's."""
     robot_key: Annotated[str | None, tyro.conf.arg(metavar="KEY|FILE")] = None
-    """The robot side's public key; needs --keys."""
+    """Public key of the robot side; needs --keys."""
 
     def __post_init__(self) -> None:
         for name in ("view_connect", "keys", "robot_key"):
@@ -69,7 +69,7 @@ class DoctorSettings:
 
 
 def doctor(arguments: Sequence[str]) -> int:
-    """Look, judge and tell."""
+    """Run the checks and print the result."""
     settings = parse_settings(DoctorSettings, "feelahead doctor", arguments)
     if settings.connect is not None:
         return _look_along(settings, settings.connect)
@@ -101,7 +101,7 @@ def _look_along(settings: DoctorSettings, connect: str) -> int:
 
 
 def examine() -> list[Finding]:
-    """Every check of this machine, in the order of the table."""
+    """Run every check of this machine, in the order of the table."""
     seen = controllers.controllers_seen()
     rules, is_root = controllers.udev_rules(), hasattr(os, "geteuid") and os.geteuid() == 0
     return [
@@ -116,11 +116,11 @@ def examine() -> list[Finding]:
 
 
 def show(findings: list[Finding], console: Console) -> None:
-    """A table, and below it what to do, unwrapped so that it can be copied."""
+    """Print a table, and below it the remedies, unwrapped so that they can be copied."""
     table = Table(title="feelahead doctor")
     table.add_column("what")
     table.add_column("")
-    table.add_column("how it stands", overflow="fold")
+    table.add_column("state", overflow="fold")
     for finding in findings:
         table.add_row(finding.name, Text(finding.verdict.value, _COLOURS[finding.verdict]), Text(finding.said))
     console.print(table)

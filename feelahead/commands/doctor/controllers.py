@@ -20,7 +20,7 @@ _NAME: Final = "controller"
 
 
 def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Sequence[Finding]) -> Finding:
-    """Whether a controller may be opened: found to be so, or by udev's rules (`rules`: file -> text)."""
+    """Check whether a controller may be opened: by trial, or by udev's rules (`rules`: file -> text)."""
     name = "udev rule"
     if sys.platform != "linux":
         return Finding(name, Verdict.OK, f"not needed on {sys.platform}")
@@ -30,7 +30,7 @@ def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Se
         return Finding(name, Verdict.OK, "there, for USB and Bluetooth")
     remedy = installing_command()
     if is_root:
-        return Finding(name, Verdict.OK, "not needed by root, who you are; what is below is for everybody else", remedy)
+        return Finding(name, Verdict.OK, "not needed by root, as you are; the command below is for other users", remedy)
     denied = any("no permission" in seen.said for seen in controllers)
     opened = f"lets you open {', '.join(missing)}; plug the controller in again after it"
     verdict = Verdict.MISSING if denied else Verdict.NOTE
@@ -38,7 +38,7 @@ def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Se
 
 
 def missing_grants(rules: Mapping[str, str]) -> list[str]:
-    """The models and transports that no rule in these files opens to the person at the machine."""
+    """Return the models and transports that no rule in these files opens to the person at the machine."""
     lines = [line for text in rules.values() for line in text.splitlines() if not line.lstrip().startswith("#")]
     granting = "\n".join(line for line in lines if "hidraw" in line and re.search(r'uaccess|MODE\s*:?=\s*"066', line))
     wanted = {
@@ -53,7 +53,7 @@ def missing_grants(rules: Mapping[str, str]) -> list[str]:
 
 
 def controllers_seen() -> list[Finding]:
-    """Every controller that is connected, opened for a moment, or why there is none."""
+    """Open each connected controller for a moment; return a finding each, or why there is none."""
     try:
         backend = load_backend()
     except NoDriverError as error:
@@ -65,7 +65,7 @@ def controllers_seen() -> list[Finding]:
 
 
 def udev_rules() -> dict[str, str]:
-    """The text of each file of udev's rules."""
+    """Read the readable files of udev's rules: text by path."""
     paths = [path for folder in RULE_FOLDERS for path in sorted(Path(folder).glob("*.rules"))]
     return {str(path): path.read_text(encoding="utf-8", errors="replace") for path in paths if os.access(path, os.R_OK)}
 

@@ -1,31 +1,31 @@
-"""The outcome of a check."""
+"""Outcome of a check."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class Verdict(StrEnum):
-    """A verdict."""
+    """Verdict of a check."""
 
     OK = "ok"
     NOTE = "note"
-    """Works without; something is better, or possible, with it."""
+    """Optional: something is better, or possible, with it."""
     MISSING = "missing"
-    """The thing that was checked does not work."""
+    """The checked thing does not work."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One check's outcome."""
+    """Outcome of one check."""
 
     name: str
     verdict: Verdict
     said: str
-    """The finding in one line."""
+    """Finding in one line."""
     remedy: str | None = None
-    """The command or change that mends it; None where there is nothing to do."""
+    """Command or change that mends it; None if nothing is to do."""
 
 
 def fit_for_demo(findings: list[Finding]) -> bool:
-    """Whether everything is there that the demo needs: one extra."""
+    """Return whether the demo can run: it needs one extra."""
     return not any(finding.name == "extra robot" and finding.verdict is Verdict.MISSING for finding in findings)

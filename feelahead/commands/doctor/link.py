@@ -1,7 +1,7 @@
-"""Look at the way to a robot side, no farther than to the first thing that is wrong with it.
+"""Check of the path to a robot side, up to the first fault.
 
 Harmless to the person who drives: two connections to each port, one after the other, and questions that the robot side
-answers without letting anybody in. A Hello would ask for the arm, so none is sent.
+answers without admitting anybody. A Hello would request the arm, so that none is sent.
 """
 
 import secrets
@@ -28,34 +28,34 @@ from feelahead.commands.doctor.port import (
 
 _ROUND_TRIPS: Final = 20
 _MEASURE_S: Final = 5.0
-"""A long way allows fewer round trips."""
+"""Time limit for the round trips, in seconds: a long path allows fewer."""
 _PAUSE_S: Final = 0.11
-"""The robot side answers strangers ten times a second."""
+"""Pause between questions, in seconds: the robot side answers strangers ten times a second."""
 _TELEMETRY_LIMIT_S: Final = 2.0
 _ANSWER_LIMIT_S: Final = 2.5
 _HANDSHAKE_LIMIT_S: Final = 4.0
-"""Less than the 5 s after which a robot side hangs up: what ends earlier was refused."""
+"""Time limit of a handshake, in seconds: below the 5 s after which a robot side hangs up, an end is a refusal."""
 _STEP_S: Final = 0.05
 _LARGE: Final = bytes(4000)
-"""No message; three packets of full size."""
+"""Payload that is no message; three packets of full size."""
 _LARGE_LIMIT_S: Final = 2.5
 _MOST_LOST: Final = 2
-"""Answers, where links are emulated, or where other strangers ask."""
+"""Number of answers that may be lost, because of an emulated link or of other strangers."""
 
 
 @dataclass(frozen=True)
 class Talk:
-    """The answers to questions that ask for nothing; no round trips without an answer."""
+    """Answers of the robot side; no round trips without an answer."""
 
     round_trips_s: tuple[float, ...] = ()
     place: int = 0
-    """The place that we would get: 0 owns the arm."""
+    """Place that we would get: 0 owns the arm."""
     waiting: int = 0
-    """The number of observers."""
+    """Number of observers."""
 
 
 def look_along(way: Way) -> tuple[Talk, WayError | None]:
-    """Look at everything up to the first thing that is wrong."""
+    """Check everything up to the first fault; return the answers and the fault."""
     clock, talk = MonotonicClock(), Talk()
     try:
         to_control, to_view = resolved(way.control, "--connect"), resolved(way.view, "--view-connect")
@@ -74,7 +74,7 @@ def look_along(way: Way) -> tuple[Talk, WayError | None]:
 
 
 def told(way: Way, talk: Talk, error: WayError | None) -> dict[str, object]:
-    """Tell programs what was found."""
+    """Return the findings for programs."""
     trips_s = talk.round_trips_s
     return {
         "connect": host_and_port(way.control),
@@ -92,7 +92,7 @@ def told(way: Way, talk: Talk, error: WayError | None) -> dict[str, object]:
 
 
 def reached(talk: Talk) -> str:
-    """The line for a way on which nothing is wrong."""
+    """Return the line for a path without fault."""
     trips_s = talk.round_trips_s
     arm = "the arm is free (you would own it)"
     if talk.place:
@@ -102,7 +102,7 @@ def reached(talk: Talk) -> str:
 
 
 class _Questions:
-    """Asks the robot side what it answers to anybody, and watches whether it sends telemetry."""
+    """Questions that the robot side answers to anybody, and a check for telemetry."""
 
     def __init__(self, sockets: OperatorSockets, way: Way, clock: MonotonicClock, round_trip_s: float) -> None:
         self._sockets = sockets
@@ -110,7 +110,7 @@ class _Questions:
         self._clock = clock
         self._round_trip_s = round_trip_s
         self._epoch = secrets.randbits(53)
-        """One that no Hello opens."""
+        """Epoch that no Hello opens."""
         self._sequence = 0
         self._notices: list[LeaseNotice] = []
         self._telemetry = False
@@ -141,20 +141,20 @@ class _Questions:
         return Talk(tuple(trips_s), self._notices[-1].place, self._notices[-1].waiting)
 
     def expect_telemetry(self) -> None:
-        """WayError unless some comes."""
+        """Raise WayError unless telemetry arrives."""
         if not self._until(_TELEMETRY_LIMIT_S + 2.0 * self._round_trip_s, lambda: self._telemetry):
             place = host_and_port(self._way.view)
             said = f"{place} is no view port of a robot side, or not of this one: it sends no telemetry"
             raise WayError("view port", f"the control port works, but {said}", VIEW_CONNECT)
 
     def expect_large(self) -> None:
-        """WayError unless a question gets through behind packets of full size."""
+        """Raise WayError unless a question passes behind packets of full size."""
         self._until(_PAUSE_S)
         if not self._sockets.send(_LARGE):
             return
-        # The robot side would hang up after 3 s without a heartbeat, and the next connection would be a free one.
+        # The robot side would hang up after 3 s without a heartbeat, and the next connection would be clear.
         if not any(self._ask() and self._answered(_LARGE_LIMIT_S / 2) for _ in range(2)):
-            said = f"small packets reach {self._place}, large ones do not: the way swallows what is too long for it"
+            said = f"small packets reach {self._place}, large ones do not: the path drops too long packets"
             remedy = "a smaller MTU here, such as: sudo ip link set DEVICE mtu 1280 (VPNs and tunnels need that)"
             raise WayError("large packets", said, remedy)
 
@@ -168,18 +168,16 @@ class _Questions:
                 "our key", said, f"run there: feelahead keys allow NAME {public_part(self._way.keys.secret)}"
             )
         said = f"the program at {place} has another key than --robot-key says, or is no such port of a robot side"
-        remedy = "--robot-key with what is shown on the robot's machine by: feelahead keys show robot"
+        remedy = "--robot-key with the key that this shows on the robot's machine: feelahead keys show robot"
         return WayError("robot key", said, remedy)
 
     def _no_answer(self) -> WayError:
-        said = (
-            f"{self._place} speaks ZeroMQ and does not answer: a robot side that still starts or stands still, its view"
-        )
-        remedy = "wait until it says that it listens (its first start compiles for a minute), and say its control port"
+        said = f"{self._place} speaks ZeroMQ and does not answer: a robot side that is starting or paused, its view"
+        remedy = "wait until it listens (its first start compiles for a minute), and give its control port"
         return WayError("no answer", f"{said} port, or another program", remedy)
 
     def _ask(self) -> bool:
-        """A command under no lease of an epoch that has not begun: it is answered, and moves nothing."""
+        """Send a command without lease, of an epoch without Hello: it is answered, and moves nothing."""
         self._sequence += 1
         header = Header(epoch=self._epoch, sequence=self._sequence, sent_s=self._clock.now())
         return self._sockets.send(encode(MotionCommand(header, l2=0.0, r2=0.0)))
@@ -189,7 +187,7 @@ class _Questions:
         return self._until(limit_s, lambda: len(self._notices) > before)
 
     def _until(self, limit_s: float, done: Callable[[], bool] = lambda: False) -> bool:
-        """Read whatever comes until `done`; False where that is not so in time."""
+        """Process messages until `done`; return False if the time is over first."""
         end_s = self._clock.now() + limit_s
         while not done():
             if (left_s := end_s - self._clock.now()) <= 0.0:

@@ -28,7 +28,7 @@ EXTRAS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
     "record": ("recording runs", ("foxglove", "mcap")),
     "experiments": ("sweeps over many runs", ("matplotlib", "pyarrow", "distributed")),
 }
-"""Each extra with its purpose, and the modules that it brings."""
+"""Purpose and modules of each extra."""
 COMPILE: Final = "feelahead doctor --compile"
 _LIMIT_S: Final = 60.0
 _RENDER: Final = """
@@ -41,17 +41,17 @@ _REALTIME: Final = "import json; from common.realtime.priority import make_realt
 
 @dataclass(frozen=True)
 class KernelFacts:
-    """Counts of kernels, and of those not compiled."""
+    """Numbers of kernels, and of those not compiled."""
 
     kernels: int
     missing: int
     folder: str
-    """The folder of their machine code."""
+    """Folder of their machine code."""
     writable: bool
 
 
 def check_extra(extra: str, failures: Mapping[str, str]) -> Finding:
-    """Whether every module of an extra could be imported; `failures`: what Python said of those that could not."""
+    """Check that every module of an extra can be imported; `failures`: Python's error by failed module."""
     (purpose, modules), name = EXTRAS[extra], f"extra {extra}"
     if not failures:
         return Finding(name, Verdict.OK, f"{', '.join(modules)}: {purpose}")
@@ -64,7 +64,7 @@ def check_extra(extra: str, failures: Mapping[str, str]) -> Finding:
 
 
 def check_kernels(facts: KernelFacts | None) -> list[Finding]:
-    """Whether a start compiles; `facts`: None where there is no Numba, which another check says."""
+    """Check whether a start compiles; `facts`: None without Numba, which another check reports."""
     if facts is None:
         return []
     if not facts.missing:
@@ -78,17 +78,17 @@ def check_kernels(facts: KernelFacts | None) -> list[Finding]:
 
 
 def check_rendering(troubles: Mapping[str, str | None]) -> Finding:
-    """Whether the cameras' pictures can be rendered; `troubles`: way to render -> why not, None if it works."""
+    """Check that the cameras' pictures can be rendered; `troubles`: backend -> why not, None if it works."""
     working = [name for name, trouble in troubles.items() if trouble is None]
     if working:
-        return Finding("cameras", Verdict.OK, f"rendered without a screen by way of {working[0].upper() or 'OpenGL'}")
+        return Finding("cameras", Verdict.OK, f"rendered without a screen by {working[0].upper() or 'OpenGL'}")
     said = "; ".join(trouble for trouble in troubles.values() if trouble is not None)
     remedy = REMEDY if "egl" in troubles else None
     return Finding("cameras", Verdict.NOTE, f"no pictures, the arm is driven without: {said}", remedy)
 
 
 def check_realtime(notes: Sequence[str]) -> list[Finding]:
-    """Whether `--realtime` would be granted; `notes` are its own, one for each thing that is not."""
+    """Check that `--realtime` would be granted; `notes`: those of `--realtime`, one for each refusal."""
     if sys.platform != "linux":
         return [Finding("--realtime", Verdict.NOTE, "Linux alone has it; the sides run without")]
     findings = []
@@ -99,19 +99,19 @@ def check_realtime(notes: Sequence[str]) -> list[Finding]:
 
 
 def failed_imports(extra: str) -> dict[str, str]:
-    """The modules of an extra that cannot be imported, and why."""
+    """Return the modules of an extra that cannot be imported, with the reasons."""
     failures = {}
     for module in EXTRAS[extra][1]:
         try:
             importlib.import_module(module)
-        # A library may fail in any way.
+        # An import may raise any error.
         except Exception as error:
             failures[module] = (str(error).splitlines() or [type(error).__name__])[0]
     return failures
 
 
 def kernel_facts() -> KernelFacts | None:
-    """Which kernels are compiled; None where none can be."""
+    """Count the compiled kernels; None if none can be compiled."""
     try:
         from robot_side.compiled.warm_up import import_kernels  # noqa: PLC0415
     except ImportError:
@@ -127,20 +127,20 @@ def _facts(kernels: Sequence["Compiled"]) -> KernelFacts:
 
 
 def rendering_troubles() -> dict[str, str | None]:
-    """For each way to render without a screen why it does not work, None if it does; each in a process of its own."""
+    """Return for each off-screen backend why it fails, None if it works; each is tried in a separate process."""
     outputs = {backend: _output_of(_RENDER, backend) for backend in BACKENDS}
     ended = "trying it ends Python, or takes too long"
     return {backend: ended if said is None else json.loads(said) for backend, said in outputs.items()}
 
 
 def realtime_notes() -> list[str]:
-    """The notes of `--realtime`, tried in a process of its own."""
+    """Return the notes of `--realtime`, tried in a separate process."""
     notes: list[str] = json.loads((sys.platform == "linux" and _output_of(_REALTIME)) or "[]")
     return notes
 
 
 def _output_of(program: str, *arguments: str) -> str | None:
-    """The last line that a Python process writes; None when it fails."""
+    """Return the last line that a Python process writes; None if it fails."""
     command = [sys.executable, "-P", "-c", program, *arguments]
     try:
         done = subprocess.run(
@@ -152,7 +152,7 @@ def _output_of(program: str, *arguments: str) -> str | None:
 
 
 def compile_kernels(*, as_json: bool) -> int:
-    """Compile those that are not, and say what there is then; 1 where they are not kept for the next start."""
+    """Compile the missing kernels and print the result; return 1 if they are not kept for the next start."""
     try:
         from robot_side.compiled.warm_up import import_kernels, warm_up  # noqa: PLC0415
 

@@ -1,4 +1,4 @@
-"""Knock at a port where a robot side should listen, and judge how it answers."""
+"""Connection to a port where a robot side should listen, and diagnosis of the answer."""
 
 import errno
 import os
@@ -13,14 +13,14 @@ from common.sockets.endpoints import Endpoint, following, resolve, split_connect
 from common.sockets.greeting import GREETING_BYTES, KNOCK, mechanism_of
 
 _CONNECT_LIMIT_S: Final = 4.0
-"""A second more than it takes Linux to find out that nobody on the network has an address."""
+"""Time limit of a connection, in seconds: one more than Linux needs to find that an address is unused."""
 _GREETING_LIMIT_S: Final = 3.0
 _STEPS: Final = "feelahead keys --help has the steps on both machines"
 VIEW_CONNECT: Final = "say --view-connect tcp://HOST:PORT with the port that the robot side names at its start"
 
 
 class WayError(Exception):
-    """The first thing that is wrong with the way; `wrong` is its kind in a word or two."""
+    """First fault of the path; `wrong` is the kind in a word or two."""
 
     def __init__(self, wrong: str, said: str, remedy: str) -> None:
         super().__init__(f"{wrong}: {said}; to mend it: {remedy}")
@@ -29,7 +29,7 @@ class WayError(Exception):
 
 @dataclass(frozen=True)
 class Way:
-    """The address of a robot side, and the keys to it."""
+    """Addresses of a robot side, and the keys for it."""
 
     control: Endpoint
     view: Endpoint
@@ -37,7 +37,7 @@ class Way:
 
     @classmethod
     def to(cls, connect: str, view_connect: str | None = None, keys: OperatorKeys | None = None) -> "Way":
-        """Read the addresses by their spelling; ConfigurationError for what is none."""
+        """Read the addresses without resolving them; raises ConfigurationError for invalid ones."""
         control = Endpoint(*split_connect(connect, "--connect"), ipv6=False)
         if view_connect is None:
             return cls(control, following(control, connect, "--view-connect"), keys)
@@ -46,23 +46,23 @@ class Way:
 
 @dataclass(frozen=True)
 class Opening:
-    """A port's answer to a TCP connection, and its first bytes."""
+    """Answer of a port to a TCP connection, and its first bytes."""
 
     error: int | None = None
-    """The errno of a connection that failed, ETIMEDOUT for one that nobody answered; None for one that stands."""
+    """Errno of a failed connection, ETIMEDOUT without answer; None for an established one."""
     said: bytes = b""
     hung_up: bool = False
-    """Whether it ended the connection by itself."""
+    """Whether the port ended the connection by itself."""
     took_s: float = 0.0
-    """The time until the connection stood."""
+    """Time until the connection was established."""
 
 
 def judge_port(way: Way, port: Endpoint, opening: Opening, *, loopback: bool = False) -> None:
-    """WayError where it is no robot side's port. loopback: of this machine."""
+    """Raise WayError if it is no robot side's port. loopback: it is on this machine."""
     place = host_and_port(port)
     if opening.error is not None:
         raise _no_connection(way, port, opening.error, loopback=loopback)
-    see_who = f"say the robot side's own port; who has this one is shown there by: ss -ltnp 'sport = :{port.port}'"
+    see_who = f"give the robot side's port; the program at this one is shown there by: ss -ltnp 'sport = :{port.port}'"
     match mechanism_of(opening.said), way.keys is not None:
         case ("NULL", False) | ("CURVE", True):
             return
@@ -81,13 +81,13 @@ def judge_port(way: Way, port: Endpoint, opening: Opening, *, loopback: bool = F
         said += " with too many connections"
         see_who = "start the robot side behind it, or end the program that keeps connecting"
     else:
-        said = f"{place} takes connections and says nothing: no robot side, or one that stands still"
-        see_who += "; a stopped process goes on after: kill -CONT PID"
+        said = f"{place} takes connections and says nothing: no robot side, or a paused one"
+        see_who += "; a stopped process continues after: kill -CONT PID"
     raise WayError("something else", said, see_who)
 
 
 def judge_view(way: Way, opening: Opening, *, loopback: bool = False) -> None:
-    """WayError as `judge_port`, where the control port works."""
+    """Raise WayError like `judge_port`, for a view port whose control port works."""
     try:
         judge_port(way, way.view, opening, loopback=loopback)
     except WayError as error:
@@ -105,7 +105,7 @@ def _no_connection(way: Way, port: Endpoint, error: int, *, loopback: bool) -> W
         return WayError("closed port", f"{place} refuses connections: nothing listens there", remedy)
     if error == errno.ETIMEDOUT:
         ports = list(dict.fromkeys(str(each.port) for each in (way.control, way.view)))
-        said = f"{place} gave no answer in {_CONNECT_LIMIT_S:g} s: a firewall drops what is sent there, or nothing has"
+        said = f"{place} gave no answer in {_CONNECT_LIMIT_S:g} s: a firewall drops the packets, or no machine has"
         remedy = (
             f"let TCP ports {' and '.join(ports)} in on the robot's machine, such as: sudo ufw allow proto tcp from"
         )
@@ -120,7 +120,7 @@ def _no_connection(way: Way, port: Endpoint, error: int, *, loopback: bool) -> W
 
 
 def resolved(port: Endpoint, flag: str) -> Endpoint:
-    """Replace the host by its first address; WayError where nobody knows it."""
+    """Replace the host by its first address; raises WayError if it cannot be resolved."""
     try:
         return replace(port, host=resolve(port.host, port.address, flag)[0])
     except ConfigurationError as error:
@@ -129,12 +129,12 @@ def resolved(port: Endpoint, flag: str) -> Endpoint:
 
 
 def host_and_port(port: Endpoint) -> str:
-    """Name a port in a line for people."""
+    """Return HOST:PORT, for people."""
     return port.address.removeprefix("tcp://")
 
 
 def knock(port: Endpoint, clock: MonotonicClock) -> Opening:
-    """Connect, and listen to what it says first."""
+    """Connect, and read the first bytes."""
     began_s = clock.now()
     try:
         connection = socket.create_connection((port.host, port.port), _CONNECT_LIMIT_S)

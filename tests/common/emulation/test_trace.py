@@ -73,7 +73,7 @@ def test_a_bad_trace_is_refused_in_one_line(tmp_path: Path, content: str, named:
 @pytest.mark.parametrize("clause", ["delay 5ms", "loss 1%"])
 def test_a_trace_stands_for_delay_and_loss(tmp_path: Path, clause: str) -> None:
     path = written(tmp_path, "delay_ns\n1\n")
-    with pytest.raises(ConfigurationError, match=f"stands beside '{clause.split(maxsplit=1)[0]}'"):
+    with pytest.raises(ConfigurationError, match=f"excludes '{clause.split(maxsplit=1)[0]}'"):
         LinkProfile.parse(f"trace {path} {clause}")
 
 

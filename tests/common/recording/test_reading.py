@@ -121,7 +121,7 @@ def test_a_damaged_description_is_told_in_one_line(short: tuple[bytes, list[int]
             open_recording(path)
         except ConfigurationError as error:
             told.append(str(error))
-    assert any("what it says of itself is damaged; valid: " in text for text in told)
+    assert any("its header is damaged; valid: " in text for text in told)
     assert not any("\n" in text for text in told)
 
 

@@ -26,7 +26,7 @@ def test_the_printed_commands_lead_from_nothing_to_an_allowed_operator(
     listed = said(capsys, "list", *robot)
     assert robot_key in listed
     assert "anna" in listed
-    assert "no more" in said(capsys, "revoke", "anna", *robot)
+    assert "is revoked" in said(capsys, "revoke", "anna", *robot)
     assert "anna" not in said(capsys, "list", *robot)
 
 

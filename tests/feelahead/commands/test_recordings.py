@@ -47,7 +47,7 @@ def test_wrong_content_in_a_right_file_is_one_line(tmp_path: Path) -> None:
     [
         ("run.txt", "ends in .mcap"),
         ("missing/run.mcap", "its folder is not there"),
-        ("there.mcap", "is there already; valid: a path where nothing is yet"),
+        ("there.mcap", "exists already; valid: a new file's path"),
     ],
 )
 def test_where_nothing_can_be_recorded(tmp_path: Path, name: str, told: str) -> None:
