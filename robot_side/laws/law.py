@@ -42,7 +42,7 @@ class Law(Protocol):
         ...
 
     def around(self, pose: GripperPose) -> Around | None:
-        """Return the map of onset distances around the gripper, or None; for an operator side that traces its sticks."""
+        """Return the map of onset distances around the gripper, for an operator side that traces its path, or None."""
         ...
 
     def summary(self) -> dict[str, int]:

@@ -17,7 +17,7 @@ from robot_side.laws.sensed import R2, STICK
 BEYOND_M: Final = 0.05
 """Distance examined beyond that of loop age, reaction and braking, as the loop age varies"""
 FIELD_PERIOD_S: Final = 0.01
-"""Period of looks from the gripper's place: a controller is written to no more often. Other places: three times this."""
+"""Period of looks from the gripper's place: controllers are written to no more often. Other places: three times it."""
 
 _find_ability = call_at_address(TRUTH, ABILITY)
 _prediction_error = inlined(prediction_error)

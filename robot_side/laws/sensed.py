@@ -12,7 +12,7 @@ from robot_side.field.scratch import STRENGTHS
 R2, L2, STICK = 0, 1, 2
 """Sides along which a law looks"""
 DISPLACEMENT, STIFFNESS, FULL_SPEED, ACCELERATION, OF_A_SIDE = (2 * STRENGTHS + k for k in range(5))
-"""Indices in a side's numbers, R2's before L2's: after eight fast, eight slow onset distances: δ in m, s(δ), v_max, a"""
+"""Indices of a side's numbers, R2 before L2: after eight fast and eight slow onset distances, δ (m), s(δ), v_max, a"""
 SPEED, HORIZON, RUMBLE, ENLARGEMENT, OVERLAP, TOOL_SPEED, NUMBERS = (2 * OF_A_SIDE + k for k in range(7))
 """Indices after the numbers of R2 and L2; and the count of all numbers"""
 
