@@ -40,7 +40,7 @@ class PredictionErrors:
 
 
 def prediction_error(rows: FloatArray, loop_age_s: float, full_speed_m_s: float) -> tuple[float, float]:
-    """Interpolate μ_δ and σ_δ in m at a loop age between the rows (k, 3); beyond the last, in proportion to loop age."""
+    """Interpolate μ_δ and σ_δ in m at a loop age in the rows (k, 3); beyond the last, in proportion to loop age."""
     count, after = rows.shape[0], 0
     if count == 0:
         return WITHOUT_TABLE * full_speed_m_s * loop_age_s, 0.0

@@ -16,7 +16,7 @@ _TOLERANCE: Final = 1e-10
 """Largest difference of the two rules over a piece, in cubes of the radius; the finer rule errs by a tenth of that."""
 _NO_PUSH: Final = (0.0, 0.0, 0.0)
 _TOLERANCE_OF_GRADIENT: Final = 1e-5
-"""Largest difference of the gradients, in squares of the radius; less smooth, they show corners that both rules miss."""
+"""Largest difference of the gradients, in squares of the radius; they show corners that both rules miss."""
 _HARDLY: Final = 1e-4
 """Largest angle, in rad, by which rounding turns an arc back"""
 _AT_POLE: Final = 1e-12
