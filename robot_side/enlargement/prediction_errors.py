@@ -77,7 +77,7 @@ def _rows(path: Path, kind: str, tables: Any) -> Rows:
     valid = all(np.isfinite(row).all() and row[0] > 0.0 and row[2] >= 0.0 for row in rows)
     if not (rows and valid and list(rows) == sorted(rows)):
         raise ConfigurationError(
-            f"--prediction-errors {path}: [[{kind}]] is missing or not as it should be; valid: tables with"
+            f"--prediction-errors {path}: [[{kind}]] is missing or invalid; valid: tables with"
             f" {', '.join(_KEYS)}, loop ages rising"
         )
     return rows  # type: ignore[return-value]

@@ -37,7 +37,7 @@ from robot_side.surroundings.scene_columns import SCENE, contact_with, next_obje
 MARGIN_M: Final = 0.012
 """m: distance before that of full strength, over which strength grows"""
 LEAST_DEPTH_M: Final = 0.0005
-"""A shallower overlap is a graze: V_min = π R (0.5 mm)². Encoder noise turns the motion aside by less."""
+"""Depth up to which an overlap is a graze: V_min = π R (0.5 mm)². Encoder noise turns the motion aside by less."""
 
 scene_at, scratch_at = SCENE.at, SCRATCH.at
 
@@ -119,8 +119,8 @@ def _look_at(
 ) -> None:
     """Shorten the onset distances by one object, whose rows within the reach are kept: best first.
 
-    Clusters and pairs share one queue: pair p as p, cluster c as -1 - c, or as -1 - c - (number of clusters) while only
-    a lower bound of the contact is known. Pairs that wait lie at the other end.
+    Clusters and pairs share one queue: pair p as p, cluster c as -1 - c. While only a lower bound of its contact is
+    known, cluster c is -1 - c - (number of clusters). Pairs that wait lie at the other end.
     """
     scratch = scratch_at(bundles.scratch)
     keys, items, count, pairs, waiting, margin = scratch.keys_m, scratch.items, 0, 0, 0, MARGIN_M

@@ -23,7 +23,7 @@ _NEWTON_M: Final = 5e-5
 """Distance from the onset at which one step of Newton's method ends the search"""
 _DOUBT_M: Final = 5e-4
 _DOUBT: Final = 1.0 / 6.0
-"""Share of the distance between samples by which the cubic may err when it says that an onset is too late"""
+"""Share of the distance between samples, at most _DOUBT_M, by which the cubic may err when an onset seems too late"""
 _MOST_STEPS: Final = 12
 _MOST_SAMPLES: Final = 400
 _MOST_OF_A_PEAK: Final = 4

@@ -29,9 +29,9 @@ def total_overlap_m3(
     moved_m: FloatArray | None = None,
     of_objects_m3: FloatArray = _NOWHERE,
 ) -> float:
-    """Return Σ V_ij in m³ of spheres (m, 4), centres and radii, with all objects but those passed over; classes (k,).
+    """Return Σ V_ij in m³ of spheres (m, 4), centres and radii, with all objects but those passed over.
 
-    inflated_m (m, 1 or more): its first column counts. moved_m (3,). of_objects_m3 (k,): filled by object.
+    classes (k,). inflated_m (m, 1 or more): its first column counts. moved_m (3,). of_objects_m3 (k,): by object.
     ValueError for a sphere that is not finite: it would compare as far away.
     """
     by_m = np.zeros_like(spheres) if inflated_m is None else inflated_m

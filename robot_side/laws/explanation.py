@@ -34,7 +34,7 @@ class Explains(Protocol):
     """Law that explains its result."""
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """Explain one trigger of `sensed`, which `situation` led to."""
+        """Explain one trigger of `sensed`, the result for `situation`."""
         ...
 
 

@@ -54,7 +54,7 @@ class Moment(NamedTuple):
     now: float
     loop_age: float
     by_operator: bool
-    """The operator side predicts what is under way."""
+    """Whether the operator side predicts δ"""
     widest: float
     """Half the gap between the fingers, m (§3.4)"""
     right: float

@@ -81,8 +81,8 @@ PROSPECT: Final = np.dtype(
         *((name, np.float64) for name in ("reach", "gone", "stretch")),
     ]
 )
-"""Parameters of a look: û, û·(μ_ee - μ_c), μ_δ and σ_δ² of eq. 10, the arm's v_max and a. reach: distance examined
-(m). gone: distance covered before the place (m). stretch: length of the path over that of its chord."""
+"""Parameters of a look: û, û·(μ_ee - μ_c), μ_δ and σ_δ² of eq. 10, the arm's v_max and a. `reach` is the distance
+examined (m), `gone` that covered before the place (m), `stretch` the length of the path over that of its chord."""
 
 
 class MemoryColumns(NamedTuple):

@@ -1,4 +1,4 @@
-"""The paper's plain law (§4.2), for comparison: every sphere enlarged by D_incr in all directions, one total overlap.
+"""The paper's plain law (§4.2), for comparison. Every sphere is enlarged by D_incr in all directions.
 
 s = min(1, Σ_ij V_ij / (f Σ_i V_i)), the same for both triggers and at every travel. The delay is in D_incr (eq. 8).
 """

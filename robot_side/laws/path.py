@@ -45,9 +45,9 @@ def fastest_m_s(bundle: IntArray, centers: FloatArray, tool: Vector, ahead: Vect
 def plan_places(
     bundle: IntArray, centers: FloatArray, tool: Vector, approach: Vector, until: float, ahead: float
 ) -> None:
-    """Choose the times of the places on the path: even, the last at `until`; none if the gripper stays.
+    """Choose the times of the places on the path, even, the last at `until`. There are none if the gripper stays.
 
-    ahead: distance ahead (m) at which places shall be as close as at the gripper; it matters in turns.
+    ahead: distance ahead (m) at which places shall be as close as at the gripper. It matters in turns.
     """
     memory = memory_at(bundle)
     state, farthest = memory.state[0], until * fastest_m_s(bundle, centers, tool, scale(ahead, approach))
@@ -93,7 +93,7 @@ def move(
     after: float,
     ahead: float,
 ) -> None:
-    """Move the tool and its spheres to where they will be `after` seconds, and find the chord that leads on from there.
+    """Move the tool and its spheres to their places in `after` seconds, and find the chord that leads on from there.
 
     origin, rotation (3, 3), centers (m, 3): the present ones, kept exactly after 0 s. linear, turning: velocities of
     the tool without the trigger's part (m/s, rad/s). ahead: the trigger's part by then, along the approach axis (m).

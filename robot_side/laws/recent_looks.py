@@ -64,7 +64,7 @@ def longest_ago(bundle: IntArray) -> float:
 def keep(bundle: IntArray, side: int, place: int, now: float, tool: Vector, ways: FloatArray) -> None:
     """Store a look along the memory's prospect. ways (2, 8): its onset distances, fast and slow. tool: its position.
 
-    Looks from the same place are forgotten if too old or along another direction. Without room the oldest goes.
+    Looks from the same place are forgotten if too old or along another direction. Without room the oldest is dropped.
     """
     memory = memory_at(bundle)
     along, first, kept = load(memory.direction.reshape(1, 3), 0), ROOM * side, 0

@@ -1,6 +1,6 @@
 """The swept law's one compiled call a tick, from a situation to stiffness.
 
-measure the motion ─▶ what is due ─▶ prospect ─▶ look ─▶ keep ─▶ feel
+measure the motion ─▶ due looks ─▶ prospect ─▶ look ─▶ keep ─▶ feel
 """
 
 import math

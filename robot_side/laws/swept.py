@@ -4,9 +4,9 @@ Fields take turns, one in a tick: R2, L2, and the stick while it is deflected. I
 subtracted from the onset distances, which is exact for a translation. The shortest of the last 0.1 s count: where the
 gripper just passes an object, encoder noise alone can flip none to full.
 
-While the gripper drifts, turns, or moves its fingers, R2 and L2 are looked along from places on its path, too, until a
-command sent now has stopped it (`path`). An operator side that traces its own sticks gets a map around the gripper
-instead (`around`). An object that approaches has its contact distances shortened by its motion in that time.
+While the gripper drifts, turns, or moves its fingers, R2 and L2 are looked along from places on its path, too. The path
+ends where a command sent now has stopped the gripper (`path`). An operator side that traces its own sticks gets a map
+around the gripper instead (`around`). An object's approach in that time shortens its contact distances.
 """
 
 import math
@@ -246,7 +246,7 @@ class SweptLaw:
             ("pose.sphere_on_finger", len(pose.sphere_on_finger), spheres),
         ):
             if count != valid:
-                raise ValueError(f"{name} = {count}; valid: {valid}, as many as there are joints or spheres")
+                raise ValueError(f"{name} = {count}; valid: {valid}, the number of joints or spheres")
         for name in ("tool_position_m", "tool_rotation", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
             require_finite(f"pose.{name}", getattr(pose, name))
         require_finite("joint_velocities_rad_s", rates)

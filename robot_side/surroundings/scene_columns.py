@@ -49,7 +49,7 @@ def contact_in_front(scene: SceneColumns, row: int, start: Vector, along: Vector
 def contact_with(
     scene: SceneColumns, row: int, start: Vector, along: Vector, radius: float, reach: float, clear: bool
 ) -> Contact:
-    """Return the first contact of a sphere with the primitive in `row`; û·n is 0 unless the primitive is convex.
+    """Return the first contact of a sphere with the primitive in `row`; û·n is 0, no bound, for a mesh with dents.
 
     clear: the sphere is known not to overlap, so a mesh is not tested for that.
     """

@@ -70,7 +70,7 @@ def require_closed(triangles: IntArray, numbers_given: IntArray) -> None:
     backward = int(np.count_nonzero((starts == end) & (ends == start)))
     raise ValueError(
         f"triangles[{numbers_given[row]}]: its edge from vertex {start} to {end} is used {forward} times in this "
-        f"direction and {backward} times in the other; valid: a closed surface, as often in either"
+        f"direction and {backward} times in the other; valid: a closed surface, equally often in both"
     )
 
 
