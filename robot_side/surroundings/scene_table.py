@@ -106,7 +106,7 @@ def scene_table(objects: PerceivedObjects) -> SceneTable:
 
 
 def go_to(table: SceneTable, objects: PerceivedObjects) -> bool:
-    """Update the table to another frame of the same movers. Return False if a primitive has lost its volume.
+    """Update the table to another frame with the same first frame. Return False if a primitive has lost its volume.
 
     ValueError if `require_valid` refuses the frame.
     """

@@ -25,7 +25,7 @@ class Surroundings:
     def see(self, frame: PerceivedObjects) -> SceneTable:
         """Return the table of a frame, made on first use; ValueError if `require_valid` refuses the frame.
 
-        Frames of the same movers share one table, which each call updates in place. A refused frame changes nothing.
+        Frames with the same first frame share one table, updated in place by each call. A refused one changes nothing.
         """
         first = frame if frame.since is None else frame.since[0].first
         for kept in (first, frame):

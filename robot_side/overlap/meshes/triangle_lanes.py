@@ -32,7 +32,7 @@ LANES = 64
 WIDTH = 8
 """Lanes in a group: as many as the widest vectors hold"""
 ROW = LANES + 8
-"""Distance between two rows of the scratch array: rows 4096 bytes apart would conflict in the cache."""
+"""Distance between two rows of the scratch array: rows 4096 bytes apart would slow each other down."""
 
 # The rows of the scratch array, each of `LANES` numbers: one flat array with constant offsets lets LLVM see that
 # rows do not overlap. (A sum of two of these constants as an argument is enough to hide it.)

@@ -37,7 +37,7 @@ def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
 def placed(
     sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
 ) -> None:
-    """Write the numbers of a box at a pose; sizes: the centre in the object's frame, and half sizes."""
+    """Write the numbers of a box at a pose; sizes: the centre in the posed frame, and half sizes."""
     write_pose(posed(position, turns, turn, sizes[k, 0], sizes[k, 1], sizes[k, 2]), turns, turn, numbers, row)
     for axis in range(3):
         numbers[row, 12 + axis] = sizes[k, 3 + axis]

@@ -64,7 +64,7 @@ _COARSE: Final = np.array(
 
 @inlined
 def _excess(angle: float, u: float, v: float, rho: float, alpha: float, beta: float) -> float:
-    """Return the ellipse's equation at a point of the circle: ≤ 0 inside the ellipse."""
+    """Return the value of the ellipse's equation at a point of the circle: ≤ 0 inside the ellipse."""
     x, y = (u + rho * math.cos(angle)) / alpha, (v + rho * math.sin(angle)) / beta
     return x * x + y * y - 1.0
 
@@ -182,7 +182,7 @@ def _section(u: float, v: float, rho: float, alpha: float, beta: float) -> tuple
             area += 0.5 * (rho * rho * (end - start) + u * (to_y - from_y) - v * (to_x - from_x))
             along_u, along_v, arcs = along_u + to_y - from_y, along_v - (to_x - from_x), arcs + end - start
         else:
-            # Arc of the ellipse from the circle's exit to the circle's next entry.
+            # Arc of the ellipse from the circle's exit to its next entry.
             turn = math.atan2(to_y / beta, to_x / alpha) - math.atan2(from_y / beta, from_x / alpha)
             # Where rounding makes two crossings of one, both arcs are tiny.
             if turn < 0.0 and (turn < -_HARDLY or end - start > 1.0):
