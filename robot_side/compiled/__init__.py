@@ -1,1 +1,1 @@
-"""Compile with Numba: decorators, a safe cache, columns, arrays on the stack, vectors in registers."""
+"""Compilation with Numba: decorators, a safe cache, columns, arrays on the stack, vectors in registers."""

@@ -1,4 +1,4 @@
-"""Compiling in processes beside this one, which leave machine code on disk: Numba compiles in one thread alone."""
+"""Compilation in other processes, which leave machine code on disk: Numba compiles in one thread only."""
 
 import os
 import select
@@ -17,14 +17,14 @@ from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import code_sizes
 
 _MOST_PROCESSES: Final = 4
-"""With more, half of the work would be done twice; each takes 0.4 GB."""
+"""Most processes: with more, half of the work would be done twice. Each takes 0.4 GB."""
 
 
 class KernelQueue:
-    """Kernels for several processes, the largest first: each process asks for its next, so that all end together.
+    """Queue of kernels for several processes, largest first: each process asks for its next, so that all end together.
 
-    A function that several kernels call is compiled once in each process that needs it. So the size of a kernel is
-    the bytecode of its functions that no other process has.
+    A function that several kernels call is compiled once in each process that needs it. So the size of a kernel
+    counts only the bytecode of functions that no other process has.
     """
 
     def __init__(self, kernels: Sequence[Compiled], processes: int) -> None:
@@ -32,7 +32,7 @@ class KernelQueue:
         self._has: list[set[FunctionType]] = [set() for _ in range(processes)]
 
     def take(self, process: int) -> Compiled | None:
-        """Take the next for a process, by its number; None when there is none left."""
+        """Take the next kernel for a process, by its number; None if the queue is empty."""
         if not self._sizes:
             return None
         elsewhere = set[FunctionType]().union(*self._has) - self._has[process]
@@ -46,16 +46,16 @@ class KernelQueue:
 
 
 def compile_beside(kernels: Sequence[Compiled], count: int, done: Callable[[str], None] = lambda _: None) -> None:
-    """Compile kernels of our modules in `count` processes, 4 at most; call `done` with the name of each.
+    """Compile kernels of our modules in `count` processes, at most 4; call `done` with each kernel's name.
 
-    A process may be killed, or find no room on the disk. `prepare` compiles what is missing then.
+    A process may be killed, or the disk may be full. Then `prepare` compiles the missing kernels.
     """
     count = min(count, _MOST_PROCESSES, len(kernels))
     waiting = KernelQueue(kernels, count)
     with ExitStack() as processes:
         channels = [processes.enter_context(Companion(__name__)).channel for _ in range(count)]
         for channel in channels:
-            # Before any of them is waited for: a process may take two seconds to end.
+            # Close all channels before waiting: a process may take two seconds to end.
             processes.callback(channel.close)
 
         def hand_on(place: int) -> None:
@@ -75,7 +75,7 @@ def compile_beside(kernels: Sequence[Compiled], count: int, done: Callable[[str]
 
 
 def _listen(owner: Channel, speaking: threading.Lock, names: SimpleQueue[str]) -> None:
-    """Take names of kernels from the owner, and end with it: a compilation cannot be asked to stop."""
+    """Receive kernels' names from the owner, and end the process with it: a compilation cannot be cancelled."""
     while not owner.ended:
         select.select([owner], [], [])
         with speaking:
@@ -85,7 +85,7 @@ def _listen(owner: Channel, speaking: threading.Lock, names: SimpleQueue[str]) -
 
 
 def main() -> None:
-    """Compile each kernel whose name comes, which says its module, too; end where nothing can be kept."""
+    """Compile each kernel by its name, which begins with its module; end if machine code cannot be stored."""
     owner, _ = companion_channel(sys.argv[1:])
     speaking, names = threading.Lock(), SimpleQueue[str]()
     threading.Thread(target=_listen, args=(owner, speaking, names), daemon=True).start()

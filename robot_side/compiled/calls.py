@@ -1,4 +1,4 @@
-"""Call one kernel from another by its address: Numba itself would compile the called one again, at full cost."""
+"""Calls of kernels by address from other kernels: Numba would compile the called kernel again, at full cost."""
 
 from collections.abc import Callable
 from typing import Any, cast
@@ -11,9 +11,9 @@ from robot_side.compiled.numba_inside import call_at
 
 
 def call_at_address(returns: Any, arguments: tuple[Any, ...]) -> Callable[[int, tuple[Any, ...]], Any]:
-    """Make the function by which kernels call others of these types: of an `address` and a tuple of the arguments.
+    """Return the function (address, tuple of arguments) with which kernels call others of these types.
 
-    In kernels only. Arguments of other types are refused as the caller is compiled.
+    In kernels only. Arguments of other types raise numba.TypingError when the caller is compiled.
     """
     wanted = returns(*arguments)
 
@@ -32,7 +32,7 @@ def call_at_address(returns: Any, arguments: tuple[Any, ...]) -> Callable[[int, 
 
 
 def _fits(given: Any, wanted: Any) -> bool:
-    """Whether the two look the same in memory: an array may be read-only here and not there."""
+    """Return whether two types have the same layout in memory: only one of two arrays may be read-only."""
     if isinstance(wanted, numba.types.Array):
         of = ("dtype", "ndim", "layout")
         return isinstance(given, numba.types.Array) and all(getattr(given, a) == getattr(wanted, a) for a in of)

@@ -1,6 +1,6 @@
-"""Declare arrays that go to a kernel together, by their addresses: once, for Python and for kernels.
+"""Bundles of arrays that go to a kernel as one argument, by their addresses; declared once for Python and kernels.
 
-One argument costs a fifth of what twenty do.
+One argument costs a fifth of twenty.
 """
 
 import functools
@@ -17,11 +17,11 @@ from robot_side.compiled.numba_inside import array_at, element_of
 _Columns = TypeVar("_Columns", bound=tuple[Any, ...])
 
 BUNDLE: Final = numba.types.Array(numba.types.int64, 2, "C", readonly=True)
-"""The Numba type of `Declared.bundle`."""
+"""Numba type of `Declared.bundle`"""
 
 
 class Form(NamedTuple):
-    """The form of a column: an array (n, *inner) of elements of one type."""
+    """Form of a column: an array (n, *inner) of elements of one type."""
 
     dtype: np.dtype
     inner: tuple[int, ...] = ()
@@ -38,36 +38,36 @@ BUNDLED: Final = Form(np.dtype(np.int64), (2,))
 
 
 def rows(width: int) -> Form:
-    """(n, width) floats."""
+    """Return the form of (n, width) floats."""
     return Form(NUMBERS.dtype, (width,))
 
 
 def matrices(height: int, width: int) -> Form:
-    """(n, height, width) floats."""
+    """Return the form of (n, height, width) floats."""
     return Form(NUMBERS.dtype, (height, width))
 
 
 def records(dtype: Any) -> Form:
-    """(n,) records of `dtype`."""
+    """Return the form of (n,) records of `dtype`."""
     return Form(dtype)
 
 
 class Declared(Generic[_Columns]):
-    """A named tuple of arrays, with the form of each of them."""
+    """Named tuple of arrays, with the form of each array."""
 
     def __init__(self, columns: type[_Columns], *forms: Form) -> None:
-        """forms: one for each field, in order; TypeError for another number of them."""
+        """forms: one for each field, in order; TypeError for another number of forms."""
         self._fields: tuple[str, ...] = cast(Any, columns)._fields
         if len(forms) != len(self._fields):
             raise TypeError(f"{columns.__name__} has {len(self._fields)} columns, not {len(forms)}")
         self._forms = forms
         self.at: Callable[[IntArray], _Columns] = _view(columns, forms)
-        """Find the columns by a bundle; in kernels only"""
+        """Function from a bundle to the columns; in kernels only"""
 
     def bundle(self, owner: object) -> IntArray:
-        """Address and number of rows (n, 2) of the owner's arrays of these names; the owner must keep them.
+        """Return addresses and numbers of rows (n, 2) of the owner's arrays of these names; the owner must keep them.
 
-        ValueError for an array with gaps between its rows, not aligned, or of another form than declared.
+        ValueError for an array that is not C-contiguous, not aligned, or of another form than declared.
         """
         arrays = [getattr(owner, name) for name in self._fields]
         for name, array, form in zip(self._fields, arrays, self._forms, strict=True):
@@ -81,7 +81,7 @@ class Declared(Generic[_Columns]):
 
 
 def _view(columns: Any, forms: tuple[Form, ...]) -> Any:
-    # One intrinsic: as many calls as there are columns take longer to compile than what is done with them.
+    # One intrinsic for all: a call for each column would take longer to compile than the code that uses them.
     def at(_typing: Any, bundle: Any) -> Any:
         arrays = [numba.types.Array(numba.from_dtype(form.dtype), 1 + len(form.inner), "C") for form in forms]
         together = cast(Any, numba.types.BaseTuple).from_types(arrays, columns)

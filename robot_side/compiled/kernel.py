@@ -1,6 +1,6 @@
-"""Typed decorators around Numba: `inlined` for building blocks, `compiled` for what Python calls.
+"""Typed decorators around Numba: `inlined` for building blocks, `compiled` for kernels that Python calls.
 
-Numba is imported untyped; everything else in this package sees ordinary typed functions.
+Numba is imported untyped; all other modules see ordinary typed functions.
 """
 
 import contextlib
@@ -28,55 +28,55 @@ from robot_side.compiled.sources import digest
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 # Division by zero follows IEEE 754 instead of raising, which lets LLVM vectorise. No fastmath flag is set:
-# results stay the same from machine to machine and NaN is not assumed away. Without Numba's runtime (_nrt) nobody
-# counts who holds an array. So a kernel that allocates does not compile; others compile in two thirds of the time.
+# results stay the same from machine to machine and NaN is not assumed away. Without Numba's runtime (_nrt) arrays
+# have no reference counts. So a kernel that allocates does not compile; others compile in two thirds of the time.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
 
 
 def input_array(dimensions: int) -> Any:
-    """The Numba type of a C-contiguous float64 array that the kernel only reads.
+    """Return the Numba type of a C-contiguous float64 array that the kernel only reads.
 
-    Read-only and writable arrays are both accepted, so that neither brings a compilation of its own.
+    Read-only and writable arrays are both accepted, with one compilation.
     """
     return numba.types.Array(numba.types.float64, dimensions, "C", readonly=True)
 
 
 def output_array(dimensions: int) -> Any:
-    """The Numba type of a C-contiguous float64 array that the kernel fills."""
+    """Return the Numba type of a C-contiguous float64 array that the kernel fills."""
     return numba.types.Array(numba.types.float64, dimensions, "C")
 
 
 def input_indices() -> Any:
-    """The Numba type of a C-contiguous int64 array (n,) that the kernel only reads."""
+    """Return the Numba type of a C-contiguous int64 array (n,) that the kernel only reads."""
     return numba.types.Array(numba.types.int64, 1, "C", readonly=True)
 
 
 def input_flags() -> Any:
-    """The Numba type of a C-contiguous array (n,) of bools that the kernel only reads."""
+    """Return the Numba type of a C-contiguous array (n,) of bools that the kernel only reads."""
     return numba.types.Array(numba.types.boolean, 1, "C", readonly=True)
 
 
 def output_indices() -> Any:
-    """The Numba type of a C-contiguous int64 array (n,) that the kernel fills."""
+    """Return the Numba type of a C-contiguous int64 array (n,) that the kernel fills."""
     return numba.types.Array(numba.types.int64, 1, "C")
 
 
 def record_array(dtype: np.dtype) -> Any:
-    """The Numba type of a contiguous array (n,) of records with named fields, which the kernel reads and fills."""
+    """Return the Numba type of a contiguous array (n,) of records, which the kernel reads and fills."""
     return numba.types.Array(numba.from_dtype(dtype), 1, "C")
 
 
 def together(*parts: Any) -> Any:
-    """The Numba type of a tuple of these; a kernel takes a dozen arrays in one as fast as one array."""
+    """Return the Numba type of a tuple of these; a kernel takes a tuple of a dozen arrays as fast as one array."""
     return cast(Any, numba.types).Tuple(parts)
 
 
 NUMBER: Any = numba.types.float64
-"""The Numba type of a float."""
+"""Numba type of a float"""
 TRUTH: Any = numba.types.boolean
-"""The Numba type of a bool."""
+"""Numba type of a bool"""
 COUNT: Any = numba.types.int64
-"""The Numba type of an int."""
+"""Numba type of an int"""
 
 
 _FOR_CALLERS: dict[str, Any] = {**_OPTIONS, "pipeline_class": WithoutMachineCode}
@@ -88,7 +88,7 @@ def inlined(function: _Function) -> _Function:
 
 
 def building_block(function: _Function) -> _Function:
-    """Compile `function` once for the kernels that call it, leaving LLVM to decide about inlining."""
+    """Compile `function` once for the kernels that call it; LLVM decides about inlining."""
     return cast(_Function, ignore_constant_flags(numba.njit(**_FOR_CALLERS)(function)))
 
 
@@ -100,7 +100,7 @@ def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:
 
 
 fused_multiply_add: Callable[[float, float, float], float] = cast(Any, numba.extending.intrinsic)(_fused_multiply_add)
-"""The product and sum a · b + c with one rounding (IEEE 754-2008, 5.4.1); in kernels only."""
+"""Product and sum a · b + c with one rounding (IEEE 754-2008, 5.4.1); in kernels only"""
 
 
 def _power_of_two_below(_typing: Any, _length: Any) -> Any:
@@ -113,7 +113,7 @@ def _power_of_two_below(_typing: Any, _length: Any) -> Any:
 
 
 power_of_two_below: Callable[[float], float] = cast(Any, numba.extending.intrinsic)(_power_of_two_below)
-"""The largest power of two that is at most a positive normal float, by its exponent's bits; in kernels only."""
+"""Largest power of two that is at most a positive normal float, by its exponent's bits; in kernels only"""
 
 
 @contextlib.contextmanager
@@ -132,14 +132,14 @@ _kernels: list["Compiled"] = []
 
 
 def imported_kernels() -> tuple["Compiled", ...]:
-    """The kernels of every module that has been imported so far."""
+    """Return the kernels of every module that has been imported so far."""
     return tuple(_kernels)
 
 
 class Compiled:
-    """A kernel with one signature, compiled (or loaded from the cache on disk) when it is first needed.
+    """Kernel with one signature, compiled (or loaded from the cache on disk) on first use.
 
-    With one signature no later call can start a compilation. An array of another type, number of dimensions or
+    With one signature, no later call can start a compilation. An array of another type, number of dimensions or
     layout raises TypeError instead of stalling a running tick.
     """
 
@@ -147,20 +147,20 @@ class Compiled:
         self.name = f"{function.__module__}.{function.__qualname__}"
         self._dispatcher: Any = numba.njit(**_OPTIONS)(function)
         self.function = function
-        """Its Python function."""
+        """Python function of the kernel"""
         self.signature = (returns or numba.types.void)(*arguments)
         self._preparing = threading.Lock()
         self.ready = False
-        """Whether it is compiled, so that the next call takes no longer than any other."""
+        """Whether the kernel is compiled, so that the next call is as fast as any other"""
         self._run: Callable[..., Any] = self._prepare_and_run
         _kernels.append(self)
 
     __call__: Any = property(operator.attrgetter("_run"))
-    """Run the kernel; TypeError for arrays that its signature does not name. A property, as a method that hands all
+    """Run the kernel; TypeError for arrays of other types than its signature. A property, as a method that passes all
     arguments on would take longer than some kernels."""
 
     def prepare(self) -> None:
-        """Compile or load now."""
+        """Compile or load the kernel now."""
         with self._preparing:
             if not self.ready:
                 keep_on_disk(self._dispatcher, self.name, self._key())
@@ -171,17 +171,17 @@ class Compiled:
 
     @property
     def is_ours(self) -> bool:
-        """Whether another process finds it by its name."""
+        """Whether another process finds the kernel by its name"""
         top_level = self.function.__qualname__ == self.function.__name__
         return top_level and self.name.startswith("robot_side.")
 
     @property
     def is_kept(self) -> bool:
-        """Whether its machine code for this processor is on disk."""
+        """Whether the kernel's machine code for this processor is on disk"""
         return kept(self.name, self._key()) is not None
 
     def _key(self) -> str:
-        # Not before it is asked for: only then does every building block exist.
+        # Computed on first use: only then does every building block exist.
         return f"{machine()} {self.signature} {digest(self.function)}"
 
     def _prepare_and_run(self, *arguments: Any) -> Any:
@@ -190,20 +190,20 @@ class Compiled:
 
     @property
     def address(self) -> int:
-        """The address of its machine code, for `calls.call_at_address`; compiles it if need be."""
+        """Address of the kernel's machine code, for `calls.call_at_address`; compiled if necessary"""
         if not self.ready:
             self.prepare()
         return entry_point(self._dispatcher, self.signature)
 
     @property
     def cache_hits(self) -> int:
-        """Number of times that its machine code came from the disk: 0 or 1."""
+        """Number of times that the machine code came from the disk: 0 or 1"""
         return sum(self._dispatcher.stats.cache_hits.values())
 
 
 def compiled(*arguments: Any, returns: Any = None) -> Callable[[Callable[..., Any]], Compiled]:
-    """Make a function of these Numba argument types a `Compiled` kernel.
+    """Return a decorator that makes a function of these Numba argument types a `Compiled` kernel.
 
-    It fills its output arrays, and returns a value of the type `returns` unless that is None.
+    The kernel fills its output arrays, and returns a value of the type `returns` unless that is None.
     """
     return functools.partial(Compiled, arguments=arguments, returns=returns)

@@ -1,4 +1,4 @@
-"""Keep machine code on disk: a file for each kernel, processor and state of the sources, whole or not at all."""
+"""Machine code on disk: one file for each kernel, processor and version of the sources, complete or absent."""
 
 import contextlib
 import hashlib
@@ -12,37 +12,37 @@ from common.files.user_folders import cache_folder
 _ENDING: Final = ".machine-code"
 _CHECK_BYTES: Final = 32
 _VERSIONS: Final = 8
-"""The most files that one kernel keeps: processors and states of the sources may take turns."""
+"""Most files for one kernel: processors and versions of the sources may alternate."""
 
 
 def machine_code_folder(environment: Mapping[str, str] = os.environ) -> Path:
-    """Find the folder: $NUMBA_CACHE_DIR, else `kernels` in the user's cache."""
+    """Return the folder: $NUMBA_CACHE_DIR, else `kernels` in the user's cache."""
     given = environment.get("NUMBA_CACHE_DIR")
     return Path(given) if given else cache_folder(environment) / "kernels"
 
 
 def can_keep() -> bool:
-    """Whether the folder can be written to, or made."""
+    """Return whether the folder can be written to, or made."""
     folder = machine_code_folder().absolute()
     there = next(place for place in (folder, *folder.parents) if place.exists())
     return os.access(there, os.W_OK | os.X_OK)
 
 
 def kept(name: str, key: str) -> bytes | None:
-    """The machine code of the kernel `name` by its `key`; None where there is none, or not all of it."""
+    """Return the machine code of the kernel `name` by its `key`; None if absent or incomplete."""
     try:
         content = _path(name, key).read_bytes()
     except OSError:
         return None
-    # A crash or a full disk may have left a part.
+    # A crash or a full disk may have left an incomplete file.
     check, code = content[:_CHECK_BYTES], content[_CHECK_BYTES:]
     return code if hashlib.sha256(code).digest() == check else None
 
 
 def keep(name: str, key: str, code: bytes) -> None:
-    """Keep it for the next start; a folder that cannot be written to, or has no room, keeps nothing."""
+    """Store the machine code for the next start. Nothing is stored if the folder is read-only or the disk is full."""
     path = _path(name, key)
-    # Renamed when whole: other processes may read it, or write the same, meanwhile.
+    # Renamed when complete: meanwhile other processes may read or write the same file.
     part = path.with_suffix(f".{os.getpid()}")
     with contextlib.suppress(OSError):
         try:
@@ -52,7 +52,7 @@ def keep(name: str, key: str, code: bytes) -> None:
         except OSError:
             part.unlink(missing_ok=True)
             raise
-        # What processes left that were killed goes with the old ones.
+        # Partial files of killed processes are deleted with the old ones.
         files = sorted(path.parent.glob(f"{name}-*"), key=lambda file: file.stat().st_mtime)
         for old in files[:-_VERSIONS]:
             old.unlink(missing_ok=True)

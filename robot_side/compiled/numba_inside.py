@@ -1,7 +1,7 @@
-"""Everything here rests on names that Numba does not promise to keep; nothing else in feelahead does.
+"""All uses of Numba's private names, which may change without notice; no other module of feelahead has any.
 
-Tried with the versions that pyproject.toml pins. To try another one: widen the pin, run tests/robot_side/compiled
-on an empty cache, and see that cold compilation takes no longer.
+Tested with the versions that pyproject.toml pins. To test another one: widen the pin, run tests/robot_side/compiled
+with an empty cache, and check that cold compilation takes no longer.
 """
 
 import contextlib
@@ -27,7 +27,7 @@ from robot_side.compiled.machine_code import keep, kept, machine_code_folder
 
 @register_pass(mutates_CFG=False, analysis_only=True)  # type: ignore[no-untyped-call]
 class _ForCallers(LoweringPass):
-    """Make the function known to its callers, which `NativeLowering` leaves out without machine code."""
+    """Compiler pass that registers a function for its callers; `NativeLowering` does not, without machine code."""
 
     _name = "for_callers"
 
@@ -35,7 +35,7 @@ class _ForCallers(LoweringPass):
         super().__init__()  # type: ignore[no-untyped-call]
 
     def run_pass(self, state: Any) -> bool:
-        """Numba knows a compiled function by its entry point, so each gets one that nothing calls."""
+        """Register the function with a dummy entry point: Numba identifies compiled functions by their entry points."""
         entry_point = object().__reduce_ex__
         state["cr"] = state["cr"]._replace(cfunc=entry_point)
         state.targetctx.insert_user_function(entry_point, state["cr"].fndesc, [state["library"]])
@@ -43,9 +43,9 @@ class _ForCallers(LoweringPass):
 
 
 class _ForLinking(JITCodeLibrary):
-    """Optimised, to be linked into kernels; never in memory as something to run.
+    """Library of optimised code that is linked into kernels, and never loaded to run.
 
-    Without that, a kernel's loops over lanes come out half as fast.
+    Otherwise a kernel's loops over lanes are half as fast.
     """
 
     def _finalize_final_module(self) -> None:
@@ -54,14 +54,13 @@ class _ForLinking(JITCodeLibrary):
 
 
 class WithoutMachineCode(CompilerBase):
-    """Compile to what a kernel needs to link the function in.
+    """Compiler of functions that only kernels call: it stops at the code that a kernel links.
 
-    By default Numba also makes machine code of it, and wrappers for Python and C. That takes more than half of the
-    time, and nothing but kernels calls these functions.
+    By default Numba also generates machine code, and wrappers for Python and C. They take more than half of the time.
     """
 
     def define_pipelines(self) -> list[Any]:
-        """The ordinary passes and `_ForCallers`."""
+        """Return the ordinary passes and `_ForCallers`."""
         self.state.flags.no_cpython_wrapper = True
         self.state.flags.no_cfunc_wrapper = True
         self.state.flags.no_compile = True
@@ -89,16 +88,16 @@ def ignore_constant_flags(dispatcher: Any) -> Any:
 
 
 def machine() -> str:
-    """Name the versions and the processor, which machine code depends on beside its sources."""
+    """Return versions and processor: machine code depends on these and on its sources."""
     processor = cast(Any, cpu_target).target_context.codegen().magic_tuple()
     return f"{numba.__version__} {llvmlite.__version__} {sys.implementation.cache_tag} {processor}"
 
 
 class _OnDisk(_Cache):
-    """Keep a kernel's machine code in a file of `machine_code`.
+    """Cache of a kernel's machine code in a file of `machine_code`.
 
-    Numba's own cache knows a kernel by its file alone: it would go on running an old version of a building block from
-    another file. It keeps nothing where it can only read, and a full disk ends the start.
+    Numba's own cache checks only the kernel's file: it would continue to run an old version of a building block from
+    another file. It stores nothing in a read-only folder, and a full disk ends the start.
     """
 
     cache_path = property(lambda _: str(machine_code_folder()))
@@ -107,35 +106,35 @@ class _OnDisk(_Cache):
         self._names: Final = name, key
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled kernel, or None where there is none."""
+        """Return the compiled kernel, or None."""
         del sig
         target_context.refresh()
         code = kept(*self._names)
-        # Numba's own way to keep it; whoever can write there can run programs as this user anyway.
-        with contextlib.suppress(Exception):  # unpickling may raise anything: then it is compiled anew
+        # Numba's own format. A program that can write to this folder can run code as this user anyway.
+        with contextlib.suppress(Exception):  # unpickling may raise anything: then the kernel is compiled again
             return code and cast(Any, CompileResult)._rebuild(target_context, *pickle.loads(code))  # noqa: S301
         return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep it."""
+        """Store the compiled kernel."""
         del sig
-        # An address of this process is in some.
+        # Dynamic globals are addresses of this process.
         if not data.library.has_dynamic_globals:
             keep(*self._names, cast(Any, dumps)(data._reduce()))
 
     def enable(self) -> None:
-        """It always is."""
+        """Do nothing: the cache is always enabled."""
 
     disable = flush = enable
 
 
 def keep_on_disk(dispatcher: Any, name: str, key: str) -> None:
-    """Let the dispatcher load machine code from disk by `name` and `key`, and keep there what it compiles."""
+    """Let the dispatcher load machine code from disk by `name` and `key`, and store new code there."""
     dispatcher._cache = cast(Any, _OnDisk)(name, key)
 
 
 def entry_point(dispatcher: Any, signature: Any) -> int:
-    """The address of a compiled kernel's machine code, as kernels call each other."""
+    """Return the address of a compiled kernel's machine code, for calls from kernels."""
     result = dispatcher.overloads[signature.args]
     return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
 
@@ -151,7 +150,7 @@ def call_at(context: Any, builder: Any, signature: Any, address: Any, given: lis
 
 
 def array_at(context: Any, builder: Any, array_type: Any, pointer: Any, shape: list[Any]) -> Any:
-    """Build the C-contiguous array of this type and shape (integers of 64 bits) at a pointer; nobody frees it."""
+    """Build the C-contiguous array of this type and shape (64-bit integers) at a pointer; it is never freed."""
     array = make_array(array_type)(context, builder)  # type: ignore[no-untyped-call]
     itemsize = shape[0].type(get_itemsize(context, array_type))  # type: ignore[no-untyped-call]
     strides = [itemsize]

@@ -1,4 +1,4 @@
-"""What a kernel is built from: the files of every function that goes into it, and the constants that these read."""
+"""Sources of a kernel: the files of all functions that it compiles, and the constants that these read."""
 
 import functools
 import hashlib
@@ -13,13 +13,13 @@ import numpy as np
 
 _OURS = frozenset({"common", "robot_side"})
 _COMPILERS = ("kernel.py", "numba_inside.py")
-"""The files beside this one that decide how any kernel is compiled."""
+"""Files beside this one that affect the compilation of all kernels"""
 
 
 def sources(function: Callable[..., Any]) -> frozenset[Path]:
-    """Find the source files of `function` and of every function of ours that it names, directly or through others.
+    """Return the source files of `function` and of every function of ours that it names, directly or through others.
 
-    Where they lie does not matter. A module that is named as a whole counts with all that it names.
+    They may be in any folder. A module that is named as a whole counts with all that it names.
     """
     here = Path(__file__).parent
     return frozenset(here / name for name in _COMPILERS) | {
@@ -28,9 +28,9 @@ def sources(function: Callable[..., Any]) -> frozenset[Path]:
 
 
 def digest(function: Callable[..., Any]) -> str:
-    """Digest the content of `sources(function)` and the values of the constants that its parts read by name.
+    """Return a digest of `sources(function)` and of the values of the constants that its parts read by name.
 
-    Constants count by value, because a number does not know the file from which it was imported.
+    Constants count by value, because a number has no record of the file from which it was imported.
     """
     result = hashlib.sha256()
     for path in sorted(sources(function)):
@@ -41,7 +41,7 @@ def digest(function: Callable[..., Any]) -> str:
 
 
 def code_sizes(function: Callable[..., Any]) -> dict[FunctionType, int]:
-    """Every function that compiling `function` compiles, itself too, with the size of its bytecode (bytes)."""
+    """Return `function` and all functions that are compiled with it, with the sizes of their bytecode in bytes."""
     return {part: len(part.__code__.co_code) for part in _parts(function) if isinstance(part, FunctionType)}
 
 
@@ -51,7 +51,7 @@ def _content(path: Path) -> bytes:
 
 
 def _parts(function: Callable[..., Any]) -> set[Any]:
-    """Every function, class and module of ours that compiling `function` looks into."""
+    """Return every function, class and module of ours that the compilation of `function` uses."""
     found: set[Any] = set()
     waiting: list[Any] = [inspect.unwrap(function)]
     while waiting:
@@ -67,7 +67,7 @@ def _parts(function: Callable[..., Any]) -> set[Any]:
 
 
 def _ours(value: object, user: FunctionType | ModuleType) -> Any:
-    """The function, class or module of ours behind a value that `user` names; None where there is none."""
+    """Return the function, class or module of ours behind a value that `user` names, or None."""
     if isinstance(value, ModuleType):
         return value if value.__name__.partition(".")[0] in _OURS else None
     if hasattr(value, "__wrapped__"):
@@ -80,7 +80,7 @@ def _ours(value: object, user: FunctionType | ModuleType) -> Any:
 
 
 def _named(function: FunctionType) -> Iterator[tuple[str, object]]:
-    """The globals and the variables of surrounding functions that `function` names, with their values."""
+    """Yield the globals and the variables of surrounding functions that `function` names, with their values."""
     for name in _names(function.__code__):
         if name in function.__globals__:
             yield name, function.__globals__[name]
@@ -106,7 +106,7 @@ def _constants(function: Callable[..., Any]) -> Iterator[str]:
 
 
 def _value(value: object) -> str | None:
-    """The value as a text that is the same in every process; None for what is no constant."""
+    """Return the value as a text that is the same in every process; None if it is no constant."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {value.tobytes().hex()}"
     if isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""Small arrays in a kernel's own frame: kernels allocate nothing."""
+"""Small arrays on the stack: kernels allocate no heap memory."""
 
 import math
 from collections.abc import Callable
@@ -13,10 +13,10 @@ from robot_side.compiled.numba_inside import array_at, room_on_stack
 
 
 def on_stack(*shape: int, dtype: Any = np.float64) -> Callable[[], np.ndarray]:
-    """Make the function by which a kernel gets an array of this shape, with anything in it; in kernels only.
+    """Return a function with which a kernel gets an uninitialised array of this shape; in kernels only.
 
-    It is gone when the function that asked returns: never return it, nor a tuple with it. Each place that asks has its
-    own, in a loop the same each time.
+    The array ends with the function that called: never return it, nor a tuple with it. Each place of a call has one
+    array, in a loop the same each time.
     """
     element = np.dtype(dtype)
 

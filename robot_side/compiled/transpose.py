@@ -1,6 +1,6 @@
-"""Rows of numbers to columns in vector instructions, four rows at a time; in kernels only.
+"""Transposition of rows to columns by vector instructions, four rows at a time; in kernels only.
 
-LLVM copies a loop that does this number by number: gathering the pairs' arrays would cost as much as their bounds.
+LLVM compiles such a loop number by number: gathering the pairs' arrays would cost as much as their bounds.
 """
 
 from collections.abc import Callable
@@ -55,18 +55,18 @@ def _transpose_three(_typing: Any, rows: Any, _start: Any, columns: Any, _end: A
 transpose_four: Callable[[FloatArray, int, int, int, int, FloatArray, int, int], None] = cast(
     Any, numba.extending.intrinsic
 )(_transpose_four)
-"""(rows, first, second, third, fourth, columns, end, apart): four numbers of each of four rows, which begin at these
-places in `rows`, to four numbers from `end` of each of four columns, `apart` numbers apart in `columns`. Both are
-flat."""
+"""(rows, first, second, third, fourth, columns, end, apart): copy four numbers of each of four rows, which begin at
+these places in `rows`, to four numbers from `end` on in each of four columns, which are `apart` numbers apart in
+`columns`. Both arrays are flat."""
 
 transpose_three: Callable[[FloatArray, int, FloatArray, int, int], None] = cast(Any, numba.extending.intrinsic)(
     _transpose_three
 )
-"""(rows, start, columns, end, apart): the same for three numbers of each of four rows of just three."""
+"""(rows, start, columns, end, apart): the same for four consecutive rows of three numbers, from `start` on"""
 
 
 def _access(context: Any, builder: Any, source_type: Any, source: Any, target_type: Any, target: Any) -> Any:
-    """Functions that read four numbers from an index of `source`, and write four to one of `target`."""
+    """Return functions that read four numbers from an index of `source`, and write four to one of `target`."""
     pointers = [
         context.make_array(kind)(context, builder, array).data
         for kind, array in ((source_type, source), (target_type, target))
@@ -91,5 +91,5 @@ def _plus(builder: Any, start: Any, step: Any, count: int) -> Any:
 
 
 def _pick(builder: Any, first: Any, second: Any, *numbers: int) -> Any:
-    """Four of the numbers of two vectors, counted through both."""
+    """Return four of the numbers of two vectors, indexed through both."""
     return builder.shuffle_vector(first, second, ir.Constant(ir.VectorType(ir.IntType(32), 4), numbers))

@@ -1,4 +1,4 @@
-"""Vectors of three as tuples: Numba keeps them in registers, where small arrays would live on the heap."""
+"""Vectors of three as tuples: Numba keeps them in registers, but small arrays on the heap."""
 
 import math
 
@@ -10,55 +10,55 @@ Vector = tuple[float, float, float]
 
 @inlined
 def load(array: FloatArray, row: int) -> Vector:
-    """Row `row` of an (n, 3) array."""
+    """Return row `row` of an (n, 3) array."""
     return array[row, 0], array[row, 1], array[row, 2]
 
 
 @inlined
 def add(a: Vector, b: Vector) -> Vector:
-    """The sum a + b."""
+    """Return the sum a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @inlined
 def subtract(a: Vector, b: Vector) -> Vector:
-    """The difference a - b."""
+    """Return the difference a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @inlined
 def negative(a: Vector) -> Vector:
-    """The opposite -a."""
+    """Return -a."""
     return -a[0], -a[1], -a[2]
 
 
 @inlined
 def scale(factor: float, a: Vector) -> Vector:
-    """The multiple factor · a."""
+    """Return the product factor · a."""
     return factor * a[0], factor * a[1], factor * a[2]
 
 
 @inlined
 def dot(a: Vector, b: Vector) -> float:
-    """The scalar product a · b."""
+    """Return the scalar product a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @inlined
 def cross(a: Vector, b: Vector) -> Vector:
-    """The vector product a × b."""
+    """Return the vector product a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @inlined
 def norm(a: Vector) -> float:
-    """The length |a|."""
+    """Return the length |a|."""
     return math.sqrt(dot(a, a))
 
 
 @inlined
 def unit(a: Vector) -> Vector:
-    """The direction a / |a|; 0 when |a| is 0 or too small to be told from it, so that it counts for nothing."""
+    """Return the direction a / |a|; 0 if |a| is 0 or underflows to it."""
     length = norm(a)
     if length == 0.0:
         return 0.0, 0.0, 0.0

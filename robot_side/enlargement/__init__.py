@@ -1,4 +1,4 @@
-"""How wrong the gripper's position may be, and how far it is enlarged therefore (eq. 3-10)."""
+"""Position error of the gripper, and the enlargement that covers it (eq. 3-10)."""
 
 from robot_side.enlargement.distance import enlargement_distance
 

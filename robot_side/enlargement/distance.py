@@ -1,4 +1,4 @@
-"""How far the gripper is enlarged so that a warning comes in time with probability P (eq. 9-10)."""
+"""Enlargement of the gripper by which a warning comes in time with probability P (eq. 9-10)."""
 
 import math
 from dataclasses import dataclass, field
@@ -18,7 +18,7 @@ Vector3 = tuple[float, float, float]
 
 
 def standard_quantile(probability: npt.ArrayLike) -> FloatArray:
-    """Φ⁻¹(P; 0, 1); ValueError for P outside (0, 1)."""
+    """Return Φ⁻¹(P; 0, 1); ValueError for P outside (0, 1)."""
     p = np.asarray(probability, dtype=np.float64)
     if not ((p > 0.0) & (p < 1.0)).all():
         raise ValueError(f"probability = {p} is outside (0, 1); valid: 0 < probability < 1")
@@ -26,7 +26,7 @@ def standard_quantile(probability: npt.ArrayLike) -> FloatArray:
 
 
 def _non_negative(name: str, value: npt.ArrayLike) -> FloatArray:
-    """`value` as floats; ValueError that names it when an element is negative or not finite."""
+    """Return `value` as floats; ValueError with `name` if an element is negative or not finite."""
     values = np.asarray(value, dtype=np.float64)
     if not (np.isfinite(values) & (values >= 0.0)).all():
         raise ValueError(f"{name} = {values} is negative or not finite; valid: finite and at least 0")
@@ -54,11 +54,11 @@ def enlargement_distance(
     variance_m2: npt.ArrayLike,
     delay_displacement_m: npt.ArrayLike,
 ) -> float | FloatArray:
-    """Enlargement D_incr(P) = ΔT_d + max(0, Φ⁻¹(P; mean, variance)) in metres (eq. 9-10).
+    """Return the enlargement D_incr(P) = ΔT_d + max(0, Φ⁻¹(P; mean, variance)) in metres (eq. 9-10).
 
     probability: P in (0, 1). mean_m: a magnitude, as |μ_ee| + √3 |μ_c|, so never negative.
-    variance_m2: σ_p² + σ_c²; with 0 the statistical part is the mean itself.
-    delay_displacement_m: ΔT_d = |v| t_d (eq. 8). The arguments broadcast; a float for four scalars.
+    variance_m2: σ_p² + σ_c²; if 0, the statistical part is the mean itself.
+    delay_displacement_m: ΔT_d = |v| t_d (eq. 8). The arguments broadcast; four scalars give a float.
     ValueError for P outside (0, 1) and for any other argument that is negative or not finite.
     """
     z = standard_quantile(probability)
@@ -74,7 +74,7 @@ def enlargement_distance(
 
 @inlined
 def statistical_distance(mean: float, variance: float, quantile: float) -> float:
-    """D_σ = max(0, μ + Φ⁻¹(P) √σ²), lengths in m (eq. 9-10): what every law, and every explanation, means by it."""
+    """Return D_σ = max(0, μ + Φ⁻¹(P) √σ²), lengths in m (eq. 9-10): the one formula for all laws and explanations."""
     return max(0.0, mean + quantile * math.sqrt(variance))
 
 
@@ -86,10 +86,10 @@ def _statistical_loop(mean: FloatArray, variance: FloatArray, quantile: FloatArr
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """How wrong the gripper, the camera and the prediction of the delay may be (eq. 9-10); frames: the world's."""
+    """Errors of gripper, camera and delay prediction, and the probability P (eq. 9-10), in the world frame."""
 
     probability: float = 0.99
-    """P in (0, 1): how often the warning must come before the contact; of one surface, one-sided."""
+    """P in (0, 1): share of approaches in which the warning comes before the contact; one surface, one-sided"""
     camera_mean_m: Vector3 = (0.0, 0.0, 0.0)
     """μ_c, true minus perceived."""
     camera_sd_m: float = 0.0
@@ -120,16 +120,16 @@ class Uncertainty:
         return mean_m
 
     def mean_along_m(self, direction: FloatArray) -> float:
-        """û·(μ_ee - μ_c) along a unit vector `direction` (3,): how much nearer than it seems a thing is on average."""
+        """Return û·(μ_ee - μ_c) along a unit vector `direction` (3,): how much nearer than perceived objects are."""
         return float(direction @ self.mean_m)
 
 
 def plain_enlargements_m(
     uncertainty: Uncertainty, covariances: FloatArray, velocities_m_s: FloatArray, loop_age_s: float
 ) -> FloatArray:
-    """D_incr of each sphere (m,) as the paper prints it: the same in every direction, with |v| t_d and Σ's trace.
+    """Return D_incr of each sphere (m,) as the paper prints it: equal in all directions, with |v| t_d and Σ's trace.
 
-    |μ_c| of the vector: √3 times the mean where that is the same on each axis.
+    |μ_c| is the vector's length: √3 times the mean if that is the same on each axis.
     covariances (m, 3, 3) from `position_covariance`, velocities_m_s (m, 3) of the centres.
     """
     mean_m = math.hypot(*uncertainty.kinematic_mean_m) + math.hypot(*uncertainty.camera_mean_m)

@@ -7,11 +7,11 @@ from robot_side.compiled.kernel import compiled, input_array, output_array
 
 
 def position_covariance(jacobians: FloatArray, encoder_sigma_rad: FloatArray) -> FloatArray:
-    """Covariance Σ_ee = J diag(σ_θ²) Jᵀ (m, 3, 3) of the position error of m points (eq. 5), m².
+    """Return the covariance Σ_ee = J diag(σ_θ²) Jᵀ (m, 3, 3) of the position error of m points (eq. 5), m².
 
     jacobians (m, 3, n): the points' positional Jacobians at the estimated configuration, m/rad; the result
     is in their frame. encoder_sigma_rad (n,): standard deviation of each joint's error; metres for a
-    prismatic joint. ValueError for another number of joints; what is not finite makes NaN.
+    prismatic joint. ValueError for another number of joints; NaN passes through.
     """
     if encoder_sigma_rad.shape != jacobians.shape[2:]:
         raise ValueError(f"encoder_sigma_rad has the shape {encoder_sigma_rad.shape}; valid: {jacobians.shape[2:]}")
@@ -22,7 +22,7 @@ def position_covariance(jacobians: FloatArray, encoder_sigma_rad: FloatArray) ->
 
 @compiled(input_array(3), input_array(1), output_array(3))
 def _covariance_loop(jacobians: FloatArray, sigma: FloatArray, covariances: FloatArray) -> None:
-    """Σ_ee of each point."""
+    """Fill Σ_ee of each point."""
     for point in range(jacobians.shape[0]):
         for row in range(3):
             for column in range(row + 1):
@@ -35,12 +35,12 @@ def _covariance_loop(jacobians: FloatArray, sigma: FloatArray, covariances: Floa
 
 
 def directional_variance(covariances: FloatArray, directions: FloatArray) -> FloatArray:
-    """Variance uᵀ Σ u in m² along unit directions, in the covariances' frame.
+    """Return the variance uᵀ Σ u in m² along unit directions, in the covariances' frame.
 
     covariances (m, 3, 3); directions (m, 3) give (m,), directions (m, k, 3) give (m, k).
     """
     by_point = directions.reshape(len(covariances), -1, 3)
     variance = np.einsum("mki,mki->mk", by_point @ covariances, by_point)
-    # Rounding may leave -1e-20 along a direction in which nothing can be wrong.
+    # Rounding may leave -1e-20 along a direction without error.
     result: FloatArray = np.maximum(variance, 0.0).reshape(directions.shape[:-1])
     return result

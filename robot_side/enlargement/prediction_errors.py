@@ -1,4 +1,4 @@
-"""What the prediction of the delay's displacement misses: μ_δ and σ_δ of eq. 10, over loop age and who predicts."""
+"""Errors μ_δ and σ_δ of the predicted delay displacement (eq. 10), by loop age and predicting side."""
 
 import tomllib
 from collections.abc import Mapping
@@ -13,34 +13,34 @@ from common.errors import ConfigurationError
 from common.protocol.messages import Compensation
 
 BUILT_IN: Final = Path(__file__).parent / "prediction_errors.toml"
-"""Of the built-in arm, written by `feelahead bench error --table`."""
+"""Table of the built-in arm, written by `feelahead bench error --table`"""
 WITHOUT_TABLE: Final = 0.2
-"""Share of v_max t_d that is taken for μ_δ where no table is known."""
+"""Share of v_max t_d that is taken as μ_δ without a table"""
 _KEYS: Final = ("loop_age_ms", "mu_mm", "sigma_mm")
 
 Rows = tuple[tuple[float, float, float], ...]
-"""(loop age in s, μ_δ in m, σ_δ in m), loop ages rising."""
+"""Rows (loop age in s, μ_δ in m, σ_δ in m), loop ages rising"""
 
 
 @dataclass(frozen=True)
 class PredictionErrors:
-    """μ_δ and σ_δ; without rows, 20 % of the way that full speed goes in the loop age."""
+    """Tables of μ_δ and σ_δ; without rows, μ_δ is 20 % of the distance at full speed in the loop age."""
 
     rows: Mapping[Compensation, Rows] = field(default_factory=dict)
     arm: str | None = None
-    """The fingerprint of the arm that they were measured on."""
+    """Fingerprint of the arm on which the errors were measured"""
 
     def table(self, kind: Compensation) -> FloatArray:
-        """The rows (k, 3) of one kind of compensation, none where nothing is known."""
+        """Return the rows (k, 3) for one compensating side, or no rows if unknown."""
         return np.array(self.rows.get(kind, ()), dtype=np.float64).reshape(-1, 3)
 
     def at(self, kind: Compensation, loop_age_s: float, full_speed_m_s: float) -> tuple[float, float]:
-        """μ_δ and σ_δ in metres at a loop age, as `prediction_error` has them."""
+        """Return μ_δ and σ_δ in metres at a loop age, by `prediction_error`."""
         return prediction_error(self.table(kind), loop_age_s, full_speed_m_s)
 
 
 def prediction_error(rows: FloatArray, loop_age_s: float, full_speed_m_s: float) -> tuple[float, float]:
-    """μ_δ and σ_δ in metres at a loop age, between the rows (k, 3); beyond the last one they grow with the loop age."""
+    """Interpolate μ_δ and σ_δ in m at a loop age in the rows (k, 3); beyond the last, in proportion to loop age."""
     count, after = rows.shape[0], 0
     if count == 0:
         return WITHOUT_TABLE * full_speed_m_s * loop_age_s, 0.0
@@ -56,7 +56,7 @@ def prediction_error(rows: FloatArray, loop_age_s: float, full_speed_m_s: float)
 
 
 def load_prediction_errors(path: Path) -> PredictionErrors:
-    """Read a table; ConfigurationError for a file that is none, naming what is wrong with it."""
+    """Read a table; ConfigurationError names what is wrong in an invalid file."""
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -77,7 +77,7 @@ def _rows(path: Path, kind: str, tables: Any) -> Rows:
     valid = all(np.isfinite(row).all() and row[0] > 0.0 and row[2] >= 0.0 for row in rows)
     if not (rows and valid and list(rows) == sorted(rows)):
         raise ConfigurationError(
-            f"--prediction-errors {path}: [[{kind}]] is missing or not as it should be; valid: tables with"
+            f"--prediction-errors {path}: [[{kind}]] is missing or invalid; valid: tables with"
             f" {', '.join(_KEYS)}, loop ages rising"
         )
     return rows  # type: ignore[return-value]

@@ -1,4 +1,4 @@
-"""The field along one direction: the distances at which the eight strengths begin."""
+"""Field along one direction: the onset distances of the eight strengths."""
 
 from dataclasses import dataclass
 from typing import NoReturn
@@ -16,7 +16,7 @@ _STILL: FloatArray = np.empty(0)
 
 @dataclass(frozen=True)
 class Along:
-    """A direction, and how uncertain what lies along it is (eq. 9-10)."""
+    """Direction of a look, and the uncertainty along it (eq. 9-10)."""
 
     direction: FloatArray
     """û (3,), unit, in the world frame"""
@@ -27,26 +27,26 @@ class Along:
     quantile: float
     """Φ⁻¹(P)"""
     reach_m: float
-    """How far ahead is looked."""
+    """Distance that is examined"""
     mean_along_m: float = 0.0
     """μ_δ"""
     variance_along_m2: float = 0.0
     """σ_δ²"""
     early_m: FloatArray | None = None
-    """(k,) by how much each object's ways are shorter, as it comes towards the gripper; None: all stand still"""
+    """Approach of each object (k,), by which its contact distances shorten; None: all are at rest"""
 
 
 @dataclass(frozen=True)
 class Field:
-    """What is ahead along one direction, as it was when it was looked at."""
+    """Result of one look."""
 
     ways_m: FloatArray
-    """(2, 8) the distances at which strengths 1 to 8 begin, never falling, infinite beyond the reach. The fast list,
-    and the slow one: an object that is to be touched is felt less there, and where it is expected."""
+    """(2, 8) onset distances of strengths 1 to 8, rising, infinite beyond the reach. The fast list, then the slow one:
+    there an object that is to be touched is felt less, and at its expected place."""
     sigma_m: float
-    """The largest D_σ of the gripper's spheres."""
+    """Largest D_σ of the gripper's spheres"""
     counts: IntArray
-    """How much work it was, at the places of `Count`."""
+    """Counts of the work, indexed by `Count`"""
 
     @property
     def fast_m(self) -> FloatArray:
@@ -63,7 +63,7 @@ class Field:
 
 @dataclass
 class Ahead:
-    """Looks ahead along one direction at a time, as the law does within its own call; keeps the room for that."""
+    """Single looks from Python, as the law's compiled call has them; keeps the scratch memory."""
 
     encoder_sigma_rad: FloatArray
     """(n,)"""
@@ -75,10 +75,10 @@ class Ahead:
     def look(
         self, pose: GripperPose, scene: SceneTable, classes: IntArray, along: Along, widest_m: float = np.inf
     ) -> Field:
-        """The field at `pose`; classes (k,): of the objects (`object_class`); widest_m: half the fingers' gap.
+        """Return the field at `pose`. classes (k,): the objects' (`object_class`). widest_m: half the fingers' gap.
 
-        ValueError that names the field of `pose` or `along` that holds NaN or infinity: it would compare as far away
-        and silently give no warning.
+        ValueError names the field of `pose` or `along` that holds NaN or infinity: it would compare as far away, and
+        silently give no warning.
         """
         objects = len(scene.first_rows) - 1
         early_m = _STILL if along.early_m is None else along.early_m
@@ -101,7 +101,7 @@ class Ahead:
 
 
 def _refuse(pose: GripperPose, along: Along) -> NoReturn:
-    """Raise the ValueError that says what is not finite."""
+    """Raise the ValueError that names the field that is not finite."""
     for name in ("tool_position_m", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
         require_finite(f"pose.{name}", getattr(pose, name))
     for name in ("direction", "mean_m", "variance_m2", "mean_along_m", "variance_along_m2", "quantile", "reach_m"):

@@ -1,7 +1,7 @@
-"""D_σ of each of the gripper's spheres along a direction (eq. 3-7, 9, 10), and how much of it inflates the sphere.
+"""D_σ of each of the gripper's spheres along a direction (eq. 3-7, 9, 10), and the part that inflates the sphere.
 
-What camera and arm miss lies in any direction: it inflates. What the prediction of the delay misses lies along the
-motion: it shortens the ways (docs/feel.md).
+Errors of camera and arm lie in any direction: they inflate. Prediction errors of the delay lie along the motion: they
+shorten the contact distances (docs/feel.md).
 """
 
 import math
@@ -14,12 +14,12 @@ from robot_side.enlargement.distance import statistical_distance
 from robot_side.field.scratch import CLUSTER, Error, ScratchColumns
 
 Spread = tuple[float, Vector, Vector, Vector]
-"""A quadratic form: its value at the tool, the factors of x, y and z, of their squares, and of yz, zx and xy."""
+"""Quadratic form: the value at the tool, the factors of x, y and z, of their squares, and of yz, zx and xy"""
 
 
 @inlined
 def spread_along(jacobian: FloatArray, encoder_variance: FloatArray, along: Vector) -> Spread:
-    """Work out ûᵀ J diag(σ_θ²) Jᵀ û (eq. 5) of any point that moves with the tool: a quadratic form of its place.
+    """Return ûᵀ J diag(σ_θ²) Jᵀ û (eq. 5) of points that move with the tool, as a quadratic form of their place.
 
     A joint moves the point r from the tool by û·(v + ω × r) = û·v + (û × ω)·r. jacobian (6, n): the tool's.
     """
@@ -37,17 +37,17 @@ def spread_along(jacobian: FloatArray, encoder_variance: FloatArray, along: Vect
 
 @inlined
 def variance_at(spread: Spread, arm: Vector) -> float:
-    """Evaluate the variance (m²) of the point at `arm` from the tool."""
+    """Return the variance (m²) of the point at `arm` from the tool."""
     at_tool, linear, squares, others = spread
     x, y, z = arm
     products = others[0] * y * z + others[1] * z * x + others[2] * x * y
     variance = at_tool + dot(linear, arm) + dot(squares, (x * x, y * y, z * z)) + products
-    # Rounding may bring what is nearly 0 below it. A maximum would hide NaN.
+    # Rounding may bring a small variance below 0. max() would hide NaN.
     return 0.0 if variance < 0.0 else variance
 
 
 class Missed(NamedTuple):
-    """What may be wrong along a direction, without the joints' part (eq. 9-10)."""
+    """Errors along a direction, without the joints' part (eq. 9-10)."""
 
     mean: float
     """û·(μ_ee - μ_c) in m"""
@@ -63,7 +63,7 @@ class Missed(NamedTuple):
 
 @inlined
 def inflation_and_distance(missed: Missed, kinematic: float) -> tuple[float, float]:
-    """Work out what camera and arm may miss at P, and D_σ, of a point whose joints' variance (m²) this is."""
+    """Return the inflation and D_σ of a point. kinematic: variance (m²) from the joints."""
     both = kinematic + missed.variance
     inflation = statistical_distance(missed.mean, both, missed.quantile)
     return inflation, statistical_distance(
@@ -83,7 +83,7 @@ def inflate(
     missed: Missed,
     scratch: ScratchColumns,
 ) -> bool:
-    """Fill the scratch's spheres, inflations, D_σ, errors along the direction, clusters; False for what is not finite.
+    """Fill the scratch's spheres, inflations, D_σ, errors and clusters. Return False for numbers that are not finite.
 
     centers (m, 3), radii (m,), on_finger (m,).
     """
@@ -101,7 +101,7 @@ def inflate(
         scratch.on_finger[i] = on_finger[i]
         errors[Error.LARGEST] = max(errors[Error.LARGEST], whole)
         errors[Error.ALONG] = max(errors[Error.ALONG], whole - inflation)
-        # A maximum may hide NaN; a sum does not.
+        # max() may hide NaN; the sum does not.
         check += whole + inflation + kinematic + arm[0] + arm[1] + arm[2] + radii[i]
     for first in range(0, radii.size, CLUSTER):
         middle, radius = around_spheres(spheres, scratch.inflation_m, first, min(first + CLUSTER, radii.size))
@@ -112,7 +112,7 @@ def inflate(
 
 @inlined
 def around_spheres(spheres: FloatArray, inflated: FloatArray, first: int, end: int) -> tuple[Vector, float]:
-    """Find a sphere around those from `first` to `end` of spheres (m, 4), each inflated by the first column."""
+    """Return a sphere around those from `first` to `end` of spheres (m, 4), each inflated by the first column."""
     x, y, z, count = 0.0, 0.0, 0.0, max(end - first, 1)
     for i in range(first, end):
         x, y, z = x + spheres[i, 0], y + spheres[i, 1], z + spheres[i, 2]
@@ -140,7 +140,7 @@ def explain_inflation(
     kinematic_variance: FloatArray,
     distances: FloatArray,
 ) -> None:
-    """Fill ûᵀΣû (m,) in m² and D_σ (m,) in m of points (m, 3), as `inflate` has them, for people who look."""
+    """Fill ûᵀΣû (m,) in m² and D_σ (m,) in m of points (m, 3), as in `inflate`, for explanations."""
     along = load(direction.reshape(1, 3), 0)
     spread, origin = spread_along(jacobian, encoder_variance, along), load(tool.reshape(1, 3), 0)
     for i in range(distances.size):

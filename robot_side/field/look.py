@@ -1,9 +1,9 @@
-"""One look along a direction, in one compiled call: where the eight strengths begin (eq. 3-12, §4.2).
+"""One look along a direction, in one compiled call: the onset distances of the eight strengths (eq. 3-12, §4.2).
 
     inflate ─▶ broad phase: objects, clusters of spheres ─▶ contact of each sphere ─▶ overlap profiles
 
-Best first: the object, the cluster or the sphere that may be touched first comes next. An overlap is worked out only
-where a strength may begin sooner than those known by then (`profile`).
+Best-first search: the next object, cluster or sphere is the one that may be touched first. An overlap is computed only
+where it may shorten an onset distance (`profile`).
 """
 
 import math
@@ -35,16 +35,16 @@ from robot_side.surroundings.kinds.layout import HALF_SPACE, MESH
 from robot_side.surroundings.scene_columns import SCENE, contact_with, next_object
 
 MARGIN_M: Final = 0.012
-"""m: over this distance before the one at which full strength is due, strength grows."""
+"""m: distance before that of full strength, over which strength grows"""
 LEAST_DEPTH_M: Final = 0.0005
-"""A shallower overlap is a graze: V_min = π R (0.5 mm)². Encoder noise turns the motion aside by less."""
+"""Depth up to which an overlap is a graze: V_min = π R (0.5 mm)². Encoder noise turns the motion aside by less."""
 
 scene_at, scratch_at = SCENE.at, SCRATCH.at
 
 
 @inlined
 def _last_to_count(scratch: ScratchColumns, margin: float) -> float:
-    """The bound: a contact beyond this, less its lead, changes no strength."""
+    """Return the distance beyond which a contact, less its lead, changes no onset distance."""
     last: float = max(scratch.distances_m[0, STRENGTHS - 1], scratch.distances_m[1, STRENGTHS - 1])
     return last + margin
 
@@ -53,7 +53,7 @@ def _last_to_count(scratch: ScratchColumns, margin: float) -> float:
 def _near_rows(
     bundles: Bundles, first: int, end: int, center: Vector, size: float, along: Vector, reach: float
 ) -> tuple[int, float]:
-    """Keep those of the rows that a sphere around others touches within the reach; how many, and the least distance."""
+    """Keep the rows that a bounding sphere touches within the reach. Return their number and the least distance."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     count, least = 0, math.inf
     for row in range(first, end):
@@ -68,7 +68,7 @@ def _near_rows(
 
 @building_block
 def _cluster_bound(bundles: Bundles, rows: int, cluster: int, along: Vector, reach: float) -> tuple[float, bool]:
-    """No more than `_cluster_contact`, of meshes the boxes around them; whether there are any."""
+    """Return a lower bound of `_cluster_contact`, with boxes around meshes, and whether there are meshes."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     center, radius, least, rough = load(scratch.clusters, cluster), scratch.clusters[cluster, 3], math.inf, False
     for k in range(rows):
@@ -82,7 +82,7 @@ def _cluster_bound(bundles: Bundles, rows: int, cluster: int, along: Vector, rea
 
 @building_block
 def _cluster_contact(bundles: Bundles, rows: int, cluster: int, along: Vector, reach: float, clear: bool) -> float:
-    """The least distance at which any of a cluster's spheres touches any of the first rows kept."""
+    """Return the least distance at which a cluster's bounding sphere touches any of the first rows kept."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     center, radius, least = load(scratch.clusters, cluster), scratch.clusters[cluster, 3], math.inf
     for k in range(rows):
@@ -94,7 +94,7 @@ def _cluster_contact(bundles: Bundles, rows: int, cluster: int, along: Vector, r
 
 @building_block
 def _follow(bundles: Bundles, item: int, rows: int, thing: int, along: Vector, reach: float, waits: bool) -> bool:
-    """Follow the overlap profile of the pair at a place; see `follow`."""
+    """Follow the overlap profile of pair `item`; see `follow`."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     pair = scratch.pairs[item]
     center, end = load(scratch.spheres, pair.sphere), reach + MARGIN_M + pair.lead
@@ -117,10 +117,10 @@ def _look_at(
     widest: float,
     reach: float,
 ) -> None:
-    """Shorten the distances by one object, of which the first rows are kept: best first.
+    """Shorten the onset distances by one object, whose rows within the reach are kept: best first.
 
-    Clusters and pairs are in one queue: a cluster as -1 less the number of it, a pair as the place of it. Clusters of
-    which a bound is known alone follow in number, as if there were more. Pairs that wait lie at the other end.
+    Clusters and pairs share one queue: pair p as p, cluster c as -1 - c. While only a lower bound of its contact is
+    known, cluster c is -1 - c - (number of clusters). Pairs that wait lie at the other end.
     """
     scratch = scratch_at(bundles.scratch)
     keys, items, count, pairs, waiting, margin = scratch.keys_m, scratch.items, 0, 0, 0, MARGIN_M
@@ -140,11 +140,11 @@ def _look_at(
                 waiting += 1
                 items[items.size - waiting] = item
         elif item < -clusters:
-            # No farther than a margin beyond the nearest one, at first: most clusters never come nearer.
+            # At first at most a margin beyond the nearest cluster: most clusters never come nearer.
             near = min(last, max(nearest, first + early) + margin)
             bound = _cluster_contact(bundles, rows, -1 - item - clusters, along, near, True)
             if bound <= near:
-                # Something may rise, and what overlaps is asked for.
+                # An overlap may rise: now meshes are tested for overlap, too.
                 bound = _cluster_contact(bundles, rows, -1 - item - clusters, along, near, False)
                 nearest = min(nearest, bound)
                 count = push(keys, items, count, _key(bound, early, False), item + clusters)
@@ -165,7 +165,7 @@ def _look_at(
 
 @inlined
 def _key(bound: float, early: float, rough: bool) -> float:
-    """The place in the queue: a cluster that may overlap comes first."""
+    """Return the key in the queue: a cluster that may overlap comes first."""
     return bound - early if bound > 0.0 or rough else -math.inf
 
 
@@ -173,7 +173,7 @@ LOOK: Final = (
     *(input_array(2), input_array(1), input_flags(), input_array(1), input_array(2), input_array(1), input_array(1)),
     *(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, input_indices(), input_array(1), BUNDLE, BUNDLE),
 )
-"""What `look` takes, for who calls it by its address."""
+"""Argument types of `look`, for calls by address"""
 
 
 @compiled(*LOOK, returns=TRUTH)
@@ -197,13 +197,13 @@ def look(
     scene_bundle: IntArray,
     scratch_bundle: IntArray,
 ) -> bool:
-    """Fill the scratch's distances; False for spheres, or errors, that are not finite: they would compare as far away.
+    """Fill the scratch's onset distances. Return False for numbers that are not finite: they would compare as far away.
 
-    centers (m, 3), radii (m,), on_finger (m,): of the gripper's spheres. tool (3,), jacobian (6, n),
-    encoder_variance (n,), direction: the unit û (3,). mean, variance, mean_along, variance_along, quantile: those of
-    `Missed`. widest: half the gap between the fingers, the most by which a finger's sphere is inflated towards
-    the target (§3.4). classes (k,): of the objects (`object_class`). early (k,): their strengths begin sooner by this,
-    as they come nearer; empty where all stand still.
+    centers (m, 3), radii (m,), on_finger (m,): the gripper's spheres. tool (3,), jacobian (6, n),
+    encoder_variance (n,), direction: the unit û (3,). mean, variance, mean_along, variance_along, quantile: see
+    `Missed`. widest: half the gap between the fingers, the largest inflation of a finger's sphere towards the
+    target (§3.4). classes (k,): the objects' (`object_class`). early (k,): the objects' approach, by which contact
+    distances shorten; empty if all are at rest.
     """
     bundles, scene, scratch = Bundles(scene_bundle, scratch_bundle), scene_at(scene_bundle), scratch_at(scratch_bundle)
     along, margin, spheres = load(direction.reshape(1, 3), 0), MARGIN_M, radii.size
@@ -242,7 +242,7 @@ def look(
     for kind in range(2):
         soonest = math.inf
         for level in range(STRENGTHS - 1, -1, -1):
-            # Where a strength begins, the weaker ones have begun. Beyond the reach not all is known.
+            # Weaker strengths begin no later than stronger ones. Beyond the reach not all objects are known.
             soonest = min(soonest, scratch.distances_m[kind, level])
             scratch.distances_m[kind, level] = soonest if soonest <= reach else math.inf
     return True

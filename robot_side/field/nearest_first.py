@@ -1,4 +1,4 @@
-"""A binary heap of numbered items, the one with the least key first."""
+"""Binary heap of numbered items, least key first."""
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block
@@ -6,7 +6,7 @@ from robot_side.compiled.kernel import building_block
 
 @building_block
 def push(keys: FloatArray, items: IntArray, count: int, key: float, item: int) -> int:
-    """Add an item to the first `count`; how many there are then."""
+    """Add an item to a heap of `count`; return the new count."""
     place = count
     while place > 0 and keys[(place - 1) // 2] > key:
         above = (place - 1) // 2
@@ -18,7 +18,7 @@ def push(keys: FloatArray, items: IntArray, count: int, key: float, item: int) -
 
 @building_block
 def drop_first(keys: FloatArray, items: IntArray, count: int) -> int:
-    """Remove the first of `count` items; how many are left."""
+    """Remove the first of `count` items; return the new count."""
     left, place = count - 1, 0
     key, item = keys[left], items[left]
     while 2 * place + 1 < left:

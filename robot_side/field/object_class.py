@@ -4,8 +4,8 @@ from typing import Final
 
 OBSTACLE: Final = 0
 TOUCHABLE: Final = 1
-"""It is to be touched: a support, while something is held."""
+"""Object that is to be touched: a support, while an object is held"""
 TARGET: Final = 2
-"""It is to be touched: a finger's inflation towards it ends at half the gap."""
+"""Object that is to be touched: a finger's inflation towards it ends at half the gap."""
 PASSED_OVER: Final = 3
-"""Ignored, or held."""
+"""Object that is ignored or held"""

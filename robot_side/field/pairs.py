@@ -1,4 +1,4 @@
-"""Pairs of one gripper sphere and one object: where they touch, and which of its primitives the sphere enters."""
+"""Pairs of one gripper sphere and one object: their contact distance, and the primitives that the sphere enters."""
 
 import math
 from typing import Any, Final
@@ -12,7 +12,7 @@ from robot_side.surroundings.kinds.layout import HALF_SPACE, Contact
 from robot_side.surroundings.scene_columns import SCENE, contact_with
 
 _ROUNDED: Final = 5e-3
-"""The cosine at a contact may be off by this where rounding chose another nearest point."""
+"""Error of the cosine at a contact where rounding chose another nearest point"""
 
 scene_at, scratch_at = SCENE.at, SCRATCH.at
 
@@ -21,7 +21,7 @@ scene_at, scratch_at = SCENE.at, SCRATCH.at
 def _meet_sphere(
     bundles: Bundles, i: int, rows: int, radius: float, along: Vector, reach: float, clear: bool
 ) -> Contact:
-    """Where a sphere first touches any of the first rows kept."""
+    """Return the first contact of a sphere with any of the first rows kept."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     least, least_closing, center = math.inf, 0.0, load(scratch.spheres, i)
     for k in range(rows):
@@ -49,7 +49,7 @@ def _pair(
     reach: float,
     clear: bool,
 ) -> Any:
-    """Write the pair of a sphere and an object; where they do not touch within the reach, its contact is infinite."""
+    """Write the pair of a sphere and an object. The contact is infinite if they do not touch within the reach."""
     scratch = scratch_at(bundles.scratch)
     pair, inflated = scratch.pairs[place], scratch.inflation_m[i, 0]
     if object_class == TARGET and scratch.on_finger[i] and inflated > widest:
@@ -76,7 +76,7 @@ def _write_entry(entry: Any, row: int, enters: float, closing: float) -> None:
 
 @building_block
 def enter(bundles: Bundles, pair: Any, rows: int, along: Vector, reach: float) -> int:
-    """Write which of the rows kept a pair's sphere enters, and where; how many."""
+    """Write entries of the kept rows that a pair's sphere enters; return their number."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     if rows == 1:
         _write_entry(scratch.entries[0], scratch.rows[0], pair.contact, pair.closing)
@@ -106,14 +106,14 @@ def pairs_of(
     reach: float,
     clear: bool,
 ) -> int:
-    """Write the pairs of a sphere and an object that touch within the reach; how many."""
+    """Write the pairs of a sphere and an object that touch within the reach; return their number."""
     found = 0
     for uninflated in (False, True):
         pair = _pair(
             bundles, place + found, i, uninflated, rows, thing, object_class, early, along, widest, reach, clear
         )
         found += 1 if pair.contact < math.inf else 0
-        # A sphere that overlaps already may have swallowed what is ahead of it: it counts uninflated, too.
+        # An inflated sphere that overlaps may contain the object ahead: the sphere counts uninflated, too.
         if not pair.overlaps:
             break
     return found

@@ -1,11 +1,10 @@
-"""The overlap profile of one gripper sphere and one object, and where it makes strengths begin (§4.2).
+"""Overlap profile of one gripper sphere and one object, and the onset distances that follow (§4.2).
 
     W(E) = max over 0 <= E' <= E of (V(E') - V(0))⁺,   d = sup{E >= 0 : W(E) = 0}
     s(D) = min(1, W(D + m) / max(W(d + m), m |∇V(0)|, V_min))
 
-V(E) is the overlap after the distance E along û. It is sampled only as far as a strength can still begin sooner than
-those known so far (`sooner`). Between two samples goes a cubic (`samples`); where it says that a strength begins, V is
-asked.
+V(E) is the overlap after the distance E along û. It is sampled only as far as an onset distance can still become
+shorter (`sooner`). A cubic interpolates between two samples (`samples`). Where the cubic has an onset, V is sampled.
 """
 
 import math
@@ -19,30 +18,30 @@ from robot_side.field.sooner import begin, keep_tangents, latest_of, matters, ma
 
 scratch_at = SCRATCH.at
 _TOLERANCE_M: Final = 2e-5
-"""A strength's beginning is known this well."""
+"""Tolerance of an onset distance"""
 _NEWTON_M: Final = 5e-5
-"""From so near, Newton's method goes to where it begins."""
+"""Distance from the onset at which one step of Newton's method ends the search"""
 _DOUBT_M: Final = 5e-4
 _DOUBT: Final = 1.0 / 6.0
-"""The cubic is trusted up to this share of the distance between its samples to say that a strength begins too late."""
+"""Share of the distance between samples, at most _DOUBT_M, by which the cubic may err when an onset seems too late"""
 _MOST_STEPS: Final = 12
 _MOST_SAMPLES: Final = 400
 _MOST_OF_A_PEAK: Final = 4
 _FLAT: Final = 0.005
-"""A peak is known this well, as a share of what the overlap has risen by."""
+"""Tolerance of a peak, as a share of the overlap's rise"""
 _FINE: Final = 1.0 / 6.0
 _COARSE: Final = 0.5
-"""The distance between samples beyond the margin, in margins: where another primitive is entered, and elsewhere."""
+"""Distance between samples beyond the margin, in margins: near the entry of another primitive, and elsewhere"""
 _EARLY: Final = 0.4
-"""The share of the margin at which a second sample of a smooth profile lies: early strengths begin there. Other
-profiles keep samples over the margin, of which the second one is the middle."""
+"""Position of the second sample of a smooth profile, in margins: early strengths begin there. Other profiles have it
+in the middle, as one of the samples kept over the margin."""
 
 
 class Rise(NamedTuple):
-    """The distance at which an overlap begins to rise, the overlap there, and the rise that full strength takes."""
+    """Start of an overlap's rise, and the rise that full strength takes."""
 
     free: Sample
-    """At d"""
+    """Sample at d"""
     floor: float
     """V(0)"""
     least: float
@@ -51,7 +50,7 @@ class Rise(NamedTuple):
 
 @building_block
 def _crossing(profile: Profile, a: Sample, b: Sample, wanted: float, latest: float, bundles: Bundles) -> Sample:
-    """The first distance between two samples at which V passes a volume; or one from `latest` on, if that is later."""
+    """Return the first crossing of V = wanted between two samples, or any sample from `latest` on if it is later."""
     for step in range(_MOST_STEPS):
         guess = on_cubic(a, b, wanted)
         if b.at - a.at <= _TOLERANCE_M:
@@ -73,9 +72,9 @@ def _crossing(profile: Profile, a: Sample, b: Sample, wanted: float, latest: flo
 
 @building_block
 def _top(profile: Profile, a: Sample, b: Sample, floor: float, bundles: Bundles) -> tuple[bool, Sample]:
-    """The highest overlap between two samples; False where the cubic has no peak there.
+    """Return whether V has a peak between two samples, and the sample of the highest overlap.
 
-    It may have one although V rises, or falls, at both. A peak with a kink is no cubic's, and is asked for again.
+    There may be a peak although V rises, or falls, at both. The cubic misses a peak with a kink: it is refined.
     """
     best = a if a.volume > b.volume else b
     peaks = False
@@ -94,14 +93,14 @@ def _top(profile: Profile, a: Sample, b: Sample, floor: float, bundles: Bundles)
 
 @building_block
 def _first_rise(profile: Profile, last: Sample, rises: bool, full: float, bundles: Bundles) -> tuple[bool, Rise]:
-    """Look for d beyond the sample at 0 of a pair that overlaps there; False where no strength can begin sooner.
+    """Find d beyond 0 for a pair that overlaps there. Return False if no onset distance can become shorter.
 
-    full: at least what full strength takes.
+    full: least rise of the overlap at full strength.
     """
     scratch, floor = scratch_at(bundles.scratch), last.volume
     pair, ball = profile.pair, 4.0 / 3.0 * math.pi * profile.pair.radius**3
     disc, step = math.pi * pair.radius * pair.radius, _FINE * profile.margin
-    # What rises by rounding alone, to fall at once, has not begun to.
+    # A rise within rounding does not count.
     if last.slope * _TOLERANCE_M > NOTHING * ball:
         return True, Rise(last, floor, full)
     given_up = True
@@ -130,13 +129,13 @@ def _first_rise(profile: Profile, last: Sample, rises: bool, full: float, bundle
                     last = middle
             return True, Rise(last, floor, full)
         last, rises = found, may_rise
-    # After the most samples the overlap counts as rising from there: early, and never silent.
+    # After the last sample the overlap counts as rising from there: early, and never silent.
     return given_up, Rise(last, floor, full)
 
 
 @building_block
 def _most_over_margin(profile: Profile, rise: Rise, middle: Sample, full: Sample, bundles: Bundles) -> float:
-    """Work out W(d + m), and keep samples over the margin; middle, full: those at half of it, and at its end."""
+    """Return W(d + m), and keep samples over the margin. middle, full: the samples at its half and its end."""
     scratch = scratch_at(bundles.scratch)
     samples, step, most = scratch.samples, profile.margin / SAMPLES, max(0.0, full.volume - rise.floor)
     last = rise.free
@@ -168,7 +167,7 @@ def _take(
     reference: float,
     bundles: Bundles,
 ) -> int:
-    """Let the strengths begin that do so between two samples, from `level` on; the next one."""
+    """Enter the strengths from `level` on that begin between two samples; return the next level."""
     distances = scratch_at(bundles.scratch).distances_m
     while level < STRENGTHS:
         wanted = floor + (level + 0.5) / STRENGTHS * reference
@@ -179,7 +178,7 @@ def _take(
             found = a if a.volume >= wanted else on_cubic(a, b, wanted)
             if found.at < latest + min(_DOUBT * (b.at - a.at), _DOUBT_M) and a.volume < wanted:
                 found = _crossing(profile, a, b, wanted, latest, bundles)
-                # What is known there serves the next strength, too.
+                # The sample serves the next strength, too.
                 a = found
             if found.at < latest:
                 begin(profile, level, found.at, distances)
@@ -189,7 +188,7 @@ def _take(
 
 @building_block
 def follow(profile: Profile, least: float, waits: bool, bundles: Bundles) -> bool:
-    """Shorten the distances at which strengths begin by one pair; True: ask again, after all other pairs.
+    """Shorten the onset distances by one pair. Return True to be called again, after all other pairs.
 
     least: V_min. waits: a pair whose overlap falls at first may wait, as it takes many samples.
     """
@@ -222,7 +221,7 @@ def follow(profile: Profile, least: float, waits: bool, bundles: Bundles) -> boo
         return False
     level, stored, last = 0, 0, free
     if smooth:
-        # The overlap with convex primitives rises until there.
+        # The overlap with convex primitives rises up to `full`.
         level = _take(profile, level, free, second, floor, reference, bundles)
         level = _take(profile, level, second, full, floor, reference, bundles)
         last = full
@@ -238,7 +237,7 @@ def follow(profile: Profile, least: float, waits: bool, bundles: Bundles) -> boo
 def _is_late(
     profile: Profile, free: Sample, second: Sample, full: Sample, floor: float, reference: float, distances: FloatArray
 ) -> bool:
-    """Whether an overlap that seems to rise all along the margin lets every strength begin too late to count."""
+    """Return whether every strength begins too late to count, of an overlap that seems to rise all along the margin."""
     if not (floor <= second.volume <= full.volume and min(free.slope, second.slope, full.slope) >= 0.0):
         return False
     late = True
@@ -262,7 +261,7 @@ def _go_on(
     reference: float,
     bundles: Bundles,
 ) -> None:
-    """Let the strengths from `level` on begin beyond a sample, of which the first `stored` steps are kept."""
+    """Enter the strengths from `level` on that begin beyond a sample. The next `stored` samples are kept ones."""
     scratch, floor = scratch_at(bundles.scratch), rise.floor
     step = profile.margin / SAMPLES
     for k in range(_MOST_SAMPLES):

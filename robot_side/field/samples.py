@@ -11,20 +11,20 @@ from robot_side.surroundings.scene_columns import SCENE, contact_in_front
 
 scene_at, scratch_at = SCENE.at, SCRATCH.at
 NOTHING: Final = 1e-9
-"""Shares of the sphere's volume, and of its disc, below which a change is rounding."""
+"""Share of the sphere's volume, or of its disc, below which a change is rounding"""
 
 
 class Profile(NamedTuple):
-    """A pair, and what its profile is made of."""
+    """Pair, and the parameters of the overlap profile."""
 
     pair: Any
     entries: int
-    """How many entries of the scratch belong to the pair"""
+    """Number of the scratch's entries that belong to the pair"""
     center: Vector
     along: Vector
     margin: float
     end: float
-    """No strength within the reach begins beyond."""
+    """Distance beyond which no strength within the reach begins"""
 
 
 class Sample(NamedTuple):
@@ -37,7 +37,7 @@ class Sample(NamedTuple):
 
 @building_block
 def sample(profile: Profile, at: float, bundles: Bundles) -> tuple[Sample, float, bool]:
-    """Work out V at a distance, |∇V| there, and whether any primitive's part of it may still rise."""
+    """Return V at a distance, |∇V| there, and whether any primitive's part of V may still rise."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     radius, push = profile.pair.radius, scratch.push
     center = add(profile.center, scale(at, profile.along))
@@ -54,7 +54,7 @@ def sample(profile: Profile, at: float, bundles: Bundles) -> tuple[Sample, float
         entry.volume, entry.slope = part, slope
         rising = slope > NOTHING * math.pi * radius * radius or part <= NOTHING * radius**3
         if entry.closing == 0.0 and not rising:
-            # It may rise again, where the next triangle in front is touched.
+            # The part may rise again where the next triangle in front is touched.
             left = profile.end - at
             entry.again = at + contact_in_front(scene, entry.row, center, profile.along, radius, left)
             rising = entry.again <= at
@@ -65,7 +65,7 @@ def sample(profile: Profile, at: float, bundles: Bundles) -> tuple[Sample, float
 
 @inlined
 def next_entry(profile: Profile, at: float, scratch: ScratchColumns) -> float:
-    """The distance beyond `at` at which another primitive is entered, or one that has fallen rises again."""
+    """Return the distance beyond `at` at which another primitive is entered, or a fallen part may rise again."""
     nearest = math.inf
     for k in range(profile.entries):
         entry = scratch.entries[k]
@@ -77,7 +77,7 @@ def next_entry(profile: Profile, at: float, scratch: ScratchColumns) -> float:
 
 @inlined
 def cubic(a: Sample, b: Sample, part: float) -> float:
-    """V at `part`, 0 to 1, of the distance between two samples."""
+    """Return V at `part`, 0 to 1, of the distance between two samples."""
     rest, step = 1.0 - part, b.at - a.at
     return (
         rest * rest * (1.0 + 2.0 * part) * a.volume
@@ -88,7 +88,7 @@ def cubic(a: Sample, b: Sample, part: float) -> float:
 
 @inlined
 def cubic_slope(a: Sample, b: Sample, part: float) -> float:
-    """dV by the part."""
+    """Return the cubic's derivative by `part`."""
     rest, step = 1.0 - part, b.at - a.at
     return 6.0 * (b.volume - a.volume) * part * rest + step * (
         a.slope * rest * (1.0 - 3.0 * part) + b.slope * part * (3.0 * part - 2.0)
@@ -97,10 +97,10 @@ def cubic_slope(a: Sample, b: Sample, part: float) -> float:
 
 @inlined
 def peak(a: Sample, b: Sample) -> float:
-    """The part, 0 to 1, of the distance between two samples at which the cubic peaks; -1 where it does not."""
+    """Return the part, 0 to 1, of the distance between two samples at which the cubic peaks; -1 if there is no peak."""
     step, rise = b.at - a.at, b.volume - a.volume
     begin, end = step * a.slope, step * b.slope
-    # Of dV = begin + bend t + more t², the root where it falls.
+    # Root of dV = begin + bend t + more t² at which dV falls.
     bend, more = 2.0 * (3.0 * rise - 2.0 * begin - end), 3.0 * (begin + end - 2.0 * rise)
     inside = bend * bend - 4.0 * begin * more
     if inside <= 0.0:
@@ -112,7 +112,7 @@ def peak(a: Sample, b: Sample) -> float:
 
 @inlined
 def on_cubic(a: Sample, b: Sample, wanted: float) -> Sample:
-    """Where between two samples the cubic passes a volume: Newton's method, and halves where it leaves the bracket."""
+    """Find where the cubic passes a volume between two samples: Newton's method, bisection if it leaves the bracket."""
     low, high, part = 0.0, 1.0, 0.5
     for _ in range(8):
         off = cubic(a, b, part) - wanted

@@ -1,7 +1,7 @@
-"""Whether a pair can make any strength begin sooner than it does by now.
+"""Bounds on whether a pair can shorten any onset distance.
 
-Rule: a bound may end the work early, never move a result. Regret: three bounds for three cases (the plane that a convex
-primitive is touched in, Brunn and Minkowski's concave cube root, the sphere's disc) are more than one would wish.
+Rule: a bound may end the work early, never move a result. Regret: three bounds for three cases (the contact plane of a
+convex primitive, Brunn and Minkowski's concave cube root, the sphere's disc) are more than one would wish.
 """
 
 import math
@@ -15,14 +15,14 @@ from robot_side.field.samples import NOTHING, Profile
 from robot_side.field.scratch import STRENGTHS, TOUCH_STRENGTH
 
 _SLACK_M: Final = 5e-5
-"""A strength that would begin sooner by less than this is left as it is: many spheres of a face touch at once."""
+"""Smallest shortening of an onset distance that is pursued: many spheres of a face touch at once."""
 _ENOUGH: Final = 1e-6
-"""Overlaps above this share of R³ have a tangent that bounds well."""
+"""Share of R³ above which an overlap's tangent bounds well"""
 
 
 @inlined
 def latest_of(profile: Profile, level: int, distances: FloatArray) -> float:
-    """Up to which distance the pair may make a strength begin sooner than it does by now."""
+    """Return the distance up to which the profile may shorten the onset distance of a strength."""
     pair = profile.pair
     latest: float = distances[0, level]
     if not pair.touchable or level < TOUCH_STRENGTH:
@@ -32,7 +32,7 @@ def latest_of(profile: Profile, level: int, distances: FloatArray) -> float:
 
 @inlined
 def matters(profile: Profile, level: int, at: float, distances: FloatArray) -> bool:
-    """Whether any strength from `level` on may still begin sooner, if it begins beyond `at`."""
+    """Return whether the profile beyond `at` may shorten any onset distance from `level` on."""
     any_does = False
     for k in range(level, STRENGTHS):
         any_does = any_does or latest_of(profile, k, distances) > at
@@ -41,7 +41,7 @@ def matters(profile: Profile, level: int, at: float, distances: FloatArray) -> b
 
 @inlined
 def begin(profile: Profile, level: int, at: float, distances: FloatArray) -> None:
-    """Let a strength begin where the profile says so, unless it begins sooner by now."""
+    """Shorten a strength's onset distances to the profile's onset `at`, if they are longer."""
     pair, found = profile.pair, at - profile.margin - profile.pair.lead
     distances[0, level] = min(distances[0, level], found)
     if not pair.touchable or level < TOUCH_STRENGTH:
@@ -50,21 +50,21 @@ def begin(profile: Profile, level: int, at: float, distances: FloatArray) -> Non
 
 @inlined
 def _cap(depth: float, radius: float) -> float:
-    """The volume of a sphere's cap (eq. 12)."""
+    """Return the volume of a sphere's cap (eq. 12)."""
     height = min(max(depth, 0.0), 2.0 * radius)
     return math.pi * height * height * (3.0 * radius - height) / 3.0
 
 
 @inlined
 def _uncovered(distance: float, radius: float) -> float:
-    """The part of a ball that it has newly moved into after a distance: no overlap rises by more."""
+    """Return the volume that a ball newly covers after a distance: no overlap rises by more."""
     moved = min(max(distance, 0.0), 2.0 * radius)
     return math.pi * moved * (radius * radius - moved * moved / 12.0)
 
 
 @inlined
 def _touched(part: Any, least: float) -> tuple[float, float]:
-    """The cube root of a part's overlap in the newest sample, and its slope; infinite where it has no good tangent."""
+    """Return the cube root of a part's newest overlap and its slope; infinite without a good tangent."""
     if not part.volume > least:
         return math.inf, 0.0
     root = part.volume ** (1.0 / 3.0)
@@ -73,9 +73,9 @@ def _touched(part: Any, least: float) -> tuple[float, float]:
 
 @building_block
 def keep_tangents(profile: Profile, at: float, second: bool, entries: np.ndarray) -> bool:
-    """Keep the tangents that the newest sample, at `at`, gives; whether V rises up to there.
+    """Keep the tangents of the newest sample, at `at`. Return whether V rises up to there.
 
-    The cube root is concave while one convex primitive is entered (Brunn, Minkowski), so that a tangent bounds it.
+    The cube root is concave while one convex primitive is entered (Brunn, Minkowski), so a tangent bounds it.
     """
     least, falls = _ENOUGH * profile.pair.radius**3, -NOTHING * math.pi * profile.pair.radius**2
     rises = True
@@ -95,7 +95,7 @@ def keep_tangents(profile: Profile, at: float, second: bool, entries: np.ndarray
 
 @inlined
 def _by_tangent(at: float, touches: float, root: float, steep: float) -> float:
-    """The most that a cube root has been; where it falls, nothing is known of what has been before."""
+    """Return an upper bound of a cube root up to `at`; infinite for a tangent that falls, unless it touches at 0."""
     if steep > 0.0:
         return root + steep * (at - touches)
     return root if touches == 0.0 else math.inf
@@ -103,7 +103,7 @@ def _by_tangent(at: float, touches: float, root: float, steep: float) -> float:
 
 @inlined
 def _most(profile: Profile, at: float, entries: np.ndarray) -> float:
-    """The most that V is at a distance; infinite where a primitive is not convex."""
+    """Return an upper bound of V at a distance; infinite if a primitive is not convex."""
     most = 0.0
     for k in range(profile.entries):
         part = entries[k]
@@ -119,9 +119,9 @@ def _most(profile: Profile, at: float, entries: np.ndarray) -> float:
 
 @building_block
 def may_count(profile: Profile, floor: float, full: float, distances: FloatArray, entries: np.ndarray) -> bool:
-    """Whether a pair may make any strength begin sooner.
+    """Return whether a pair may shorten any onset distance.
 
-    floor: V(0). full: at least what full strength takes. entries: with what bounds them.
+    floor: V(0). full: least rise of the overlap at full strength. entries: with their bounds.
     """
     pair = profile.pair
     for level in range(STRENGTHS):

@@ -1,4 +1,4 @@
-"""The overlap of a gripper's spheres with all objects, and with each (eq. 11-12)."""
+"""Overlap of a gripper's spheres with all objects, and with each (eq. 11-12)."""
 
 import math
 from typing import Final
@@ -29,10 +29,10 @@ def total_overlap_m3(
     moved_m: FloatArray | None = None,
     of_objects_m3: FloatArray = _NOWHERE,
 ) -> float:
-    """Σ V_ij in m³ of spheres (m, 4), centres and radii, with all objects but those passed over; classes (k,).
+    """Return Σ V_ij in m³ of spheres (m, 4), centres and radii, with all objects but those passed over.
 
-    inflated_m (m, 1 or more): by its first column. moved_m (3,). of_objects_m3 (k,): takes each object's part.
-    ValueError for a sphere that is not finite, which would compare as far away from everything.
+    classes (k,). inflated_m (m, 1 or more): its first column counts. moved_m (3,). of_objects_m3 (k,): by object.
+    ValueError for a sphere that is not finite: it would compare as far away.
     """
     by_m = np.zeros_like(spheres) if inflated_m is None else inflated_m
     total = sum_overlaps(
@@ -46,7 +46,7 @@ def total_overlap_m3(
 SUM_OVERLAPS: Final = (
     *(input_array(2), input_array(2), input_array(1), input_indices(), BUNDLE, output_array(1), output_array(1)),
 )
-"""What `sum_overlaps` takes, for who calls it by its address."""
+"""Argument types of `sum_overlaps`, for calls by address"""
 
 
 @compiled(*SUM_OVERLAPS, returns=NUMBER)
@@ -59,7 +59,7 @@ def sum_overlaps(
     push: FloatArray,
     of_objects: FloatArray,
 ) -> float:
-    """Add up V_ij in m³ as `total_overlap_m3` has it; NaN for what is not finite. push (3,): room for a gradient."""
+    """Sum V_ij in m³ as in `total_overlap_m3`; NaN for numbers that are not finite. push (3,): scratch memory."""
     scene, shift, count = _scene_at(scene_bundle), load(moved.reshape(1, 3), 0), spheres.shape[0]
     check = shift[0] + shift[1] + shift[2]
     for i in range(count):

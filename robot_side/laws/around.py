@@ -1,8 +1,8 @@
-"""Ways from around the gripper: a coarse map for the operator side of where its sticks may take it until it stands.
+"""Coarse map of onset distances around the gripper, for an operator side that traces its path.
 
-The operator side knows its sticks a loop before the robot side does. It traces its path through the map
-(`operator_side/feel/path_ahead.py`). A probe is a place that a fully deflected stick reaches (`Around`). Of each only
-the way of full strength is kept, fast and slow.
+The operator side knows its sticks one loop age before the robot side. It traces its path through the map
+(`operator_side/feel/path_ahead.py`). A probe is a place that a fully deflected stick reaches (`Around`). Each probe
+keeps only the onset distances of full strength, fast and slow.
 """
 
 import math
@@ -20,27 +20,27 @@ from robot_side.laws.path import move
 from robot_side.laws.sensed import HORIZON, L2, OF_A_SIDE, R2
 
 FIRST_PROBE: Final = 1 + MOST_PLACES
-"""The number that the first probe has as a place"""
+"""Place number of the first probe"""
 STILL_M_S: Final = 0.002
 _STILL_RAD_S: Final = 0.01
-"""Slower than this, gripper and objects rest."""
+"""Speeds up to which gripper and objects count as at rest"""
 _RETREATS_M_S: Final = 0.01
-"""Slower than this, either trigger may be meant."""
+"""Speed below which both triggers count as leading"""
 _SELDOM: Final = 4.0
 """Periods between looks along the trigger that does not lead"""
 _HOLDS_S: Final = 1.5
-"""While something moves, a look from a probe holds no longer. Where ticks are rare, probes come late."""
+"""Age at which a probe's look expires while something moves. Where ticks are rare, probes come late."""
 _SAME_TIME: Final = 0.05
-"""Share by which T may be off"""
+"""Relative change of T up to which the probes' looks count"""
 
 
 @inlined
 def follow_motion(
     bundle: IntArray, velocity: Vector, turning: Vector, moves: bool, until: float, now: float, by_operator: bool
 ) -> None:
-    """Remember when the gripper moved last, and begin anew with another T (s), or where looks count no more.
+    """Record when the gripper last moved. Discard the probes' looks if T (s) has changed.
 
-    by_operator: somebody traces the map; while nobody does, no look counts.
+    by_operator: the operator side traces the map; otherwise no look counts.
     """
     memory = memory_at(bundle)
     state = memory.state[0]
@@ -55,7 +55,7 @@ def follow_motion(
 
 @inlined
 def is_known(bundle: IntArray) -> bool:
-    """Tell whether the map holds: each probe was looked from since that counts, and lately if anything moved."""
+    """Return whether the map holds: each probe's look counts, and is recent if anything has moved since."""
     memory = memory_at(bundle)
     state, known = memory.state[0], bool(memory.settings[0].around != 0.0)
     for probe in range(2 * PROBES):
@@ -67,7 +67,7 @@ def is_known(bundle: IntArray) -> bool:
 
 @inlined
 def probe_waiting(bundle: IntArray, now: float, speed: float) -> tuple[float, int, int]:
-    """Find the probe that has waited longest: how many periods, its side and its place; see `longest_waiting`."""
+    """Find the probe that has waited longest: periods waited, side and place, as in `longest_waiting`."""
     memory = memory_at(bundle)
     most, of_side, of_place = -math.inf, 0, 0
     state = memory.state[0]
@@ -77,7 +77,7 @@ def probe_waiting(bundle: IntArray, now: float, speed: float) -> tuple[float, in
         leads = speed > -_RETREATS_M_S if side == R2 else speed < _RETREATS_M_S
         for probe in range(PROBES):
             at = memory.around[side * PROBES + probe].at
-            # What counts no more is due at once: until it is seen anew the operator side has a map of before.
+            # A discarded look is due again at once: until then the operator side has the old map.
             waited = (now - at) / (PERIOD_S if leads else _SELDOM * PERIOD_S) + (2.0 if at < state.anew else 0.0)
             waited = waited if at <= state.moved or at < state.anew else -math.inf
             if waited > most:
@@ -96,7 +96,7 @@ def go_to_probe(
     speed: float,
     loop_age: float,
 ) -> float:
-    """Move to a probe, 0 for where the gripper is; the way (m) gone by then, as `go_to` has it."""
+    """Move to a probe, 0 for the gripper's place. Return the distance (m) covered by then, as `go_to` does."""
     memory = memory_at(bundle)
     settings, until = memory.settings[0], float(memory.state[0].until)
     linear, turning, after, since = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0
@@ -131,7 +131,7 @@ def keep_probe(bundle: IntArray, side: int, probe: int, now: float, tool: Vector
 
 @inlined
 def _closing(approach: Vector, classes: IntArray, velocities: FloatArray) -> float:
-    """Find how fast the fastest thing that may be met comes nearer against `approach`."""
+    """Return the highest speed of an object against `approach`, without objects that are passed over."""
     closing = 0.0
     for thing in range(velocities.shape[0]):
         if classes[thing] != PASSED_OVER:
@@ -152,9 +152,9 @@ def ways_around(
     felt: FloatArray,
     ways: FloatArray,
 ) -> bool:
-    """Fill ways (LISTS, PROBES) from where the tool (3,) is; False while one is not known.
+    """Fill ways (LISTS, PROBES), onset distances in m from the tool (3,). Return False while one is unknown.
 
-    rotation (3, 3), classes (k,), velocities (k, 3), or (0, 3) where none is known, and felt as `sense` filled it.
+    rotation (3, 3), classes (k,), velocities (k, 3), or (0, 3) if unknown, and felt as `sense` filled it.
     """
     memory, place = memory_at(bundle), load(tool.reshape(1, 3), 0)
     if velocities.shape[0] > classes.size or not is_known(bundle):
@@ -165,12 +165,12 @@ def ways_around(
         for probe in range(PROBES):
             one = memory.around[side * PROBES + probe]
             gone = dot((one.direction[0], one.direction[1], one.direction[2]), place) - one.began
-            # A look knows what moves until the gripper stands, and not what has moved since.
+            # A look includes the objects' motion until the gripper stands, but not their motion since the look.
             gone += closing * (memory.state[0].measured - one.at)
             for kind in range(2):
                 ways[2 * side + kind, probe] = one.ways[kind] - gone
         for kind in range(2):
-            # Straight ahead the newest look knows more: what has just appeared, and what the fingers do.
+            # Straight ahead the newest look knows more: new objects and the motion of the fingers.
             newest = felt[side * OF_A_SIDE + kind * STRENGTHS + STRENGTHS - 1]
             if newest < felt[HORIZON]:
                 ways[2 * side + kind, 0] = min(ways[2 * side + kind, 0], newest)

@@ -1,4 +1,4 @@
-"""What the enlargement is made of and what overlaps, for people who look; worked out only when asked for."""
+"""Terms of the enlargement, and overlaps by object, for display. Computed only on request."""
 
 import math
 from dataclasses import dataclass
@@ -18,23 +18,23 @@ from robot_side.surroundings.scene_table import SceneTable
 
 Trigger = Literal["l2", "r2"]
 Overlaps = dict[int, float]
-"""By object, m³; only where there is any."""
+"""Overlap in m³ by object, without objects that do not overlap"""
 
 
 @dataclass(frozen=True)
 class TriggerExplained:
-    """Of one trigger."""
+    """Enlargement and overlaps along one trigger."""
 
     terms: EnlargementTerms
     overlaps_m3: Overlaps
-    """Of the gripper inflated by D_σ and moved by the robot side's δ (eq. 11-12)"""
+    """Overlaps of the gripper, inflated by D_σ and moved by the robot side's δ (eq. 11-12)"""
 
 
 class Explains(Protocol):
-    """A law that can say why."""
+    """Law that explains its result."""
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """One trigger, as `sensed` was found in `situation`."""
+        """Explain one trigger of `sensed`, the result for `situation`."""
         ...
 
 
@@ -44,7 +44,7 @@ def enlargement_terms(
     encoder_sigma_rad: FloatArray,
     displacement_m: float,
 ) -> tuple[EnlargementTerms, FloatArray]:
-    """What eq. 8-10 are made of for the sphere with the largest D_σ; and D_σ of all (m,). encoder_sigma_rad (n,)."""
+    """Return the terms of eq. 8-10 for the largest D_σ, and D_σ of all spheres (m,). encoder_sigma_rad (n,)."""
     pose, count = situation.pose, len(situation.pose.sphere_radii_m)
     kinematic_m2, sigma_m = np.empty(count), np.empty(count)
     explain_inflation(
@@ -67,12 +67,12 @@ def enlargement_terms(
 
 
 def overlaps_by_object(spheres: FloatArray, scene: SceneTable, classes: IntArray) -> Overlaps:
-    """Σ_i V_ij of each object j that the spheres (m, 4) overlap, but for those passed over; classes (k,)."""
+    """Return Σ_i V_ij of each object j that the spheres (m, 4) overlap and that is not passed over; classes (k,)."""
     found_m3 = np.zeros(len(classes))
     total_overlap_m3(spheres, scene, classes, of_objects_m3=found_m3)
     return {int(thing): float(found_m3[thing]) for thing in np.flatnonzero(found_m3)}
 
 
 def moved_and_inflated(pose: GripperPose, moved_m: FloatArray, by_m: FloatArray) -> FloatArray:
-    """The gripper's spheres (m, 4): moved by (3,), inflated by (m,)."""
+    """Return the gripper's spheres (m, 4), moved by (3,) and inflated by (m,)."""
     return np.concatenate([pose.sphere_centers_m + moved_m, (pose.sphere_radii_m + by_m)[:, None]], axis=1)

@@ -1,6 +1,6 @@
-"""What is felt now of what was seen lately: the ways are shortened by what the tool has moved along since.
+"""Onset distances at this moment: those of the recent looks, less the tool's motion since.
 
-The shortest ways hold. For a translation that is exact.
+The shortest ones count. For a translation the result is exact.
 """
 
 import math
@@ -34,11 +34,11 @@ from robot_side.laws.sensed import (
 )
 
 MOST_M: Final = 100.0
-"""What a message can say; a simulation about to become unstable shows wild figures, and must get to say so."""
+"""Limit of distances and speeds in a message. A simulation that becomes unstable exceeds it, and must still report."""
 
 
 def room_to_feel() -> FloatArray:
-    """Room for the numbers of `Sensed`, and for the stick's ways after them."""
+    """Return an array for the numbers of `Sensed`, followed by the onset distances along the stick."""
     return np.zeros(NUMBERS + 2 * STRENGTHS)
 
 
@@ -49,13 +49,13 @@ def _bounded(value: float, least: float, most: float) -> float:
 
 @inlined
 def _moved(one: Any, tool: Vector) -> float:
-    """How far the tool has got along a look's direction since."""
+    """Return the distance (m) that the tool has moved along a look's direction since the look."""
     return dot((one.direction[0], one.direction[1], one.direction[2]), tool) - float(one.began)
 
 
 @building_block
 def _shortest(seen: np.ndarray, side: int, count: int, tool: Vector, ways: FloatArray) -> None:
-    """Fill ways (16,), fast and slow, from where the tool is now."""
+    """Fill ways (16,), fast and slow, with the shortest onset distances from the tool's present position."""
     ways[: 2 * STRENGTHS] = math.inf
     for k in range(ROOM * side, ROOM * side + count):
         one = seen[k]
@@ -68,7 +68,7 @@ def _shortest(seen: np.ndarray, side: int, count: int, tool: Vector, ways: Float
 
 @inlined
 def _reached(ways: FloatArray, first: int, reach: float) -> int:
-    """How many of the eight ways from `first` on are no longer than this."""
+    """Count the onset distances, of the eight from `first` on, that are at most `reach`."""
     count = 0
     for place in range(first, first + STRENGTHS):
         if ways[place] <= reach:
@@ -78,7 +78,7 @@ def _reached(ways: FloatArray, first: int, reach: float) -> int:
 
 @inlined
 def _known(bundle: IntArray, side: int, tool: Vector) -> float:
-    """How far ahead of the tool anything is known: as far as the newest look reached from where the gripper is."""
+    """Return the distance examined ahead of the tool: the rest of the newest look's reach from place 0."""
     memory = memory_at(bundle)
     known = -math.inf
     latest = -math.inf
@@ -101,10 +101,10 @@ def feel(
     deflection: float,
     felt: FloatArray,
 ) -> None:
-    """Fill `felt`, that of `room_to_feel`, for a tool there that moves with this velocity.
+    """Fill `felt`, made by `room_to_feel`, for a tool at `tool` that moves with `velocity`.
 
-    loop_age: t_d, known or at worst. deflection: of the stick, 0 to 1; its speed is felt by the slow ways below the
-    speed of touching.
+    loop_age: t_d in s, the worst case while unknown. deflection: the stick's, 0 to 1. Below the touch speed the slow
+    onset distances count.
     """
     memory = memory_at(bundle)
     seen, counts, newest, settings = memory.seen, memory.counts, memory.newest, memory.settings[0]
@@ -116,7 +116,7 @@ def feel(
     for side in (R2, L2):
         mine, able = felt[side * OF_A_SIDE :], newest[side]
         _shortest(seen, side, counts[side], tool, mine)
-        # What is under way from an operator who has echoed nothing is not known: at worst full speed.
+        # Commands under way from an operator who has echoed nothing are unknown: full speed is the worst case.
         under_way = speed if side == R2 else -speed
         if not is_known:
             under_way = max(under_way, able.speed)

@@ -1,4 +1,4 @@
-"""How the fingers move against the tool, by where their spheres were."""
+"""Velocities of the fingers' spheres against the tool, measured from their recent positions."""
 
 from typing import Final
 
@@ -8,16 +8,16 @@ from robot_side.compiled.vectors import Vector, dot, load, scale, subtract
 from robot_side.laws.memory import FINGER_POSES, memory_at
 
 _NOISE_M_S: Final = 0.015
-"""Slower than this, fingers rest: their readings are noisy."""
+"""Speed up to which fingers count as at rest: their readings are noisy."""
 _FINGERS_S: Final = 0.06
-"""The time over which their speed is measured."""
+"""Time over which the fingers' speed is measured"""
 
 
 @inlined
 def measure_fingers(
     bundle: IntArray, centers: FloatArray, tool: Vector, rotation: FloatArray, now: float, changed: bool
 ) -> None:
-    """Measure how the spheres (m, 3) move against the tool, by where they were; 0 for spheres that are new."""
+    """Measure the velocities of the spheres (m, 3) against the tool. changed: the spheres are new; 0 for these."""
     memory = memory_at(bundle)
     state, count = memory.state[0], centers.shape[0]
     oldest = 0

@@ -1,4 +1,4 @@
-"""What a law makes of the surroundings in one tick: two trigger fields and a rumble, whatever the law."""
+"""Interface of every law: from a situation to two trigger fields and a rumble, once a tick."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -13,38 +13,38 @@ from robot_side.surroundings.perceived import PerceivedObjects
 
 @dataclass
 class Situation:
-    """Where the gripper is among what, and what is known of the link."""
+    """Gripper, objects and link in one tick."""
 
     pose: GripperPose
-    """With the spheres of what it holds"""
+    """Pose of the gripper, with the spheres of the held object"""
     joint_velocities_rad_s: FloatArray
     """(n,)"""
     objects: PerceivedObjects
     loop_age_s: float
     """t_d of eq. 8; the configured worst case while unknown"""
     loop_age_known: bool
-    """Whether the owner has echoed a stamp, so that what is under way is no older than `loop_age_s`."""
+    """Whether the owner has echoed a stamp. Then commands under way are at most `loop_age_s` old."""
     compensation: Compensation
-    """Whose prediction of the delay's displacement is felt."""
+    """The side that compensates the delay; eq. 10 uses its prediction errors."""
     gap_m: float | None
     """Free gap between the fingers; None without a gripper"""
     held: int | None
-    """The object that the gripper holds"""
+    """Index of the held object, if any"""
     lateral: Vector2
     """Deflection of the stick that moves across, as commanded"""
 
 
 class Law(Protocol):
-    """From a situation to what is felt."""
+    """Law from a situation to stiffness."""
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Work out one tick."""
+        """Compute one tick."""
         ...
 
     def around(self, pose: GripperPose) -> Around | None:
-        """Ways from around the gripper, for an operator side that traces its sticks; None for none."""
+        """Return the map of onset distances around the gripper, for an operator side that traces its path, or None."""
         ...
 
     def summary(self) -> dict[str, int]:
-        """How much work there was and was not, over the run."""
+        """Return counts of the work, done and saved, over the run."""
         ...

@@ -1,8 +1,8 @@
-"""Which field is looked at in a tick: they take turns, the one that has waited longest first.
+"""Schedule of looks: in each tick the field that has waited longest comes first.
 
-R2, L2, and the stick while it is deflected, each from where the gripper is and from where it will have drifted, turned
-or closed its fingers to. A look takes one tick. A tick has one look, two while a field is 1.5 periods old, and all that
-are due after 5 periods, or where a place is new.
+R2, L2, and the stick while it is deflected are fields. Each is looked along from the gripper's place, and from where
+the gripper will have drifted, turned or closed its fingers. A tick has one look, two while a field is 1.5 periods old,
+and all that are due after 5 periods, or if a place is new.
 """
 
 import math
@@ -24,13 +24,13 @@ from robot_side.laws.recent_looks import keep, longest_waiting
 from robot_side.laws.sensed import L2, R2
 
 OVERLAP_PERIOD_S: Final = 0.02
-"""The overlap at δ is a figure that people read."""
+"""Period of the overlap at δ: a figure for people to read"""
 ROUNDING_S: Final = 1e-9
 _ROUNDING: Final = 1e-6
 _OVERDUE: Final = 1.5
-"""While a field is this many periods old, a tick has two looks;"""
+"""Age of a field, in periods, from which a tick has two looks"""
 _FAR_BEHIND: Final = 5.0
-"""and while one is this old, or was never looked at, a tick has all that are due."""
+"""Age of a field, in periods, from which a tick has all looks that are due. A new place is infinitely old."""
 _ALL: Final = 1000
 
 scratch_at = SCRATCH.at
@@ -40,7 +40,7 @@ _sum_overlaps = call_at_address(NUMBER, SUM_OVERLAPS)
 
 
 class Moment(NamedTuple):
-    """What the kernel is told of one tick, handed on as one."""
+    """Input of the kernel in one tick."""
 
     rotation: FloatArray
     jacobian: FloatArray
@@ -54,24 +54,24 @@ class Moment(NamedTuple):
     now: float
     loop_age: float
     by_operator: bool
-    """The operator side predicts what is under way."""
+    """Whether the operator side predicts δ"""
     widest: float
-    """Half the gap between the fingers (§3.4)"""
+    """Half the gap between the fingers, m (§3.4)"""
     right: float
     up: float
-    """The stick's deflection"""
+    """Deflection of the stick, with `right`"""
     classes: IntArray
     closing: IntArray
-    """The same while the fingers move: what they close on is what they are to touch."""
+    """Classes while the fingers move: the target is passed over, as they shall touch it."""
     velocities: FloatArray
-    """(k, 3) of the objects; empty where all stand still"""
+    """Velocities of the objects (k, 3); empty if unknown: they count as at rest"""
     scene: IntArray
     scratch: IntArray
 
 
 @inlined
 def _fill_early(bundle: IntArray, velocities: FloatArray, stopping: float) -> None:
-    """By how much each object's ways are shorter: what it comes nearer by until the arm stands."""
+    """Fill the distance by which each object approaches until the arm stands: its contact distances shorten."""
     memory = memory_at(bundle)
     along = load(memory.direction.reshape(1, 3), 0)
     for thing in range(velocities.shape[0]):
@@ -80,7 +80,7 @@ def _fill_early(bundle: IntArray, velocities: FloatArray, stopping: float) -> No
 
 @building_block
 def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool:
-    """Look along one side from one place, and keep what was seen; False for what is not finite."""
+    """Look along one side from one place and keep the result. Return False for numbers that are not finite."""
     memory = memory_at(bundle)
     state, prospect, count = memory.state[0], memory.prospect[0], moment.radii.size
     there = moment.tool, moment.rotation, moment.centers, side
@@ -129,9 +129,9 @@ def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool
 
 @inlined
 def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
-    """Look at what has waited longest; at more than `at_most` fields where they have waited too long.
+    """Run the `at_most` looks that have waited longest, or more if they have waited too long.
 
-    One probe comes where no field is looked along, nor the motion measured (`at_most` 0); sooner where it has waited.
+    A due probe waits for a tick without a look and without measuring the motion (`at_most` 0); an overdue one does not.
     """
     busy = at_most == 0
     waited, side, place = longest_waiting(bundle, moment.now)
@@ -147,7 +147,7 @@ def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
     of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed)
     due = _OVERDUE if busy else 1.0 - _ROUNDING
     while of_probe >= due:
-        # After the first one only those that were never looked from.
+        # After the first probe, only those without any look.
         due = math.inf
         if not _look_along(bundle, moment, side, place):
             return False

@@ -1,4 +1,4 @@
-"""What the swept law keeps from tick to tick, and the room it works in: columns that its one call reads and fills."""
+"""Memory and workspace of the swept law: columns that its one compiled call reads and fills."""
 
 from collections.abc import Iterable
 from enum import IntEnum
@@ -14,17 +14,17 @@ from robot_side.field.scratch import STRENGTHS, Count
 
 SIDES: Final = 3
 EVEN_PLACES: Final = 8
-"""Places along the path, evenly in time, from which a side is looked at at most;"""
+"""Most places on the path, evenly in time, from which a side is looked along"""
 MOST_PLACES: Final = EVEN_PLACES + 2
-"""and with one before and one after that of the shortest way: in between something may be nearer."""
+"""Most places, with one before and one after that of the shortest onset distance: a nearer object may lie between."""
 ROOM: Final = 12 * (1 + MOST_PLACES)
-"""Looks of one side: a place is looked from a hundred times a second at most."""
+"""Capacity for one side's looks: at most a hundred a second from each place"""
 FINGER_POSES: Final = 8
-"""The most that are kept, of the last 0.06 s."""
+"""Capacity for the fingers' poses of the last 0.06 s"""
 
 
 class Kernel(IntEnum):
-    """Kernels that are called by their addresses: compiled in anew, each would cost seconds at the start."""
+    """Kernels that are called by address: compiled into the caller, each would cost seconds at the start."""
 
     ABILITY = 0
     PROSPECT = 1
@@ -33,11 +33,11 @@ class Kernel(IntEnum):
 
 
 class Total(IntEnum):
-    """Counts over the run, after those of `Count`."""
+    """Indices of the run's counts, after those of `Count`."""
 
     LOOKS = len(Count)
     WITH_NOTHING_NEAR = len(Count) + 1
-    """Looks within the reach of which no sphere met anything"""
+    """Looks in whose reach no sphere met an object"""
 
 
 STATE: Final = np.dtype(
@@ -46,10 +46,10 @@ STATE: Final = np.dtype(
         *((name, np.float64) for name in ("measured", "next", "next_overlap", "overlap", "moved", "anew", "until")),
     ]
 )
-"""spheres: how many the gripper had, -1 before the first tick. moments: how many places besides the gripper's own are
-looked from. finger_poses: how many are kept. measured, next, next_overlap: when the motion was measured, when something
-is due again at the earliest, when the overlap at δ is (s). overlap: that one (m³). moved: when anything moved last.
-anew: since when looks from probes count (`around`). until: T, the time until the arm stands (s)."""
+"""spheres: number of the gripper's spheres, -1 before the first tick. moments: number of even places on the path.
+finger_poses: number kept. measured: time of the last motion measurement (s). next: earliest time of the next look (s).
+next_overlap, overlap: time of the next overlap at δ (s), and the latest one (m³). moved: time of the last motion (s).
+anew: time from which looks from probes count (s, `around`). until: T, the time until the arm stands (s)."""
 SEEN: Final = np.dtype(
     [
         ("place", np.int64),
@@ -59,13 +59,13 @@ SEEN: Final = np.dtype(
         ("ways", np.float64, (2, STRENGTHS)),
     ]
 )
-"""One look: when, from which place, the ways that it found, fast and slow. began: where the tool was along it (m)."""
+"""One look: its place, time and onset distances, fast and slow. began: the tool's position along its direction (m)."""
 AROUND: Final = np.dtype(
     [("at", np.float64), ("direction", np.float64, (3,)), ("began", np.float64), ("ways", np.float64, (2,))]
 )
-"""The newest look from a probe (`around`): when, and the ways of full strength. direction, began: as those of SEEN."""
+"""Newest look from a probe (`around`): time and onset distances of full strength. direction, began: as in SEEN."""
 NEWEST: Final = np.dtype([(name, np.float64) for name in ("reach", "speed", "acceleration", "sigma", "overlap")])
-"""Of the newest look from where the gripper is: how far it looked, what the arm can do there, D_σ, and Σ V_ij (m³)."""
+"""Newest look from the gripper's place: reach (m), the arm's speed and acceleration there, D_σ (m), Σ V_ij (m³)."""
 SETTINGS: Final = np.dtype(
     [
         *((name, np.float64) for name in ("trigger_speed", "stick_speed", "turn_speed", "touch_speed")),
@@ -73,7 +73,7 @@ SETTINGS: Final = np.dtype(
         ("mean", np.float64, (3,)),
     ]
 )
-"""Speeds in m/s and rad/s; σ_c² (m²), Φ⁻¹(P), and μ_ee - μ_c (m) of eq. 10. around: 0 where nobody asks for that."""
+"""Speeds in m/s and rad/s; σ_c² (m²), Φ⁻¹(P), and μ_ee - μ_c (m) of eq. 10. around: 0 if nobody asks for the map."""
 PROSPECT: Final = np.dtype(
     [
         ("direction", np.float64, (3,)),
@@ -81,12 +81,12 @@ PROSPECT: Final = np.dtype(
         *((name, np.float64) for name in ("reach", "gone", "stretch")),
     ]
 )
-"""How to look along one side: û, û·(μ_ee - μ_c), μ_δ and σ_δ² of eq. 10, the arm's v_max and a; how far, the way that
-is gone before, and by how much the path is longer than its chord."""
+"""Parameters of a look: û, û·(μ_ee - μ_c), μ_δ and σ_δ² of eq. 10, the arm's v_max and a. `reach` is the distance
+examined (m), `gone` that covered before the place (m), `stretch` the length of the path over that of its chord."""
 
 
 class MemoryColumns(NamedTuple):
-    """The columns; the fields are those of Memory."""
+    """Columns of the bundle; the fields are those of Memory."""
 
     state: np.ndarray
     seen: np.ndarray
@@ -134,49 +134,49 @@ memory_at = MEMORY.at
 
 
 def _floats(values: FloatArray) -> FloatArray:
-    """As kernels take them; a bundle knows no types."""
+    """Return a contiguous float64 array, as kernels need it: a bundle carries no types."""
     return np.ascontiguousarray(values, dtype=np.float64)
 
 
 class Memory:
-    """What is kept; `bundle` is what kernels take."""
+    """Owner of the columns; `bundle` is the argument for kernels."""
 
     def __init__(self, limits: JointLimits, encoder_sigma_rad: FloatArray, missed: Iterable[FloatArray]) -> None:
-        """missed: rows (k, 3) of loop age, μ_δ, σ_δ, for the operator side's prediction and for the robot side's."""
+        """missed: rows (k, 3) of loop age, μ_δ, σ_δ, first of the operator side's prediction, then the robot side's."""
         self.state: np.ndarray = np.zeros(1, dtype=STATE)
         self.state["spheres"] = -1
         for name in ("measured", "next", "next_overlap", "moved", "anew"):
             self.state[name] = -np.inf
         self.seen: np.ndarray = np.zeros(SIDES * ROOM, dtype=SEEN)
-        """Those of one side together, from `ROOM` times the side on"""
+        """Looks by side: a side's begin at `ROOM` times its number"""
         self.around: np.ndarray = np.zeros(2 * PROBES, dtype=AROUND)
-        """Those of one side together"""
+        """Looks from probes, grouped by side"""
         self.around["at"] = -np.inf
         self.counts: IntArray = np.zeros(SIDES, dtype=np.int64)
-        """How many there are of each side"""
+        """Number of looks by side"""
         self.newest: np.ndarray = np.zeros(SIDES, dtype=NEWEST)
         self.looked_s: FloatArray = np.full((SIDES, 1 + MOST_PLACES), -np.inf)
-        """By side and place: when it was last looked from there, minus infinity where it never was."""
+        """Time of the last look by side and place, minus infinity before the first"""
         self.nearest_m: FloatArray = np.full((SIDES, 1 + MOST_PLACES), np.inf)
-        """By side and place: the way of full strength that was found there last"""
+        """Onset distance of full strength in the last look, by side and place"""
         self.places: IntArray = np.zeros(SIDES, dtype=np.int64)
-        """From how many places each side is looked at. Place 0 is where the gripper is."""
+        """Number of places by side. Place 0 is where the gripper is."""
         self.moments_s: FloatArray = np.zeros(EVEN_PLACES)
-        """After which the gripper will be at the even places"""
+        """Times until the gripper reaches the even places"""
         self.velocity: FloatArray = np.zeros((2, 3))
-        """Linear and angular, of the tool, without that along its approach axis"""
+        """Linear velocity of the tool across its approach axis, and angular velocity"""
         self.finger_poses_s: FloatArray = np.zeros(FINGER_POSES)
         self.tool_m: FloatArray = np.zeros(3)
         self.rotation: FloatArray = np.zeros((3, 3))
-        """Of the tool at the place that is looked from"""
+        """Rotation of the tool at the place of the look"""
         self.chord: FloatArray = np.zeros(3)
-        """Where the trigger leads on to from there, by 1 m of its way"""
+        """Displacement of the tool from there, for 1 m of the trigger's path"""
         self.prospect: np.ndarray = np.zeros(1, dtype=PROSPECT)
         self.direction: FloatArray = np.zeros(3)
         self.able: FloatArray = np.zeros(FOUND + limits.velocity_rad_s.size)
-        """Speed and acceleration there, by how much the motion is off, and the joints' rates"""
+        """Result of `find_ability`: speed, acceleration, error of the motion, and the joints' rates"""
         self.displacement_m: FloatArray = np.zeros(3)
-        """δ of the overlap that is looked at"""
+        """δ of the overlap figure"""
         self.push, self.nothing = np.zeros(3), np.zeros(0)
         self.settings: np.ndarray = np.zeros(1, dtype=SETTINGS)
         able = limits.velocity_rad_s, limits.acceleration_rad_s2
@@ -185,19 +185,19 @@ class Memory:
         )
         self.encoder_variance = _floats(encoder_sigma_rad) ** 2
         self.kernels: IntArray = np.zeros(len(Kernel), dtype=np.int64)
-        """Their addresses"""
+        """Addresses by `Kernel`"""
         self.totals: IntArray = np.zeros(len(Count) + len(Total), dtype=np.int64)
         self.early_m: FloatArray = np.zeros(0)
-        """By how much each object's ways are shorter, as it comes nearer"""
+        """Approach of each object, by which its contact distances shorten"""
         self.own_m_s: FloatArray = np.zeros((0, 3))
-        """(m, 3) of each sphere against the tool: the fingers', in the world frame"""
+        """Velocity of each sphere against the tool (m, 3), in the world frame: the fingers' motion"""
         self.finger_poses_m: FloatArray = np.zeros((0, 3))
-        """Where the spheres were in the tool frame, pose after pose"""
+        """Positions of the spheres in the tool frame, pose after pose"""
         self.centers_m: FloatArray = np.zeros((0, 3))
-        """Of the spheres at the place that is looked from"""
+        """Centres of the spheres at the place of the look"""
 
     def make_room(self, spheres: int, objects: int) -> None:
-        """Have room for a gripper of m spheres among k objects; what is known of the same spheres stays."""
+        """Allocate columns for this number of spheres and objects. State of the same spheres stays."""
         if objects > len(self.early_m):
             self.early_m = np.zeros(objects)
         if spheres > len(self.own_m_s):
@@ -207,5 +207,5 @@ class Memory:
         self.bundle = MEMORY.bundle(self)
 
     def fits(self, spheres: int, objects: int) -> bool:
-        """Whether there is room for these numbers of spheres and objects."""
+        """Return whether there is room for these numbers of spheres and objects."""
         return spheres <= len(self.own_m_s) and objects <= len(self.early_m)

@@ -1,4 +1,4 @@
-"""The laws by their names. Another law is a file of its own and an entry here; it is imported when it is asked for."""
+"""Laws by name, imported on demand. Another law is one file and one entry here."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ if TYPE_CHECKING:
     from robot_side.laws.law import Law
 
     class NamedLaw(Law, Explains, Protocol):
-        """A law that a robot side can be told to follow."""
+        """Law that a robot side can follow."""
 
         def expect(self, probability: float) -> None:
-            """Take another P of eq. 10 from now on; ConfigurationError outside (0, 1)."""
+            """Set P of eq. 10; ConfigurationError outside (0, 1)."""
 
 
 LawName = Literal["swept", "paper"]
-"""swept: ways along each trigger, for its own zones. paper: the plain law of §4.2, one number for both triggers."""
+"""swept: onset distances along each trigger. paper: the plain law of §4.2, one number for both triggers."""
 
 
 def _swept(*arguments: Any) -> NamedLaw:
@@ -35,4 +35,4 @@ def _paper(*arguments: Any) -> NamedLaw:
 
 
 LAWS: Final[Mapping[LawName, Callable[..., NamedLaw]]] = {"swept": _swept, "paper": _paper}
-"""Makers: of an uncertainty, the encoders' standard deviations (n,) in rad, joint limits, tool motion, surroundings."""
+"""Factories; arguments: uncertainty, encoders' standard deviations (n,) in rad, joint limits, motion, surroundings"""

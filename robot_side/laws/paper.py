@@ -1,4 +1,4 @@
-"""The paper's plain law (§4.2), to compare with: every sphere enlarged by D_incr in all directions, one total overlap.
+"""The paper's plain law (§4.2), for comparison. Every sphere is enlarged by D_incr in all directions.
 
 s = min(1, Σ_ij V_ij / (f Σ_i V_i)), the same for both triggers and at every travel. The delay is in D_incr (eq. 8).
 """
@@ -27,12 +27,12 @@ from robot_side.laws.sensed import Sensed
 from robot_side.surroundings.surroundings import Surroundings
 
 REFERENCE_SHARE: Final = 0.05
-"""f. The paper names no reference: the smaller it is, the earlier all is full, beside and behind, too."""
+"""f. The paper names no reference. A smaller one gives full strength earlier, for objects beside and behind, too."""
 PERIOD_S: Final = 0.01
 
 
 class PaperLaw:
-    """Keeps what it found until it looks again."""
+    """The paper's law; keeps its result until the next look."""
 
     def __init__(
         self,
@@ -42,7 +42,7 @@ class PaperLaw:
         motion: ToolMotionSettings,
         surroundings: Surroundings | None = None,
     ) -> None:
-        """encoder_sigma_rad (n,): eq. 3. surroundings: the owner of what is perceived; one of its own by default."""
+        """encoder_sigma_rad (n,): eq. 3. surroundings: owner of the perceived scene; a new one by default."""
         self.surroundings = surroundings or Surroundings()
         self.looked = 0
         self._uncertainty = uncertainty
@@ -52,26 +52,26 @@ class PaperLaw:
         self._sensed: tuple[float, Sensed] | None = None
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Work out one tick; the overlap is looked at a hundred times a second."""
+        """Compute one tick; the overlap at most a hundred times a second."""
         if self._sensed is None or now_s - self._sensed[0] >= PERIOD_S - 1e-9:
             self._sensed = now_s, self._look(situation)
         return self._sensed[1]
 
     def expect(self, probability: float) -> None:
-        """P of eq. 10 from now on; ConfigurationError outside (0, 1)."""
+        """Set P of eq. 10; ConfigurationError outside (0, 1)."""
         self._uncertainty = replace(self._uncertainty, probability=probability)
 
     def around(self, pose: GripperPose) -> Around | None:
-        """Nothing: the plain law has no ways."""
+        """Return None: the plain law has no onset distances."""
         del pose
         return None
 
     def summary(self) -> dict[str, int]:
-        """How much work there was, over the run."""
+        """Return the number of looks over the run."""
         return {"fields": self.looked}
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """The same for both triggers: D_incr in all directions, of which |v| t_d is called displacement here."""
+        """Explain D_incr, the same for both triggers and in all directions; |v| t_d is the displacement."""
         del trigger, sensed
         enlargement_m, covariances, velocities = self._enlargements(situation)
         largest = int(enlargement_m.argmax())
@@ -92,7 +92,7 @@ class PaperLaw:
         return TriggerExplained(terms, overlaps_by_object(spheres, table, _classes_of(situation)))
 
     def _enlargements(self, situation: Situation) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """D_incr (m,), covariances (m, 3, 3) and velocities (m, 3) of the spheres."""
+        """Return D_incr (m,), covariances (m, 3, 3) and velocities (m, 3) of the spheres."""
         jacobians = situation.pose.sphere_jacobians
         covariances = position_covariance(jacobians, self._encoder_sigma_rad)
         velocities_m_s = jacobians @ situation.joint_velocities_rad_s

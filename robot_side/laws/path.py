@@ -1,12 +1,12 @@
-"""The gripper's path until the arm stands: a screw motion by trigger, sticks and fingers, and samples along it.
+"""Path of the gripper until the arm stands: a screw motion by trigger, sticks and fingers, and samples along it.
 
 Sticks move and turn the tool in its own frame. Its point moves with v, and it turns with ω. After t it has turned by
 θ = |ω| t, and its point has gone
 
     t V v,    V = 1 + (1 - cos θ)/θ [a] + (1 - sin θ/θ) [a]²,    a = ω/|ω|
 
-(exponential map of SE(3)). The trigger moves it along the approach axis z, and so along the chord V z by then. That
-points along z turned by θ/2. What is under way by then is gone already: the way at a place begins there.
+(exponential map of SE(3)). The trigger moves it along the approach axis z, and so along the chord V z by then. The
+chord points along z turned by θ/2. Commands under way have moved the tool by then: distances at a place include that.
 """
 
 import math
@@ -20,15 +20,15 @@ from robot_side.laws.memory import EVEN_PLACES, memory_at
 from robot_side.laws.sensed import L2
 
 SPACING_M: Final = 0.015
-"""No sphere gets farther between two places: less than an inflated fingertip's sphere is wide. A gripper that would
-need more places than the most has them farther apart."""
+"""Largest motion of a sphere between two places: less than an inflated fingertip's sphere is wide. A gripper that would
+need more than EVEN_PLACES has them farther apart."""
 _LEAST_M: Final = 0.003
 """Smaller motions are ignored."""
 
 
 @inlined
 def fastest_m_s(bundle: IntArray, centers: FloatArray, tool: Vector, ahead: Vector) -> float:
-    """|v + ω × r + its own| of the fastest sphere, or of one farther on by `ahead`, in m/s; NaN for what is none."""
+    """Return the largest |v + ω × r + own| of all spheres, there and farther on by `ahead`, in m/s; NaN for NaN."""
     memory = memory_at(bundle)
     velocity, turning = load(memory.velocity, 0), load(memory.velocity, 1)
     fastest, check = 0.0, 0.0
@@ -36,7 +36,7 @@ def fastest_m_s(bundle: IntArray, centers: FloatArray, tool: Vector, ahead: Vect
         lever, alone = subtract(load(centers, i), tool), add(velocity, load(memory.own_m_s, i))
         near, far = norm(add(alone, cross(turning, lever))), norm(add(alone, cross(turning, add(lever, ahead))))
         fastest = max(fastest, near, far)
-        # A maximum may hide what is no number.
+        # max() may hide NaN; the sum does not.
         check += near + far
     return fastest if math.isfinite(check) else math.nan
 
@@ -45,9 +45,9 @@ def fastest_m_s(bundle: IntArray, centers: FloatArray, tool: Vector, ahead: Vect
 def plan_places(
     bundle: IntArray, centers: FloatArray, tool: Vector, approach: Vector, until: float, ahead: float
 ) -> None:
-    """Decide after which times to look from the path: evenly, the last at `until`; never where the gripper stays.
+    """Choose the times of the places on the path, even, the last at `until`. There are none if the gripper stays.
 
-    ahead: so far ahead (m) it is to be looked as finely as near the gripper, which counts while it turns.
+    ahead: distance ahead (m) at which places shall be as close as at the gripper. It matters in turns.
     """
     memory = memory_at(bundle)
     state, farthest = memory.state[0], until * fastest_m_s(bundle, centers, tool, scale(ahead, approach))
@@ -60,7 +60,7 @@ def plan_places(
 
 @inlined
 def time_of_place(bundle: IntArray, side: int, place: int) -> float:
-    """Find the time at which the gripper will be at a place: the last two lie half a step beside the shortest way."""
+    """Return the time until the gripper is at a place. The last two places lie half a step beside the nearest one."""
     memory = memory_at(bundle)
     even = memory.state[0].moments
     if place <= even:
@@ -77,7 +77,7 @@ def time_of_place(bundle: IntArray, side: int, place: int) -> float:
 
 @inlined
 def _along_screw(vector: Vector, axis: Vector, across: float, twice: float) -> Vector:
-    """Work out v + across · a × v + twice · a × (a × v), which both a rotation and V are (Rodrigues)."""
+    """Return v + across · a × v + twice · a × (a × v), the form of both a rotation and V (Rodrigues)."""
     turned = cross(axis, vector)
     return add(vector, add(scale(across, turned), scale(twice, cross(axis, turned))))
 
@@ -93,10 +93,10 @@ def move(
     after: float,
     ahead: float,
 ) -> None:
-    """Put the tool and its spheres where they will be after that time, and find the chord that leads on from there.
+    """Move the tool and its spheres to their places in `after` seconds, and find the chord that leads on from there.
 
-    origin, rotation (3, 3), centers (m, 3): where they are; after 0 s, exactly these. linear, turning: of the
-    tool, but for what the trigger adds (m/s, rad/s). ahead: the trigger's own way by then, along the approach axis (m).
+    origin, rotation (3, 3), centers (m, 3): the present ones, kept exactly after 0 s. linear, turning: velocities of
+    the tool without the trigger's part (m/s, rad/s). ahead: the trigger's part by then, along the approach axis (m).
     """
     memory = memory_at(bundle)
     stays, axis, angle = after == 0.0, unit(turning), after * norm(turning)
@@ -132,10 +132,10 @@ def go_to(
     speed: float,
     loop_age: float,
 ) -> float:
-    """Move to a place that is looked from along one side, 0 for where the gripper is; the way (m) gone by then.
+    """Move to a place of one side, 0 for the gripper's. Return the distance (m) that the trigger has covered by then.
 
-    speed: along the approach axis. What is under way goes on for the loop age. A place stands for the path from half a
-    step before it on.
+    speed: along the approach axis. Commands under way last for the loop age. A place represents the path from half a
+    step before it.
     """
     memory, after = memory_at(bundle), time_of_place(bundle, side, place)
     forth, since = 1.0 if side != L2 else -1.0, max(after - 0.5 * memory.moments_s[0], 0.0)
@@ -156,5 +156,5 @@ def go_to_place(
     speed: float,
     loop_age: float,
 ) -> float:
-    """Move as `go_to` does, for people who look; bundle: the memory's; tool (3,)."""
+    """Move as `go_to` does, called from Python. bundle: the memory's. tool (3,)."""
     return go_to(bundle, load(tool.reshape(1, 3), 0), rotation, centers, side, place, speed, loop_age)

@@ -1,4 +1,4 @@
-"""How to look along one side: where it leads, what the arm can do there, how wrong what is known may be (eq. 9-10)."""
+"""Parameters of a look along one side: direction, the arm's ability in it, and errors (eq. 9-10)."""
 
 import math
 from typing import Final
@@ -15,31 +15,31 @@ from robot_side.laws.memory import Kernel, memory_at
 from robot_side.laws.sensed import R2, STICK
 
 BEYOND_M: Final = 0.05
-"""The distance looked beyond what a reaction, the loop age and braking take, as the loop age varies."""
+"""Distance examined beyond that of loop age, reaction and braking, as the loop age varies"""
 FIELD_PERIOD_S: Final = 0.01
-"""A controller is written to no more often. From where the gripper is yet to come, it is looked a third as often."""
+"""Period of looks from the gripper's place: controllers are written to no more often. Other places: three times it."""
 
 _find_ability = call_at_address(TRUTH, ABILITY)
 _prediction_error = inlined(prediction_error)
 
 
 def stopping_s(speed: float, acceleration: float, loop_age: float) -> float:
-    """The time from a report until the arm stands. It goes at full speed; a person feels the report and lets go."""
+    """Return the time from a report until the arm stands: full speed for loop age and reaction, then braking."""
     return loop_age + HORIZON_S + speed / acceleration
 
 
 stopping = inlined(stopping_s)
-"""The same in kernels."""
+"""`stopping_s` in kernels"""
 
 
 @inlined
 def horizon_m(speed: float, acceleration: float, loop_age: float) -> float:
-    """How far full speed gets before anything felt stops it, and a little more."""
+    """Return the distance that full speed covers before a reaction has stopped it, plus BEYOND_M."""
     return speed * (loop_age + HORIZON_S) + speed * speed / (2.0 * acceleration) + BEYOND_M
 
 
 FIND_PROSPECT: Final = (BUNDLE, COUNT, input_array(2), input_array(2), NUMBER, NUMBER, NUMBER, TRUTH, NUMBER)
-"""What `find_prospect` takes, for who calls it by its address."""
+"""Argument types of `find_prospect`, for calls by address"""
 
 
 @compiled(*FIND_PROSPECT, returns=TRUTH)
@@ -54,11 +54,11 @@ def find_prospect(
     by_operator: bool,
     gone: float,
 ) -> bool:
-    """Fill the memory's prospect and direction for one side; False for a Jacobian by which nothing can be resolved.
+    """Fill the memory's prospect and direction for one side. Return False for a Jacobian that cannot be resolved.
 
-    bundle: the memory's. rotation (3, 3), jacobian (6, n): of the tool at the place that is looked from. right, up: the
-    stick's deflection. by_operator: the operator side predicts what is under way. gone: the way (m) before the place,
-    from which the memory's chord leads on.
+    bundle: the memory's. rotation (3, 3): the tool's at the place of the look. jacobian (6, n): the tool's present one.
+    right, up: the stick's deflection. by_operator: the operator side predicts δ. gone: distance (m) covered before the
+    place, from which the memory's chord leads on.
     """
     memory = memory_at(bundle)
     settings, found, able = memory.settings[0], memory.prospect[0], memory.able
@@ -75,7 +75,7 @@ def find_prospect(
         return False
     found.speed, found.acceleration = able[0], able[1]
     mean, sd = 0.0, 0.0
-    # The stick is felt where it leads with the speed that it commands: nothing is predicted.
+    # The stick's rumble takes the commanded speed: no prediction, so no prediction error.
     if side != STICK:
         rows = memory.missed_by_operator if by_operator else memory.missed_by_robot
         mean, sd = _prediction_error(rows, loop_age, found.speed)

@@ -1,4 +1,4 @@
-"""What was seen of what is ahead lately, along each side and from each place; the shortest ways hold."""
+"""Recent looks along each side and from each place; the shortest onset distances count."""
 
 import math
 from typing import Final
@@ -11,14 +11,14 @@ from robot_side.laws.memory import ROOM, SIDES, memory_at
 from robot_side.laws.prospect import FIELD_PERIOD_S
 
 STEADY_S: Final = 0.1
-"""A way that was found holds for this time, in which strength falls in the trigger."""
+"""Time for which an onset distance counts: in the trigger, too, strength falls over 0.1 s."""
 _SAME_DIRECTION: Final = 0.999
-"""Cosine: 2.6° to either side."""
+"""Cosine of the largest angle between looks along the same direction: 2.6°"""
 
 
 @inlined
 def look_from(bundle: IntArray, side: int, places: int) -> None:
-    """Look along one side from this number of places from now on, and forget what was seen from others."""
+    """Set the number of places from which one side is looked along; forget looks from the others."""
     memory = memory_at(bundle)
     first, kept = ROOM * side, 0
     for place in range(memory.places[side], places):
@@ -34,9 +34,9 @@ def look_from(bundle: IntArray, side: int, places: int) -> None:
 
 @inlined
 def longest_waiting(bundle: IntArray, now: float) -> tuple[float, int, int]:
-    """How many periods the side and place that has waited longest has waited, with these two.
+    """Return the longest wait in periods, with its side and place.
 
-    A place that the gripper is yet to come to has three times the period.
+    Places ahead on the path have three times the period.
     """
     memory = memory_at(bundle)
     most, of_side, of_place = -math.inf, 0, 0
@@ -51,7 +51,7 @@ def longest_waiting(bundle: IntArray, now: float) -> tuple[float, int, int]:
 
 @inlined
 def longest_ago(bundle: IntArray) -> float:
-    """When the look was that is longest ago, of all sides and places."""
+    """Return the earliest of the times of the last looks, of all sides and places."""
     memory = memory_at(bundle)
     first = math.inf
     for side in range(SIDES):
@@ -62,10 +62,9 @@ def longest_ago(bundle: IntArray) -> float:
 
 @inlined
 def keep(bundle: IntArray, side: int, place: int, now: float, tool: Vector, ways: FloatArray) -> None:
-    """Take in a look along the memory's prospect, asked with the tool there; ways (2, 8) from its place, fast and slow.
+    """Store a look along the memory's prospect. ways (2, 8): its onset distances, fast and slow. tool: its position.
 
-    What was seen from the same place is forgotten if it is too old or was along another direction. Where there is no
-    room for more, the oldest goes.
+    Looks from the same place are forgotten if too old or along another direction. Without room the oldest is dropped.
     """
     memory = memory_at(bundle)
     along, first, kept = load(memory.direction.reshape(1, 3), 0), ROOM * side, 0

@@ -1,6 +1,6 @@
-"""The swept law's one compiled call a tick, from a situation to what is felt.
+"""The swept law's one compiled call a tick, from a situation to stiffness.
 
-measure the motion ─▶ what is due ─▶ prospect ─▶ look ─▶ keep ─▶ feel
+measure the motion ─▶ due looks ─▶ prospect ─▶ look ─▶ keep ─▶ feel
 """
 
 import math
@@ -35,7 +35,7 @@ _find_prospect = call_at_address(TRUTH, FIND_PROSPECT)
 
 @inlined
 def _velocity(jacobian: FloatArray, first: int, rates: FloatArray) -> Vector:
-    """What three rows of the Jacobian make of joint rates (n,)."""
+    """Return the product of three rows of the Jacobian, from `first` on, with the joint rates (n,)."""
     found = 0.0, 0.0, 0.0
     for joint in range(rates.size):
         column = jacobian[first, joint], jacobian[first + 1, joint], jacobian[first + 2, joint]
@@ -45,10 +45,10 @@ def _velocity(jacobian: FloatArray, first: int, rates: FloatArray) -> Vector:
 
 @building_block
 def _measure(bundle: IntArray, moment: Moment, velocity: Vector, turning: Vector, changed: bool) -> bool:
-    """Measure what moves the gripper besides the triggers; False for a Jacobian by which nothing can be resolved."""
+    """Measure the gripper's motion besides the triggers. Return False for a Jacobian that cannot be resolved."""
     memory = memory_at(bundle)
     state, across = memory.state[0], subtract(velocity, scale(moment.speed, moment.approach))
-    # What sticks do the operator side traces, from around the gripper.
+    # The operator side traces the sticks' motion through the map.
     traced = is_known(bundle) and moment.by_operator
     for axis in range(3):
         memory.velocity[0, axis] = 0.0 if traced else across[axis]
@@ -96,7 +96,7 @@ def sense(
     bundle: IntArray,
     felt: FloatArray,
 ) -> bool:
-    """Fill `felt`, that of `room_to_feel`; False for what does not fit, or is not finite and would compare as far away.
+    """Fill `felt`, made by `room_to_feel`. Return False for wrong sizes, and for NaN, which would compare as far away.
 
     tool_position (3,), rotation (3, 3), jacobian (6, n), rates (n,), centers (m, 3), radii (m,), on_finger (m,). The
     others are those of `Moment`; is_known: the loop age is.
@@ -109,7 +109,7 @@ def sense(
         return False
     state, tool = memory.state[0], load(tool_position.reshape(1, 3), 0)
     approach, velocity = (rotation[0, 2], rotation[1, 2], rotation[2, 2]), _velocity(jacobian, 0, rates)
-    # Of spheres and the rest of the pose a look sees for itself.
+    # A look checks the spheres and the rest of the pose itself.
     if not math.isfinite(dot(tool, approach) + dot(velocity, velocity) + now + loop_age + right + up):
         return False
     deflected, changed = right != 0.0 or up != 0.0, state.spheres != radii.size
@@ -119,7 +119,7 @@ def sense(
             *(by_operator, widest, right, up, classes, closing, velocities, scene_bundle, scratch_bundle),
         )
         at_most = 1
-        # What is gripped or let go changes which spheres there are.
+        # Gripping and releasing change the number of spheres.
         if changed or now - state.measured >= FIELD_PERIOD_S - ROUNDING_S:
             if not _measure(bundle, moment, velocity, _velocity(jacobian, 3, rates), changed):
                 return False

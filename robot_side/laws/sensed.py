@@ -1,4 +1,4 @@
-"""What one tick found out about the surroundings: numbers in one array, of which messages are made when they leave."""
+"""Result of one tick: numbers in one array, from which messages are made when they are sent."""
 
 from functools import cached_property
 from typing import Final
@@ -10,23 +10,23 @@ from common.protocol.messages import TriggerField, Ways
 from robot_side.field.scratch import STRENGTHS
 
 R2, L2, STICK = 0, 1, 2
-"""The sides along which a law looks."""
+"""Sides along which a law looks"""
 DISPLACEMENT, STIFFNESS, FULL_SPEED, ACCELERATION, OF_A_SIDE = (2 * STRENGTHS + k for k in range(5))
-"""Of the numbers of R2, and then of L2: after eight fast and eight slow ways, δ in m, s(δ), v_max, a."""
+"""Indices of a side's numbers, R2 before L2: after eight fast and eight slow onset distances, δ (m), s(δ), v_max, a"""
 SPEED, HORIZON, RUMBLE, ENLARGEMENT, OVERLAP, TOOL_SPEED, NUMBERS = (2 * OF_A_SIDE + k for k in range(7))
-"""After those of R2 and L2; and how many numbers there are in all."""
+"""Indices after the numbers of R2 and L2; and the count of all numbers"""
 
 
 class Sensed:
-    """What one tick found out."""
+    """Result of one tick."""
 
     def __init__(self, numbers: FloatArray) -> None:
-        """numbers (NUMBERS,): SI units, at the places above; they must not change from now on."""
+        """numbers (NUMBERS,): SI units, at the indices above. They must not change later."""
         self.numbers: Final = numbers
 
     @classmethod
     def of(cls, l2: TriggerField, r2: TriggerField, **others: float) -> "Sensed":
-        """Make one of two fields and the properties below, 0 where they are not given; ValueError for no number."""
+        """Build one from two fields and the properties below, 0 if not given; ValueError for NaN or infinity."""
         numbers: FloatArray = np.zeros(NUMBERS)
         for side, field in ((R2, r2), (L2, l2)):
             numbers[side * OF_A_SIDE : (side + 1) * OF_A_SIDE] = (
@@ -40,12 +40,12 @@ class Sensed:
 
     @cached_property
     def l2(self) -> TriggerField:
-        """What lies ahead along L2."""
+        """Field along L2."""
         return _trigger_field(self.numbers, L2)
 
     @cached_property
     def r2(self) -> TriggerField:
-        """What lies ahead along R2."""
+        """Field along R2."""
         return _trigger_field(self.numbers, R2)
 
     def stiffness(self, side: int) -> float:
@@ -59,7 +59,7 @@ class Sensed:
 
     @property
     def horizon_m(self) -> float:
-        """So far the fields look ahead."""
+        """Distance that the fields examine"""
         return float(self.numbers[HORIZON])
 
     @property

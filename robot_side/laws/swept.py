@@ -1,13 +1,12 @@
 """The law "swept": the gripper, inflated by D_σ, is moved along each trigger until it overlaps something (§4.2).
 
-Fields are worked out in turns, one in a tick: R2, L2, and along the stick while that is deflected. In between the ways
-are shortened by what the tool has moved along, which is exact for a translation. The shortest of the last 0.1 s hold:
-where the gripper just passes something, encoder noise alone can flip no strength to full.
+Fields take turns, one in a tick: R2, L2, and the stick while it is deflected. In between, the tool's motion is
+subtracted from the onset distances, which is exact for a translation. The shortest of the last 0.1 s count: where the
+gripper just passes an object, encoder noise alone can flip none to full.
 
-While the gripper drifts, turns, or moves its fingers, R2 and L2 are looked along from places on its path, too, until a
-command that is sent now has stopped it: the shortest ways hold (`path`). An operator side that traces its own sticks
-gets ways from around the gripper in their stead (`around`). What comes towards the gripper by itself shortens its ways
-by what it covers in that time.
+While the gripper drifts, turns, or moves its fingers, R2 and L2 are looked along from places on its path, too. The path
+ends where a command sent now has stopped the gripper (`path`). An operator side that traces its own sticks gets a map
+around the gripper instead (`around`). An object's approach in that time shortens its contact distances.
 """
 
 import math
@@ -53,7 +52,7 @@ _NO_VELOCITIES: Final[FloatArray] = np.empty((0, 3))
 
 
 class Asked(NamedTuple):
-    """What one look is asked; the first fields are those of `Ahead.look`."""
+    """Arguments of one look, for `Ahead.look`."""
 
     pose: GripperPose
     classes: IntArray
@@ -62,7 +61,7 @@ class Asked(NamedTuple):
 
 
 class SweptLaw:
-    """Keeps each side's newest field."""
+    """The law "swept"; keeps the recent looks of each side."""
 
     def __init__(
         self,
@@ -72,7 +71,7 @@ class SweptLaw:
         motion: ToolMotionSettings,
         surroundings: Surroundings | None = None,
     ) -> None:
-        """encoder_sigma_rad (n,): eq. 3. surroundings: the owner of what is perceived; one of its own by default."""
+        """encoder_sigma_rad (n,): eq. 3. surroundings: owner of the perceived scene; a new one by default."""
         self.surroundings = surroundings or Surroundings()
         self.encoder_sigma_rad = encoder_sigma_rad
         self._uncertainty = uncertainty
@@ -93,7 +92,7 @@ class SweptLaw:
         self._room: tuple[int, SceneTable | None] = (-1, None)
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Work out one tick; ValueError for what is not finite or does not fit: what was seen before still holds."""
+        """Compute one tick; ValueError for wrong sizes and numbers that are not finite. Earlier looks then stay."""
         pose, scene = situation.pose, self.surroundings.see(situation.objects)
         self._make_room(pose, scene)
         if (found := self._classes_of(situation)) is not self._classes:
@@ -119,13 +118,13 @@ class SweptLaw:
         return Sensed(self._felt[:NUMBERS].copy())
 
     def expect(self, probability: float) -> None:
-        """P of eq. 10 from now on; ConfigurationError outside (0, 1)."""
+        """Set P of eq. 10; ConfigurationError outside (0, 1)."""
         self._uncertainty = replace(self._uncertainty, probability=probability)
         self.memory.settings["quantile"] = self._uncertainty.quantile
         self._look_around_anew()
 
     def around(self, pose: GripperPose) -> Around | None:
-        """Ways from around the gripper, from where it is; None while not all are known, or nobody asks for them."""
+        """Return the map of onset distances around `pose`; None while one is unknown, or nobody asks for the map."""
         until_s, ways_m = float(self.memory.state["until"][0]), np.empty((LISTS, PROBES))
         if self._frame is None or self._classes is None or not 0.0 < until_s <= LONGEST_S:
             return None
@@ -137,32 +136,32 @@ class SweptLaw:
 
     @property
     def fits_a_message(self) -> bool:
-        """Whether a map has room for all joints."""
+        """Whether the message of a map has room for all joints"""
         return len(self.encoder_sigma_rad) <= MOST_JOINTS
 
     def ask_around(self, *, asked: bool) -> None:
-        """Look from around the gripper, too, from now on, or no longer; nobody asks for it at first."""
+        """Turn looks from probes around the gripper on or off; they are off at first."""
         self.memory.settings["around"] = float(asked)
 
     def forget_around(self, before_s: float) -> None:
-        """Forget what was seen from around before then: the next tick sees all of that at once."""
+        """Forget the probes' looks before `before_s`: the next tick repeats all of these."""
         at = self.memory.around["at"]
         at[at < before_s] = -np.inf
 
     def _look_around_anew(self) -> None:
-        """Let what was seen from around count no more: what is looked at, or how, has changed."""
+        """Discard the probes' looks, as the objects' classes or P have changed."""
         self.memory.state["anew"] = np.inf
 
     def summary(self) -> dict[str, int]:
-        """How much work there was and was not, over the run."""
+        """Return counts of the work, done and saved, over the run."""
         totals = self.memory.totals.tolist()
         counts = {"fields": totals[Total.LOOKS]} | {one.name.lower(): totals[one] for one in Count}
-        # Primitives of the newest scene without volume: nothing can overlap them, so that nobody feels them.
+        # Primitives of the newest scene without volume: nothing can overlap them, so they are not felt.
         flat = 0 if self._room[1] is None else self._room[1].flat
         return counts | {"with_nothing_near": totals[Total.WITH_NOTHING_NEAR], "flat": flat}
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """What D_σ is made of along one trigger, and what overlaps at the robot side's δ; in the ticks' thread."""
+        """Explain D_σ along one trigger, and the overlaps at the robot side's δ. Call it in the ticks' thread."""
         felt, side = (sensed.l2, L2) if trigger == "l2" else (sensed.r2, R2)
         asked = self.asked(side, situation)
         terms, sigma_m = enlargement_terms(situation, asked.along, self.encoder_sigma_rad, felt.displacement_m)
@@ -171,7 +170,7 @@ class SweptLaw:
         return TriggerExplained(terms, found)
 
     def asked(self, side: int, situation: Situation, place: int = 0) -> Asked:
-        """What a look along one side is asked, where the gripper is or at a place that it is yet to come to."""
+        """Return the arguments of a look along one side, from the gripper's place or one ahead on its path."""
         pose, memory, (right, up) = situation.pose, self.memory, situation.lateral
         self._make_room(pose, self.surroundings.see(situation.objects))
         by_operator, age_s = situation.compensation == "operator", situation.loop_age_s
@@ -214,13 +213,13 @@ class SweptLaw:
             self._scratch = Scratch(*needed)
         if not self.memory.fits(spheres, len(scene.first_rows)):
             self.memory.make_room(spheres, len(scene.first_rows))
-        # Not before the first tick: whoever starts has compiled them by then, several at a time.
+        # Not before the first tick: warm-up has compiled them by then, several at a time.
         self.memory.kernels[:] = [kernel.address for kernel in (find_ability, find_prospect, look, sum_overlaps)]
 
     def _classes_of(self, situation: Situation) -> tuple[object, IntArray, IntArray]:
-        """What each object is to the field (k,), and what while the fingers move: what they close on, they touch.
+        """Return roles and held object, the classes (k,), and those while the fingers move, as they touch the target.
 
-        The newest tick's own where roles and what is held are those of then; kept by a tick alone, not by who explains.
+        Equal roles and held object return the last tick's own. Only a tick stores the result, not an explanation.
         """
         roles, held = situation.objects.roles, situation.held
         if self._classes is not None and self._classes[0] == (roles, held):
@@ -236,7 +235,7 @@ class SweptLaw:
         return (roles, held), classes, np.where(classes == TARGET, PASSED_OVER, classes)
 
     def _refuse(self, situation: Situation, now_s: float = 0.0) -> NoReturn:
-        """Raise the ValueError that says what is not finite, or of which there are too few or too many."""
+        """Raise the ValueError that names the field that is not finite or has the wrong size."""
         pose, limits_rad_s, rates = situation.pose, self._limits.velocity_rad_s, situation.joint_velocities_rad_s
         joints, spheres = len(self.encoder_sigma_rad), len(pose.sphere_radii_m)
         for name, count, valid in (
@@ -247,7 +246,7 @@ class SweptLaw:
             ("pose.sphere_on_finger", len(pose.sphere_on_finger), spheres),
         ):
             if count != valid:
-                raise ValueError(f"{name} = {count}; valid: {valid}, as many as there are joints or spheres")
+                raise ValueError(f"{name} = {count}; valid: {valid}, the number of joints or spheres")
         for name in ("tool_position_m", "tool_rotation", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
             require_finite(f"pose.{name}", getattr(pose, name))
         require_finite("joint_velocities_rad_s", rates)
@@ -257,5 +256,5 @@ class SweptLaw:
 
 
 def _widest_m(situation: Situation) -> float:
-    """Half the gap between the fingers, the most by which their spheres are inflated towards the target (§3.4)."""
+    """Return half the gap between the fingers, the largest inflation of their spheres towards the target (§3.4)."""
     return math.inf if situation.gap_m is None else 0.5 * max(situation.gap_m, 0.0)

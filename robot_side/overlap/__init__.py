@@ -1,8 +1,7 @@
 """Exact overlap volumes of spheres with solids, their gradients, and `warm_up` to compile beforehand.
 
-Read `volumes` and `meshes.mesh` for the functions, `lanes.face_angles` for the idea, `lanes.tetrahedron_lane` and
-`lanes.box_lane` for how it is used, `precise.polyhedron` for what tiny overlaps need, and `kernels` for what a 1 kHz
-tick calls.
+The functions are in `volumes` and `meshes.mesh`, those for a 1 kHz tick in `kernels`. `lanes.face_angles` explains the
+method. `lanes.tetrahedron_lane` and `lanes.box_lane` use it, `precise.polyhedron` has the tiny overlaps.
 """
 
 from importlib import import_module
@@ -28,7 +27,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """What deals with meshes, loaded when first asked for: who has none does not wait for their kernels to compile."""
+    """Load the names for meshes on first use: a program without meshes does not compile their kernels."""
     if name == "MeshLibrary":
         return import_module("robot_side.overlap.meshes.mesh_library").MeshLibrary
     if name in {"Mesh", "sphere_mesh"}:

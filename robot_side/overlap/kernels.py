@@ -1,13 +1,13 @@
-"""Overlaps of (sphere, primitive) pairs in contiguous arrays: what a 1 kHz tick calls.
+"""Overlaps of (sphere, primitive) pairs in contiguous arrays, for calls in a 1 kHz tick.
 
 The caller vouches for equal numbers of rows, and for finite values, radii >= 0, rotations that are orthonormal to
-1e-6 and normals other than 0; with `vouched=False` any other value raises `DoubtfulNumbersError`, and so may one that
-is just within its limits. Arrays are float64 and C-contiguous, lengths in m; any other type or layout raises TypeError.
+1e-6 and normals other than 0. With `vouched=False` any other value raises `DoubtfulNumbersError`; so may a value just
+within its limits. Arrays are float64 and C-contiguous, lengths in m; any other type or layout raises TypeError.
 Each function returns (volumes (p,) in m³, gradients (p, 3) = dV/dcentre in m², areas (p,) = dV/dradius in m²) in new
-arrays. `robot_side.overlap` has the functions that say what is wrong.
+arrays. The functions of `robot_side.overlap` name the wrong argument.
 
-Boxes and tetrahedra go three ways: bounds settle most pairs that do not cut, vector lanes work out the others, and
-the few for which doubles do not suffice (see `lane_result`) are worked out once more by the precise forms.
+Boxes and tetrahedra have three methods. Bounds settle most pairs that do not cut. Vector lanes compute the others. The
+precise forms recompute the few for which doubles do not suffice (see `lane_result`).
 """
 
 import os
@@ -30,37 +30,37 @@ from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
 from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
 
 PAIRS_PER_THREAD = 8192
-"""A thread is worth starting for so many boxes or tetrahedra, nearly a millisecond of work."""
+"""Boxes or tetrahedra that are worth a thread: nearly a millisecond of work"""
 
 _RESULTS = output_array(1), output_array(2), output_array(1)
 
 
 @dataclass
 class PairCounts:
-    """How many pairs of spheres with boxes or tetrahedra went which way; calls add to it."""
+    """Numbers of pairs of spheres with boxes or tetrahedra by method; calls add to them."""
 
     pairs: int = 0
     early: int = 0
-    """settled by bounds alone"""
+    """Pairs that were settled by bounds alone"""
     precise: int = 0
-    """worked out by the precise forms"""
+    """Pairs that were computed by the precise forms"""
 
 
 class DoubtfulNumbersError(ValueError):
-    """Numbers may be out of range or NaN."""
+    """Error for numbers that may be out of range or NaN."""
 
 
 def sphere_pairs(
     centers: FloatArray, radii: FloatArray, other_centers: FloatArray, other_radii: FloatArray, *, vouched: bool = True
 ) -> Overlaps:
-    """Spheres `centers` (p, 3), `radii` (p,) with spheres `other_centers` (p, 3), `other_radii` (p,)."""
+    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with `other_centers` (p, 3), `other_radii` (p,)."""
     return _one_by_one(_sphere_loop, (centers, radii, other_centers, other_radii), vouched)
 
 
 def half_space_pairs(
     centers: FloatArray, radii: FloatArray, normals: FloatArray, offsets: FloatArray, *, vouched: bool = True
 ) -> Overlaps:
-    """Spheres `centers` (p, 3), `radii` (p,) with half-spaces normals (p, 3)·x <= offsets (p,)."""
+    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with half-spaces normals (p, 3)·x <= offsets (p,)."""
     return _one_by_one(_half_space_loop, (centers, radii, normals, offsets), vouched)
 
 
@@ -83,9 +83,9 @@ def box_pairs(
     counts: PairCounts | None = None,
     threads: int | None = None,
 ) -> Overlaps:
-    """Spheres with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3) to world, `box_half_sizes` (p, 3).
+    """Return overlaps with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3) to world, `box_half_sizes` (p, 3).
 
-    `threads` None takes as many as pay.
+    `threads` None chooses the number by the number of pairs.
     """
     arguments = centers, radii, box_centers, box_rotations, box_half_sizes
     return _many(overlap_boxes, precise_boxes, arguments, vouched, counts, threads)
@@ -100,9 +100,9 @@ def tetrahedron_pairs(
     counts: PairCounts | None = None,
     threads: int | None = None,
 ) -> Overlaps:
-    """Spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3), in any order.
+    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3), in any order.
 
-    `threads` None takes as many as pay.
+    `threads` None chooses the number by the number of pairs.
     """
     return _many(overlap_tetrahedra, precise_tetrahedra, (centers, radii, vertices), vouched, counts, threads)
 
@@ -116,7 +116,7 @@ def _many(
     threads: int | None,
 ) -> Overlaps:
     total = len(arguments[1])
-    # The kernels leave pairs without contact alone.
+    # The kernels do not write the results of pairs without contact.
     results = np.zeros(total), np.zeros((total, 3)), np.zeros(total)
     if threads is None:
         threads = min(total // PAIRS_PER_THREAD, os.cpu_count() or 1) if total >= 2 * PAIRS_PER_THREAD else 1
@@ -133,7 +133,7 @@ def _many(
         try:
             shared = _pool().map(part_of, ends[:-1], ends[1:])
         except RuntimeError:
-            # The interpreter is ending, and starts no threads any more.
+            # The interpreter is shutting down and starts no more threads.
             shared = map(part_of, ends[:-1], ends[1:])
         parts = list(shared)
     if counts is not None:
@@ -146,7 +146,7 @@ def _many(
 def _part(
     overlap: Compiled, precise: Compiled, arguments: tuple[FloatArray, ...], results: Overlaps, vouched: bool
 ) -> tuple[int, int]:
-    """Fill in `results`; how many pairs bounds did not settle, and how many took the precise forms."""
+    """Fill `results`; return the number of pairs that bounds did not settle, and of those with precise forms."""
     rows: IntArray = np.empty(len(arguments[1]) + 1, dtype=np.int64)
     unsettled = overlap(*arguments, *results, rows)
     partial = rows.item(-1)
@@ -164,7 +164,7 @@ def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="overlap")
 
 
-# A forked process has none of the threads, and would wait for them for ever.
+# A forked process has none of the threads, and would wait for them forever.
 os.register_at_fork(after_in_child=_pool.cache_clear)
 
 

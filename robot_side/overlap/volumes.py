@@ -7,15 +7,15 @@ m³, or, with `gradient=True`, the tuple (volumes (...), gradients (..., 3), are
 - gradients, dV/dcentre in m²: the direction in which moving the sphere increases the overlap fastest;
 - areas, dV/dradius in m²: the part of the sphere's surface that lies within the solid.
 
-Where the derivative jumps (equal spheres at one place) it is that of one side. A solid without volume and a
+Where the derivative jumps (equal spheres at one place), the result is that of one side. A solid without volume and a
 radius of 0 give 0 throughout.
 
 ValueError for NaN, infinity, a magnitude above 1e50, a negative radius or size, a wrong or incompatible shape:
-the text names the argument, the value and what is valid.
+the text names the argument, the value and the valid range.
 
 The error is at most 1e-15 of the sphere's volume (2e-15 of the great circle and 1e-15 of the sphere's surface for the
-derivatives) whatever the ratio of the sizes and the distance from the origin. Overlaps below a millionth of the sphere
-are right to 1e-9 or better of themselves; with slivers and needles that holds down to 1e-12 of the sphere.
+derivatives), for all ratios of sizes and all distances from the origin. Overlaps below a millionth of the sphere have a
+relative error of 1e-9 or less; with slivers and needles that holds down to 1e-12 of the sphere.
 docs/benchmarks.md has the figures.
 """
 
@@ -56,7 +56,7 @@ def sphere_sphere(
 def sphere_sphere(
     centers: Array, radii: Array, other_centers: Array, other_radii: Array, *, gradient: bool = False
 ) -> FloatArray | Overlaps:
-    """Overlap with the spheres `other_centers` (..., 3), `other_radii` (...) in m; see this module."""
+    """Return the overlap with the spheres `other_centers` (..., 3), `other_radii` (...) in m; see this module."""
     return _overlaps(_SPHERES, (centers, radii, other_centers, other_radii), gradient)
 
 
@@ -71,7 +71,7 @@ def sphere_half_space(
 def sphere_half_space(
     centers: Array, radii: Array, normals: Array, offsets: Array, *, gradient: bool = False
 ) -> FloatArray | Overlaps:
-    """Overlap with the half-spaces `normals` (..., 3) · x <= `offsets` (...), V_c of eq. 12; see this module.
+    """Return the overlap with half-spaces `normals` (..., 3) · x <= `offsets` (...), V_c of eq. 12; see this module.
 
     The normals need not have unit length, but must not be 0.
     """
@@ -107,11 +107,11 @@ def sphere_box(
     *,
     gradient: bool = False,
 ) -> FloatArray | Overlaps:
-    """Overlap with the boxes {c + Q diag(half) x : |xᵢ| <= 1}; see this module.
+    """Return the overlap with the boxes {c + Q diag(half) x : |xᵢ| <= 1}; see this module.
 
     `box_centers` c (..., 3) in m, `box_rotations` Q (..., 3, 3) from the box to the spheres' frame,
-    `box_half_sizes` half (..., 3) in m. The set is taken for the Q given, however it was rounded; with
-    ‖QᵀQ - I‖ > 1e-6 (Frobenius) it is refused.
+    `box_half_sizes` half (..., 3) in m. The set is that of the given, rounded Q; ValueError for
+    ‖QᵀQ - I‖ > 1e-6 (Frobenius).
     """
     return _overlaps(_BOXES, (centers, radii, box_centers, box_rotations, box_half_sizes), gradient)
 
@@ -125,13 +125,13 @@ def sphere_tetrahedron(centers: Array, radii: Array, vertices: Array, *, gradien
 def sphere_tetrahedron(
     centers: Array, radii: Array, vertices: Array, *, gradient: bool = False
 ) -> FloatArray | Overlaps:
-    """Overlap with the tetrahedra of `vertices` (..., 4, 3) in m, in any order; see this module."""
+    """Return the overlap with the tetrahedra of `vertices` (..., 4, 3) in m, in any order; see this module."""
     return _overlaps(_TETRAHEDRA, (centers, radii, vertices), gradient)
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """The overlaps of one kind of solid, and what is asked of each argument: its name and last dimensions."""
+    """Overlap function of one kind of solid, and the check, name and last dimensions of each argument."""
 
     pairs: Callable[..., Overlaps]
     arguments: tuple[tuple[Check, str, tuple[int, ...]], ...]
@@ -157,7 +157,7 @@ _TETRAHEDRA = _Kind(tetrahedron_pairs, (*_CENTERS_AND_RADII, (numbers, "vertices
 
 
 def _overlaps(kind: _Kind, given: tuple[Array, ...], gradient: bool) -> FloatArray | Overlaps:
-    # What is plain goes straight to the kernels, which find out in passing whether numbers are in doubt.
+    # Plain arrays go directly to the kernels, which also detect doubtful numbers.
     plain = plain_rows(given, kind.trailing)
     if plain is not None:
         rows, shape = plain

@@ -1,1 +1,1 @@
-"""What the camera says is there: perceived objects, their roles, the target."""
+"""Perceived objects, their roles, and the target."""

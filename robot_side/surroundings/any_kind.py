@@ -1,4 +1,4 @@
-"""Nearest point of, and contact of a moving sphere with, a primitive of any kind."""
+"""Nearest point of a primitive of any kind, and contact of a moving sphere with the primitive."""
 
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block
@@ -12,7 +12,7 @@ _nearest, _contact = by_kind([kind.nearest for kind in KINDS]), by_kind([kind.co
 
 @building_block
 def nearest(kind: int, shapes: FloatArray, row: int, point: Vector) -> Nearest:
-    """The nearest point of the primitive in `row`; of a mesh, the box around it."""
+    """Return the nearest point of the primitive in `row`; for a mesh, of the box around it."""
     found: Nearest = _nearest(kind, shapes, row, point)
     return found
 
@@ -21,6 +21,6 @@ def nearest(kind: int, shapes: FloatArray, row: int, point: Vector) -> Nearest:
 def contact(
     kind: int, shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, reach: float
 ) -> Contact:
-    """Where a sphere that moves along the unit vector `along` first touches; of a mesh, the box around it."""
+    """Return the first contact of a sphere that moves along the unit vector `along`; for a mesh, with its box."""
     found: Contact = _contact(kind, shapes, row, start, radius, along, reach)
     return found

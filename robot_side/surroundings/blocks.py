@@ -1,7 +1,7 @@
-"""Objects in blocks that lie together, and blocks of blocks, so that far ones are passed over 64 and 4 096 at a time.
+"""Bounding volume hierarchy: blocks of objects that lie together, and blocks of blocks; far ones are skipped at once.
 
-The order is that of a curve through all of space (Morton 1966); it needs no tree, and stays when objects move: the
-bounds around the blocks that they are in follow them.
+The order is that of a space-filling curve (Morton 1966). It needs no tree, and stays when objects move: the bounds of
+their blocks follow them. A block skips 64 objects, a block of blocks 4 096.
 """
 
 import math
@@ -16,13 +16,13 @@ from robot_side.surroundings.bounds import write_around
 TOGETHER: Final = 64
 """Objects in a block, and blocks in a block of blocks."""
 _CELLS: Final = 1 << 16
-"""Along each axis of the curve."""
+"""Cells along each axis of the curve"""
 
 
 def in_blocks(object_bounds: FloatArray) -> IntArray:
-    """The objects of bounds (k, 4) that have any, as they follow each other in blocks; those without an end first.
+    """Return the order in blocks of the objects that have bounds (k, 4); infinite objects come first.
 
-    What fits in one block stays in the order of the objects.
+    Objects that fit in one block keep their order.
     """
     there = np.flatnonzero(object_bounds[:, 3] >= 0.0)
     if len(there) <= TOGETHER:
@@ -40,7 +40,7 @@ def in_blocks(object_bounds: FloatArray) -> IntArray:
 
 
 def _spread(numbers: np.ndarray) -> np.ndarray:
-    """The 16 bits of each number (n,), two zeros after each."""
+    """Return the 16 bits of each number (n,), with two zeros after each bit."""
     for shift, mask in ((16, 0x0000FF0000FF), (8, 0x00F00F00F00F), (4, 0x0C30C30C30C3), (2, 0x249249249249)):
         numbers = (numbers | (numbers << np.uint64(shift))) & np.uint64(mask)
     return numbers
@@ -48,7 +48,7 @@ def _spread(numbers: np.ndarray) -> np.ndarray:
 
 @inlined
 def bound_blocks(bounds: FloatArray, which: IntArray, blocks: FloatArray, groups: FloatArray) -> None:
-    """Bound the blocks `which`, rising, of objects with bounds (o, 4) in their order, and the blocks around them."""
+    """Write the bounds of the blocks `which`, rising, and of the blocks around them. bounds (o, 4): in block order."""
     for k in range(which.size):
         first = which[k] * TOGETHER
         write_around(bounds, first, min(first + TOGETHER, bounds.shape[0]), blocks[which[k]])
@@ -66,15 +66,15 @@ def _bound(bounds: FloatArray, which: IntArray, blocks: FloatArray, groups: Floa
 
 
 class Blocks:
-    """The order of objects, and what bounds their blocks."""
+    """Order of the objects, and bounds of their blocks."""
 
     def __init__(self, object_bounds: FloatArray, order: IntArray | None = None) -> None:
-        """object_bounds (k, 4): read whenever blocks are bound. order: kept from where the objects were before."""
+        """object_bounds (k, 4): the objects'. order: that of earlier positions; by default a new one."""
         self.order = in_blocks(object_bounds) if order is None else order
-        """(o,) those that have bounds"""
+        """(o,) objects that have bounds"""
         self._object_bounds = object_bounds
         self.bounds: FloatArray = object_bounds[self.order]
-        """(o, 4) of each, in the order"""
+        """(o, 4) of each object, in the order"""
         self.blocks: FloatArray = np.empty((-(-len(self.order) // TOGETHER), 4))
         """(b, 4) around each block"""
         self.groups: FloatArray = np.empty((-(-len(self.blocks) // TOGETHER), 4))
@@ -82,7 +82,7 @@ class Blocks:
         _bound(self.bounds, np.arange(len(self.blocks)), self.blocks, self.groups)
 
     def places(self, things: IntArray) -> IntArray:
-        """Where each of these objects is in the order; -1 for one that has no bounds."""
+        """Return the place of each of these objects in the order; -1 for an object without bounds."""
         found = np.full(len(self._object_bounds), -1)
         found[self.order] = np.arange(len(self.order))
         return found[things]

@@ -1,4 +1,4 @@
-"""Distances of points from the objects of a frame, by the same nearest points as the compiled pass has."""
+"""Distances of points from the objects of a frame, by the nearest points of the compiled pass."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from robot_side.surroundings.scene_table import SceneTable
 
 
 def nearest_points(points_m: FloatArray, scene: SceneTable, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Signed distances (p,) in metres, and directions (p, 3), from points (p, 3) to the scene's primitives `rows` (p,).
+    """Return signed distances (p,) in m, and directions (p, 3), from points (p, 3) to the primitives `rows` (p,).
 
     Positive outside. The direction is the unit vector along which the distance falls fastest.
     """
@@ -26,7 +26,7 @@ def nearest_points(points_m: FloatArray, scene: SceneTable, rows: IntArray) -> t
 
 
 def nearest_mesh_points(points_m: FloatArray, scene: SceneTable, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-    """The same for rows that are meshes, all of them."""
+    """Do as `nearest_points`, for rows that are all meshes. ValueError for a scene without a mesh library."""
     # A scene without meshes does not load the kernels for them.
     from robot_side.overlap.meshes.mesh_library import nearest_mesh_pairs  # noqa: PLC0415
 
@@ -43,7 +43,7 @@ def nearest_mesh_points(points_m: FloatArray, scene: SceneTable, rows: IntArray)
 
 
 def object_distances(centers_m: FloatArray, radii_m: FloatArray, scene: SceneTable, reach_m: float) -> FloatArray:
-    """The distance (k,) from spheres (m,) to each object, where it is no more than `reach_m`; else infinite."""
+    """Return the distance (k,) from spheres (m,) to each object; infinite beyond `reach_m`."""
     gaps: FloatArray = np.full(len(scene.objects.names), np.inf)
     spheres = np.concatenate([centers_m, radii_m[:, None]], axis=1)
     _least_gaps(spheres, scene.bounds, scene.shapes, scene.kinds, scene.object_index, reach_m, gaps)
@@ -84,7 +84,7 @@ def _least_gaps(
     reach: float,
     gaps: FloatArray,
 ) -> None:
-    """Lower `gaps` (k,) to the distances to all primitives but meshes that bounds do not show to be beyond `reach`."""
+    """Lower `gaps` (k,) to the distances to primitives other than meshes, as far as bounds lie within `reach`."""
     middle, size = around(spheres, 0, spheres.shape[0])
     for row in range(kinds.size):
         if kinds[row] == MESH or norm(subtract(load(bounds, row), middle)) - bounds[row, 3] - size > reach:

@@ -1,8 +1,8 @@
-"""Frames that differ from an earlier one by where some objects are: their cost is that of what moves.
+"""Frames that differ from an earlier one by the poses of some objects: only the objects that move cost time.
 
-A camera makes a `Movers` of the objects that may move, and whenever it looks says the numbers of these alone: n rows of
-20, one for each of their primitives (see `kinds.layout`), those of an object together and ordered by kind, and then m
-rows, one for each object: its position, rotation and velocity. What the others are, and where, is said once.
+A camera makes one `Movers` of the objects that may move. Each new frame brings only the numbers of these. First come n
+rows of 20, one for each of their primitives (see `kinds.layout`), grouped by object and ordered by kind. Then come m
+rows, one for each object: position, rotation and velocity. The first frame has all other objects.
 """
 
 import math
@@ -19,28 +19,28 @@ from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.placing import numbers_of, primitives_of
 
 OF_OBJECTS: Final = {"positions_m": (3,), "rotations": (3, 3), "velocities_m_s": (3,)}
-"""The arrays of a frame with a row for each object, in the order of its numbers."""
+"""Arrays of a frame with a row for each object, in the order of the object's numbers"""
 
 
 class Part(NamedTuple):
-    """Where the values of one of a frame's arrays are among the movers' numbers."""
+    """Places of the values of a frame's array among the movers' numbers."""
 
     places: IntArray
-    """(r,) the rows there"""
+    """(r,) rows of the numbers"""
     rows: IntArray
-    """(r,) and those of the array"""
+    """(r,) rows of the array"""
     columns: slice
     shape: tuple[int, ...]
 
 
 class Movers:
-    """The objects of one frame that may be elsewhere in the next ones."""
+    """Objects of one frame that may be elsewhere in later frames."""
 
     def __init__(self, first: PerceivedObjects, things: IntArray) -> None:
-        """things (m,): their places among the names of `first`, rising. ValueError for others, or if `first` is made
-        of an earlier one itself."""
+        """things (m,): indices into the names of `first`, rising. ValueError for other indices, or if `first` is
+        itself a frame of movers."""
         if first.since is not None:
-            raise ValueError("first says only what is new since an earlier frame; valid: a frame that says all")
+            raise ValueError("first is itself a frame of movers; valid: a complete frame")
         beyond = things.size > 0 and (things[0] < 0 or things[-1] >= len(first.names))
         if beyond or (np.diff(things) <= 0).any():
             raise ValueError(f"things holds {things}; valid: rising places among {len(first.names)} objects")
@@ -50,7 +50,7 @@ class Movers:
         owners, kinds, rows_of_kind = primitives_of(first)
         own = np.flatnonzero(np.isin(owners, things))
         self._own = own[np.argsort(owners[own], kind="stable")]
-        """(n,) of all primitives"""
+        """(n,) indices into all primitives of the frame"""
         self.first_rows = np.searchsorted(owners[self._own], np.append(things, len(first.names)))
         self.parts = self._all_parts(kinds[self._own], rows_of_kind[self._own])
         made_whole = {*self.parts, "time_s", "roles", "since"}
@@ -69,7 +69,7 @@ class Movers:
         return parts
 
     def numbers_in(self, objects: PerceivedObjects) -> FloatArray:
-        """The movers' numbers where a frame of the same objects has them; NaN for what it does not know."""
+        """Return the movers' numbers in a frame of the same objects; NaN for unknown poses and velocities."""
         of_objects = [getattr(objects, name) for name in OF_OBJECTS]
         shapes = OF_OBJECTS.values()
         count = len(self.things)
@@ -81,13 +81,13 @@ class Movers:
 
     @cached_property
     def at_first(self) -> FloatArray:
-        """Their numbers in `first`."""
+        """Numbers of the movers in `first`"""
         return self.numbers_in(self.first)
 
     def frame(self, time_s: float, numbers: FloatArray, roles: tuple[Role, ...]) -> PerceivedObjects:
-        """The next frame: the movers by their numbers, all else as in the first.
+        """Return a new frame: the movers by their numbers, all else as in the first frame.
 
-        roles: of all objects. ValueError for another number of either.
+        roles: of all objects. ValueError for another number of rows or roles.
         """
         shape = len(self._own) + len(self.things), NUMBERS
         if numbers.shape != shape or numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
@@ -98,13 +98,13 @@ class Movers:
 
 
 class _Elsewhere(PerceivedObjects):
-    """Such a frame: an array is made whole when somebody reads it first."""
+    """Frame of movers; each array is built on first read."""
 
     def __init__(self, **said: Any) -> None:
         vars(self).update(said)
 
     def __getattr__(self, name: str) -> Any:
-        """Make the whole array of what is not there yet."""
+        """Build the array `name`; AttributeError for any other name."""
         if self.since is None or name not in self.since[0].parts:
             raise AttributeError(name)
         movers, numbers = self.since

@@ -1,4 +1,4 @@
-"""A camera's frame into a scene table: one call checks what has moved, and writes where it is now."""
+"""Update of a scene table by a frame of movers: one call checks their numbers and writes their rows."""
 
 import math
 from typing import Final
@@ -15,9 +15,9 @@ from robot_side.surroundings.validity import is_possible
 
 WRITTEN: Final = 0
 FLAT: Final = 1
-"""One has no volume: nothing is written."""
+"""A primitive has no volume: nothing is written."""
 IMPOSSIBLE: Final = 2
-"""One has numbers that cannot be: nothing is written."""
+"""A primitive's numbers are invalid: nothing is written."""
 _scene = SCENE.at
 
 
@@ -31,7 +31,7 @@ def _take(numbers: FloatArray, own: int, shape: FloatArray) -> None:
 def _judged(
     scene: SceneColumns, things: IntArray, numbers: FloatArray, measured: bool, shape: FloatArray, bound: FloatArray
 ) -> int:
-    """What is to come of the numbers; nothing is written yet."""
+    """Return the result that `write_movers` will have; write nothing."""
     own, found = 0, WRITTEN
     for k in range(things.size):
         for row in range(scene.first_rows[things[k]], scene.first_rows[things[k] + 1]):
@@ -63,10 +63,10 @@ def write_movers(
     shape: FloatArray,
     bound: FloatArray,
 ) -> int:
-    """Write the primitives of the objects `things` (m,), in their order, and bound the blocks; what came of it.
+    """Write the primitives of the objects `things` (m,) and bound their blocks. Return WRITTEN, FLAT or IMPOSSIBLE.
 
     numbers (n + m, 20) as in `movers`; places (m,) in the order of blocks, or -1. measured: with velocities.
-    shape (1, 20) and bound (1, 4) are room.
+    shape (1, 20) and bound (1, 4): scratch.
     """
     scene = _scene(bundle)
     found = _judged(scene, things, numbers, measured, shape, bound)

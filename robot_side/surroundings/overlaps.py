@@ -1,6 +1,6 @@
-"""Overlap of a sphere with one primitive of any kind (eq. 11-12): short closed forms in place, others by address.
+"""Overlap of a sphere with one primitive of any kind (eq. 11-12): short closed forms inlined, others by address.
 
-A scene compiles the kernels of its own kinds alone. Boxes, tetrahedra and meshes: the lanes of `robot_side.overlap`
+A scene compiles only the kernels of its own kinds. Boxes, tetrahedra and meshes: the lanes of `robot_side.overlap`
 without the precise forms, exact to 1e-13 of the sphere. Ellipsoids: quadrature, to some 1e-9. A strength needs 1e-3.
 """
 
@@ -67,6 +67,6 @@ def overlap(
     meshes: IntArray,
     push: FloatArray,
 ) -> float:
-    """V of a sphere and the primitive in `row`; `push` (3,) takes dV/dcentre. kernels: addresses by kind."""
+    """Return V of a sphere and the primitive in `row`; fill `push` (3,) with dV/dcentre. kernels: addresses by kind."""
     found: float = _overlap_by_kind(kind, kernels, shapes, row, center, radius, meshes, push)
     return found

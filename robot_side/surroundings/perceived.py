@@ -1,4 +1,4 @@
-"""What the camera reports: objects as spheres, boxes, tetrahedra, half-spaces, meshes, ellipsoids, each with a role."""
+"""Objects from the camera: spheres, boxes, tetrahedra, half-spaces, meshes and ellipsoids, each with a role."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,19 +16,19 @@ if TYPE_CHECKING:
 
 
 KINDS: Final = (sphere.KIND, box.KIND, tetrahedron.KIND, half_space.KIND, mesh.KIND, ellipsoid.KIND)
-"""The kinds by their numbers in `kinds.layout`; their fields are those of PerceivedObjects."""
+"""Kinds by their numbers in `kinds.layout`; their fields are those of PerceivedObjects"""
 
 
 @dataclass(frozen=True, eq=False)
 class PerceivedObjects:
-    """Every object at its perceived pose, in the world frame, as contiguous arrays by kind of primitive.
+    """Objects at their perceived poses, in the world frame, as contiguous arrays by kind of primitive.
 
     An object may consist of several primitives: `*_object` (k,) holds each primitive's index into `names`.
-    Ignored objects have no primitives. Each frame is equal to itself alone.
+    Ignored objects have no primitives. Frames compare by identity.
     """
 
     time_s: float
-    """When the frame was taken."""
+    """Time of the frame"""
     names: tuple[str, ...]
     roles: tuple[Role, ...]
     sphere_centers_m: FloatArray
@@ -52,11 +52,11 @@ class PerceivedObjects:
     """(p,)"""
     half_space_object: IntArray
     mesh_library: "MeshLibrary | None" = None
-    """The shapes that meshes may have, prepared once for all frames; None without meshes."""
+    """Shapes of meshes, prepared once for all frames; None without meshes"""
     mesh_index: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     """(q,) into `mesh_library`"""
     mesh_positions_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
-    """(q, 3) where the origins of the meshes' own frames are"""
+    """(q, 3) origins of the meshes' own frames"""
     mesh_rotations: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
     """(q, 3, 3) mesh to world"""
     mesh_object: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
@@ -68,17 +68,17 @@ class PerceivedObjects:
     """(e, 3)"""
     ellipsoid_object: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     positions_m: FloatArray | None = field(default_factory=lambda: None)
-    """(k, 3) of each object's own frame, that of its first primitive, in the world frame; None where nobody knows"""
+    """(k, 3) origin of each object's own frame, that of its first primitive, in the world frame; None if unknown"""
     rotations: FloatArray | None = field(default_factory=lambda: None)
     """(k, 3, 3) object to world, with `positions_m`"""
     velocities_m_s: FloatArray | None = field(default_factory=lambda: None)
-    """(k, 3) of the objects, in the world frame; None where nobody measures them: they are taken to stand still"""
+    """(k, 3) of the objects, in the world frame; None if not measured: the objects count as at rest"""
     since: "tuple[SomeObjects, FloatArray] | None" = field(default=None, init=False, repr=False)
-    """Which objects may be elsewhere than in an earlier frame, and their numbers; None: any may be."""
+    """Objects that may have moved since an earlier frame, and their numbers; None: any may have"""
 
 
 class SomeObjects(Protocol):
-    """Objects of a frame that may be elsewhere in the next ones; `movers` says what each of these is."""
+    """Objects of a frame that may be elsewhere in later frames; `movers.Movers` documents the fields."""
 
     first: PerceivedObjects
     things: IntArray
@@ -88,7 +88,7 @@ class SomeObjects(Protocol):
 
     @property
     def at_first(self) -> FloatArray:
-        """Their numbers in `first`."""
+        """Numbers of the objects in `first`"""
         ...
 
 
@@ -96,9 +96,9 @@ class ObjectSource(Protocol):
     """A camera with segmentation, simulated or real."""
 
     def perceive(self, now_s: float) -> PerceivedObjects:
-        """The newest frame at `now_s`; the same object is returned until a newer frame is there."""
+        """Return the newest frame at `now_s`: the same object until there is a newer one."""
         ...
 
     def set_role(self, name: str, role: Role) -> None:
-        """Change what the object `name` is to the task, from the next frame on."""
+        """Change the role of the object `name`, from the next frame on."""
         ...

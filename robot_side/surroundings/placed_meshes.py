@@ -1,6 +1,6 @@
-"""Meshes where a scene has them: contact and overlap of a sphere, by kernels that others call by their addresses.
+"""Placed meshes of a scene: contact and overlap with a sphere, by kernels that are called by address.
 
-A scene without meshes loads none of this.
+A scene without meshes does not load this module.
 """
 
 from typing import Final, NamedTuple
@@ -22,7 +22,7 @@ from robot_side.surroundings.perceived import PerceivedObjects
 
 
 class MeshColumns(NamedTuple):
-    """Placed meshes, and their library's tables; the fields are those of PlacedMeshes."""
+    """Columns of placed meshes and of their library; the fields are those of PlacedMeshes."""
 
     rows: IntArray
     mesh: IntArray
@@ -50,10 +50,10 @@ _at = MESHES.at
 
 
 class PlacedMeshes:
-    """The meshes of one scene table; positions and rotations follow the movers."""
+    """Meshes of one scene table; positions and rotations follow the movers."""
 
     def __init__(self, objects: PerceivedObjects, rows_of_kind: IntArray) -> None:
-        """rows_of_kind (n,): of each row of the scene table its place among the primitives of its kind."""
+        """rows_of_kind (n,): for each row of the scene table, its index among the primitives of its kind."""
         if objects.mesh_library is None:
             raise ValueError("objects.mesh_library is None; valid: the library of the placed meshes")
         self.rows = rows_of_kind
@@ -91,7 +91,7 @@ def overlap_one_mesh(
     bundle: IntArray,
     push: FloatArray,
 ) -> float:
-    """The overlap with a closed mesh."""
+    """Return the overlap with a closed mesh."""
     meshes = _at(bundle)
     tables, place, center = _tables(meshes), meshes.rows[row], (x, y, z)
     mesh = meshes.mesh[place]
@@ -118,9 +118,9 @@ def contact_with_mesh(
     reach: float,
     inside: bool,
 ) -> Contact:
-    """Where a sphere at (x, y, z) that moves along (u, v, w) first touches; û·n is 0 for a mesh that is not convex.
+    """Return the first contact of a sphere at (x, y, z) that moves along (u, v, w); û·n is 0 unless the mesh is convex.
 
-    With `inside`, the distance to the next triangle in front, overlap or not.
+    inside: return the distance to the next triangle in front, even if they overlap.
     """
     meshes = _at(bundle)
     tables, place = _tables(meshes), meshes.rows[row]

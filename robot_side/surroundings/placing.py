@@ -1,4 +1,4 @@
-"""The rows of a scene table from the numbers of its primitives: in one pass, whatever their kinds."""
+"""Rows of a scene table from the numbers of its primitives, in one pass over all kinds."""
 
 from typing import Final, NamedTuple
 
@@ -16,7 +16,7 @@ _place_any: Final = by_kind([kind.place for kind in KINDS])
 
 @building_block
 def place_one(kind: int, numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """`Kind.place` of any kind."""
+    """Call `Kind.place` of this kind."""
     volume: float = _place_any(kind, numbers, k, bounds, row)
     return volume
 
@@ -49,7 +49,7 @@ def _place(
 
 
 class Rows(NamedTuple):
-    """What `placed_rows` makes, as SceneTable has it."""
+    """Result of `placed_rows`, with the fields of SceneTable."""
 
     shapes: FloatArray
     bounds: FloatArray
@@ -58,11 +58,11 @@ class Rows(NamedTuple):
     object_bounds: FloatArray
     object_volumes: FloatArray
     solid: bool
-    """Whether all have a volume"""
+    """Whether all primitives have a volume"""
 
 
 def placed_rows(numbers: FloatArray, kinds: IntArray, first_rows: IntArray) -> Rows:
-    """Make the rows of primitives (n, 20) of these kinds, object k's from first_rows[k] on."""
+    """Return the rows of primitives (n, 20) of these kinds; object k's begin at first_rows[k]."""
     rows, objects, numbers = len(kinds), len(first_rows) - 1, numbers.copy()
     bounds, volumes = np.empty((rows, 4)), np.empty(rows)
     object_bounds, object_volumes = np.empty((objects, 4)), np.empty(objects)
@@ -72,7 +72,7 @@ def placed_rows(numbers: FloatArray, kinds: IntArray, first_rows: IntArray) -> R
 
 
 class Primitives(NamedTuple):
-    """All primitives of a frame (n), a kind after another."""
+    """All primitives of a frame (n), grouped by kind."""
 
     owners: IntArray
     kinds: IntArray
@@ -80,7 +80,7 @@ class Primitives(NamedTuple):
 
 
 def primitives_of(objects: PerceivedObjects) -> Primitives:
-    """Whose they are, and where in the arrays of the frame."""
+    """Return the object of each primitive, its kind, and its row in the kind's arrays of the frame."""
     owners = [getattr(objects, kind.owner) for kind in KINDS]
     counts = [len(owner) for owner in owners]
     kinds = np.repeat(np.arange(len(KINDS)), counts)
@@ -88,5 +88,5 @@ def primitives_of(objects: PerceivedObjects) -> Primitives:
 
 
 def numbers_of(objects: PerceivedObjects) -> FloatArray:
-    """The numbers (n, 20) of all primitives of a frame, a kind after another."""
+    """Return the numbers (n, 20) of all primitives of a frame, grouped by kind."""
     return np.concatenate([kind.numbers(objects) for kind in KINDS])

@@ -1,4 +1,4 @@
-"""What an object is to the task, from its name or from what a person said."""
+"""Roles of objects, from their names or chosen by a person."""
 
 from collections.abc import Iterable, Mapping
 
@@ -14,7 +14,7 @@ _ROLE_OF_PREFIX = {
 
 
 def role_from_name(name: str) -> Role:
-    """The role that a name's beginning tells, in upper or lower case; an obstacle where it tells none."""
+    """Return the role by the beginning of a name, in upper or lower case; an obstacle if it has none."""
     for prefix, role in _ROLE_OF_PREFIX.items():
         if name.lower().startswith(prefix):
             return role
@@ -22,9 +22,9 @@ def role_from_name(name: str) -> Role:
 
 
 def assign_roles(names: Iterable[str], chosen: Mapping[str, Role]) -> dict[str, Role]:
-    """Each object's role: the chosen one, else the one its name tells.
+    """Return each object's role: the chosen one, else the one by its name.
 
-    ConfigurationError when `chosen` names an object that is not there.
+    ConfigurationError if `chosen` names an object that is not there.
     """
     roles = {name: role_from_name(name) for name in names}
     for name in chosen:

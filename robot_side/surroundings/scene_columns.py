@@ -1,4 +1,4 @@
-"""A scene as kernels read it: primitives in rows, objects, and blocks of objects; contact with any of them."""
+"""Columns of a scene for kernels: rows of primitives, objects, and blocks of objects; contact with any of them."""
 
 from typing import Final, NamedTuple
 
@@ -14,7 +14,7 @@ from robot_side.surroundings.kinds.layout import CONTACT, MESH, MESH_CONTACT, SH
 
 
 class SceneColumns(NamedTuple):
-    """The columns; the fields are those of SceneTable."""
+    """Columns of the bundle; the fields are those of SceneTable."""
 
     bounds: FloatArray
     shapes: FloatArray
@@ -40,7 +40,7 @@ _mesh_contact = call_at_address(MESH_CONTACT, CONTACT)
 
 @inlined
 def contact_in_front(scene: SceneColumns, row: int, start: Vector, along: Vector, radius: float, reach: float) -> float:
-    """The distance at which a sphere next touches a triangle in front of a mesh; infinite beyond the reach."""
+    """Return the distance at which a sphere next touches a triangle of a mesh in front; infinite beyond the reach."""
     found, _ = _mesh_contact(scene.kernels[-1], (scene.meshes, row, *start, *along, radius, reach, True))
     return float(found)
 
@@ -49,21 +49,21 @@ def contact_in_front(scene: SceneColumns, row: int, start: Vector, along: Vector
 def contact_with(
     scene: SceneColumns, row: int, start: Vector, along: Vector, radius: float, reach: float, clear: bool
 ) -> Contact:
-    """Where a sphere first touches the primitive in `row`; û·n is 0 for a mesh with dents, of which it bounds nothing.
+    """Return the first contact of a sphere with the primitive in `row`; û·n is 0, no bound, for a mesh with dents.
 
-    clear: it is known not to overlap, which a mesh need not be asked then.
+    clear: the sphere is known not to overlap, so a mesh is not tested for that.
     """
     kind = scene.kinds[row]
     found, closing = contact(kind, scene.shapes, row, start, radius, along, reach)
     if kind == MESH and found <= reach:
-        # So far it was the box around the mesh.
+        # The contact found is that with the box around the mesh.
         found, closing = _mesh_contact(scene.kernels[-1], (scene.meshes, row, *start, *along, radius, reach, clear))
     return found, closing
 
 
 @inlined
 def next_object(scene: SceneColumns, place: int, center: Vector, along: Vector, reach: float, radius: float) -> int:
-    """The first place in the order, from `place` on, of an object that a swept sphere may meet; blocks first."""
+    """Return the first place in the order, from `place` on, of an object that a swept sphere may meet (broad phase)."""
     size = scene.object_order.size
     while place < size:
         block = place // TOGETHER

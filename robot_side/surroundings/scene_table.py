@@ -1,4 +1,4 @@
-"""The objects of one frame as the compiled pass wants them: a row for each primitive, those of an object together."""
+"""Table of one frame's objects for the compiled pass: a row for each primitive, grouped by object."""
 
 from dataclasses import InitVar, dataclass
 from functools import cached_property
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Moving:
-    """The movers' part of a table."""
+    """Places of the movers in a table."""
 
     def __init__(self, movers: SomeObjects, table: "SceneTable") -> None:
         self.movers = movers
@@ -28,7 +28,7 @@ class Moving:
         self.blocks = np.unique(self.places[self.places >= 0] // TOGETHER)
         sizes = np.diff(table.first_rows)[movers.things]
         self.solid = bool((np.diff(movers.first_rows) == sizes).all())
-        """Whether no primitive of theirs was left out."""
+        """Whether the table has all of the movers' primitives"""
         self.room: tuple[FloatArray, FloatArray] = np.empty((1, NUMBERS)), np.empty((1, 4))
 
 
@@ -38,24 +38,24 @@ class SceneTable:
 
     objects: PerceivedObjects
     bounds: FloatArray
-    """(n, 4) centre and radius of a sphere around each"""
+    """(n, 4) centre and radius of a sphere around each primitive"""
     shapes: FloatArray
-    """(n, 15) as the files of `kinds` lay them out; of meshes the boxes around them"""
+    """(n, 15) in the layout of each kind (`kinds`); for meshes, the boxes around them"""
     kinds: IntArray
     """(n,)"""
     rows_of_kind: IntArray
-    """(n,) the row of each primitive in the arrays of `objects` for that kind"""
+    """(n,) row of each primitive in its kind's arrays of `objects`"""
     first_rows: IntArray
-    """(k + 1,) where each object's rows begin, and n"""
+    """(k + 1,) first row of each object, and n"""
     object_bounds: FloatArray
-    """(k, 4) around each object"""
+    """(k, 4) centre and radius of a sphere around each object"""
     object_volumes: FloatArray
     """(k,) in m³"""
     flat: int
-    """How many primitives have no volume, and so nothing to overlap: they are left out."""
+    """Number of primitives without volume: nothing can overlap them, so they are left out."""
     order: InitVar[IntArray | None] = None
     moving: Moving | None = None
-    """The movers that have been written since the table was made"""
+    """Movers whose newest numbers the table holds, if any"""
 
     def __post_init__(self, order: IntArray | None) -> None:
         self.blocks = Blocks(self.object_bounds, order)
@@ -64,7 +64,7 @@ class SceneTable:
 
     @cached_property
     def kernels(self) -> IntArray:
-        """Addresses of the kernels of overlaps by kind, then of contacts with meshes; 0 where there are none."""
+        """Addresses of the overlap kernels by kind, then of the contact kernel of meshes; 0 if not needed"""
         found = np.zeros(len(KINDS) + 1, dtype=np.int64)
         for number, kind in enumerate(KINDS):
             if kind.kernel is not None and (self.kinds == number).any():
@@ -75,12 +75,12 @@ class SceneTable:
 
     @cached_property
     def meshes(self) -> IntArray:
-        """A bundle of `placed`."""
+        """Bundle of `placed`"""
         return np.zeros((1, 2), dtype=np.int64) if self.placed is None else self.placed.bundle
 
     @cached_property
     def bundle(self) -> IntArray:
-        """What kernels read of it."""
+        """Bundle of this table for kernels"""
         return SCENE.bundle(self)
 
     @cached_property
@@ -90,7 +90,7 @@ class SceneTable:
 
     @cached_property
     def placed(self) -> "PlacedMeshes | None":
-        """The meshes; None where there are none."""
+        """Placed meshes; None without meshes"""
         if self.objects.mesh_library is None:
             return None
         # A scene without meshes does not load the kernels for them.
@@ -100,15 +100,15 @@ class SceneTable:
 
 
 def scene_table(objects: PerceivedObjects) -> SceneTable:
-    """The table of one frame alone; ValueError for what `require_valid` refuses."""
+    """Return the table of one frame; ValueError if `require_valid` refuses the frame."""
     require_valid(objects)
     return make(objects)
 
 
 def go_to(table: SceneTable, objects: PerceivedObjects) -> bool:
-    """Write into the table what another frame since the same first one has; False where something lost its volume.
+    """Update the table to another frame with the same first frame. Return False if a primitive has lost its volume.
 
-    ValueError for what `require_valid` refuses.
+    ValueError if `require_valid` refuses the frame.
     """
     before = table.moving
     since = objects.since
@@ -127,7 +127,7 @@ def go_to(table: SceneTable, objects: PerceivedObjects) -> bool:
 
 
 def _write_movers(table: SceneTable, moving: Moving, numbers: FloatArray) -> int:
-    """Write the movers of these numbers; what came of it."""
+    """Write the movers by their numbers; return the result of `write_movers`."""
     movers = moving.movers
     where = movers.things, moving.places, moving.blocks
     found = int(write_movers(numbers, *where, movers.measured, table.bundle, *moving.room))
@@ -143,7 +143,7 @@ def _owners(objects: PerceivedObjects) -> tuple[IntArray, ...]:
 
 
 def moved_table(last: SceneTable, objects: PerceivedObjects) -> SceneTable | None:
-    """The table of the same objects where they are now; None where there are others, or some have no volume."""
+    """Return the table of the same objects at new poses; None for other objects, or if some have no volume."""
     same = last.flat == 0 and len(last.objects.names) == len(objects.names)
     owners = zip(_owners(last.objects), _owners(objects), strict=True)
     if not (same and all(old is new or old.tobytes() == new.tobytes() for old, new in owners)):
@@ -181,7 +181,7 @@ def _table(
 
 
 def make(objects: PerceivedObjects) -> SceneTable:
-    """The table of a valid frame, primitives ordered by object, those without volume left out."""
+    """Return the table of a valid frame: primitives grouped by object, without those that have no volume."""
     owners, kinds, rows_of_kind = primitives_of(objects)
     numbers = numbers_of(objects)
     volumes = placed_rows(numbers, kinds, np.zeros(1, dtype=np.int64)).volumes

@@ -1,4 +1,4 @@
-"""What is perceived has one owner: it makes and keeps the tables of the newest frames, the target and its centre."""
+"""Owner of the perceived scene: tables of the newest frames, the target and its centre."""
 
 from typing import Final
 
@@ -10,23 +10,22 @@ from robot_side.surroundings.target import center_m, next_target, object_centers
 from robot_side.surroundings.validity import require_valid
 
 _KEPT: Final = 8
-"""The number of frames whose tables are kept"""
+"""Number of frames whose tables are kept"""
 
 
 class Surroundings:
-    """The frames seen lately, and what follows from each."""
+    """Tables and targets of the recent frames."""
 
     def __init__(self) -> None:
         self._tables: dict[int, SceneTable] = {}
-        """By the identity of the frame that each was made of"""
+        """Tables by the identity of their frames"""
         self._target: tuple[object, int | None] = (None, None)
-        """The roles that were searched last, and what was found"""
+        """Roles that were searched last, and the target found"""
 
     def see(self, frame: PerceivedObjects) -> SceneTable:
-        """The table of a frame, made when it is first seen; ValueError for what `require_valid` refuses.
+        """Return the table of a frame, made on first use; ValueError if `require_valid` refuses the frame.
 
-        A frame that says what is new since an earlier one shares that one's table, which is updated in
-        place. Asking for another of these frames updates the table again. A frame that is refused changes nothing.
+        Frames with the same first frame share one table, updated in place by each call. A refused one changes nothing.
         """
         first = frame if frame.since is None else frame.since[0].first
         for kept in (first, frame):
@@ -44,14 +43,14 @@ class Surroundings:
         return table
 
     def target(self, frame: PerceivedObjects) -> int | None:
-        """The object whose role is the target; None when there is none."""
+        """Return the index of the object whose role is the target, or None."""
         # Frames share their roles, which may be many.
         if self._target[0] is not frame.roles:
             self._target = frame.roles, frame.roles.index(Role.TARGET) if Role.TARGET in frame.roles else None
         return self._target[1]
 
     def center_m(self, frame: PerceivedObjects, index: int) -> FloatArray:
-        """The centre (3,) of one object of a frame: see `target.center_m`."""
+        """Return the centre (3,) of one object of a frame; see `target.center_m`."""
         return center_m(self.see(frame), index)
 
     def _keep(self, frame: PerceivedObjects, table: SceneTable) -> SceneTable:
@@ -62,18 +61,18 @@ class Surroundings:
 
 
 class Sight:
-    """The newest frame, and where the target is."""
+    """Newest frame, and the target's centre in it."""
 
     def __init__(self, camera: ObjectSource, surroundings: Surroundings) -> None:
         self.frame: PerceivedObjects | None = None
         self.target: int | None = None
-        """The target's index among the objects; None without one"""
+        """Index of the target among the objects; None without a target"""
         self.target_m: FloatArray | None = None
-        """(3,) its centre"""
+        """(3,) centre of the target"""
         self._camera, self._surroundings = camera, surroundings
 
     def see(self, now_s: float) -> PerceivedObjects:
-        """Take in the camera's newest frame."""
+        """Read the camera's newest frame."""
         objects = self._camera.perceive(now_s)
         if objects is not self.frame:
             self._surroundings.see(objects)
@@ -83,7 +82,7 @@ class Sight:
         return objects
 
     def choose_next(self, objects: PerceivedObjects, tool_position_m: FloatArray, approach: FloatArray) -> None:
-        """Make another object the target: the next one along the unit vector `approach` (3,)."""
+        """Make the next object along the unit vector `approach` (3,) the target."""
         chosen = next_target(objects, self.target, object_centers(objects), tool_position_m, approach)
         if chosen is None:
             return

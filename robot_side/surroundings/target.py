@@ -1,4 +1,4 @@
-"""Which object is the target: found in a frame, and switched by the operator's button."""
+"""Choice of the target: centres of objects, and the next target at the operator's button."""
 
 import math
 
@@ -14,12 +14,12 @@ from robot_side.surroundings.scene_columns import SCENE
 from robot_side.surroundings.scene_table import SceneTable
 
 _OFF_AXIS_WEIGHT = 3.0
-"""A metre off the approach axis puts an object as far back in the order as three along it."""
+"""Weight of a distance across the approach axis, against one along the axis, in the order of objects"""
 _scene = SCENE.at
 
 
 def object_centers(objects: PerceivedObjects) -> FloatArray:
-    """(k, 3) the mean of each object's primitives' centres, in metres; NaN for half-spaces and ignored objects.
+    """Return the mean of each object's primitives' centres (k, 3) in m; NaN for half-spaces and ignored objects.
 
     A mesh's centre is that of its bounding box in its own frame.
     """
@@ -52,7 +52,7 @@ def _center(bundle: IntArray, thing: int, center: FloatArray) -> None:
 
 
 def center_m(table: SceneTable, thing: int) -> FloatArray:
-    """The same (3,) of one object of a table, of its primitives that have a volume."""
+    """Return the centre (3,) of one object of a table, the mean over the primitives that have a volume."""
     center: FloatArray = np.empty(3)
     _center(table.bundle, thing, center)
     return center
@@ -65,10 +65,10 @@ def next_target(
     tool_position_m: FloatArray,
     approach: FloatArray,
 ) -> str | None:
-    """The object to become the target when the operator asks for another one; None when there is no other.
+    """Return the name of the next target when the operator asks for another one; None if there is no other.
 
-    The obstacles and the target ahead of the tool stand in an order of nearness along the approach axis; the
-    one after the `present` target follows it, and the first one follows the last, or a target without a centre.
+    Obstacles ahead of the tool, and the target, are ordered by nearness along the approach axis. The object after the
+    `present` target is next; the first one follows the last one, and follows a target without a centre.
     centers_m (k, 3) from `object_centers`; `approach` is a unit vector (3,) in the world frame.
     """
     offsets = centers_m - tool_position_m

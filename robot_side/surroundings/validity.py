@@ -1,4 +1,4 @@
-"""Whether what the camera reports can be: checked once for each frame, so that no tick has to."""
+"""Validation of the camera's frames, once for each frame."""
 
 import math
 from typing import Final
@@ -14,15 +14,14 @@ from robot_side.surroundings.placing import numbers_of, primitives_of
 
 _UNIT_TOLERANCE = 1e-6
 _FIELDS: Final = tuple((kind.owner, *array) for kind in KINDS for array in kind.arrays)
-"""Each array with the field that counts its rows."""
+"""Arrays, each with the field that has one entry for each of its rows"""
 _CHECKED: Final = tuple(array for kind in KINDS for array in kind.arrays if array.check is not Check.INDEX)
 
 
 def require_valid(objects: PerceivedObjects) -> None:
-    """Raise a ValueError that names the field of `objects` that no primitive can have, or that no kernel can read.
+    """Raise a ValueError that names the field of `objects` whose numbers, type or shape are invalid.
 
-    A number that is not finite would compare as far away and silently give no warning, and a kernel does not look
-    where an array ends.
+    NaN would compare as far away and silently give no warning, and kernels do not check the ends of arrays.
     """
     for owner, name, row, check in _FIELDS:
         indices, values = getattr(objects, owner), getattr(objects, name)
@@ -54,7 +53,7 @@ def require_valid(objects: PerceivedObjects) -> None:
 
 
 def _require_known_meshes(objects: PerceivedObjects) -> None:
-    """Raise a ValueError unless each mesh is one of the library's."""
+    """Raise a ValueError unless the library has each mesh."""
     indices = objects.mesh_index
     if indices.size == 0:
         return
@@ -72,7 +71,7 @@ def _described(values: np.ndarray) -> str:
 
 
 def _refuse(objects: PerceivedObjects) -> None:
-    """Raise the ValueError that says which number it is."""
+    """Raise the ValueError that names the invalid array."""
     for name, _, check in _CHECKED:
         values = getattr(objects, name)
         require_finite(f"objects.{name}", values)
@@ -91,7 +90,7 @@ _ANY, _FINITE, _LEAST_0, _UNIT, _ORTHONORMAL = range(5)
 
 
 def _codes(kind: Kind) -> list[int]:
-    """What each of a primitive's numbers must be, beside finite."""
+    """Return the checks of each of a primitive's numbers."""
     codes = [_ANY] * NUMBERS
     for array in kind.arrays:
         if array.name in kind.parts:
@@ -106,7 +105,7 @@ _CODES: Final = np.array([_codes(kind) for kind in KINDS])
 
 @inlined
 def _are_unit(numbers: FloatArray, row: int, start: int, columns: int) -> bool:
-    """Whether the matrix (3, columns) that begins there has unit columns at right angles."""
+    """Return whether the matrix (3, columns) that begins at `start` has unit columns at right angles."""
     for first in range(columns):
         for second in range(first + 1):
             product = -1.0 if first == second else 0.0
@@ -120,7 +119,7 @@ def _are_unit(numbers: FloatArray, row: int, start: int, columns: int) -> bool:
 
 @building_block
 def is_possible(kind: int, numbers: FloatArray, row: int) -> bool:
-    """Whether a primitive of this kind can have the numbers (n, 20) in this row."""
+    """Return whether the numbers (n, 20) in this row are valid for a primitive of this kind."""
     for place in range(NUMBERS):
         code = _CODES[kind, place]
         if code != _ANY:

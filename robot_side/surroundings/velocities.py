@@ -1,4 +1,4 @@
-"""How fast objects move, from where they were seen in the last frames."""
+"""Velocities of objects, from their positions in the last frames."""
 
 from typing import Final
 
@@ -8,15 +8,15 @@ from common.arrays import FloatArray
 from robot_side.compiled.kernel import COUNT, NUMBER, compiled, input_array, output_array
 
 WINDOW_S = 0.2
-"""Over so long a time a velocity is measured: a tenth of a second late, and a frame's noise counts little."""
+"""Time over which a velocity is measured: the result is a tenth of a second late, and a frame's noise counts little."""
 
 
 _FRAMES: Final = 8
-"""Room for so many in the beginning"""
+"""Initial capacity in frames"""
 
 
 class ObjectVelocities:
-    """The slope of each object's positions over the window, by least squares."""
+    """Slope of each object's positions over a time window, by least squares."""
 
     def __init__(self, window_s: float = WINDOW_S) -> None:
         """ValueError unless the window is above 0."""
@@ -28,7 +28,7 @@ class ObjectVelocities:
         self._kept = 0
 
     def see(self, time_s: float, positions_m: FloatArray) -> FloatArray:
-        """Take in a frame, no older than the last one; velocities (k, 3) in m/s of the k objects, 0 in the first.
+        """Add a frame, no older than the last one. Return velocities (k, 3) in m/s of the objects, 0 for the first.
 
         positions_m (k, 3): of one point of each object. ValueError for another number of objects than before.
         """
@@ -58,7 +58,7 @@ def _see(
     positions: FloatArray,
     velocities: FloatArray,
 ) -> int:
-    """Add positions (3 k,) to those seen at the first of the times, drop what is too old; the slopes (3 k,)."""
+    """Drop frames that are too old, add positions (3 k,), fill velocities (3 k,); return the number of frames kept."""
     first = 0
     while first < kept and times[first] < oldest:
         first += 1
@@ -71,7 +71,7 @@ def _see(
     for place in range(positions.size):
         seen[kept, place] = positions[place]
     kept += 1
-    # From now, as a clock's large numbers have few digits for what is between.
+    # Times relative to now: a clock's large numbers leave few digits for differences.
     middle, spread = 0.0, 0.0
     for frame in range(kept):
         middle += (times[frame] - now) / kept

@@ -1,1 +1,1 @@
-"""What the public functions require of their arguments."""
+"""Requirements of the public functions on their arguments."""

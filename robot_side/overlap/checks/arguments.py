@@ -9,18 +9,18 @@ import numpy.typing as npt
 from common.arrays import BoolArray, FloatArray
 
 LARGEST = 1e50
-"""The largest magnitude of any coordinate or length (m): products of six of them stay finite."""
+"""Largest magnitude of any coordinate or length, in m: products of six such numbers stay finite."""
 
 SMALLEST_NORMAL = 1e-50
-"""The shortest normal of a half-space."""
+"""Least length of the normal of a half-space"""
 
 ORTHONORMALITY = 1e-6
-"""The largest Frobenius norm of QᵀQ - I of a rotation Q."""
+"""Largest Frobenius norm of QᵀQ - I of a rotation Q"""
 
 
 @dataclass(frozen=True)
 class Argument:
-    """An argument that has been checked: every row of the last `trailing` dimensions is one item."""
+    """Checked argument: every row of the last `trailing` dimensions is one item."""
 
     name: str
     values: FloatArray
@@ -28,16 +28,16 @@ class Argument:
 
     @property
     def leading(self) -> tuple[int, ...]:
-        """The dimensions that broadcast."""
+        """Dimensions that broadcast"""
         return self.values.shape[: self.values.ndim - len(self.trailing)]
 
     @property
     def items(self) -> FloatArray:
-        """The items in one row after the other, (items, *trailing), contiguous."""
+        """Items in consecutive rows, (items, *trailing), contiguous"""
         return np.ascontiguousarray(self.values).reshape(-1, *self.trailing)
 
     def refuse_any(self, wrong: BoolArray, shape: tuple[int, ...], what_is_valid: str) -> None:
-        """ValueError about the first of the items or numbers that is wrong; `shape` is that of their array."""
+        """Raise a ValueError that names the first item or number that is wrong; `shape` is that of their array."""
         if not wrong.any():
             return
         index = tuple(int(place) for place in np.unravel_index(wrong.argmax(), shape))
@@ -45,7 +45,7 @@ class Argument:
         raise ValueError(f"{label} = {self.values[index].tolist()} is out of range; valid: {what_is_valid}")
 
     def rows(self, shape: tuple[int, ...]) -> FloatArray:
-        """The items repeated to the leading dimensions `shape`, flattened to (items, *trailing), contiguous."""
+        """Return the items repeated to the leading dimensions `shape`, flattened to (items, *trailing), contiguous."""
         if self.leading == shape:
             return self.items
         repeated = np.broadcast_to(self.values, (*shape, *self.trailing))
@@ -53,7 +53,7 @@ class Argument:
 
 
 Check = Callable[[str, npt.ArrayLike, tuple[int, ...]], Argument]
-"""A check of an argument, given its name, value and last dimensions; ValueError where it fails."""
+"""Check of an argument by name, value and last dimensions; ValueError if it fails"""
 
 _FLOAT64 = np.dtype(np.float64)
 
@@ -61,7 +61,7 @@ _FLOAT64 = np.dtype(np.float64)
 def plain_rows(
     values: Sequence[npt.ArrayLike], trailing: Sequence[tuple[int, ...]]
 ) -> tuple[list[FloatArray], tuple[int, ...]] | None:
-    """The items of float64 arrays whose leading dimensions are the same, and these; None for anything else."""
+    """Return the items of float64 arrays with equal leading dimensions, and these; None for any other arguments."""
     try:
         arrays = [np.asarray(value) for value in values]
     except ValueError:
@@ -76,17 +76,17 @@ def plain_rows(
 
 
 def numbers(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = ()) -> Argument:
-    """`value` as finite float64 with the last dimensions `trailing`, or ValueError."""
+    """Return `value` as finite float64 with the last dimensions `trailing`, or raise a ValueError."""
     return _within(name, value, trailing, -LARGEST, f"finite, magnitude at most {LARGEST:g}")
 
 
 def lengths(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = ()) -> Argument:
-    """`numbers` that are not negative."""
+    """Return `numbers` that are not negative, or raise a ValueError."""
     return _within(name, value, trailing, 0.0, f"finite, 0 to {LARGEST:g} m")
 
 
 def directions(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = (3,)) -> Argument:
-    """`numbers` (..., 3) of which no vector is 0."""
+    """Return `numbers` (..., 3) of which no vector is 0, or raise a ValueError."""
     argument = numbers(name, value, trailing)
     short = np.hypot(np.hypot(*argument.items.T[:2]), argument.items[:, 2]) < SMALLEST_NORMAL
     argument.refuse_any(short, argument.leading, f"a vector of length {SMALLEST_NORMAL:g} or more")
@@ -94,7 +94,7 @@ def directions(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = (3,)
 
 
 def rotations(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = (3, 3)) -> Argument:
-    """`numbers` (..., 3, 3) of which every matrix is orthonormal."""
+    """Return `numbers` (..., 3, 3) of which every matrix is orthonormal, or raise a ValueError."""
     argument = numbers(name, value, trailing)
     excess = argument.items.swapaxes(1, 2) @ argument.items - np.eye(3)
     skewed = (excess * excess).sum(axis=(1, 2)) > ORTHONORMALITY**2
@@ -113,13 +113,13 @@ def _within(name: str, value: npt.ArrayLike, trailing: tuple[int, ...], lowest: 
     if values.ndim < len(trailing) or values.shape[values.ndim - len(trailing) :] != trailing:
         raise ValueError(f"{name} has the shape {values.shape}; valid: {_shape_text(trailing)}")
     argument = Argument(name, values, trailing)
-    # Compared so that NaN is outside, too.
+    # In this form of the comparison NaN is outside, too.
     argument.refuse_any(~((values >= lowest) & (values <= LARGEST)), values.shape, what_is_valid)
     return argument
 
 
 def broadcast(arguments: Sequence[Argument]) -> tuple[int, ...]:
-    """The common leading dimensions of the arguments, or ValueError."""
+    """Return the common leading dimensions of the arguments, or raise a ValueError."""
     first = arguments[0].leading
     if all(argument.leading == first for argument in arguments):
         return first

@@ -1,1 +1,1 @@
-"""The closed forms: ball, half-space, and what every solid has in common."""
+"""Closed forms: ball, half-space, and the results that all solids share."""

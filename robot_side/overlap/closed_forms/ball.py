@@ -1,4 +1,4 @@
-"""Two spheres (eq. 11)."""
+"""Overlap of two spheres (eq. 11)."""
 
 import math
 
@@ -10,13 +10,12 @@ from robot_side.overlap.digits.double_double import minus, plus, rounded, square
 
 @building_block
 def sphere_overlap(center: Vector, radius: float, other_center: Vector, other_radius: float) -> Overlap:
-    """The lens that the sphere (`center`, `radius`) has in common with another; all in m.
+    """Return the overlap of the sphere (`center`, `radius`) with another one, a lens; all in m.
 
-    The volume of the lens is a product and a sum of terms that are positive throughout, formed from three
-    gaps that are differences of lengths, taken in double-double: `overlap` between the surfaces facing each
-    other and the distances by which the smaller sphere still sticks out. It is relatively accurate at every
-    depth. Spheres that touch, inside or outside, give the limit
-    exactly. Two equal spheres at the same place count as the first within the second.
+    The volume of the lens is made of positive terms only. They come from three gaps, differences of lengths in
+    double-double: `overlap` between the surfaces that face each other, and the distances by which the smaller
+    sphere sticks out. So the volume is relatively accurate at every depth. Spheres that touch, inside or outside,
+    give the limit exactly. Two equal spheres at the same place count as the first within the second.
     """
     x = two_sum(other_center[0], -center[0])
     y = two_sum(other_center[1], -center[1])
@@ -25,7 +24,7 @@ def sphere_overlap(center: Vector, radius: float, other_center: Vector, other_ra
     precise_distance = square_root(plus(plus(times(x, x), times(y, y)), times(z, z)))
     distance = precise_distance[0]
     large, small = max(radius, other_radius), min(radius, other_radius)
-    # How far the smaller centre lies beyond the larger surface.
+    # Distance of the smaller sphere's centre beyond the larger one's surface.
     beyond = minus(precise_distance, (large, 0.0))
     overlap, sticking_out = rounded(minus((small, 0.0), beyond)), rounded(plus((small, 0.0), beyond))
     if overlap <= 0.0 or small == 0.0:

@@ -1,4 +1,4 @@
-"""One sphere and one half-space (eq. 11): the sphere's cap, V_c of eq. 12."""
+"""Overlap of a sphere and a half-space (eq. 11): the sphere's cap, V_c of eq. 12."""
 
 import math
 
@@ -10,10 +10,10 @@ from robot_side.overlap.digits.double_double import divided, minus, multiple, pl
 
 @building_block
 def half_space_overlap(center: Vector, radius: float, normal: Vector, offset: float) -> Overlap:
-    """The cap of the sphere (`center`, `radius`) within {x: normal·x <= offset}; lengths in m.
+    """Return the cap of the sphere (`center`, `radius`) within {x: normal·x <= offset}; lengths in m.
 
-    `normal` may have any length but 0; the set is the one that the inequality describes. Relatively accurate
-    at every depth: the distance of the plane is the small difference of large products, hence double-double.
+    `normal` may have any length but 0. The result is relatively accurate at every depth: the distance of the plane
+    is a small difference of large products, hence double-double.
     """
     x, y, z = center
     a, b, c = normal
@@ -27,9 +27,9 @@ def half_space_overlap(center: Vector, radius: float, normal: Vector, offset: fl
 
 @inlined
 def cap(depth: float, rest: float, radius: float, normal: Vector) -> Overlap:
-    """The cap of height `depth` of a sphere, `rest` = 2 `radius` - `depth`, all in m, given relatively accurately.
+    """Return the cap of height `depth` of a sphere; `rest` = 2 `radius` - `depth`. All in m and relatively accurate.
 
-    `normal` is the unit vector from the cap's flat side away from the solid.
+    `normal` is the unit vector at the cap's flat side that points away from the solid.
     """
     if depth <= 0.0 or radius == 0.0:
         return nothing()

@@ -1,1 +1,1 @@
-"""Arithmetic beyond a double, and arctangents."""
+"""Arithmetic with more digits than a double, and arctangents."""

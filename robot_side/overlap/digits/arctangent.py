@@ -1,7 +1,7 @@
-"""The angle of (cosine, sine) without a branch, so that LLVM works out several at a time.
+"""Angle of (cosine, sine) without a branch, so that LLVM computes several at a time.
 
-The C library's atan2 keeps a loop scalar. Here the argument is turned into |angle| <= π/8, where the odd
-polynomial below departs from the arctangent by less than 6e-18; the whole is within 4e-16, relative.
+The C library's atan2 keeps a loop scalar. Here the argument is turned into |angle| <= π/8, where the odd polynomial
+below differs from the arctangent by less than 6e-18. The result has a relative error below 4e-16.
 """
 
 import math
@@ -12,7 +12,7 @@ TANGENT_OF_EIGHTH = math.sqrt(2.0) - 1.0
 """tan(π/8)"""
 
 # (arctan(x)/x - 1)/x² as a polynomial in x² over [0, tan²(π/8)], highest power first: the Chebyshev fit of degree
-# 10, which tests/robot_side/overlap/test_arctangent.py works out again with mpmath.
+# 10, which tests/robot_side/overlap/test_arctangent.py recomputes with mpmath.
 COEFFICIENTS = (
     -0.01917688711906226,
     0.03923165829558719,
@@ -27,7 +27,7 @@ COEFFICIENTS = (
     -0.3333333333333333,
 )
 
-# The parts of π/4 and π/2 that a double leaves out, without which the angles near them lose their last digit.
+# Parts of π/4, π/2 and π that a double leaves out; without these, angles nearby lose their last digit.
 _QUARTER, _QUARTER_REST = math.pi / 4.0, 3.061616997868383e-17
 _HALF, _HALF_REST = math.pi / 2.0, 6.123233995736766e-17
 _WHOLE, _WHOLE_REST = math.pi, 1.2246467991473532e-16
@@ -35,9 +35,9 @@ _WHOLE, _WHOLE_REST = math.pi, 1.2246467991473532e-16
 
 @inlined
 def arctangent(sine: float, cosine: float) -> float:
-    """The angle in (-π, π] of the direction (`cosine`, `sine`), of any length; 0 for (0, 0).
+    """Return the angle in (-π, π] of the direction (`cosine`, `sine`), of any length; 0 for (0, 0).
 
-    The negative half of the axis counts as π, whatever the sign of a zero `sine`.
+    The negative half of the axis gives π for both signs of a zero `sine`.
     """
     opposite, adjacent = abs(sine), abs(cosine)
     low, high = min(opposite, adjacent), max(opposite, adjacent)
@@ -57,7 +57,7 @@ def arctangent(sine: float, cosine: float) -> float:
     factor = factor * square + COEFFICIENTS[9]
     factor = factor * square + COEFFICIENTS[10]
     rest = tangent * (square * factor)
-    # Each turn adds the large part first and its left-out part to the small one.
+    # Each turn adds the double to the large part and the left-out part to the small one.
     large = _QUARTER if beyond_eighth else 0.0
     small = rest + (_QUARTER_REST if beyond_eighth else 0.0)
     turned = opposite > adjacent

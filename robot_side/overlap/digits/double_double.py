@@ -1,9 +1,9 @@
-"""Double-double arithmetic: a number as the unevaluated sum of two floats, good to some 31 digits.
+"""Double-double arithmetic: a number as the unevaluated sum of two floats, with some 31 digits.
 
 The building blocks are Knuth's two-sum, Dekker's fast two-sum and the two-product with a fused multiply-add, after
-Hida, Li and Bailey, "Library for double-double and quad-double arithmetic" (2007). Unless stated otherwise a result
-is off by at most 2⁻¹⁰³ times the sum of the magnitudes that go into it: relatively where nothing cancels. There is no
-special care for overflow, nor for products below 1e-290.
+Hida, Li and Bailey, "Library for double-double and quad-double arithmetic" (2007). Unless stated otherwise, the error
+of a result is at most 2⁻¹⁰³ times the sum of the terms' magnitudes: a relative bound if nothing cancels. Overflow and
+products below 1e-290 are not treated.
 """
 
 import math
@@ -19,14 +19,14 @@ ZERO: DoubleDouble = (0.0, 0.0)
 
 @inlined
 def fast_two_sum(a: float, b: float) -> DoubleDouble:
-    """The exact sum a + b where |a| >= |b| or a is 0."""
+    """Return the exact sum a + b, for |a| >= |b| or a = 0."""
     high = a + b
     return high, b - (high - a)
 
 
 @inlined
 def two_sum(a: float, b: float) -> DoubleDouble:
-    """The exact sum a + b."""
+    """Return the exact sum a + b."""
     high = a + b
     part = high - a
     return high, (a - (high - part)) + (b - part)
@@ -34,53 +34,53 @@ def two_sum(a: float, b: float) -> DoubleDouble:
 
 @inlined
 def two_product(a: float, b: float) -> DoubleDouble:
-    """The exact product a · b."""
+    """Return the exact product a · b."""
     high = a * b
     return high, fused_multiply_add(a, b, -high)
 
 
 @inlined
 def rounded(a: DoubleDouble) -> float:
-    """The nearest float."""
+    """Return the nearest float."""
     return a[0] + a[1]
 
 
 @inlined
 def negated(a: DoubleDouble) -> DoubleDouble:
-    """The opposite -a."""
+    """Return -a."""
     return -a[0], -a[1]
 
 
 @inlined
 def plus(a: DoubleDouble, b: DoubleDouble) -> DoubleDouble:
-    """The sum a + b."""
+    """Return the sum a + b."""
     high, low = two_sum(a[0], b[0])
     return fast_two_sum(high, low + (a[1] + b[1]))
 
 
 @inlined
 def minus(a: DoubleDouble, b: DoubleDouble) -> DoubleDouble:
-    """The difference a - b."""
+    """Return the difference a - b."""
     return plus(a, negated(b))
 
 
 @inlined
 def times(a: DoubleDouble, b: DoubleDouble) -> DoubleDouble:
-    """The product a · b."""
+    """Return the product a · b."""
     high, low = two_product(a[0], b[0])
     return fast_two_sum(high, fused_multiply_add(a[0], b[1], fused_multiply_add(a[1], b[0], low)))
 
 
 @inlined
 def multiple(factor: float, a: DoubleDouble) -> DoubleDouble:
-    """The product of a float and a double-double."""
+    """Return the product of a float and a double-double."""
     high, low = two_product(factor, a[0])
     return fast_two_sum(high, fused_multiply_add(factor, a[1], low))
 
 
 @inlined
 def divided(a: DoubleDouble, b: DoubleDouble) -> DoubleDouble:
-    """The quotient a / b; b is not 0."""
+    """Return the quotient a / b; b is not 0."""
     quotient = a[0] / b[0]
     rest = fused_multiply_add(-quotient, b[0], a[0]) + fused_multiply_add(-quotient, b[1], a[1])
     return fast_two_sum(quotient, rest / b[0])
@@ -88,7 +88,7 @@ def divided(a: DoubleDouble, b: DoubleDouble) -> DoubleDouble:
 
 @inlined
 def square_root(a: DoubleDouble) -> DoubleDouble:
-    """The square root; 0 for what is not positive."""
+    """Return the square root; 0 for numbers that are not positive."""
     if a[0] <= 0.0:
         return 0.0, 0.0
     root = math.sqrt(a[0])
@@ -98,5 +98,5 @@ def square_root(a: DoubleDouble) -> DoubleDouble:
 
 @inlined
 def is_less(a: DoubleDouble, b: DoubleDouble) -> bool:
-    """Whether a < b."""
+    """Return whether a < b."""
     return a[0] < b[0] or (a[0] == b[0] and a[1] < b[1])

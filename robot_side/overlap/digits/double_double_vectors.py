@@ -18,7 +18,7 @@ PreciseVector = tuple[DoubleDouble, DoubleDouble, DoubleDouble]
 
 @inlined
 def load_number(array: FloatArray, row: int) -> DoubleDouble:
-    """The number that `store_number` put into row `row` of an (n, 3, 2) array."""
+    """Return the number that `store_number` put into row `row` of an (n, 3, 2) array."""
     return array[row, 0, 0], array[row, 0, 1]
 
 
@@ -31,7 +31,7 @@ def store_number(array: FloatArray, row: int, value: DoubleDouble) -> None:
 
 @inlined
 def load_vector(array: FloatArray, row: int) -> PreciseVector:
-    """Row `row` of an (n, 3, 2) array."""
+    """Return row `row` of an (n, 3, 2) array."""
     return (
         (array[row, 0, 0], array[row, 0, 1]),
         (array[row, 1, 0], array[row, 1, 1]),
@@ -49,43 +49,43 @@ def store_vector(array: FloatArray, row: int, value: PreciseVector) -> None:
 
 @inlined
 def highs(a: PreciseVector) -> Vector:
-    """The vector rounded to floats."""
+    """Return the vector rounded to floats."""
     return a[0][0], a[1][0], a[2][0]
 
 
 @inlined
 def precise_negative(a: PreciseVector) -> PreciseVector:
-    """The opposite -a."""
+    """Return -a."""
     return negated(a[0]), negated(a[1]), negated(a[2])
 
 
 @inlined
 def precise_add(a: PreciseVector, b: PreciseVector) -> PreciseVector:
-    """The sum a + b."""
+    """Return the sum a + b."""
     return plus(a[0], b[0]), plus(a[1], b[1]), plus(a[2], b[2])
 
 
 @inlined
 def precise_subtract(a: PreciseVector, b: PreciseVector) -> PreciseVector:
-    """The difference a - b."""
+    """Return the difference a - b."""
     return minus(a[0], b[0]), minus(a[1], b[1]), minus(a[2], b[2])
 
 
 @inlined
 def precise_scale(factor: DoubleDouble, a: PreciseVector) -> PreciseVector:
-    """The multiple factor · a."""
+    """Return the product factor · a."""
     return times(factor, a[0]), times(factor, a[1]), times(factor, a[2])
 
 
 @building_block
 def precise_dot(a: PreciseVector, b: PreciseVector) -> DoubleDouble:
-    """The scalar product a · b."""
+    """Return the scalar product a · b."""
     return plus(plus(times(a[0], b[0]), times(a[1], b[1])), times(a[2], b[2]))
 
 
 @building_block
 def precise_cross(a: PreciseVector, b: PreciseVector) -> PreciseVector:
-    """The vector product a × b."""
+    """Return the vector product a × b."""
     return (
         minus(times(a[1], b[2]), times(a[2], b[1])),
         minus(times(a[2], b[0]), times(a[0], b[2])),
@@ -95,7 +95,7 @@ def precise_cross(a: PreciseVector, b: PreciseVector) -> PreciseVector:
 
 @building_block
 def precise_unit(a: PreciseVector) -> tuple[PreciseVector, DoubleDouble]:
-    """(a / |a|, |a|); the vector 0 where |a| is 0 or cannot be told from it."""
+    """Return (a / |a|, |a|); the vector is 0 if |a| is 0 or underflows to it."""
     length = square_root(precise_dot(a, a))
     if length[0] == 0.0:
         return ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0)), length

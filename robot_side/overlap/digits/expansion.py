@@ -1,7 +1,7 @@
-"""Sums and products without any rounding, where a sign decides between something and nothing.
+"""Sums and products without rounding, where a sign decides whether there is any overlap.
 
-The terms of a sum are distilled by two-sums until one of them is all of it (Ogita, Rump and Oishi, "Accurate sum and
-dot product", 2005): slow, and only asked where double-double cannot tell a value well from 0.
+The terms of a sum are distilled by two-sums until one term is the sum (Ogita, Rump and Oishi, "Accurate sum and
+dot product", 2005). This is slow, and used only if double-double cannot distinguish a value from 0.
 """
 
 from common.arrays import FloatArray
@@ -12,15 +12,15 @@ from robot_side.overlap.digits.double_double import two_product, two_sum
 from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs, precise_cross, precise_dot
 
 _UNCERTAIN = 1e-15
-"""Determinants below this, for vectors of length 1, are taken again without rounding."""
+"""Size of determinants, for vectors of length 1, below which they are computed again without rounding"""
 _power_terms, _determinant_terms = on_stack(20), on_stack(192)
 
 
 @building_block
 def exact_sum(terms: FloatArray) -> float:
-    """The sum of the terms, which are overwritten, to a relative error of 1e-15."""
+    """Return the sum of the terms with a relative error of 1e-15; the terms are overwritten."""
     for _ in range(terms.size):
-        # Each pass leaves the sum as it is and gathers it in the last term.
+        # Each pass keeps the sum and gathers it in the last term.
         rest = 0.0
         for term in range(1, terms.size):
             terms[term], terms[term - 1] = two_sum(terms[term], terms[term - 1])
@@ -32,7 +32,7 @@ def exact_sum(terms: FloatArray) -> float:
 
 @building_block
 def exact_power(point: PreciseVector, radius: float) -> float:
-    """R² - |point|² to a relative error of 1e-15."""
+    """Return R² - |point|² with a relative error of 1e-15."""
     terms = _power_terms()
     terms[0], terms[1] = two_product(radius, radius)
     count = 2
@@ -47,7 +47,7 @@ def exact_power(point: PreciseVector, radius: float) -> float:
 
 @building_block
 def determinant(a: PreciseVector, b: PreciseVector, c: PreciseVector) -> float:
-    """The determinant a · (b × c) to a relative error of 1e-15: 0 only where it is exactly 0."""
+    """Return the determinant a · (b × c) with a relative error of 1e-15: 0 only if it is exactly 0."""
     value = precise_dot(a, precise_cross(b, c))[0]
     if abs(value) > _UNCERTAIN * norm(highs(a)) * norm(highs(b)) * norm(highs(c)):
         return value
@@ -56,7 +56,7 @@ def determinant(a: PreciseVector, b: PreciseVector, c: PreciseVector) -> float:
 
 @building_block
 def _exact_determinant(a: PreciseVector, b: PreciseVector, c: PreciseVector) -> float:
-    """The determinant a · (b × c) to a relative error of 1e-15."""
+    """Return the determinant a · (b × c) with a relative error of 1e-15."""
     terms = _determinant_terms()
     count = 0
     for first in range(3):

@@ -1,7 +1,7 @@
-"""The arctangent in double-double, and angles that are summed as a product of complex numbers.
+"""Arctangent in double-double, and sums of angles as products of complex numbers.
 
-A table holds (cos, sin) of the multiples of π/256 to π/4. Turning (x, y) back by the nearest of them leaves an angle
-of at most π/512, for which eight terms of the arctangent's series suffice.
+A table holds (cos, sin) of the multiples of π/256 up to π/4. Turning (x, y) back by the nearest multiple leaves an
+angle of at most π/512, for which eight terms of the arctangent's series suffice.
 """
 
 import math
@@ -22,7 +22,7 @@ from robot_side.overlap.digits.double_double import (
 )
 
 STEPS = 256
-"""How many steps of the table make π."""
+"""Steps of the table in π"""
 _BITS = 200
 
 Turn = tuple[DoubleDouble, DoubleDouble, float]
@@ -32,14 +32,14 @@ NO_TURN: Turn = ((1.0, 0.0), (0.0, 0.0), 0.0)
 
 
 def _split(value: int) -> tuple[float, float]:
-    """A fixed-point number of `_BITS` binary places as a double-double."""
+    """Return a fixed-point number of `_BITS` binary places as a double-double."""
     high = value / (1 << _BITS)
     numerator, denominator = high.as_integer_ratio()
     return high, (value - (numerator << _BITS) // denominator) / (1 << _BITS)
 
 
 def _table() -> FloatArray:
-    """(65, 2, 2): cosine and sine of the multiples of π/256, as double-doubles."""
+    """Return cosine and sine of the multiples of π/256, as double-doubles (65, 2, 2)."""
     one = 1 << _BITS
     cosine = math.isqrt(one * one // 2)
     for _ in range(6):
@@ -62,7 +62,7 @@ _FAR = 2.0**300
 
 @building_block
 def arctangent(y: DoubleDouble, x: DoubleDouble) -> DoubleDouble:
-    """The angle (rad) of the point (x, y) in [-π, π], to 1e-31; 0 for the origin."""
+    """Return the angle (rad) of the point (x, y) in [-π, π], to 1e-31; 0 for the origin."""
     across, along = (y if y[0] >= 0.0 else negated(y)), (x if x[0] >= 0.0 else negated(x))
     steep = across[0] > along[0]
     if steep:
@@ -89,11 +89,11 @@ def arctangent(y: DoubleDouble, x: DoubleDouble) -> DoubleDouble:
 
 @inlined
 def turned(turn: Turn, x: DoubleDouble, y: DoubleDouble) -> Turn:
-    """The sum of an angle and that of the complex number x + i y."""
+    """Return the sum of an angle and the angle of the complex number x + i y."""
     real = minus(times(turn[0], x), times(turn[1], y))
     imaginary = plus(times(turn[0], y), times(turn[1], x))
     turns = turn[2]
-    # Both angles in [0, π], or both in (-π, 0): only then can the product's angle have come round.
+    # Both angles in [0, π], or both in (-π, 0): only then can the product's angle have wrapped around.
     if turn[1][0] >= 0.0 and y[0] >= 0.0:
         if imaginary[0] < 0.0:
             turns += 1.0
@@ -109,5 +109,5 @@ def turned(turn: Turn, x: DoubleDouble, y: DoubleDouble) -> Turn:
 
 @inlined
 def whole_angle(turn: Turn) -> DoubleDouble:
-    """The angle (rad), whole turns included."""
+    """Return the angle (rad), with whole turns."""
     return plus(arctangent(turn[1], turn[0]), multiple(2.0 * turn[2], PI))

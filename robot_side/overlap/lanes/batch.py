@@ -1,4 +1,4 @@
-"""Run many pairs of one kind: bounds settle most of them, the others are gathered into full blocks of lanes."""
+"""Loop over many pairs of one kind: bounds settle most pairs, the others are gathered into full blocks of lanes."""
 
 from collections.abc import Callable
 from typing import Any
@@ -28,13 +28,13 @@ Run = Callable[[FloatArray, FloatArray, Any, FloatArray, FloatArray, FloatArray,
 
 
 def found_columns(inputs: int) -> tuple[int, int, int]:
-    """Number a block's columns after the pairs' own: the verdict, the solid's volume, the result."""
+    """Return the indices of a block's columns after the inputs: the verdict, the solid's volume, the result."""
     return inputs, inputs + 1, inputs + 2
 
 
 @inlined
 def _fill_group(block: FloatArray, count: int, inputs: int) -> None:
-    """Copy the first lane to those that the last group has beyond `count`."""
+    """Copy the first lane to the lanes of the last group beyond `count`."""
     for lane in range(count, lane_groups(count) * WIDTH):
         copy_lane(block, 0, block, lane, inputs)
 
@@ -45,15 +45,15 @@ def batch(
     work_out: Callable[[FloatArray, int], None],
     inputs: int,
 ) -> Run:
-    """Make the loop over spheres `centers` (p, 3), `radii` (p,) and as many solids, a tuple of arrays; in kernels only.
+    """Return the loop over spheres `centers` (p, 3), `radii` (p,) and solids, a tuple of arrays; in kernels only.
 
-    A block has `inputs` columns for what a pair consists of, then a verdict, the solid's volume, and the result.
-    load: fills the first columns with `count` pairs from `first` on. bound: fills in verdicts and volumes of the first
-    groups of lanes; returns the sum of weights and doubts. work_out: fills in results.
+    A block has `inputs` columns for the pair, then a verdict, the solid's volume, and the result. `load` fills the
+    first columns with `count` pairs from `first` on. `bound` fills verdicts and volumes of the first groups of lanes,
+    and returns the sum of weights and doubts. `work_out` fills results.
 
-    The results must hold zeros. Pairs that need precise forms go to the first entries of `rows` (p + 1,), their number
-    is returned. The last entry is the number n of pairs that lanes worked out; ~n, below 0, where a number may be NaN
-    or out of range.
+    The results must hold zeros. Pairs that need precise forms go to the first entries of `rows` (p + 1,); the loop
+    returns their number. The last entry is the number n of pairs that lanes computed, or ~n, below 0, if a number may
+    be NaN or out of range.
     """
     bounds, solid_volume, result = found_columns(inputs)
     lanes, indices = on_stack((result + RESULT_COLUMNS) * LANES), on_stack(LANES, dtype=np.int64)
@@ -82,7 +82,7 @@ def batch(
             if left == 0:
                 continue
             if left == groups * WIDTH * SOME_PARTIAL:
-                # Nothing to sort out: worked out where they are.
+                # All lanes are partial: compute in place.
                 work_out(block, groups)
                 partial += count
                 for lane in range(count):

@@ -1,4 +1,4 @@
-"""Many spheres with as many boxes: pairs that do not cut are settled by bounds, the others go through lanes."""
+"""Pairs of spheres and boxes: bounds settle pairs that do not cut, lanes compute the others."""
 
 import numpy as np
 
@@ -34,16 +34,16 @@ from robot_side.overlap.lanes.lanes import (
     weight,
 )
 
-# Columns of a block: what a pair consists of, then what its bounds tell, then its result.
+# Columns of a block: the pair, then the bounds' verdict, then the result.
 _CENTER, _RADIUS, _BOX_CENTER, _ROTATION, _HALF_SIZES, _INPUTS = 0, 3, 4, 7, 16, 19
 _BOUNDS, _SOLID_VOLUME, _RESULT = found_columns(_INPUTS)
 
 _SLACK = 1e-5
-"""Share of all lengths by which bounds must settle a pair: rotations are orthonormal only to 1e-6."""
+"""Margin of the bounds, as a share of all lengths: rotations are orthonormal only to 1e-6."""
 
 
 _SURELY_ORTHONORMAL = 0.99 * ORTHONORMALITY**2
-"""With room for what the squared norm rounds."""
+"""Squared limit of ORTHONORMALITY, with a margin for rounding"""
 
 
 @inlined
@@ -75,7 +75,7 @@ def _columns(block: FloatArray, lane: int) -> Columns:
 
 @building_block
 def _bound(block: FloatArray, groups: int) -> int:
-    """Fill in what bounds tell of the first groups of lanes, and the boxes' volumes; the sum of weights and doubts."""
+    """Fill verdicts of the first groups of lanes, and the boxes' volumes; return the sum of weights and doubts."""
     total = 0
     for lane in range(groups * WIDTH):
         q_0, q_1, q_2 = _columns(block, lane)
@@ -110,7 +110,7 @@ def _bound(block: FloatArray, groups: int) -> int:
 
 @inlined
 def _excess_2(q_0: Vector, q_1: Vector, q_2: Vector) -> float:
-    """The squared Frobenius norm of QᵀQ - I for the columns of Q."""
+    """Return the squared Frobenius norm of QᵀQ - I for the columns of Q."""
     first, second, third = dot(q_0, q_0) - 1.0, dot(q_1, q_1) - 1.0, dot(q_2, q_2) - 1.0
     across_0, across_1, across_2 = dot(q_1, q_2), dot(q_2, q_0), dot(q_0, q_1)
     across_2 = across_0 * across_0 + across_1 * across_1 + across_2 * across_2
@@ -121,7 +121,7 @@ def _excess_2(q_0: Vector, q_1: Vector, q_2: Vector) -> float:
 def _work_out(block: FloatArray, groups: int) -> None:
     for lane in range(groups * WIDTH):
         radius = column(block, _RADIUS, lane)
-        # Lengths near 1 keep products of many from overflowing; a power of two takes no digit.
+        # Lengths near 1 keep products of many from overflow; division by a power of two is exact.
         size = power_of_two_below(radius)
         shrink = 1.0 / size
         overlap, unsettled = box_lane(
@@ -160,7 +160,7 @@ def overlap_boxes(
     areas: FloatArray,
     rows: IntArray,
 ) -> int:
-    """Fill in spheres with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3) to world, `box_half_sizes` (p, 3).
+    """Fill overlaps with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3) to world, `box_half_sizes` (p, 3).
 
     See `batch`.
     """

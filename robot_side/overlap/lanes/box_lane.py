@@ -1,8 +1,8 @@
-"""A sphere and a box without a branch: what the vectorised loop of `box_batch` does in each lane.
+"""Overlap of a sphere and a box without a branch, for each lane of the vectorised loop of `box_batch`.
 
-The box is the parallelepiped {c + Σ xₖ qₖ : |xₖ| <= halfₖ} for the columns qₖ of its rotation as they are given, which
-need only be perpendicular to 1e-6. Everything is measured from the point of the box next to the sphere's centre, so
-that the size of the box costs no digits. Axes are named k, i and j in cyclic order; each has an upper and a lower side.
+The box is the parallelepiped {c + Σ xₖ qₖ : |xₖ| <= halfₖ} for the given columns qₖ of its rotation, which need only
+be perpendicular to 1e-6. Coordinates start at the point of the box nearest to the sphere's centre, so that the size of
+the box costs no digits. Axes are named k, i and j in cyclic order; each has an upper and a lower side.
 """
 
 import math
@@ -18,7 +18,7 @@ from robot_side.overlap.lanes.split_edge import SplitEdge, split_edge
 Columns = tuple[Vector, Vector, Vector]
 
 Sides = tuple[float, float]
-"""A value for an axis's upper side and one for its lower side."""
+"""Values for an axis's upper side and lower side"""
 
 Axis = tuple[Vector, float, Vector, float, Sides]
 """(unit direction of q, |q|, outward unit normal of the upper face, q·normal, coordinates of the sides along q from the
@@ -29,7 +29,7 @@ EdgeLine = tuple[float, float, float, float, float]
 start and end are signed distances (m) from the foot."""
 
 FourLines = tuple[EdgeLine, EdgeLine, EdgeLine, EdgeLine]
-"""The edges along an axis at the (upper i, upper j), (upper, lower), (lower, upper) and (lower, lower) sides."""
+"""Edges along an axis at the (upper i, upper j), (upper, lower), (lower, upper) and (lower, lower) sides"""
 
 EdgeInFaces = tuple[SplitEdge, float, float]
 """(split edge, d in the face across i, d in the face across j)"""
@@ -37,16 +37,16 @@ EdgeInFaces = tuple[SplitEdge, float, float]
 FourEdges = tuple[EdgeInFaces, EdgeInFaces, EdgeInFaces, EdgeInFaces]
 
 LARGEST_REACH = 1e4
-"""Boxes are cut off so many radii from their point next to the sphere's centre."""
+"""Distance, in radii, from the nearest point to the sphere's centre, at which boxes are cut off"""
 
 NO_REST = (0.0, 0.0, 0.0)
 
 
 @inlined
 def box_lane(center: Vector, radius: float, box_center: Vector, columns: Columns, half: Vector) -> LaneResult:
-    """The overlap of the sphere (`center`, `radius`) with a box of any handedness, the radius being about 1.
+    """Return the overlap of the sphere (`center`, `radius`) with a box of any handedness; the radius is about 1.
 
-    It is exact to some 4e-16 of the sphere where the result does not call for precise forms.
+    The overlap is exact to some 4e-16 of the sphere, unless the result asks for precise forms.
     """
     q_0, q_1, q_2 = columns
     across_0, across_1, across_2 = cross(q_1, q_2), cross(q_2, q_0), cross(q_0, q_1)
@@ -66,7 +66,7 @@ def box_lane(center: Vector, radius: float, box_center: Vector, columns: Columns
         sum_of_products(middle[1], rest[1], place, (q_0[1], q_1[1], q_2[1]), NO_REST),
         sum_of_products(middle[2], rest[2], place, (q_0[2], q_1[2], q_2[2]), NO_REST),
     )
-    # What lies farther away cannot be reached, and is cut off, lest products of distances overflow.
+    # Parts farther away are out of reach, and are cut off so that products of distances do not overflow.
     most = LARGEST_REACH * radius
     axis_0 = _axis(q_0, normal_0, rise_0, place[0], half[0], most)
     axis_1 = _axis(q_1, normal_1, rise_1, place[1], half[1], most)
@@ -103,7 +103,7 @@ def box_lane(center: Vector, radius: float, box_center: Vector, columns: Columns
 
 @inlined
 def _normal(q: Vector, across: Vector, handedness: float) -> tuple[Vector, float]:
-    """(outward unit normal of the upper face, q·normal)."""
+    """Return (outward unit normal of the upper face, q·normal)."""
     normal = scale(handedness / norm(across), across)
     return normal, dot(q, normal)
 
@@ -121,7 +121,7 @@ def _axis(q: Vector, normal: Vector, rise: float, place: float, half: float, mos
 
 @inlined
 def _heights(reference: Vector, axis: Axis) -> Sides:
-    """Signed distances (m) of the upper and the lower face from the centre along their outward normals."""
+    """Return signed distances (m) of the upper and the lower face from the centre, along their outward normals."""
     shift = dot(reference, axis[2])
     return shift + axis[4][0] * axis[3], -shift - axis[4][1] * axis[3]
 
@@ -137,9 +137,9 @@ def _lines(
     heights_i: Sides,
     handedness: float,
 ) -> FourLines:
-    """The lines of the four edges along `axis`; `heights_i` are those of the faces across i."""
+    """Return the lines of the four edges along `axis`; `heights_i` are those of the faces across i."""
     direction, length, _, _, sides = axis
-    # Unit vectors at right angles to the edges: in the faces across i towards upper j, and the other way round.
+    # Unit vectors at right angles to the edges: in the faces across i towards upper j, and across j towards upper i.
     toward_j, toward_i = (
         scale(handedness, cross(direction, axis_i[2])),
         scale(handedness, cross(axis_j[2], direction)),
@@ -168,7 +168,7 @@ def _line(
     height: float,
     ends: tuple[float, float],
 ) -> EdgeLine:
-    """The line through reference + side_i q_i + side_j q_j, each side with its sign: 1 for upper, -1 for lower."""
+    """Return the line through reference + side_i q_i + side_j q_j; the signs of the sides: 1 upper, -1 lower."""
     shift = along[0] + (side_i[0] * along[1] + side_j[0] * along[2])
     distance_i = side_j[1] * (across_i[0] + (side_i[0] * across_i[1] + side_j[0] * across_i[2]))
     distance_j = side_i[1] * (across_j[0] + (side_i[0] * across_j[1] + side_j[0] * across_j[2]))
@@ -177,7 +177,7 @@ def _line(
 
 @inlined
 def _corner_norms(line: EdgeLine) -> tuple[float, float]:
-    """The distances (m) of the edge's start and end from the centre."""
+    """Return the distances (m) of the edge's start and end from the centre."""
     return math.sqrt(line[2] + line[0] * line[0]), math.sqrt(line[2] + line[1] * line[1])
 
 
@@ -205,7 +205,7 @@ def _split_line(line: EdgeLine, start_norm: float, end_norm: float, radius: floa
 def _opposite_faces(
     edges_i: FourEdges, edges_j: FourEdges, heights: Sides, radius: float
 ) -> tuple[float, float, float]:
-    """(Σ h·A, A of the upper face less A of the lower, Σ S) of the faces across an axis k.
+    """Return (Σ h·A, A of the upper face less A of the lower, Σ S) of the faces across an axis k.
 
     k is the second axis for the edges along i, and the first one for those along j.
     """
@@ -218,7 +218,7 @@ def _opposite_faces(
 def _face(
     first: EdgeInFaces, second: EdgeInFaces, third: EdgeInFaces, fourth: EdgeInFaces, height: float, radius: float
 ) -> tuple[float, float]:
-    """(A, S) of a face from its two edges along i and its two along j."""
+    """Return (A, S) of a face from its two edges along i and its two along j."""
     depth = abs(height)
     total = first_edge(edge_terms(first[0], first[2], depth))
     total = add_edge(total, edge_terms(second[0], second[2], depth))

@@ -1,20 +1,20 @@
-"""A face's area in the ball and the part of the sphere's surface that it covers, from its split edges.
+"""Area of a face inside the ball, and the part of the sphere's surface that the face covers, from its split edges.
 
-Put the origin at the sphere's centre. By the divergence theorem the overlap with a solid of flat faces is
-Σ (h A + R S) / 3 over the faces, with h a face's signed distance along its outward normal, A its area inside the ball
-and S the part of the sphere's surface that lies within the solid as far as this face bounds it. Each face is a sum
-over its edges, of the triangles that they make with the face's foot point, d being an edge's signed distance from it:
+The origin is the sphere's centre. By the divergence theorem the overlap with a solid of flat faces is
+Σ (h A + R S) / 3 over the faces. h is a face's signed distance along its outward normal, A its area inside the ball,
+and S the part of the sphere's surface that lies within the solid as far as this face bounds it. Each face is a sum over
+the triangles of its edges with the face's foot point; d is an edge's signed distance from the foot point:
 
     A = Σ d·inside/2 + (R² - h²) φ/2,     S = R sign(h) (R Ω - (R - |h|) φ)
 
-where φ is the angle under which the face's foot sees the parts of its edges outside the ball, and Ω the solid angle
-under which the centre sees the triangles of the foot with these parts. No topological decision is taken (whether an
-edge is cut, where the foot lies), so that rounding cannot flip one: the sum is continuous in all its inputs, on
-tangents and on corners too, and holds for every closed oriented surface.
+φ is the angle at the face's foot over the parts of its edges outside the ball. Ω is the solid angle at the centre over
+the triangles of the foot with these parts. No topological decision is taken (whether an edge is cut, where the foot
+lies), so rounding cannot flip one. The sum is continuous in all its inputs, on tangents and corners, too, and holds for
+every closed oriented surface.
 
-Each part adds to φ the angle of the complex number (d² + t·t', d |t' - t|), t and t' being where it begins and ends
-along the edge, and to Ω/2 that of van Oosterom and Strackee (1983) for such a triangle. Angles are summed by
-multiplying the complex numbers: one arctangent for each of φ and Ω, and nothing branches.
+Each part from t to t' along the edge adds to φ the angle of the complex number (d² + t·t', d |t' - t|). It adds to Ω/2
+the angle of van Oosterom and Strackee (1983) for such a triangle. Angles are summed by multiplying the complex
+numbers: one arctangent for each of φ and Ω, and no branch.
 """
 
 import math
@@ -27,15 +27,15 @@ Turn = tuple[float, float]
 """(cosine, sine) of an angle, times a common positive factor."""
 
 EdgeTerms = tuple[float, Turn, Turn]
-"""What an edge adds to a face: (d·inside in m², turn of φ, turn of Ω/2)."""
+"""Terms of an edge in the sum of a face: (d·inside in m², turn of φ, turn of Ω/2)"""
 
 FaceSum = tuple[float, Turn, float, Turn]
-"""Σ d·inside, the turn of φ and its whole turns, and the turn of Ω/2 of the edges so far."""
+"""Sum over the edges so far: Σ d·inside, the turn of φ and its whole turns, and the turn of Ω/2"""
 
 
 @inlined
 def edge_terms(edge: SplitEdge, distance: float, depth: float) -> EdgeTerms:
-    """The terms of `edge` in a face at the distance `depth` = |h| (m) from the sphere's centre.
+    """Return the terms of `edge` in a face at the distance `depth` = |h| (m) from the sphere's centre.
 
     `distance` is d (m): from the face's foot to the edge's line, positive where the edge runs anticlockwise round
     the foot as seen from outside.
@@ -51,7 +51,7 @@ def _part_turns(part: OutsidePart, norms: float, distance: float, depth: float) 
     length, product, norm_product = part
     outside = length > 0.0
     sine = distance * length if outside else 0.0
-    # Both cosines are at least 0 but for rounding: no part turns by more than a right angle.
+    # Up to rounding, both cosines are at least 0: no part turns by more than a right angle.
     plane_cosine = distance * distance + product if outside else 1.0
     solid_cosine = norm_product + depth * norms if outside else 1.0
     return (plane_cosine, sine), (solid_cosine, sine)
@@ -59,19 +59,19 @@ def _part_turns(part: OutsidePart, norms: float, distance: float, depth: float) 
 
 @inlined
 def multiply(a: Turn, b: Turn) -> Turn:
-    """The turn by both angles."""
+    """Return the turn by both angles."""
     return a[0] * b[0] - a[1] * b[1], a[1] * b[0] + a[0] * b[1]
 
 
 @inlined
 def first_edge(terms: EdgeTerms) -> FaceSum:
-    """The sum of one edge."""
+    """Return the sum of one edge."""
     return terms[0], terms[1], 0.0, terms[2]
 
 
 @inlined
 def add_edge(total: FaceSum, terms: EdgeTerms) -> FaceSum:
-    """The sum with another edge.
+    """Return the sum with another edge.
 
     φ reaches a whole turn, so passages through ±π are counted; Ω/2 reaches half a turn at most.
     """
@@ -84,13 +84,13 @@ def add_edge(total: FaceSum, terms: EdgeTerms) -> FaceSum:
 
 @inlined
 def face_areas(height: float, total: FaceSum, radius: float) -> tuple[float, float]:
-    """(A, S) in m² of the face at the signed distance `height` from its edges' sum."""
+    """Return (A, S) in m² of the face at the signed distance `height`, from the sum of its edges."""
     triangle, plane, turns, solid = total
     depth = abs(height)
     gap = max(radius - depth, 0.0)
     plane_angle = arctangent(plane[1], plane[0]) + 2.0 * math.pi * turns
     half_solid_angle = arctangent(solid[1], solid[0])
-    # Ω/2 lies in [0, π]: what rounds past π comes back at -π.
+    # Ω/2 lies in [0, π]: an angle that rounds past π returns as -π.
     half_solid_angle += 2.0 * math.pi if half_solid_angle < -0.5 * math.pi else 0.0
     disc = 0.5 * (triangle + gap * (radius + depth) * plane_angle)
     covered = radius * (2.0 * radius * half_solid_angle - gap * plane_angle)

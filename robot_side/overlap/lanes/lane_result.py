@@ -1,4 +1,4 @@
-"""What becomes of a lane's sums: bounds, exact answers where nothing is cut, and which pairs need precise forms."""
+"""Result of a lane: bounds, exact values if nothing is cut, and whether the pair needs precise forms."""
 
 import math
 
@@ -6,23 +6,23 @@ from robot_side.compiled.kernel import inlined
 from robot_side.overlap.closed_forms.solid import Overlap, sphere_area, sphere_volume
 
 LaneResult = tuple[Overlap, float]
-"""(overlap, 1 where doubles do not settle it, so that the pair needs precise forms, else 0)"""
+"""(overlap, 1 if doubles do not suffice, so that the pair needs precise forms, else 0)"""
 
 TINY = 1e-6
-"""Below this share of the sphere's volume an overlap is worked out precisely: the lanes' error, some 4e-16 of the
-sphere, would be more than 1e-9 of it."""
+"""Share of the sphere's volume below which an overlap is computed precisely: the lanes' error, some 4e-16 of the
+sphere, would be more than 1e-9 of the overlap."""
 
 FARTHEST_REFERENCE = 4.0
-"""A reference point farther than so many radii from the sphere's centre costs digits."""
+"""Distance, in radii, of a reference point from the sphere's centre, beyond which digits are lost"""
 
 FARTHEST_CORNER = 1e10
-"""Corners beyond so many radii could make products of distances overflow."""
+"""Distance of corners, in radii, beyond which products of distances could overflow"""
 
 CLEAR = 1.0 + 1e-9
-"""A squared distance above the squared radius by this factor is no contact, whatever was rounded on the way."""
+"""Ratio of squared distance to squared radius above which there is no contact, in spite of rounding"""
 
 WELL_CLEAR = 1.1
-"""The same where digits were lost."""
+"""CLEAR for lanes that lost digits"""
 
 
 @inlined
@@ -37,17 +37,17 @@ def settle(
     extent: float,
     strained: bool,
 ) -> LaneResult:
-    """`overlap` within its bounds, and exact where the solid's surface does not reach the sphere.
+    """Return `overlap` within its bounds, and exact values if the solid's surface does not reach the sphere.
 
-    `nearest_2` is the squared distance (m²) of the surface from the sphere's centre, `lowest` the least signed
-    distance (m) of the centre below the faces' planes, positive inside, `reference_2` the squared distance (m²) of the
-    reference point, `farthest` (m) that of the farthest corner, `extent` (m) the length of the longest edge; `strained`
-    means that digits were lost on the way.
+    `nearest_2` is the squared distance (m²) of the surface from the sphere's centre, `lowest` the least signed distance
+    (m) of the centre below the faces' planes, positive inside. `reference_2` is the squared distance (m²) of the
+    reference point, `farthest` (m) the distance of the farthest corner, `extent` (m) the length of the longest edge.
+    `strained`: digits were lost.
     """
-    # Every choice is between values that have been worked out, so that it becomes an instruction and no branch.
+    # Every choice is between computed values, so that it compiles to an instruction without a branch.
     volume, gradient, area = overlap
     whole, whole_area = sphere_volume(radius), sphere_area(radius)
-    # Inside, it is at least the radius, and outside at most 0: rounding cannot take one for the other.
+    # `lowest` is at least the radius inside, and at most 0 outside: rounding cannot confuse the two.
     engulfed = (lowest > 0.5 * radius) & (solid_volume > 0.0)
     uncut_volume, uncut_area = whole if engulfed else 0.0, whole_area if engulfed else 0.0
     clear = WELL_CLEAR if strained else CLEAR
@@ -57,7 +57,7 @@ def settle(
     # The error of a solid smaller than the sphere is smaller, too.
     tiny = TINY * whole * min(extent, radius)
     doubtful = (reference_2 > FARTHEST_REFERENCE**2 * (radius * radius)) | (bounded_volume * radius < tiny) | strained
-    # What overflowed on the way is no number, and compares as neither more nor less.
+    # After an overflow this is not finite, and the comparison is false.
     number = volume + gradient[0] + gradient[1] + gradient[2]
     sane = (farthest <= FARTHEST_CORNER * radius) & (abs(number) < math.inf)
     unsettled = 1.0 if doubtful else 0.0

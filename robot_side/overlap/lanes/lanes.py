@@ -1,7 +1,7 @@
 """Columns of numbers, one lane a pair: the working memory of the vectorised loops.
 
-A block's columns lie one after another in a single array at distances that are known when compiling, so that LLVM
-can tell them apart and turn a loop over lanes into vector instructions.
+A block's columns lie one after another in a single array, at distances known at compile time. So LLVM can distinguish
+them and compile a loop over lanes to vector instructions.
 """
 
 import numpy as np
@@ -13,34 +13,34 @@ from robot_side.compiled.vectors import Vector
 from robot_side.overlap.closed_forms.solid import Overlap
 
 LANES = 64
-"""Pairs in a block: small enough for the columns to stay in the first-level cache."""
+"""Pairs in a block: few enough for the columns to stay in the first-level cache"""
 
 WIDTH = 8
-"""Lanes come in groups of as many as the widest vectors hold, which spares the loops a scalar remainder."""
+"""Lanes in a group: as many as the widest vectors hold, so that loops have no scalar remainder"""
 
 RESULT_COLUMNS = 6
-"""V, the gradient, the area, and 1 where the pair is unsettled."""
+"""Columns of a result: V, the gradient, the area, and 1 if the pair is unsettled"""
 
 NOTHING, WHOLE_SPHERE, WHOLE_SOLID, PARTIAL = 0.0, 1.0, 2.0, 3.0
-"""What a pair's bounds tell: no contact, the sphere within the solid, the solid within the sphere, or neither."""
+"""Verdicts of the bounds: no contact, the sphere within the solid, the solid within the sphere, or none of these"""
 
 SOME_PARTIAL = 1 << 32
-"""The sum of `weight` over a block is at least this if a lane is `PARTIAL`, and 0 if there is no contact in any."""
+"""Least sum of `weight` over a block in which a lane is `PARTIAL`; 0 is the sum without any contact."""
 
 SOME_DOUBTFUL = 1 << 48
-"""The sum of `doubt` over a block is at least this if a lane is doubtful, and else 0."""
+"""Least sum of `doubt` over a block in which a lane is doubtful; otherwise 0."""
 
 
 @inlined
 def column(lanes: FloatArray, index: int, lane: int) -> float:
-    """Column `index` of `lane`."""
+    """Return column `index` of `lane`."""
     value: float = lanes[np.uint64(index * LANES + lane)]
     return value
 
 
 @inlined
 def vector_column(lanes: FloatArray, index: int, lane: int) -> Vector:
-    """Columns `index` to `index` + 2 of `lane`."""
+    """Return columns `index` to `index` + 2 of `lane`."""
     return (
         lanes[np.uint64(index * LANES + lane)],
         lanes[np.uint64((index + 1) * LANES + lane)],
@@ -50,25 +50,25 @@ def vector_column(lanes: FloatArray, index: int, lane: int) -> Vector:
 
 @inlined
 def weight(verdict: float) -> int:
-    """What one lane's bounds add to the block's sum: whole numbers, because LLVM adds no others in vectors."""
+    """Return the term of one lane's verdict in the block's sum: an integer, as LLVM adds no others in vectors."""
     return 0 if verdict == NOTHING else (SOME_PARTIAL if verdict == PARTIAL else 1)
 
 
 @inlined
 def doubt(sure: bool) -> int:
-    """What one lane adds to its block's sum, whose numbers are `sure` to be in range or not."""
+    """Return the term of one lane in the block's sum; `sure`: the lane's numbers are in range."""
     return 0 if sure else SOME_DOUBTFUL
 
 
 @inlined
 def reach(vector: Vector) -> float:
-    """The sum of the magnitudes, NaN if there is one: no part is larger."""
+    """Return the sum of the magnitudes, NaN if there is one: no component is larger."""
     return abs(vector[0]) + abs(vector[1]) + abs(vector[2])
 
 
 @inlined
 def store_result(lanes: FloatArray, index: int, lane: int, overlap: Overlap, size: float, unsettled: float) -> None:
-    """Write an overlap that was worked out with lengths divided by `size` to the columns from `index`."""
+    """Write an overlap, computed with lengths divided by `size`, to the columns from `index` on."""
     area = size * size
     lanes[np.uint64(index * LANES + lane)] = overlap[0] * (area * size)
     lanes[np.uint64((index + 1) * LANES + lane)] = overlap[1][0] * area
@@ -80,9 +80,9 @@ def store_result(lanes: FloatArray, index: int, lane: int, overlap: Overlap, siz
 
 @inlined
 def load_rows(rows: FloatArray, first: int, count: int, width: int, lanes: FloatArray, index: int) -> None:
-    """Put `count` rows of `width` numbers from the row `first`, given flat, into the columns from `index`."""
+    """Copy `count` rows of `width` numbers from row `first` of a flat array into the columns from `index` on."""
     if count == LANES:
-        # A number of lanes that is known when compiling, and vector instructions.
+        # The number of lanes is known at compile time: vector instructions.
         for lane in range(0, LANES, 4):
             for part in range(width // 4):
                 start, end = (first + lane) * width + 4 * part, (index + 4 * part) * LANES + lane
@@ -99,7 +99,7 @@ def load_rows(rows: FloatArray, first: int, count: int, width: int, lanes: Float
 
 @inlined
 def load_vectors(rows: FloatArray, first: int, count: int, lanes: FloatArray, index: int) -> None:
-    """`load_rows` for rows of three numbers."""
+    """Do as `load_rows`, for rows of three numbers."""
     if count == LANES:
         for lane in range(0, LANES, 4):
             transpose_three(rows, 3 * (first + lane), lanes, index * LANES + lane, LANES)
@@ -109,7 +109,7 @@ def load_vectors(rows: FloatArray, first: int, count: int, lanes: FloatArray, in
 
 @inlined
 def copy_lane(lanes: FloatArray, lane: int, target: FloatArray, target_lane: int, columns: int) -> None:
-    """Copy the first `columns` of `lane`."""
+    """Copy the first `columns` of `lane` to a lane of `target`."""
     for index in range(columns):
         target[np.uint64(index * LANES + target_lane)] = lanes[np.uint64(index * LANES + lane)]
 
@@ -128,7 +128,7 @@ def scatter(
 ) -> int:
     """Write the results of `count` lanes, in the columns from `index`, to the rows `pairs` (LANES,) of the results.
 
-    `rows` holds `unsettled` pairs that need precise forms; those of these lanes are added. How many there are then.
+    `rows` holds `unsettled` pairs that need precise forms; those of these lanes are added. Return the new number.
     """
     for lane in range(count):
         pair = pairs[lane]
@@ -143,5 +143,5 @@ def scatter(
 
 @inlined
 def lane_groups(count: int) -> int:
-    """How many groups of `WIDTH` lanes hold `count` pairs."""
+    """Return the number of groups of `WIDTH` lanes that hold `count` pairs."""
     return (count + (WIDTH - 1)) // WIDTH

@@ -1,6 +1,6 @@
-"""An edge split where the ball begins and ends: what its two faces share.
+"""Edge that is split where the ball begins and ends, for its two faces.
 
-Free of branches, for the vectorised loops.
+Without branches, for the vectorised loops.
 """
 
 import math
@@ -8,25 +8,25 @@ import math
 from robot_side.compiled.kernel import inlined
 
 OutsidePart = tuple[float, float, float]
-"""A part of an edge outside the ball, from P to P' as seen from the sphere's centre, with t and t' their signed
-distances (m) from the foot of the edge's line: (t' - t, t·t', |P||P'| + P·P'); see also `SplitEdge`."""
+"""Part of an edge outside the ball, from P to P' relative to the sphere's centre: (t' - t, t·t', |P||P'| + P·P').
+t and t' are signed distances (m) from the foot of the edge's line; see also `SplitEdge`."""
 
 SplitEdge = tuple[float, OutsidePart, float, OutsidePart, float]
-"""(inside, before, before_norms, after, after_norms): `inside` (m) is how much of the edge lies in the ball; the parts
-before and after it come with the sums |P| + |P'| (m)."""
+"""(inside, before, before_norms, after, after_norms): `inside` (m) is the length of the edge in the ball; the parts
+before and after come with the sums |P| + |P'| (m)."""
 
 
 @inlined
 def split_edge(start: float, end: float, start_norm: float, end_norm: float, foot_2: float, radius: float) -> SplitEdge:
     """Split the edge that runs from `start` to `end`, signed distances (m) from the foot of its line.
 
-    The foot is the line's point next to the sphere's centre, at the squared distance `foot_2` (m²); the ends are
+    The foot is the line's point nearest to the sphere's centre, at the squared distance `foot_2` (m²). The ends are
     `start_norm` and `end_norm` (m) away from the centre.
     """
     rest_2 = radius * radius - foot_2
     reached = rest_2 > 0.0
     root = math.sqrt(rest_2 if reached else foot_2)
-    # A line that misses the ball is split at its foot, or at the end next to it: any point would do.
+    # A line that misses the ball is split at its foot, or at the end nearest to that: any point is correct.
     half_chord = root if reached else 0.0
     split_norm = radius if reached else root
     entry = min(max(-half_chord, start), end)

@@ -1,4 +1,4 @@
-"""Many spheres with as many tetrahedra: pairs that do not cut are settled by bounds, the others go through lanes."""
+"""Pairs of spheres and tetrahedra: bounds settle pairs that do not cut, lanes compute the others."""
 
 import numpy as np
 
@@ -36,15 +36,15 @@ from robot_side.overlap.lanes.lanes import (
 )
 from robot_side.overlap.lanes.tetrahedron_lane import tetrahedron_lane
 
-# Columns of a block: what a pair consists of, then what its bounds tell, then its result.
+# Columns of a block: the pair, then the bounds' verdict, then the result.
 _CENTER, _RADIUS, _CORNERS, _INPUTS = 0, 3, 4, 16
 _BOUNDS, _SOLID_VOLUME, _RESULT = found_columns(_INPUTS)
 
 _SURE = 1.0 + 1e-9
-"""Bounds settle a pair only with this margin for what they round."""
+"""Margin of the bounds for rounding, as a factor"""
 
 _ROUNDING_2 = 1e-21
-"""(8 · 2⁻⁵³)² / 1e-9: what products of three lengths may round, squared, where the margin above does not cover it."""
+"""(8 · 2⁻⁵³)² / 1e-9: squared rounding error of products of three lengths, where the margin above does not cover it"""
 
 
 @inlined
@@ -68,7 +68,7 @@ def _corners(block: FloatArray, lane: int) -> tuple[Vector, Vector, Vector, Vect
 
 @inlined
 def _bound(block: FloatArray, groups: int) -> int:
-    """Fill in what bounds tell of the first groups of lanes; the sum of the weights and doubts."""
+    """Fill verdicts of the first groups of lanes; return the sum of weights and doubts."""
     left = _bound_by_corners(block, groups)
     doubts = left // SOME_DOUBTFUL * SOME_DOUBTFUL
     left -= doubts
@@ -81,7 +81,7 @@ def _bound(block: FloatArray, groups: int) -> int:
 
 @building_block
 def _bound_by_corners(block: FloatArray, groups: int) -> int:
-    """Fill in what the corners and their bounding box tell; the sum of the weights and doubts."""
+    """Fill verdicts from the corners and their bounding box; return the sum of weights and doubts."""
     total = 0
     for lane in range(groups * WIDTH):
         first, second, third, fourth = _corners(block, lane)
@@ -104,14 +104,14 @@ def _bound_by_corners(block: FloatArray, groups: int) -> int:
 
 @building_block
 def _measure_within(block: FloatArray, groups: int) -> int:
-    """Fill in the volumes of the tetrahedra, for those within the sphere; the sum of the weights."""
+    """Fill the volumes of the tetrahedra, for those within the sphere; return the sum of weights."""
     total = 0
     for lane in range(groups * WIDTH):
         first, second, third, fourth = _corners(block, lane)
         ab, ac, ad = subtract(second, first), subtract(third, first), subtract(fourth, first)
         volume_6 = dot(ab, cross(ac, ad))
         longest_2 = max(dot(ab, ab), dot(ac, ac), dot(ad, ad))
-        # The volume of a flatter one would lose digits here.
+        # The volume of a flatter tetrahedron would lose digits here.
         flat = volume_6 * volume_6 <= 1e-14 * (longest_2 * longest_2 * longest_2)
         verdict = column(block, _BOUNDS, lane)
         verdict = PARTIAL if (verdict == WHOLE_SOLID) & flat else verdict
@@ -123,7 +123,7 @@ def _measure_within(block: FloatArray, groups: int) -> int:
 
 @building_block
 def _bound_by_planes(block: FloatArray, groups: int) -> int:
-    """Settle more of the pairs that the corners left undecided, by the planes of the faces; the sum of the weights."""
+    """Settle more pairs by the planes of the faces, after `_bound_by_corners`; return the sum of weights."""
     total = 0
     for lane in range(groups * WIDTH):
         first, second, third, fourth = _corners(block, lane)
@@ -149,16 +149,16 @@ def _bound_by_planes(block: FloatArray, groups: int) -> int:
 
 @inlined
 def _beyond_2(a: float, b: float, c: float, d: float) -> float:
-    """The squared distance (m²) of 0 from the interval that a to d span."""
+    """Return the squared distance (m²) of 0 from the interval that a to d span."""
     gap = max(min(a, b, c, d), -max(a, b, c, d), 0.0)
     return gap * gap
 
 
 @inlined
 def _side(sense: float, corner: Vector, across: Vector, enough_2: float, rounding: float) -> tuple[bool, bool]:
-    """Whether the centre lies at least the square root of `enough_2` (m²) below, or above, a face's plane.
+    """Return whether the centre lies at least the square root of `enough_2` (m²) below, or above, a face's plane.
 
-    `rounding` (m⁶) is the square of what the product of the face's normal, twice its area long, may have rounded.
+    `rounding` (m⁶) is the squared rounding error of the product with the face's normal, twice its area long.
     """
     height = sense * dot(corner, across)
     far = height * height >= enough_2 * dot(across, across) + rounding
@@ -169,7 +169,7 @@ def _side(sense: float, corner: Vector, across: Vector, enough_2: float, roundin
 def _work_out(block: FloatArray, groups: int) -> None:
     for lane in range(groups * WIDTH):
         radius = column(block, _RADIUS, lane)
-        # Lengths near 1 keep products of many from overflowing; a power of two takes no digit.
+        # Lengths near 1 keep products of many from overflow; division by a power of two is exact.
         size = power_of_two_below(radius)
         shrink = 1.0 / size
         first, second, third, fourth = _corners(block, lane)
@@ -201,5 +201,5 @@ def overlap_tetrahedra(
     areas: FloatArray,
     rows: IntArray,
 ) -> int:
-    """Fill in spheres with tetrahedra `vertices` (p, 4, 3); see `batch`."""
+    """Fill overlaps with tetrahedra `vertices` (p, 4, 3); see `batch`."""
     return _run(centers, radii, (vertices,), volumes, gradients, areas, rows)

@@ -1,9 +1,9 @@
-"""A sphere and a tetrahedron without a branch: what the vectorised loop of `tetrahedron_batch` does in each lane.
+"""Overlap of a sphere and a tetrahedron without a branch, for each lane of the vectorised loop of `tetrahedron_batch`.
 
-Heights of faces, lines of edges and their ends are all measured from a reference point: a point of the tetrahedron
-near the sphere's centre, given by its barycentric coordinates ("shares") of the corners. The distance of a face from
-it is the opposite corner's share of that corner's altitude, so what lies near is known to its last digit however
-large the tetrahedron is.
+Heights of faces, lines of edges and their ends are measured from a reference point. This is a point of the tetrahedron
+near the sphere's centre, given by barycentric coordinates ("shares") of the corners. The distance of a face from the
+point is the opposite corner's share of that corner's altitude. So near distances are known to their last digit, even
+in a large tetrahedron.
 """
 
 import math
@@ -25,17 +25,17 @@ PlacedEdge = tuple[Vector, Vector, SplitEdge, float, float, bool]
 its length, whether the foot lost digits)"""
 
 LARGEST_CANCELLATION = 10.0
-"""A foot that came of terms so many times as large as itself, or as the radius, has lost digits."""
+"""Size of a foot's terms, over the larger of foot and radius, beyond which the foot has lost digits"""
 
 SHARPEST_FACE = 20.0
-"""The normal of a triangle whose two shortest sides are together so many times the height has lost digits."""
+"""Product of a triangle's two shortest sides, over that of its normal, beyond which the normal has lost digits"""
 
 
 @inlined
 def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneResult:
-    """The overlap of the sphere (`center`, `radius`) with the tetrahedron of `corners`, the radius being about 1.
+    """Return the overlap of the sphere (`center`, `radius`) with the tetrahedron of `corners`; the radius is about 1.
 
-    It is exact to some 4e-16 of the sphere where the result does not call for precise forms.
+    The overlap is exact to some 4e-16 of the sphere, unless the result asks for precise forms.
     """
     first, second, third, fourth = corners
     a, a_rest = difference(first, center)
@@ -64,7 +64,7 @@ def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneRes
         sum_of_products(a[1], a_rest[1], weights, (ab[1], ac[1], ad[1]), (ab_rest[1], ac_rest[1], ad_rest[1])),
         sum_of_products(a[2], a_rest[2], weights, (ab[2], ac[2], ad[2]), (ab_rest[2], ac_rest[2], ad_rest[2])),
     )
-    # From a face to its opposite corner it is 6 V / 2 A.
+    # The altitude from a face to its opposite corner is 6 V / 2 A.
     height_a = dot(reference, normal_a) + share_a * (volume_6 * per_area_a)
     height_b = dot(reference, normal_b) + share_b * (volume_6 * per_area_b)
     height_c = dot(reference, normal_c) + share_c * (volume_6 * per_area_c)
@@ -122,7 +122,7 @@ def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneRes
     push = add(
         add(scale(disc_a, normal_a), scale(disc_b, normal_b)), add(scale(disc_c, normal_c), scale(disc_d, normal_d))
     )
-    # The normals of an inverted tetrahedron point inward, which turns every sign round.
+    # The normals of an inverted tetrahedron point inward, which flips every sign.
     overlap = from_faces(
         sense * moment, scale(sense, push), sense * (covered_a + covered_b + covered_c + covered_d), radius
     )
@@ -132,7 +132,7 @@ def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneRes
 
 @inlined
 def _across(ab: Vector, bc: Vector, ca: Vector) -> Vector:
-    """The normal of the triangle with these edges, twice its area long, from the two shortest."""
+    """Return the normal of the triangle with these edges, twice its area long, from the two shortest edges."""
     ab_2, bc_2, ca_2 = dot(ab, ab), dot(bc, bc), dot(ca, ca)
     ab_longest = (ab_2 >= bc_2) & (ab_2 >= ca_2)
     bc_longest = bc_2 >= ca_2
@@ -143,7 +143,7 @@ def _across(ab: Vector, bc: Vector, ca: Vector) -> Vector:
 
 @inlined
 def _is_sharp(edges: tuple[Vector, Vector, Vector], across: Vector, height: float, radius_2: float) -> bool:
-    """Whether a face that the sphere cuts has a normal without its last digits, and is large enough for it to show."""
+    """Return whether the sphere cuts a face whose normal has lost digits, and that is large enough for an effect."""
     first_2, second_2, third_2 = dot(edges[0], edges[0]), dot(edges[1], edges[1]), dot(edges[2], edges[2])
     shortest_4 = min(first_2 * second_2, first_2 * third_2, second_2 * third_2)
     cut = height * height < radius_2
@@ -153,7 +153,7 @@ def _is_sharp(edges: tuple[Vector, Vector, Vector], across: Vector, height: floa
 
 @inlined
 def _inverse_norm(a: Vector) -> float:
-    """1/|a|; 1 for the vector 0, so that what is scaled by it stays 0."""
+    """Return 1/|a|; 1 for the vector 0, so that the scaled vector stays 0."""
     length_2 = dot(a, a)
     return 1.0 / math.sqrt(length_2 if length_2 > 0.0 else 1.0)
 
@@ -165,7 +165,7 @@ def _select(condition: bool, yes: Vector, no: Vector) -> Vector:
 
 @inlined
 def _shares(first: float, second: float, third: float, fourth: float) -> Shares:
-    """Barycentric coordinates >= 0 from those of the sphere's centre; the first completes the others to exactly 1."""
+    """Return barycentric coordinates >= 0 from those of the sphere's centre; the first makes the sum exactly 1."""
     first, second = min(max(first, 0.0), 1.0), min(max(second, 0.0), 1.0)
     third, fourth = min(max(third, 0.0), 1.0), min(max(fourth, 0.0), 1.0)
     total = first + second + third + fourth
@@ -188,7 +188,7 @@ def _edge(
     end_norm: float,
     radius: float,
 ) -> PlacedEdge:
-    """The edge from start to end; `shares` are those of (start, end, third, fourth), `from_third` is start - third."""
+    """Return the edge from start to end. `shares`: of (start, end, third, fourth). `from_third`: start - third."""
     inverse_length = _inverse_norm(edge)
     direction = scale(inverse_length, edge)
     length = dot(edge, direction)
@@ -212,7 +212,7 @@ def _edge(
 def _face(
     edges: tuple[PlacedEdge, PlacedEdge, PlacedEdge], senses: Vector, normal: Vector, height: float
 ) -> tuple[FaceSum, float]:
-    """(sum over the edges, squared distance from the centre if the face's foot lies within it, else infinity)."""
+    """Return (sum over the edges, squared distance from the centre if the foot lies within the face, else infinity)."""
     first, second, third = edges
     depth = abs(height)
     distance_1 = senses[0] * dot(first[1], cross(first[0], normal))

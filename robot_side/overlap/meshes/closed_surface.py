@@ -1,4 +1,4 @@
-"""What makes a list of triangles the surface of a solid: closed, oriented outward, its parts not in each other."""
+"""Checks that triangles are the surface of a solid: closed, oriented outward, without overlapping parts."""
 
 from collections.abc import Sequence
 
@@ -11,13 +11,13 @@ from common.arrays import FloatArray, IntArray
 from robot_side.overlap.checks.arguments import numbers
 
 _FLAT = 1e-14
-"""A part whose volume is below this share of its size cubed counts as flat, and has no orientation."""
+"""Volume of a part, as a share of its size cubed, up to which the part is flat and has no orientation"""
 _SAMPLES = 8
 _CERTAIN = 0.1
 
 
 def checked_vertices(vertices: npt.ArrayLike) -> FloatArray:
-    """`vertices` as finite float64 (v, 3), or ValueError."""
+    """Return `vertices` as finite float64 (v, 3), or raise a ValueError."""
     values = numbers("vertices", vertices, (3,)).values
     if values.ndim != 2:
         raise ValueError(f"vertices has the shape {values.shape}; valid: the shape (v, 3)")
@@ -25,7 +25,7 @@ def checked_vertices(vertices: npt.ArrayLike) -> FloatArray:
 
 
 def checked_triangles(triangles: npt.ArrayLike, vertex_count: int) -> IntArray:
-    """`triangles` as int64 (t, 3) of indices below `vertex_count`, or ValueError."""
+    """Return `triangles` as int64 (t, 3) of indices below `vertex_count`, or raise a ValueError."""
     try:
         raw = np.asarray(triangles)
     except ValueError as error:
@@ -44,9 +44,9 @@ def checked_triangles(triangles: npt.ArrayLike, vertex_count: int) -> IntArray:
 
 
 def merged(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
-    """(triangles (k, 3) with each set of equal vertices as one, the triangles' numbers (k,)).
+    """Return (triangles (k, 3) with each set of equal vertices as one, the triangles' numbers (k,)).
 
-    Triangles that have a corner twice bound nothing and are left out.
+    Triangles that have a corner twice are left out: they bound nothing.
     """
     # Adding 0 makes -0 equal to 0.
     _, first, inverse = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
@@ -56,7 +56,7 @@ def merged(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, IntArra
 
 
 def require_closed(triangles: IntArray, numbers_given: IntArray) -> None:
-    """ValueError naming the first edge that is not used as often in one direction as in the other."""
+    """Raise a ValueError that names the first edge with unequal numbers of uses in its two directions."""
     starts, ends = triangles, np.roll(triangles, -1, axis=1)
     keys = _edge_keys(starts, ends)
     _, place = np.unique(keys, return_inverse=True)
@@ -70,12 +70,12 @@ def require_closed(triangles: IntArray, numbers_given: IntArray) -> None:
     backward = int(np.count_nonzero((starts == end) & (ends == start)))
     raise ValueError(
         f"triangles[{numbers_given[row]}]: its edge from vertex {start} to {end} is used {forward} times in this "
-        f"direction and {backward} times in the other; valid: a closed surface, as often in either"
+        f"direction and {backward} times in the other; valid: a closed surface, equally often in both"
     )
 
 
 def components(triangles: IntArray) -> IntArray:
-    """(t,): the number of the part that each triangle belongs to; parts hang together through edges."""
+    """Return the number of each triangle's part (t,); a part is connected by edges."""
     keys = _edge_keys(triangles, np.roll(triangles, -1, axis=1))
     _, place = np.unique(keys, return_inverse=True)
     count = len(triangles)
@@ -86,7 +86,7 @@ def components(triangles: IntArray) -> IntArray:
 
 
 def require_all_different(triangles: IntArray, numbers_given: IntArray) -> None:
-    """ValueError naming the first triangle that is there twice, the same way round: a solid laid over itself."""
+    """Raise a ValueError that names the first triangle given twice in the same direction: the solid overlaps itself."""
     first = triangles.argmin(axis=1)
     rows = np.arange(len(triangles))
     turned = np.column_stack([triangles[rows, (first + corner) % 3] for corner in range(3)])
@@ -103,14 +103,14 @@ def require_all_different(triangles: IntArray, numbers_given: IntArray) -> None:
 
 
 def signed_volume(corners: FloatArray) -> float:
-    """The volume (m³) within closed triangles `corners` (t, 3, 3), negative if they are oriented inward."""
-    # In extended precision where the machine has it: the terms of a thin plate cancel.
+    """Return the volume (m³) within closed triangles `corners` (t, 3, 3), negative if they are oriented inward."""
+    # In extended precision if the machine has it: the terms of a thin plate cancel.
     a, b, c = np.moveaxis((corners - corners.reshape(-1, 3).mean(axis=0)).astype(np.longdouble), 1, 0)
     return float(np.sum(a * np.cross(b, c)) / 6.0)
 
 
 def require_outward(corners: FloatArray, parts: IntArray, numbers_given: IntArray) -> None:
-    """ValueError unless each part is oriented outward where the others leave space, and inward within another."""
+    """Raise a ValueError unless each part is oriented outward, or inward within another part."""
     order = np.argsort(parts, kind="stable")
     ends = np.cumsum(np.bincount(parts))
     members = np.split(order, ends[:-1])
@@ -140,14 +140,14 @@ def require_outward(corners: FloatArray, parts: IntArray, numbers_given: IntArra
 
 
 def _winding_around(corners: FloatArray, members: Sequence[IntArray], boxes: FloatArray, part: int) -> int | None:
-    """How often the other parts go round this one; None where this part touches them wherever it was tried."""
+    """Return the winding number of the other parts about this one; None if it touches them at all sampled points."""
     if len(members) == 1:
         return 0
     candidates = corners[members[part]].mean(axis=1)
     points = candidates[np.linspace(0, len(candidates) - 1, _SAMPLES).astype(int)]
     winding = np.zeros(len(points))
     for row, point in enumerate(points):
-        # A part goes round nothing that lies outside of its box.
+        # A part has winding number 0 about points outside its box.
         near = np.flatnonzero((boxes[:, 0] <= point).all(axis=1) & (point <= boxes[:, 1]).all(axis=1))
         others = [members[other] for other in near.tolist() if other != part]
         if others:
@@ -158,7 +158,7 @@ def _winding_around(corners: FloatArray, members: Sequence[IntArray], boxes: Flo
 
 
 def _winding(corners: FloatArray, point: FloatArray) -> float:
-    """The winding number about `point` of triangles (t, 3, 3), by van Oosterom's and Strackee's solid angles."""
+    """Return the winding number about `point` of triangles (t, 3, 3), by van Oosterom's and Strackee's solid angles."""
     a, b, c = np.moveaxis(corners - point, 1, 0)
     length_a, length_b, length_c = (np.linalg.norm(side, axis=1) for side in (a, b, c))
     cosine = length_a * length_b * length_c + np.sum(a * b, axis=1) * length_c
@@ -167,6 +167,6 @@ def _winding(corners: FloatArray, point: FloatArray) -> float:
 
 
 def _edge_keys(starts: IntArray, ends: IntArray) -> IntArray:
-    """(3 t,): one number for each edge whatever its direction."""
+    """Return one number for each edge (3 t,), equal for both directions."""
     count = int(starts.max()) + 1
     return np.asarray((np.minimum(starts, ends) * count + np.maximum(starts, ends)).ravel(), dtype=np.int64)

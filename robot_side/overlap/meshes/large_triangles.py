@@ -1,6 +1,6 @@
-"""Lanes of triangles that are large beside the ball: the rounding errors of their far corners matter near the centre.
+"""Lanes of triangles much larger than the ball: the rounding errors of their far corners matter near the centre.
 
-Their edges' foot points and their heights are worked out again in double-double arithmetic.
+The foot points of their edges and their heights are recomputed in double-double arithmetic.
 """
 
 import math
@@ -21,16 +21,16 @@ from robot_side.overlap.meshes.mesh_tables import MeshTables
 from robot_side.overlap.meshes.triangle_lanes import BASES, CORNER_DISTANCES, DISTANCES, HEIGHT, HEIGHTS, ROW, aside
 
 FAR = 3.0
-"""An edge with both ends more than this many radii away is worked out again."""
+"""Distance, in radii, of both ends of an edge, beyond which the edge is recomputed"""
 _VANISHED = 1e-28
-"""A foot point this near to the centre, as a share of an end's distance, is a rounding error."""
+"""Distance of a foot point from the centre, as a share of an end's distance, up to which it is a rounding error"""
 
 PreciseTriangle = tuple[PreciseVector, PreciseVector, PreciseVector]
 
 
 @inlined
 def corners_about(tables: MeshTables, triangle: int, center: PreciseVector) -> PreciseTriangle:
-    """A triangle's corners relative to the centre (m)."""
+    """Return a triangle's corners relative to the centre (m)."""
     row = tables.triangles[triangle]
     return (
         precise_subtract(((row[0], 0.0), (row[1], 0.0), (row[2], 0.0)), center),
@@ -41,7 +41,7 @@ def corners_about(tables: MeshTables, triangle: int, center: PreciseVector) -> P
 
 @inlined
 def is_far(scratch: FloatArray, lane: int) -> bool:
-    """Whether a triangle has an edge that is far at both ends."""
+    """Return whether a triangle has an edge that is far at both ends."""
     far = 0
     for corner in range(3):
         far += 1 if scratch[CORNER_DISTANCES + corner * ROW + lane] > FAR else 0
@@ -52,7 +52,7 @@ def is_far(scratch: FloatArray, lane: int) -> bool:
 def refine_lane(
     scratch: FloatArray, lane: int, tables: MeshTables, triangle: int, center: PreciseVector, radius: float
 ) -> None:
-    """Work out `HEIGHTS` to `BASES` of a lane's far edges again, and `HEIGHT` if no edge is near."""
+    """Recompute `HEIGHTS` to `BASES` of a lane's far edges, and `HEIGHT` if no edge is near."""
     corners = corners_about(tables, triangle, center)
     row = tables.triangles[triangle]
     normal = row[9], row[10], row[11]
@@ -81,5 +81,5 @@ def refine_lane(
 
 @inlined
 def _rank(corner: Vector) -> float:
-    """Nearness, by which the end to start from is chosen: alike for the edge reversed, even if both are as near."""
+    """Return the rank by nearness: it chooses the same end for the reversed edge, even if both are equally near."""
     return dot(corner, corner) * (1.0 + 1e-9 * math.tanh(corner[0] + 0.73 * corner[1] + 0.29 * corner[2]))

@@ -25,21 +25,20 @@ from robot_side.overlap.meshes.mesh_tables import mesh_tables
 Array = npt.ArrayLike
 
 _IN_PLACE = np.zeros(1, dtype=np.int64), np.zeros((1, 3)), np.eye(3)[None]
-"""A mesh in its own frame: as number, position and rotation of the only one that is placed."""
+"""Index, position and rotation of a single mesh that is placed in its own frame"""
 
 
 class Mesh:
-    """A solid bounded by triangles, prepared once for many queries; it does not change.
+    """Solid bounded by triangles, prepared once for many queries; immutable.
 
-    `vertices` (v, 3) in m, `triangles` (t, 3) indices of them, anticlockwise as seen from outside. Vertices at exactly
-    the same place count as one. Every edge must be used as often in one direction as in the other, no triangle be there
-    twice. Parts that hang
-    together through no edge may touch but not overlap each other; one that lies inside another is a cavity and must be
-    oriented inward. Triangles without area are tolerated. Parts that overlap only partly are not found out: what they
-    share then counts wrongly.
+    `vertices` (v, 3) in m, `triangles` (t, 3) indices of these, anticlockwise as seen from outside. Vertices at exactly
+    the same place count as one. Every edge must be used equally often in both directions, and no triangle be given
+    twice. Parts that share no edge may touch but not overlap. A part inside another one is a cavity and must be
+    oriented inward. Triangles without area are tolerated. Parts that overlap only partly are not detected: their common
+    volume then counts wrongly.
 
     ValueError for NaN, infinity, a magnitude above 1e50, wrong shapes, types or indices, an open or inward surface,
-    an overlapping part: the text names the argument and the first triangle or edge.
+    or an overlapping part. The text names the argument and the first triangle or edge.
     """
 
     def __init__(self, vertices: Array, triangles: Array) -> None:
@@ -53,14 +52,14 @@ class Mesh:
         corners = places[kept]
         require_outward(corners, components(kept), numbers_given)
         self.volume_m3 = signed_volume(corners)
-        """The volume enclosed (m³)."""
+        """Enclosed volume (m³)"""
         if self.volume_m3 <= 0.0:
             raise ValueError(f"triangles enclose {self.volume_m3:.3g} m³; valid: a volume above 0")
         self.triangle_count = len(kept)
         self.lowest_m: FloatArray = corners.reshape(-1, 3).min(axis=0)
-        """(3,): the least coordinates (m)."""
+        """(3,) least coordinates (m)"""
         self.highest_m: FloatArray = corners.reshape(-1, 3).max(axis=0)
-        """(3,): the greatest coordinates (m)."""
+        """(3,) greatest coordinates (m)"""
         self.tables = mesh_tables(corners, self.volume_m3)
 
     @overload
@@ -68,12 +67,12 @@ class Mesh:
     @overload
     def overlap(self, centers: Array, radii: Array, *, gradient: Literal[True]) -> Overlaps: ...
     def overlap(self, centers: Array, radii: Array, *, gradient: bool = False) -> FloatArray | Overlaps:
-        """Overlap with the spheres `centers` (..., 3), `radii` (...) in m; see `robot_side.overlap.volumes`."""
+        """Return the overlap with the spheres `centers` (..., 3), `radii` (...) in m; see `volumes`."""
         (volumes, gradients, areas), _ = self._query(centers, radii)
         return (volumes, gradients, areas) if gradient else volumes
 
     def counts(self, centers: Array, radii: Array) -> IntArray:
-        """(...): how many triangles a query of each sphere evaluates, which is what it costs."""
+        """Return the number of triangles (...) that a query of each sphere evaluates: its cost."""
         return self._query(centers, radii)[1]
 
     def _query(self, centers: Array, radii: Array) -> tuple[Overlaps, IntArray]:
@@ -102,10 +101,9 @@ def sphere_mesh(
 def sphere_mesh(
     centers: Array, radii: Array, vertices: Array, triangles: Array, *, gradient: bool = False
 ) -> FloatArray | Overlaps:
-    """Overlap of the spheres `centers` (..., 3), `radii` (...) with one mesh; see `Mesh` and `volumes`.
+    """Return the overlap of the spheres `centers` (..., 3), `radii` (...) with one mesh; see `Mesh` and `volumes`.
 
-    The last few meshes are remembered, so that they are not prepared again; a `Mesh` of your own also saves the
-    comparison.
+    The last eight meshes are cached, so that they are not prepared again. A `Mesh` object also saves the look-up.
     """
     places = np.ascontiguousarray(checked_vertices(vertices))
     indices = checked_triangles(triangles, len(places))

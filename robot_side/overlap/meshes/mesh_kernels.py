@@ -1,7 +1,7 @@
-"""Overlaps and distances of (sphere, placed mesh) pairs in contiguous arrays: what a 1 kHz tick calls.
+"""Overlaps and distances of (sphere, placed mesh) pairs in contiguous arrays, for calls in a 1 kHz tick.
 
-Nothing is validated here, see `kernels`. A placed mesh is queried in its own frame, in which the sphere's centre is
-Qᵀ (centre - position), Q being the rotation from the mesh's frame to the world.
+Arguments are not validated, see `kernels`. A placed mesh is queried in its own frame. There the sphere's centre is
+Qᵀ (centre - position), with Q the rotation from the mesh's frame to the world.
 """
 
 from common.arrays import FloatArray, IntArray
@@ -26,18 +26,18 @@ from robot_side.overlap.meshes.triangle_lanes import SCRATCH
 MESH_ARGUMENTS = (
     *(input_array(2), input_array(2), input_array(2), input_indices(), input_array(2), input_indices(), input_array(1)),
 )
-"""The Numba types of the fields of `MeshTables`."""
+"""Numba types of the fields of `MeshTables`"""
 PLACED_ARGUMENTS = (input_indices(), input_array(2), input_array(3))
-"""Those of placed meshes: their indices (q,), positions (q, 3) and rotations (q, 3, 3)."""
+"""Numba types of placed meshes: indices (q,), positions (q, 3) and rotations (q, 3, 3)"""
 
 _ON_SURFACE = 1e-12
-"""A point is on the surface within this share of the mesh's size: its side is then the nearest triangle's."""
+"""Distance from the surface, as a share of the mesh's size, up to which the nearest triangle decides a point's side"""
 _scratch = on_stack(SCRATCH)
 
 
 @inlined
 def to_mesh(center: Vector, positions: FloatArray, rotations: FloatArray, pair: int) -> PreciseVector:
-    """A centre in the mesh's frame; a float would be too coarse for a ball on the far end of a large mesh."""
+    """Return a centre in the mesh's frame; a float would be too coarse for a ball at the far end of a large mesh."""
     away = (
         two_sum(center[0], -positions[pair, 0]),
         two_sum(center[1], -positions[pair, 1]),
@@ -58,7 +58,7 @@ def _product(a: Vector, b: PreciseVector) -> DoubleDouble:
 
 @inlined
 def to_world(rotations: FloatArray, pair: int, vector: Vector) -> Vector:
-    """Turn a vector from the frame of a placed mesh to the world's."""
+    """Rotate a vector from the frame of a placed mesh to the world frame."""
     rotation = rotations[pair]
     return dot(load(rotation, 0), vector), dot(load(rotation, 1), vector), dot(load(rotation, 2), vector)
 
@@ -88,10 +88,10 @@ def overlap_loop(
     touched: IntArray,
     near: IntArray,
 ) -> None:
-    """Fill volumes, gradients (in the world's frame), areas, and how many triangles each pair evaluated.
+    """Fill volumes, gradients (in the world frame), areas, and the numbers of triangles that each pair evaluated.
 
-    placed (p,): which of the placed meshes, rows of the three arrays that follow, each sphere is paired with.
-    near: room for one triangle more than there are.
+    placed (p,): each sphere's placed mesh, a row of the three arrays that follow.
+    near: scratch for one triangle more than there are.
     """
     tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
     scratch = _scratch()
@@ -114,7 +114,7 @@ def overlap_loop(
 
 @building_block
 def _signed_distance(tables: MeshTables, mesh: int, point: Vector) -> tuple[float, Vector]:
-    """(signed distance in m, negative inside; unit vector along which it falls fastest), in the mesh's frame."""
+    """Return (signed distance in m, negative inside; unit vector along which it falls fastest), in the mesh's frame."""
     triangle, foot = nearest_triangle(tables, mesh, point)
     distance = norm(foot)
     normal = tables.triangles[triangle, 9], tables.triangles[triangle, 10], tables.triangles[triangle, 11]
@@ -150,7 +150,7 @@ def nearest_loop(
     distances: FloatArray,
     directions: FloatArray,
 ) -> None:
-    """Fill signed distances (m) and directions (in the world's frame)."""
+    """Fill signed distances (m) and directions (in the world frame)."""
     tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
     for pair in range(mesh_index.size):
         point = to_mesh(load(centers, pair), positions, rotations, pair)

@@ -13,14 +13,14 @@ from robot_side.overlap.meshes.mesh_kernels import nearest_loop, overlap_loop
 from robot_side.overlap.meshes.mesh_tables import joined
 
 _FLAT_M = 1e-7
-"""A dent that is no deeper is none."""
+"""Depth of a dent up to which a mesh counts as convex"""
 _TOGETHER = 64
-"""Triangles that are looked at together: most meshes with dents show them early."""
+"""Triangles that are tested together: most meshes with dents show one early."""
 
 
 @dataclass(frozen=True)
 class MeshBounds:
-    """What contains each of m meshes, in its own frame: a box along the axes, and a sphere about the same middle."""
+    """Bounding volumes of m meshes in their own frames: boxes along the axes, and spheres about the same middles."""
 
     middles_m: FloatArray
     """(m, 3)"""
@@ -31,7 +31,7 @@ class MeshBounds:
 
 
 class MeshLibrary:
-    """The meshes that a scene places, each named by its index; it does not change. ValueError for none."""
+    """Meshes that a scene places by their indices; immutable. ValueError for an empty list."""
 
     def __init__(self, meshes: Sequence[Mesh]) -> None:
         if not meshes:
@@ -46,7 +46,7 @@ class MeshLibrary:
 
     @cached_property
     def bounds(self) -> MeshBounds:
-        """What contains each mesh."""
+        """Bounding volumes of the meshes"""
         tables = self.tables
         roots = tables.roots[:-1]
         lowest, highest = tables.boxes[roots, :3], tables.boxes[roots, 3:]
@@ -59,7 +59,7 @@ class MeshLibrary:
 
     @cached_property
     def convex(self) -> BoolArray:
-        """(m,): whether no corner of a mesh lies in front of any of its triangles."""
+        """(m,) whether each mesh is convex: no corner in front of any of its triangles"""
         tables = self.tables
         first = tables.links.reshape(-1, 3)[tables.roots[:-1], 1]
         parts = (np.split(part, first[1:]) for part in (tables.triangles[:, :9], tables.triangles[:, 9:12]))
@@ -67,19 +67,19 @@ class MeshLibrary:
 
     @property
     def corners_m(self) -> list[FloatArray]:
-        """Each mesh's triangles (t, 3, 3) in its own frame."""
+        """Triangles (t, 3, 3) of each mesh in its own frame"""
         first_triangles = self.tables.links.reshape(-1, 3)[self.tables.roots[:-1], 1]
         return np.split(self.tables.triangles[:, :9].reshape(-1, 3, 3), first_triangles[1:])
 
     def placed_middles_m(self, mesh_index: IntArray, positions: FloatArray, rotations: FloatArray) -> FloatArray:
-        """The middles (q, 3) of the bounds of placed meshes in the world frame; arguments as for `mesh_pairs`."""
+        """Return the middles (q, 3) of placed meshes' bounds in the world frame; arguments as for `mesh_pairs`."""
         middles = self.bounds.middles_m.take(mesh_index, axis=0)
         placed: FloatArray = positions + np.einsum("qij,qj->qi", rotations, middles)
         return placed
 
 
 def _is_convex(corners: FloatArray, normals: FloatArray) -> bool:
-    """Whether triangles (t, 9) with outward normals (t, 3) bound a convex solid."""
+    """Return whether triangles (t, 9) with outward normals (t, 3) bound a convex solid."""
     first, places = corners[:, :3], np.unique(corners.reshape(-1, 3), axis=0)
     offsets = np.einsum("ti,ti->t", normals, first)
     return all(
@@ -96,10 +96,10 @@ def mesh_pairs(
     positions: FloatArray,
     rotations: FloatArray,
 ) -> Overlaps:
-    """Spheres `centers` (p, 3), `radii` (p,) with meshes `mesh_index` (p,) int64 at `positions` (p, 3).
+    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with meshes `mesh_index` (p,) int64.
 
-    `rotations` (p, 3, 3) turn each mesh's frame to the world's. Returns (volumes (p,), gradients (p, 3), areas (p,)) as
-    `kernels` does, and like it checks nothing: an index that the library lacks reads beyond its arrays.
+    Meshes are at `positions` (p, 3); `rotations` (p, 3, 3) turn their frames to the world's. The result is (volumes
+    (p,), gradients (p, 3), areas (p,)), as in `kernels`. Nothing is checked: a wrong index reads beyond the arrays.
     """
     count = len(radii)
     volumes, gradients, areas = np.empty(count), np.empty((count, 3)), np.empty(count)
@@ -113,10 +113,10 @@ def mesh_pairs(
 def nearest_mesh_pairs(
     centers: FloatArray, library: MeshLibrary, mesh_index: IntArray, positions: FloatArray, rotations: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """(signed distances (p,) in m, negative inside; unit directions (p, 3)) of points and placed meshes.
+    """Return (signed distances (p,) in m, negative inside; unit directions (p, 3)) of points and placed meshes.
 
-    The direction is that in which the signed distance falls fastest: towards the
-    nearest point of the surface from outside, away from it from inside. Arguments as for `mesh_pairs`.
+    The signed distance falls fastest along the direction: towards the nearest point of the surface from outside, away
+    from that point from inside. Arguments as for `mesh_pairs`.
     """
     distances, directions = np.empty(len(centers)), np.empty((len(centers), 3))
     nearest_loop(centers, mesh_index, positions, rotations, *library.tables, distances, directions)

@@ -1,4 +1,4 @@
-"""One sphere and one closed mesh (eq. 11); `triangle_lanes` has the idea."""
+"""Overlap of a sphere and a closed mesh (eq. 11); `triangle_lanes` explains the method."""
 
 import math
 from typing import NamedTuple
@@ -47,17 +47,17 @@ from robot_side.overlap.meshes.triangle_lanes import (
 
 _WHOLE = 4.0 * math.pi
 _UNDECIDED_AREA = 1e-11
-"""Solid angles (sr) this near to 0 or 4π may be either."""
+"""Distance of a solid angle (sr) from 0 or 4π up to which it may be either"""
 _UNDECIDED_VOLUME = 1e-8
-"""Volumes of the part inside (the ball's radius being 1) that tell nothing about which."""
+"""Volume of the part inside (for radius 1) up to which it does not decide between 0 and 4π"""
 _SMALL_VOLUME = 1e-5
-"""A volume below this (the ball's radius being 1) is formed anew with less cancellation."""
+"""Volume (for radius 1) below which it is recomputed with less cancellation"""
 _CLOSE = 0.02
-"""A centre farther than this from the surface (in radii) cannot be inside where the volume is small."""
+"""Distance from the surface, in radii, beyond which a centre cannot be inside if the volume is small"""
 
 
 class Sums(NamedTuple):
-    """Of triangles: the product of their numbers, and the sums of `TURN`, `MOMENT` and `PUSH`."""
+    """Sums over triangles: the product of their complex numbers, and the sums of `TURN`, `MOMENT` and `PUSH`."""
 
     product: Complex
     turn: float
@@ -77,10 +77,10 @@ def mesh_overlap(
     near: IntArray,
     scratch: FloatArray,
 ) -> tuple[Overlap, int]:
-    """(the overlap of the sphere with a mesh, how many triangles were evaluated for it).
+    """Return (the overlap of the sphere with a mesh, the number of triangles evaluated).
 
-    The centre (m) is in the mesh's frame; `near` has room for one triangle more than the
-    mesh has, `scratch` for `triangle_lanes.SCRATCH` numbers.
+    The centre (m) is in the mesh's frame. `near` has room for one triangle more than the mesh has, `scratch` for
+    `triangle_lanes.SCRATCH` numbers.
     """
     center = highs(precise_center)
     least_2, most_2 = box_distances_2(tables, mesh, center)
@@ -110,7 +110,7 @@ def mesh_overlap(
         applies, small, small_covered, small_push = _small_overlap(precise_center, radius, tables, near, count)
         if applies:
             volume, covered, push = small, small_covered, small_push
-    # In radii up to here.
+    # Up to here lengths are in radii.
     area = radius * radius
     overlap = volume * area * radius, scale(-area, push), covered * area
     return bounded(overlap, radius, tables.volumes[mesh]), count
@@ -118,7 +118,7 @@ def mesh_overlap(
 
 @inlined
 def box_distances_2(tables: MeshTables, mesh: int, point: Vector) -> tuple[float, float]:
-    """The squared distances (m²) from `point` to the nearest and the farthest point of a mesh's box."""
+    """Return the squared distances (m²) from `point` to the nearest and the farthest point of a mesh's box."""
     least, most = 0.0, 0.0
     root = tables.roots[mesh]
     for axis in range(3):
@@ -140,7 +140,7 @@ def measured(
     count: int,
     scratch: FloatArray,
 ) -> tuple[int, bool]:
-    """Measure the triangles in `near` from `first` on; how many there was room for, and whether any is large."""
+    """Measure the triangles in `near` from `first` on; return how many fitted, and whether any is large."""
     size = min(count - first, LANES)
     groups = (size + (WIDTH - 1)) // WIDTH
     _load_lanes(tables, near, first, size, groups, scratch)
@@ -153,7 +153,7 @@ def measured(
 
 @inlined
 def with_lanes(sums: Sums, size: int, scratch: FloatArray) -> Sums:
-    """Add what has been measured."""
+    """Return the sums with the measured triangles added."""
     triangle_terms(scratch, (size + (WIDTH - 1)) // WIDTH)
     reduce_lanes(scratch, size)
     product = times(sums.product, (scratch[REAL], scratch[IMAGINARY]))
@@ -168,7 +168,7 @@ def with_lanes(sums: Sums, size: int, scratch: FloatArray) -> Sums:
 
 @inlined
 def solid_angle_inside(sums: Sums, tables: MeshTables, mesh: int, center: Vector, radius: float) -> float:
-    """The part of the sphere (sr) that lies inside the mesh."""
+    """Return the part of the sphere (sr) that lies inside the mesh."""
     covered = -2.0 * (math.atan2(sums.product[1], sums.product[0]) + sums.turn)
     covered -= _WHOLE * math.floor(covered / _WHOLE)
     if covered < _UNDECIDED_AREA or covered > _WHOLE - _UNDECIDED_AREA:
@@ -183,7 +183,7 @@ def solid_angle_inside(sums: Sums, tables: MeshTables, mesh: int, center: Vector
 def _small_overlap(
     center: PreciseVector, radius: float, tables: MeshTables, near: IntArray, count: int
 ) -> tuple[bool, float, float, Vector]:
-    """(whether it applies, volume, covered solid angle, Σ A n) of the triangles in `near`, the radius being 1."""
+    """Return (whether it applies, volume, covered solid angle, Σ A n) of the triangles in `near`, for radius 1."""
     volume, covered, push = ZERO, ZERO, (ZERO, ZERO, ZERO)
     to_radii = divided((1.0, 0.0), (radius, 0.0))
     for index in range(count):
@@ -211,7 +211,7 @@ def _lows(vector: PreciseVector) -> Vector:
 @inlined
 def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, groups: int, scratch: FloatArray) -> None:
     triangles, last = tables.triangles.reshape(-1), first + size - 1
-    # Whole groups spare the loops a remainder; the last triangle fills up the last group.
+    # Only whole groups, so that loops have no remainder; the last triangle fills the last group.
     for lane in range(0, groups * WIDTH, 4):
         place = first + lane
         row_0, row_1 = FIELDS * near[min(place, last)], FIELDS * near[min(place + 1, last)]
@@ -223,10 +223,10 @@ def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, group
 
 @building_block
 def _mostly_inside(tables: MeshTables, mesh: int, center: Vector, radius: float) -> bool:
-    """Whether the ball lies inside the mesh, which is known of all but a tiny part of it to be so or not to be so.
+    """Return whether the ball lies inside the mesh, up to a tiny part; otherwise it lies outside, up to a tiny part.
 
-    The centre itself may be in that part, in a needle or a narrow slit: of some points the one farthest from the
-    surface decides.
+    The centre itself may be in that part, in a needle or a narrow slit. So the point farthest from the surface decides,
+    of eight points.
     """
     best, best_2 = center, -1.0
     for number in range(8):

@@ -1,4 +1,4 @@
-"""Closed meshes around round solids, never smaller than these, with bounds on what they add; convex hulls.
+"""Closed meshes around round solids, never smaller than these, with bounds on the excess; convex hulls.
 
 Rounding may move a vertex by its last digit.
 """
@@ -13,20 +13,20 @@ from common.arrays import FloatArray, IntArray
 
 
 class ShapeMesh(NamedTuple):
-    """A mesh within which a solid lies."""
+    """Mesh that contains a solid."""
 
     vertices: FloatArray
     """(v, 3) in m"""
     triangles: IntArray
     """(t, 3)"""
     excess: float
-    """The share of the solid's volume by which the mesh's is greater, at most."""
+    """Largest excess of the mesh's volume, as a share of the solid's"""
     stands_out_m: float
-    """How far any point of the mesh is from the solid, at most."""
+    """Largest distance of a point of the mesh from the solid"""
 
 
 def cylinder_mesh(radius: float, half_length: float, segments: int = 32) -> ShapeMesh:
-    """A prism of `segments` sides, each touching the cylinder about the z axis, |z| <= half_length; m.
+    """Return a prism of `segments` sides, each touching the cylinder about the z axis, |z| <= half_length; m.
 
     The excess is that of a circumscribed polygon: (n / π) tan(π / n) - 1.
     """
@@ -40,10 +40,10 @@ def cylinder_mesh(radius: float, half_length: float, segments: int = 32) -> Shap
 
 
 def ellipsoid_mesh(semi_axes: npt.ArrayLike, subdivisions: int = 8) -> ShapeMesh:
-    """A polyhedron about the ellipsoid Σ (xᵢ / semi_axesᵢ)² <= 1, `semi_axes` (3,) in m.
+    """Return a polyhedron about the ellipsoid Σ (xᵢ / semi_axesᵢ)² <= 1, `semi_axes` (3,) in m.
 
     The sphere's octahedron with `subdivisions` triangles along each edge, enlarged until no face cuts the sphere, and
-    stretched. Its volume is known, so that the excess is the very one.
+    stretched. Its volume is known, so the excess is exact.
     """
     axes = np.asarray(semi_axes, dtype=np.float64)
     unit = _round(subdivisions, 0.0)
@@ -51,7 +51,7 @@ def ellipsoid_mesh(semi_axes: npt.ArrayLike, subdivisions: int = 8) -> ShapeMesh
 
 
 def capsule_mesh(radius: float, half_length: float, subdivisions: int = 8) -> ShapeMesh:
-    """A polyhedron about the capsule of points within `radius` of the segment |z| <= half_length on the z axis; m.
+    """Return a polyhedron about the capsule, the points within `radius` of |z| <= half_length on the z axis; m.
 
     The halves of an `ellipsoid_mesh` of equal axes, moved apart.
     """
@@ -60,9 +60,9 @@ def capsule_mesh(radius: float, half_length: float, subdivisions: int = 8) -> Sh
 
 
 def convex_hull_mesh(points: npt.ArrayLike) -> ShapeMesh:
-    """The convex hull of `points` (n, 3) in m, with only those vertices that it needs; nothing is added.
+    """Return the convex hull of `points` (n, 3) in m, with its corners as the only vertices.
 
-    ValueError for points all in one plane.
+    ValueError for points that are all in one plane.
     """
     places = np.asarray(points, dtype=np.float64)
     try:
@@ -76,7 +76,7 @@ def convex_hull_mesh(points: npt.ArrayLike) -> ShapeMesh:
 
 
 def _outward_hull(vertices: FloatArray) -> IntArray:
-    """The triangles (t, 3) of the convex hull, anticlockwise as seen from outside."""
+    """Return the triangles (t, 3) of the convex hull, anticlockwise as seen from outside."""
     hull = ConvexHull(vertices)
     corners = vertices[hull.simplices]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -87,7 +87,7 @@ def _outward_hull(vertices: FloatArray) -> IntArray:
 
 
 def _round(subdivisions: int, half_length: float) -> ShapeMesh:
-    """About the unit sphere, its halves moved apart by ±half_length along z; the ring between them is a prism."""
+    """Return a mesh about the unit sphere with halves moved apart by ±half_length along z, and a prism in between."""
     steps = range(-subdivisions, subdivisions + 1)
     lattice = [(x, y, z) for x in steps for y in steps for z in steps if abs(x) + abs(y) + abs(z) == subdivisions]
     directions = np.array(lattice, dtype=np.float64)
@@ -109,7 +109,7 @@ def _round(subdivisions: int, half_length: float) -> ShapeMesh:
 
 
 def _face_distances(vertices: FloatArray, triangles: IntArray) -> FloatArray:
-    """(t,): the distances of the triangles' planes from the origin."""
+    """Return the distances (t,) of the triangles' planes from the origin."""
     a, b, c = np.moveaxis(vertices[triangles], 1, 0)
     normals = np.cross(b - a, c - a)
     return np.asarray(np.abs(np.sum(a * normals, axis=1)) / np.linalg.norm(normals, axis=1))

@@ -1,4 +1,4 @@
-"""What the mesh kernels read: triangles in the order of their tree, and the tree, of one mesh or of several."""
+"""Tables for the mesh kernels: triangles in the order of their tree, and the tree, of one or several meshes."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -9,34 +9,34 @@ from common.arrays import FloatArray, IntArray
 from robot_side.overlap.meshes.triangle_tree import LINKS, build_tree
 
 FIELDS = 16
-"""Numbers for each triangle in `MeshTables.triangles`."""
+"""Numbers for each triangle in `MeshTables.triangles`"""
 
 
 class MeshTables(NamedTuple):
     """Flat arrays of m meshes with t triangles and n nodes in all; lengths in m."""
 
     triangles: FloatArray
-    """(t, 16): corners (9), outward unit normal (3), inverse edge lengths (3, from corner i to i + 1), longest edge."""
+    """(t, 16) corners (9), outward unit normal (3), inverse edge lengths (3, from corner i to i + 1), longest edge"""
     spheres: FloatArray
-    """(t, 4): centre and radius of a ball around each triangle."""
+    """(t, 4) centre and radius of a ball around each triangle"""
     boxes: FloatArray
-    """(n, 6): see `TriangleTree`."""
+    """(n, 6) see `TriangleTree`"""
     links: IntArray
-    """(3 n,): see `TriangleTree`, with indices into these arrays."""
+    """(3 n,) see `TriangleTree`, with indices into these arrays"""
     moments: FloatArray
-    """(n, 7): see `TriangleTree`."""
+    """(n, 7) see `TriangleTree`"""
     roots: IntArray
-    """(m + 1,): the root node of each mesh, and n."""
+    """(m + 1,) root node of each mesh, and n"""
     volumes: FloatArray
-    """(m,): each mesh's own volume (m³)."""
+    """(m,) volume of each mesh (m³)"""
 
     def room(self) -> IntArray:
-        """Room (t + 1,) for the triangles near a sphere, and one more; anything is in it."""
+        """Return uninitialised scratch (t + 1,) for the triangles near a sphere, and one more."""
         return np.empty(len(self.triangles) + 1, dtype=np.int64)
 
 
 def mesh_tables(corners: FloatArray, volume: float) -> MeshTables:
-    """The tables of one mesh with the triangles `corners` (t, 3, 3)."""
+    """Return the tables of one mesh with the triangles `corners` (t, 3, 3)."""
     tree = build_tree(corners)
     corners = corners[tree.order]
     edges = np.roll(corners, -1, axis=1) - corners
@@ -58,7 +58,7 @@ def mesh_tables(corners: FloatArray, volume: float) -> MeshTables:
 
 
 def joined(parts: Sequence[MeshTables]) -> MeshTables:
-    """The tables of several meshes as one."""
+    """Join the tables of several meshes."""
     links, roots, nodes, triangles = [], [0], 0, 0
     for part in parts:
         shift = np.array([nodes, triangles, 0], dtype=np.int64)
@@ -84,7 +84,7 @@ def _read_only(*arrays: np.ndarray) -> MeshTables:
 
 
 def _normals(edges: FloatArray, lengths: FloatArray) -> FloatArray:
-    """The unit normals (t, 3), worked out in extended precision; of a triangle without area any across its edges."""
+    """Return the unit normals (t, 3), in extended precision; for a triangle without area, any across its edges."""
     wide = edges.astype(np.longdouble)
     longest = lengths.argmax(axis=1)
     rows = np.arange(len(edges))
@@ -99,7 +99,7 @@ def _normals(edges: FloatArray, lengths: FloatArray) -> FloatArray:
 
 
 def _enclosing_balls(corners: FloatArray, edges: FloatArray, lengths: FloatArray) -> FloatArray:
-    """(t, 4): the ball about the middle of the longest edge or, where that leaves a corner out, about the centroid."""
+    """Return the smaller ball (t, 4) around each triangle: about the middle of its longest edge, or its centroid."""
     rows, longest = np.arange(len(corners)), lengths.argmax(axis=1)
     middles = corners[rows, longest] + 0.5 * edges[rows, longest]
     centroids = corners.mean(axis=1)

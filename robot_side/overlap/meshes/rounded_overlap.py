@@ -1,4 +1,4 @@
-"""One sphere and one closed mesh to 1e-13 of the sphere, as looks ahead need it: without what saves further digits."""
+"""Overlap of a sphere and a closed mesh to 1e-13 of the sphere, for looks: without the steps for further digits."""
 
 import math
 
@@ -13,14 +13,14 @@ from robot_side.overlap.meshes.tree_queries import corner_of, gather_near, is_in
 from robot_side.overlap.meshes.triangle_lanes import LANES
 
 _SAME_PLANE = 1e-9
-"""Triangles lie in one plane if their normals, and their distances in radii, are off by no more."""
+"""Largest difference of the normals, and of the distances in radii, of triangles in one plane"""
 
 
 @building_block
 def rounded_overlap(
     center: Vector, radius: float, tables: MeshTables, mesh: int, near: IntArray, scratch: FloatArray
 ) -> tuple[float, Vector]:
-    """(volume, gradient); arguments as of `mesh_overlap`."""
+    """Return (volume, gradient); arguments as of `mesh_overlap`."""
     least_2, most_2 = box_distances_2(tables, mesh, center)
     if least_2 >= radius * radius or radius == 0.0:
         return 0.0, (0.0, 0.0, 0.0)
@@ -31,7 +31,7 @@ def rounded_overlap(
     if count == 0:
         return sphere_volume(radius) if is_inside(tables, mesh, center) else 0.0, (0.0, 0.0, 0.0)
     if flat:
-        # Where the ball meets no other plane, the triangles of this one cover all of the disc.
+        # If the ball meets no other plane, the triangles of this one cover the whole disc.
         normal = corner_of(tables, near[0], 3)
         height = dot(normal, subtract(center, corner_of(tables, near[0], 0)))
         volume, gradient, _ = cap(radius - height, radius + height, radius, normal)
@@ -48,7 +48,7 @@ def rounded_overlap(
 
 @building_block
 def _keep_near(tables: MeshTables, center: Vector, radius: float, near: IntArray, count: int) -> int:
-    """Keep those triangles in `near` whose planes the ball meets; how many."""
+    """Keep the triangles in `near` whose planes the ball meets; return their number."""
     kept = 0
     for index in range(count):
         triangle = near[index]
@@ -60,7 +60,10 @@ def _keep_near(tables: MeshTables, center: Vector, radius: float, near: IntArray
 
 @building_block
 def _keep_touched(tables: MeshTables, center: Vector, radius: float, near: IntArray, count: int) -> tuple[int, bool]:
-    """Keep those triangles in `near` that the ball touches, until two planes are; how many, and whether it is one."""
+    """Keep the triangles in `near` that the ball touches, and all from the second plane on.
+
+    Return their number, and whether there is only one plane.
+    """
     kept = 0
     for index in range(count):
         triangle = near[index]
@@ -88,7 +91,7 @@ def _has_corner_in(tables: MeshTables, triangle: int, center: Vector, radius: fl
 
 @inlined
 def _in_plane(tables: MeshTables, triangle: int, other: int, radius: float) -> bool:
-    """Whether two triangles lie in one plane."""
+    """Return whether two triangles lie in one plane."""
     normal = corner_of(tables, triangle, 3)
     off = subtract(normal, corner_of(tables, other, 3))
     lifted = dot(normal, subtract(corner_of(tables, triangle, 0), corner_of(tables, other, 0)))

@@ -1,9 +1,8 @@
-"""Tiny overlaps with a mesh whose centre lies outside, in double-double arithmetic.
+"""Tiny overlaps of a mesh and a sphere whose centre lies outside, in double-double arithmetic.
 
-The sum of `triangle_lanes` takes the overlap's part of the sphere from the whole turn; what is left has the rounding
-errors of the whole. Without a whole turn the volume is - Σ (R³ Ω - h A) / 3, in which each face's term is the part of
-the ball beyond it: small where the overlap is, though an edge's or corner's overlap is far smaller still than these
-terms. Hence 31 digits.
+The sum of `triangle_lanes` is a small difference from a whole turn, with the rounding errors of the whole. Without a
+whole turn the volume is - Σ (R³ Ω - h A) / 3. Each face's term is the part of the ball beyond the face. The terms are
+small if the overlap is small, but the overlap with an edge or corner is far smaller still. Hence 31 digits.
 """
 
 from robot_side.compiled.kernel import building_block, inlined
@@ -34,12 +33,12 @@ from robot_side.overlap.meshes.large_triangles import PreciseTriangle
 _ONE: DoubleDouble = (1.0, 0.0)
 
 BeyondFace = tuple[DoubleDouble, DoubleDouble, PreciseVector]
-"""(volume, solid angle, area times normal), the radius being 1."""
+"""(volume, solid angle, area times normal), for radius 1"""
 
 
 @building_block
 def beyond_face(corners: PreciseTriangle) -> BeyondFace:
-    """The part of the unit ball that lies beyond a triangle as seen from its centre, positive if that is inward.
+    """Return the part of the unit ball beyond a triangle as seen from the centre, positive if that is inward.
 
     `corners` are relative to the centre, in radii.
     """
@@ -92,12 +91,12 @@ def _clipped(along: DoubleDouble, half_chord: DoubleDouble) -> DoubleDouble:
 
 @building_block
 def _angle(distance: DoubleDouble, start: DoubleDouble, end: DoubleDouble) -> DoubleDouble:
-    """The angle about the face's foot point from one place along an edge to another."""
+    """Return the angle about the face's foot point from one place along an edge to another."""
     return arctangent(times(distance, minus(end, start)), plus(times(distance, distance), times(start, end)))
 
 
 @building_block
 def _seen(depth: DoubleDouble, distance: DoubleDouble, base: DoubleDouble, along: DoubleDouble) -> DoubleDouble:
-    """The solid angle of the triangle (face's foot, edge's foot, edge's end at `along`)."""
+    """Return the solid angle of the triangle (face's foot, edge's foot, edge's end at `along`)."""
     away = square_root(plus(times(base, base), times(along, along)))
     return multiple(2.0, arctangent(times(distance, along), times(plus(base, depth), plus(base, away))))

@@ -1,4 +1,4 @@
-"""Walks over a mesh's tree: the triangles that a ball may reach, the nearest one, the winding number."""
+"""Queries of a mesh's tree: the triangles that a ball may reach, the nearest one, the winding number."""
 
 import math
 
@@ -10,12 +10,12 @@ from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, sca
 from robot_side.overlap.meshes.mesh_tables import MeshTables
 
 _CERTAIN = 0.2
-"""A winding number this near to a whole number is taken for it."""
+"""Distance from a whole number up to which a winding number is rounded to it"""
 
 
 @inlined
 def _box_distance_2(tables: MeshTables, node: int, point: Vector) -> float:
-    """The squared distance (m²) from `point` to the box of a node."""
+    """Return the squared distance (m²) from `point` to the box of a node."""
     total = 0.0
     row = np.uint64(node)
     for axis in range(3):
@@ -27,16 +27,16 @@ def _box_distance_2(tables: MeshTables, node: int, point: Vector) -> float:
 
 @inlined
 def is_clear_of(tables: MeshTables, mesh: int, point: Vector, radius: float) -> bool:
-    """Whether a ball lies outside a mesh's box, whatever `point` has lost in rounding."""
+    """Return whether a ball lies outside a mesh's box, with a margin for the rounding of `point`."""
     apart_2 = _box_distance_2(tables, tables.roots[mesh], point)
     return apart_2 > 1.000001 * radius * radius + 1e-24 * dot(point, point)
 
 
 @building_block
 def gather_near(tables: MeshTables, mesh: int, point: Vector, radius: float, near: IntArray) -> int:
-    """Write the triangles that the ball (`point`, `radius`) may reach into `near`; how many.
+    """Write the triangles that the ball (`point`, `radius`) may reach into `near`; return their number.
 
-    All that it reaches are among them. `near` has room for every triangle of the mesh and one more.
+    No triangle that the ball reaches is missing. `near` has room for every triangle of the mesh and one more.
     """
     count = 0
     node, end = tables.roots[mesh], tables.roots[mesh + 1]
@@ -51,7 +51,7 @@ def gather_near(tables: MeshTables, mesh: int, point: Vector, radius: float, nea
             gap_y = tables.spheres[row, 1] - point[1]
             gap_z = tables.spheres[row, 2] - point[2]
             reach = tables.spheres[row, 3] + radius
-            # Written in any case, kept by counting on: no branch to guess.
+            # Always written, and kept by the count: no branch to predict.
             near[count] = triangle
             count += 1 if gap_x * gap_x + gap_y * gap_y + gap_z * gap_z <= reach * reach else 0
         node += 1
@@ -60,7 +60,7 @@ def gather_near(tables: MeshTables, mesh: int, point: Vector, radius: float, nea
 
 @inlined
 def corner_of(tables: MeshTables, triangle: int, number: int) -> Vector:
-    """A corner of a triangle (m), 0 to 2; its outward unit normal for 3."""
+    """Return a corner of a triangle (m), 0 to 2; its outward unit normal for 3."""
     return (
         tables.triangles[triangle, 3 * number],
         tables.triangles[triangle, 3 * number + 1],
@@ -70,7 +70,7 @@ def corner_of(tables: MeshTables, triangle: int, number: int) -> Vector:
 
 @building_block
 def to_triangle(tables: MeshTables, triangle: int, point: Vector) -> Vector:
-    """The vector (m) from `point` to the nearest point of a triangle."""
+    """Return the vector (m) from `point` to the nearest point of a triangle."""
     normal = corner_of(tables, triangle, 3)
     best, best_2 = (0.0, 0.0, 0.0), math.inf
     inside = True
@@ -85,21 +85,21 @@ def to_triangle(tables: MeshTables, triangle: int, point: Vector) -> Vector:
             best, best_2 = foot, distance_2
         inside = inside and dot(start, cross(edge, normal)) >= 0.0
     if inside:
-        # The corner nearest to the foot rounds least; any does near the triangle.
+        # The edge's nearest point, `best`, rounds least; near the triangle any point is good.
         return scale(dot(best, normal), normal)
     return best
 
 
 @building_block
 def squared_distance(tables: MeshTables, triangle: int, point: Vector) -> float:
-    """The squared distance (m²) from `point` to a triangle."""
+    """Return the squared distance (m²) from `point` to a triangle."""
     foot = to_triangle(tables, triangle, point)
     return dot(foot, foot)
 
 
 @building_block
 def touches_surface(tables: MeshTables, mesh: int, point: Vector, radius: float) -> bool:
-    """Whether any triangle is nearer to `point` than `radius`."""
+    """Return whether any triangle is nearer to `point` than `radius`."""
     node, end = tables.roots[mesh], tables.roots[mesh + 1]
     while node < end:
         if radius <= 0.0 or _box_distance_2(tables, node, point) > radius * radius:
@@ -117,9 +117,9 @@ def touches_surface(tables: MeshTables, mesh: int, point: Vector, radius: float)
 
 @building_block
 def nearest_triangle(tables: MeshTables, mesh: int, point: Vector) -> tuple[int, Vector]:
-    """(the triangle nearest to `point`, the vector in m from there to its nearest point)."""
+    """Return (the triangle nearest to `point`, the vector in m from `point` to its nearest point)."""
     first, end = tables.roots[mesh], tables.roots[mesh + 1]
-    # Going down to the nearer child gives a good bound to begin with.
+    # Descend to the nearer child for a good first bound.
     node = first
     while tables.links[3 * node + 2] == 0:
         second = tables.links[3 * (node + 1)]
@@ -147,7 +147,7 @@ def nearest_triangle(tables: MeshTables, mesh: int, point: Vector) -> tuple[int,
 
 @inlined
 def _crosses(start: Vector, end: Vector, point: Vector, u: int, v: int) -> bool:
-    """Whether the ray from `point` along the axis `u` crosses an edge in the plane of `u` and `v`; alike reversed."""
+    """Return whether the ray from `point` along `u` crosses an edge in the u-v plane; equal for a reversed edge."""
     if (start[v] > point[v]) == (end[v] > point[v]):
         return False
     low, high = (start, end) if start[v] < end[v] else (end, start)
@@ -157,9 +157,9 @@ def _crosses(start: Vector, end: Vector, point: Vector, u: int, v: int) -> bool:
 
 @building_block
 def is_inside(tables: MeshTables, mesh: int, point: Vector) -> bool:
-    """Whether a point off the surface lies inside a mesh.
+    """Return whether a point off the surface lies inside a mesh.
 
-    A ray along an axis, out of the mesh's box by the nearest side, then crosses the surface an odd number of times.
+    From inside, a ray along an axis, to the nearest side of the mesh's box, crosses the surface an odd number of times.
     """
     node, end = tables.roots[mesh], tables.roots[mesh + 1]
     axis, sign, least = 0, 1.0, math.inf
@@ -192,7 +192,7 @@ def is_inside(tables: MeshTables, mesh: int, point: Vector) -> bool:
 
 @inlined
 def _solid_angle(tables: MeshTables, triangle: int, point: Vector) -> float:
-    """The signed solid angle (sr) of a triangle, by van Oosterom and Strackee (1983)."""
+    """Return the signed solid angle (sr) of a triangle, by van Oosterom and Strackee (1983)."""
     a = subtract(corner_of(tables, triangle, 0), point)
     b = subtract(corner_of(tables, triangle, 1), point)
     c = subtract(corner_of(tables, triangle, 2), point)
@@ -205,10 +205,10 @@ def _solid_angle(tables: MeshTables, triangle: int, point: Vector) -> float:
 
 @building_block
 def winding_number(tables: MeshTables, mesh: int, point: Vector) -> int:
-    """How often the mesh's surface goes round `point`, which lies off it: 1 inside, 0 outside.
+    """Return the winding number of the mesh's surface about `point`, which lies off it: 1 inside, 0 outside.
 
-    Triangles far from the point count as dipoles (Barill and others, Fast Winding Numbers, 2018). The sum is a whole
-    number in truth; one that is not near enough to any is formed anew with fewer dipoles, at last with none.
+    Triangles far from the point count as dipoles (Barill and others, Fast Winding Numbers, 2018). The exact sum is a
+    whole number. A sum that is not near to one is recomputed with fewer dipoles, at last with none.
     """
     total = 0.0
     for share in (2.0, 4.0, math.inf):

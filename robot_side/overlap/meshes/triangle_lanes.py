@@ -1,24 +1,23 @@
-"""Many triangles against one ball at once: branch-free loops over lanes, which LLVM turns into vector code.
+"""Many triangles and one ball at once: branch-free loops over lanes, which LLVM compiles to vector code.
 
-Put the sphere's centre at the origin and its radius at 1. A face at the signed distance h along its outward
-normal hides, as seen from the centre, a part of the sphere by the piece of it that lies inside the ball; call
-the solid angle of that piece Ω, with the sign of h. Far faces need not be visited: the solid angles of a closed
-surface sum to 4π w, w its winding number about the centre, so that the part of the sphere's surface inside
-the solid is
+The sphere has its centre at the origin, and radius 1. A face at the signed distance h along its outward normal has a
+piece inside the ball. Ω is the solid angle of that piece at the centre, with the sign of h. Far faces need not be
+visited: the solid angles of a closed surface sum to 4π w, with w its winding number about the centre. So the part of
+the sphere's surface inside the solid is
 
     S = 4π w - Σ Ω        (sum over the faces that reach the ball)
 
-and, the volume being (Σ h A + S) / 3, only S modulo 4π is wanted: it lies between 0 and 4π.
+and the volume is (Σ h A + S) / 3. Only S modulo 4π is needed, as it lies between 0 and 4π.
 
-Ω is summed from the face's edges. With p the foot point of the centre on an edge's line, h = n·p, d the signed
-distance of p from the face's own foot point, b = |p|, t the place of an edge's end along the edge, clipped to the
-ball, and c its distance, the triangle (face's foot, edge's foot, end) is seen under the solid angle
-2 atan(d t / ((b + h)(b + c))); what of the face's disc lies beyond the edges' ends adds (1 - |h|) φ, φ being its
-angle. The half angles multiply as complex numbers over all edges of all faces and take no arctangent.
+Ω is a sum over the face's edges. Let p be the foot point of the centre on an edge's line, h = n·p, d the signed
+distance of p from the face's foot point, b = |p|, t the place of an edge's end along the edge, clipped to the
+ball, and c its distance. The triangle (face's foot, edge's foot, end) has the solid angle
+2 atan(d t / ((b + h)(b + c))). The part of the face's disc beyond the edges' ends adds (1 - |h|) φ, with φ its angle.
+The half angles multiply as complex numbers over all edges of all faces and need no arctangent.
 
-Two faces that share an edge use the same p to the last bit. An edge or corner that passes through the centre, where
-each face's angle is undetermined, is therefore moved by a rounding error for both alike, and the sum modulo 4π, which
-does not depend on where an edge runs inside the ball, stays right.
+Two faces that share an edge use the same p to the last bit. At an edge or corner through the centre each face's angle
+is undetermined. Both faces then move it by the same rounding error. The sum modulo 4π does not depend on the place of
+an edge inside the ball, and stays correct.
 """
 
 import math
@@ -29,11 +28,11 @@ from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
 from robot_side.overlap.digits.arctangent import arctangent
 
 LANES = 64
-"""Triangles handled at once."""
+"""Triangles in a batch"""
 WIDTH = 8
-"""Lanes come in groups of as many as the widest vectors hold."""
+"""Lanes in a group: as many as the widest vectors hold"""
 ROW = LANES + 8
-"""The distance between two rows of the scratch array: rows 4096 bytes apart would get in each other's way."""
+"""Distance between two rows of the scratch array: rows 4096 bytes apart would slow each other down."""
 
 # The rows of the scratch array, each of `LANES` numbers: one flat array with constant offsets lets LLVM see that
 # rows do not overlap. (A sum of two of these constants as an argument is enough to hide it.)
@@ -44,12 +43,12 @@ STARTS, ENDS, CORNER_DISTANCES, HEIGHT = 24 * ROW, 27 * ROW, 30 * ROW, 33 * ROW
 REAL, IMAGINARY, TURN, MOMENT = 34 * ROW, 35 * ROW, 36 * ROW, 37 * ROW
 PUSH, PUSH_Y, PUSH_Z = 38 * ROW, 39 * ROW, 40 * ROW
 SCRATCH = 41 * ROW
-"""The length of the scratch array."""
+"""Length of the scratch array"""
 
 ASIDE = 0.62e-30, -0.51e-30, 0.47e-30
-"""By how much all triangles are moved out of positions in which a corner, edge or face passes through the centre."""
+"""Displacement of all triangles, out of positions in which a corner, edge or face passes through the centre"""
 _ROUNDING = 4e-16
-"""A foot point this near to the centre, as a share of the end's distance that it comes from, is a rounding error."""
+"""Distance of a foot point from the centre, as a share of its end's distance, up to which it is a rounding error"""
 _FAR = 1e18
 
 
@@ -67,20 +66,20 @@ def _store3(scratch: FloatArray, row: int, lane: int, values: Vector) -> None:
 
 @inlined
 def _relative(corner: Vector, center: Vector, center_rest: Vector, scaling: float) -> Vector:
-    """`corner` from the centre, in radii, moved by what only coordinates of 0 take notice of."""
+    """Return `corner` from the centre, in radii, displaced so little that only coordinates of 0 change."""
     x, y, z = scale(scaling, subtract(subtract(corner, center), center_rest))
     return x + ASIDE[0], y + ASIDE[1], z + ASIDE[2]
 
 
 @inlined
 def aside(along: Vector) -> Vector:
-    """The foot point on an edge through the centre, moved like everything else: across `along`, its unit vector."""
+    """Return the foot point on an edge through the centre: the displacement across the edge's unit vector `along`."""
     return subtract(ASIDE, scale(dot(ASIDE, along), along))
 
 
 @inlined
 def _foot(start: Vector, end: Vector, start_rank: float, end_rank: float, along: Vector) -> Vector:
-    """The foot point on an edge's line, worked out from the end of lower rank: alike for the edge reversed."""
+    """Return the foot point on an edge's line, from the end of lower rank: equal for the reversed edge."""
     from_start = start_rank < end_rank
     near = (
         start[0] if from_start else end[0],
@@ -88,7 +87,7 @@ def _foot(start: Vector, end: Vector, start_rank: float, end_rank: float, along:
         start[2] if from_start else end[2],
     )
     raw = subtract(near, scale(dot(near, along), along))
-    # Where the edge passes close to the centre its rounding error lies along the edge as likely as across it.
+    # Close to the centre, the rounding error is as likely along the edge as across it.
     x, y, z = subtract(raw, scale(dot(raw, along), along))
     vanished = max(abs(x), abs(y), abs(z)) <= _ROUNDING * max(abs(near[0]), abs(near[1]), abs(near[2]))
     instead = aside(along)
@@ -97,9 +96,9 @@ def _foot(start: Vector, end: Vector, start_rank: float, end_rank: float, along:
 
 @building_block
 def triangle_geometry(scratch: FloatArray, groups: int, center: Vector, center_rest: Vector, radius: float) -> None:
-    """Fill `HEIGHTS` to `HEIGHT` from the corners, normals and inverse edge lengths of so many groups of `WIDTH` lanes.
+    """Fill `HEIGHTS` to `HEIGHT` from the corners, normals and inverse edge lengths of `groups` of `WIDTH` lanes.
 
-    The centre is `center` + `center_rest` (m), the corners are made relative to it, in radii.
+    The centre is `center` + `center_rest` (m); results are relative to the centre, in radii.
     """
     scaling = 1.0 / radius
     for lane in range(groups * WIDTH):
@@ -115,7 +114,7 @@ def triangle_geometry(scratch: FloatArray, groups: int, center: Vector, center_r
         b = _relative(raw_b, center, center_rest, scaling)
         c = _relative(raw_c, center, center_rest, scaling)
         a_2, b_2, c_2 = dot(a, a), dot(b, b), dot(c, c)
-        # The nearer end comes first; the small second part decides between ends that are equally near.
+        # The nearer end comes first; the small second term decides between ends that are equally near.
         rank_a = a_2 + 1e-9 * (a[0] + 0.73 * a[1] + 0.29 * a[2])
         rank_b = b_2 + 1e-9 * (b[0] + 0.73 * b[1] + 0.29 * b[2])
         rank_c = c_2 + 1e-9 * (c[0] + 0.73 * c[1] + 0.29 * c[2])
@@ -147,7 +146,7 @@ Complex = tuple[float, float]
 
 @inlined
 def times(a: Complex, b: Complex) -> Complex:
-    """The product of two complex numbers."""
+    """Return the product of two complex numbers."""
     return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
 
 
@@ -160,12 +159,12 @@ def _times_conjugate(a: Complex, b: Complex) -> Complex:
 def _end(
     along: float, away: float, distance: float, base: float, height: float, half_chord: float, shrink: float
 ) -> tuple[Complex, Complex, float]:
-    """(turn within the face beyond the ball, half the solid angle up to the ball, clipped `along`) of an edge's end."""
+    """Return (turn in the face beyond the ball, half the solid angle up to the ball, clipped `along`) of an end."""
     clipped = min(max(along, -half_chord), half_chord)
     near_away = min(away, max(1.0, base))
     shrunk, reach = distance * shrink, min(max(along * shrink, -_FAR), _FAR)
     cosine = shrunk * shrunk + reach * clipped
-    # An end at the face's foot point turns nothing.
+    # An end at the face's foot point has no turn.
     turn = (cosine if cosine > 0.0 else 1.0), shrunk * (reach - clipped)
     missed = base >= 1.0
     half = (1.0 if missed else (base + height) * (base + near_away)), (0.0 if missed else distance * clipped)
@@ -176,7 +175,7 @@ def _end(
 def _edge(
     start: float, end: float, away_start: float, away_end: float, distance: float, base: float, height: float
 ) -> tuple[Complex, Complex, float]:
-    """(turn, half solid angle, twice the straight-bounded area) of an edge."""
+    """Return (turn, half solid angle, twice the straight-bounded area) of an edge."""
     shrink = 1.0 / max(base, 1.0)
     half_chord = math.sqrt(max((1.0 - base) * (1.0 + base), 0.0))
     turn_start, half_start, clipped_start = _end(start, away_start, distance, base, height, half_chord, shrink)
@@ -190,7 +189,7 @@ def _edge(
 
 @inlined
 def _wraps(a: Complex, b: Complex, product: Complex) -> float:
-    """How many whole turns arg a + arg b exceeds arg ab by."""
+    """Return the whole turns by which arg a + arg b exceeds arg ab."""
     upper = a[1] >= 0.0 and b[1] >= 0.0 and product[1] < 0.0
     lower = a[1] < 0.0 and b[1] < 0.0 and (product[1] > 0.0 or (product[1] == 0.0 and product[0] < 0.0))
     return (1.0 if upper else 0.0) - (1.0 if lower else 0.0)
@@ -198,10 +197,10 @@ def _wraps(a: Complex, b: Complex, product: Complex) -> float:
 
 @building_block
 def triangle_terms(scratch: FloatArray, groups: int) -> None:
-    """Fill `REAL` to `PUSH` of so many groups of `WIDTH` lanes from their `NORMAL`, `HEIGHTS` to `HEIGHT`.
+    """Fill `REAL` to `PUSH` of `groups` of `WIDTH` lanes from their `NORMAL`, `HEIGHTS` to `HEIGHT`.
 
-    REAL + i IMAGINARY has half of the straight-bounded part of Ω for its argument, TURN is half of the rest of Ω;
-    MOMENT is h A, PUSH A n.
+    The argument of REAL + i IMAGINARY is half of the straight-bounded part of Ω. TURN is half of the rest of Ω, MOMENT
+    is h A, and PUSH is A n.
     """
     for lane in range(groups * WIDTH):
         normal = _load3(scratch, NORMAL, lane)
@@ -234,7 +233,7 @@ def triangle_terms(scratch: FloatArray, groups: int) -> None:
 
 @inlined
 def _fold(scratch: FloatArray, lane: int, other: int) -> None:
-    """Take lane `other` into `lane`."""
+    """Add lane `other` to `lane`."""
     real, imaginary = scratch[REAL + lane], scratch[IMAGINARY + lane]
     other_real, other_imaginary = scratch[REAL + other], scratch[IMAGINARY + other]
     scratch[REAL + lane] = real * other_real - imaginary * other_imaginary
@@ -248,8 +247,8 @@ def _fold(scratch: FloatArray, lane: int, other: int) -> None:
 
 @building_block
 def reduce_lanes(scratch: FloatArray, count: int) -> None:
-    """Gather the product of the complex numbers and the sums of the rest in lane 0."""
-    # Constant counts make vector code without remainders; the lanes that this needs are filled with what adds nothing.
+    """Reduce the lanes to lane 0: the product of the complex numbers, and the sums of the other rows."""
+    # Constant counts give vector code without remainders; unused lanes are filled with neutral elements.
     filled = 64 if count > 32 else 32 if count > 16 else 16 if count > 8 else 8
     for lane in range(count, filled):
         scratch[REAL + lane] = 1.0

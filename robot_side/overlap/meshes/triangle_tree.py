@@ -1,8 +1,7 @@
-"""A tree of boxes over a mesh's triangles, in flat arrays that a kernel walks without a stack.
+"""Bounding volume hierarchy: a tree of boxes over a mesh's triangles, in flat arrays that are walked without a stack.
 
-The nodes stand in depth-first order. A node that need not be entered is left through its escape index, the number of
-the node after its last descendant; otherwise the next node is its first child. The triangles stand in the order of the
-leaves.
+The nodes are in depth-first order. From a node that is skipped, its escape index leads on: the number of the node after
+its last descendant. Otherwise the next node is the first child. The triangles are in the order of the leaves.
 """
 
 from dataclasses import dataclass
@@ -12,10 +11,10 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 
 LEAF_TRIANGLES = 10
-"""The most triangles of a leaf."""
+"""Most triangles of a leaf"""
 
 LINKS = 3
-"""Numbers for each node in `TriangleTree.links`."""
+"""Numbers for each node in `TriangleTree.links`"""
 
 
 @dataclass(frozen=True)
@@ -23,17 +22,17 @@ class TriangleTree:
     """Boxes, links and moments of n nodes over t triangles."""
 
     order: IntArray
-    """(t,): the triangles in the order of the leaves."""
+    """(t,) triangles in the order of the leaves"""
     boxes: FloatArray
-    """(n, 6): lowest and highest coordinates (m)."""
+    """(n, 6) lowest and highest coordinates (m)"""
     links: IntArray
-    """(3 n,): for each node its escape index, its first triangle and how many it has, 0 for one with children."""
+    """(3 n,) for each node its escape index, its first triangle and its number of triangles, 0 with children"""
     moments: FloatArray
-    """(n, 7): centroid by area (m), sum of area times outward normal (m²), radius about the centroid (m)."""
+    """(n, 7) centroid by area (m), sum of area times outward normal (m²), radius about the centroid (m)"""
 
 
 def build_tree(corners: FloatArray) -> TriangleTree:
-    """The tree over triangles `corners` (t, 3, 3), halved at the median of the longest side of their centroids."""
+    """Build the tree over triangles `corners` (t, 3, 3), halved at the median of the centroids' longest side."""
     middles, parts = corners.mean(axis=1), []
     boxes: list[FloatArray] = []
     links: list[tuple[int, int, int]] = []

@@ -1,1 +1,1 @@
-"""One pair of a box or tetrahedron, as exactly as it takes."""
+"""Precise overlaps of single pairs of a sphere and a box or tetrahedron."""

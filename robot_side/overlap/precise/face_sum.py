@@ -1,11 +1,11 @@
-"""The overlap of a sphere with a polyhedron in double-double, as a sum over the faces.
+"""Overlap of a sphere with a polyhedron in double-double, as a sum over the faces.
 
-The sum is the one of `face_angles`, put together otherwise so that few functions are needed. Of every face the ball
-reaches, the sides' parts outside of the ball are triangles with the face's foot point: their solid angles, which all
-have the weight R²/3 in the volume, are multiplied up as complex numbers over the whole solid, and their angles about
-the foot point over the face. A face that the ball does not reach adds its own solid angle. All solid angles are van
-Oosterom's and Strackee's (1983); the angle of each complex number is half of the solid angle. Only the parts inside
-of the ball are left as lengths. The result is continuous, like that one, wherever rounding puts a crossing.
+The sum is that of `face_angles`, arranged for few functions. For every face that the ball reaches, the sides' parts
+outside the ball form triangles with the face's foot point. Their solid angles all have the weight R²/3 in the volume,
+and are multiplied as complex numbers over the whole solid; their angles about the foot point over the face. A face that
+the ball does not reach adds its own solid angle. All solid angles are van Oosterom's and Strackee's (1983); the angle
+of each complex number is half of the solid angle. Only the parts inside the ball remain as lengths. The result is
+continuous, as in `face_angles`, for all rounding errors of a crossing.
 """
 
 import numpy as np
@@ -59,7 +59,7 @@ from robot_side.overlap.precise.features import (
 
 @building_block
 def sum_over_faces(features: FloatArray, solid: np.int64, radius: float) -> Overlap:
-    """The overlap with the solid that `features` holds the measures of; it is not yet within its bounds."""
+    """Return the overlap with the solid measured in `features`, without bounds."""
     ball = (radius, 0.0)
     radius_2 = times(ball, ball)
     solid_angle = NO_TURN
@@ -121,7 +121,7 @@ def sum_over_faces(features: FloatArray, solid: np.int64, radius: float) -> Over
 
 @inlined
 def _is_reached(features: FloatArray, solid: np.int64, face: int, plane_reached: bool) -> tuple[bool, bool]:
-    """Whether the ball reaches the face, and whether it reaches one of its sides."""
+    """Return whether the ball reaches the face, and whether it reaches one of the face's sides."""
     foot_inside, side_reached = plane_reached, False
     if plane_reached:
         for side in range(SIDES[solid]):
@@ -142,7 +142,7 @@ def _outside(
     plane_angle: Turn,
     solid_angle: Turn,
 ) -> tuple[Turn, Turn]:
-    """Both angles with the part of a side between two points added; each point is (along, slant)."""
+    """Add the part of a side between two points to both angles; each point is (along, slant)."""
     depth, distance, distance_2, base_2, below = frame
     sine = times(distance, minus(end[0], start[0]))
     alongs = times(start[0], end[0])
@@ -154,7 +154,7 @@ def _outside(
 
 @building_block
 def _whole_face(features: FloatArray, solid: np.int64, face: int, solid_angle: Turn) -> Turn:
-    """`solid_angle` with that of a face added, which does not contain the centre."""
+    """Add the solid angle of a face, which does not contain the centre, to `solid_angle`."""
     volume_6 = load_number(features, MOMENTS + face)
     a_corner = FACE_CORNERS[solid, face, 0]
     a, a_length = load_vector(features, POINTS + a_corner), load_number(features, LENGTHS + a_corner)

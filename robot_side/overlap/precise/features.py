@@ -36,11 +36,11 @@ from robot_side.overlap.digits.double_double_vectors import (
 from robot_side.overlap.digits.expansion import exact_power
 
 UNCERTAIN = 1e-28
-"""Powers of corners and edges below this, for R = 1, are taken again with less rounding or none."""
+"""Power of corners and edges, for R = 1, below which it is recomputed with less rounding or none"""
 
 
 TETRAHEDRON, BOX = np.int64(0), np.int64(1)
-"""Kinds of solid, the first index of the tables below. NumPy's, as Numba compiles anew for every literal int."""
+"""Kinds of solid, the first index of the tables below. NumPy's, as Numba compiles again for every literal int."""
 
 _FACES = (
     ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)),
@@ -61,7 +61,7 @@ _CORNERS = (range(4), range(8))
 
 
 def _table(tetrahedron: Sequence[Sequence[float]], box: Sequence[Sequence[float]]) -> IntArray:
-    """Both kinds in one array, with zeros where the tetrahedron has fewer."""
+    """Return both kinds in one array, with zeros where the tetrahedron has fewer."""
     table = np.zeros((2, len(box), len(box[0])), dtype=np.int64)
     table[0, : len(tetrahedron), : len(tetrahedron[0])] = tetrahedron
     table[1] = box
@@ -69,53 +69,53 @@ def _table(tetrahedron: Sequence[Sequence[float]], box: Sequence[Sequence[float]
 
 
 CORNERS, EDGES, FACES, SIDES = np.array([[4, 8], [6, 12], [4, 6], [3, 4]])
-"""How many of each a kind has, and the sides of a face."""
+"""Numbers of corners, edges and faces by kind, and of sides of a face"""
 EDGE_ENDS = _table(*_EDGES)
-"""(2, 12, 2): start and end corner."""
+"""(2, 12, 2) start and end corner"""
 EDGE_FACES = _table(*([(left[edge], left[edge[::-1]]) for edge in _EDGES[kind]] for kind, left in enumerate(_LEFT)))
-"""(2, 12, 2): the face on the left and on the right of the edge as seen from outside."""
+"""(2, 12, 2) face on the left and on the right of the edge, as seen from outside"""
 PARALLEL_EDGES = np.array([range(12), [_EDGES[1].index((0, end - start)) for start, end in _EDGES[1]]])
-"""(2, 12): an edge with the same vector, of at most its own number."""
+"""(2, 12) lowest edge with the same vector"""
 FACE_CORNERS = _table(*_FACES)
-"""(2, 6, 4)."""
+"""(2, 6, 4) corners of each face"""
 FACE_EDGES = _table(*([[_EDGES[kind].index((min(r), max(r))) for r in f] for f in _RUNS[kind]] for kind in range(2)))
-"""(2, 6, 4): the edge from each corner to the next one."""
+"""(2, 6, 4) edge from each corner to the next one"""
 FACE_SIGNS = _table(*([[1 if start < end else -1 for start, end in face] for face in runs] for runs in _RUNS))
-"""(2, 6, 4): 1 where the face runs along that edge, -1 where against it."""
+"""(2, 6, 4) 1 if the face runs along that edge, -1 if against it"""
 CORNER_EDGES = _table(
     *([[n for n, edge in enumerate(_EDGES[kind]) if c in edge] for c in _CORNERS[kind]] for kind in range(2))
 )
-"""(2, 8, 3): the edges that meet in the corner."""
+"""(2, 8, 3) edges that meet in the corner"""
 CORNER_FACES = _table(
     *([[n for n, face in enumerate(_FACES[kind]) if c in face] for c in _CORNERS[kind]] for kind in range(2))
 )
-"""(2, 8, 3): the faces that meet in the corner."""
+"""(2, 8, 3) faces that meet in the corner"""
 
-# The measures of one solid from the sphere's centre are rows of an array (ROWS, 3, 2); what begins at which row:
+# The measures of one solid from the sphere's centre are rows of an array (ROWS, 3, 2). First rows:
 POINTS = 0
 """Corners relative to the centre (m)."""
 LENGTHS = 8
-"""Their distances |p| (m)."""
+"""Distances |p| of the corners (m)"""
 POWERS = 16
 """R² - |p|² (m²)."""
 DIRECTIONS = 24
 """Unit vectors of the edges."""
 FEET = 36
-"""The point of each edge's line that is nearest to the centre (m)."""
+"""Foot points: the point of each edge's line nearest to the centre (m)"""
 STARTS, ENDS = 48, 60
-"""The signed distances of the edge's ends from that point (m)."""
+"""Signed distances of the edge's ends from the foot point (m)"""
 BASES = 72
-"""The squared distance of that point from the centre (m²)."""
+"""Squared distance of the foot point from the centre (m²)"""
 HALF_CHORDS = 84
 """Half the length of the edge's line within the ball (m)."""
 REACHED = 96
-"""1 where the edge has a point inside the ball, else 0."""
+"""1 if the edge has a point inside the ball, else 0"""
 NORMALS = 108
 """Outward unit vectors of the faces."""
 HEIGHTS = 114
-"""The faces' signed distances from the centre (m)."""
+"""Signed distances of the faces from the centre (m)"""
 MOMENTS = 120
-"""The height times twice the area of a triangle of three of the face's corners (m³)."""
+"""Height times twice the area of a triangle of three of the face's corners (m³)"""
 SQUARED_AREAS = 126
 """Twice the area of that triangle, squared (m⁴)."""
 ROWS = 132
@@ -123,7 +123,7 @@ ROWS = 132
 
 @building_block
 def measure_corner(features: FloatArray, corner: int, radius: float) -> None:
-    """Fill in the measures of `corner` from the corners and the `radius` (m)."""
+    """Fill the measures of `corner` from the corners and the `radius` (m)."""
     point = load_vector(features, POINTS + corner)
     distance_2 = precise_dot(point, point)
     power = minus(two_product(radius, radius), distance_2)
@@ -135,7 +135,7 @@ def measure_corner(features: FloatArray, corner: int, radius: float) -> None:
 
 @building_block
 def measure_direction(features: FloatArray, solid: np.int64, edge: int) -> None:
-    """Fill in the direction of `edge` from the corners."""
+    """Fill the direction of `edge` from the corners."""
     start, end = EDGE_ENDS[solid, edge]
     side = precise_subtract(load_vector(features, POINTS + end), load_vector(features, POINTS + start))
     direction, _ = precise_unit(side)
@@ -144,12 +144,12 @@ def measure_direction(features: FloatArray, solid: np.int64, edge: int) -> None:
 
 @building_block
 def measure_edge(features: FloatArray, solid: np.int64, edge: int, radius: float) -> None:
-    """Fill in the measures of `edge` from corners, directions and the `radius` (m)."""
+    """Fill the measures of `edge` from corners, directions and the `radius` (m)."""
     start_corner, end_corner = EDGE_ENDS[solid, edge]
     start, end = load_vector(features, POINTS + start_corner), load_vector(features, POINTS + end_corner)
     direction = load_vector(features, DIRECTIONS + edge)
     start_along, end_along = precise_dot(start, direction), precise_dot(end, direction)
-    # From the nearer end, as it rounds less.
+    # From the nearer end, which rounds less.
     if abs(start_along[0]) <= abs(end_along[0]):
         foot = precise_subtract(start, precise_scale(start_along, direction))
     else:
@@ -157,7 +157,7 @@ def measure_edge(features: FloatArray, solid: np.int64, edge: int, radius: float
     base_2 = precise_dot(foot, foot)
     half_chord_2 = minus(two_product(radius, radius), base_2)
     if abs(half_chord_2[0]) < UNCERTAIN * radius * radius:
-        # Without the rounding of the direction: exact where the coordinates have few digits.
+        # Without the rounding of the direction: exact if the coordinates have few digits.
         side = precise_subtract(end, start)
         moment, length_2 = precise_cross(start, side), precise_dot(side, side)
         above = minus(times(two_product(radius, radius), length_2), precise_dot(moment, moment))
@@ -174,10 +174,10 @@ def measure_edge(features: FloatArray, solid: np.int64, edge: int, radius: float
 
 @building_block
 def measure_face(features: FloatArray, solid: np.int64, face: int) -> None:
-    """Fill in the normal and the distances of `face` from the corners.
+    """Fill the normal and the distances of `face` from the corners.
 
     The two shortest sides give the normal and the nearest corner the distance, as these round least. A face
-    without area gets the normal 0, and so counts for nothing.
+    without area gets the normal 0, so it has no effect.
     """
     corners = FACE_CORNERS[solid, face]
     a, b = load_vector(features, POINTS + corners[0]), load_vector(features, POINTS + corners[1])
@@ -213,7 +213,7 @@ def _square(vector: PreciseVector) -> float:
 
 @inlined
 def distance_in_face(features: FloatArray, solid: np.int64, face: int, side: int) -> DoubleDouble:
-    """The signed distance d (m) of a side of `face` from the face's foot point, positive if that lies inside."""
+    """Return the signed distance d (m) of a side of `face` from the face's foot point, positive if that is inside."""
     edge, sign = FACE_EDGES[solid, face, side], FACE_SIGNS[solid, face, side]
     outward = precise_cross(load_vector(features, DIRECTIONS + edge), load_vector(features, NORMALS + face))
     distance = precise_dot(load_vector(features, FEET + edge), outward)
@@ -222,7 +222,7 @@ def distance_in_face(features: FloatArray, solid: np.int64, face: int, side: int
 
 @building_block
 def measure_all(features: FloatArray, solid: np.int64, radius: float) -> None:
-    """Fill in everything from the corners and the `radius` (m)."""
+    """Fill all measures from the corners and the `radius` (m)."""
     for corner in range(CORNERS[solid]):
         measure_corner(features, corner, radius)
     for edge in range(EDGES[solid]):
@@ -238,11 +238,11 @@ def measure_all(features: FloatArray, solid: np.int64, radius: float) -> None:
 
 @inlined
 def depth_and_rest(features: FloatArray, face: int, radius: float) -> tuple[float, float]:
-    """(R + h, R - h) in m: the height of the ball's part inside of the plane of `face`, and of the other one."""
+    """Return (R + h, R - h) in m: the heights of the ball's parts inside and outside the plane of `face`."""
     height = load_number(features, HEIGHTS + face)
     depth, rest = plus((radius, 0.0), height), minus((radius, 0.0), height)
     if depth[0] < UNCERTAIN * radius:
-        # R² - h² without the rounding of the normal: exact where the coordinates have few digits.
+        # R² - h² without the rounding of the normal: exact if the coordinates have few digits.
         area_2, moment = load_number(features, SQUARED_AREAS + face), load_number(features, MOMENTS + face)
         above = minus(times(two_product(radius, radius), area_2), times(moment, moment))
         depth = divided(above, times(area_2, rest))

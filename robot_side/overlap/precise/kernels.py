@@ -1,6 +1,6 @@
 """Overlaps that need more than float64: tiny ones, and those of solids much larger or smaller than the sphere.
 
-Nothing is validated here, as in `kernels`. Each function overwrites the results of the pairs that `rows` names.
+Arguments are not validated, as in `kernels`. Each function overwrites the results of the pairs in `rows`.
 """
 
 import math
@@ -23,7 +23,7 @@ from robot_side.overlap.precise.features import BOX, DIRECTIONS, ENDS, POINTS, R
 from robot_side.overlap.precise.polyhedron import polyhedron_overlap
 
 LARGEST_REACH = 1e3
-"""Boxes are cut off so many radii from the sphere's centre."""
+"""Distance from the sphere's centre, in radii, at which boxes are cut off"""
 
 _features = on_stack(ROWS, 3, 2)
 _RESULTS = output_array(1), output_array(2), output_array(1)
@@ -39,7 +39,7 @@ def precise_tetrahedra(
     gradients: FloatArray,
     areas: FloatArray,
 ) -> None:
-    """Spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3), for `rows` (k,)."""
+    """Fill overlaps of spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3), for `rows` (k,)."""
     features = _features()
     for index in range(rows.size):
         pair = rows[index]
@@ -71,7 +71,7 @@ def precise_boxes(
     gradients: FloatArray,
     areas: FloatArray,
 ) -> None:
-    """Spheres with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3), `box_half_sizes` (p, 3), for `rows` (k,)."""
+    """Fill overlaps with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3), `box_half_sizes` (p, 3), for `rows`."""
     features = _features()
     for index in range(rows.size):
         pair = rows[index]
@@ -98,7 +98,7 @@ def precise_boxes(
             load_vector(features, DIRECTIONS + 1),
             load_vector(features, DIRECTIONS + 2),
         )
-        # Going up where the columns are left-handed is what going down is where they are right-handed.
+        # For left-handed columns, reversing the first axis makes them right-handed.
         low_u, high_u = (ENDS, STARTS) if volume_8th < 0.0 else (STARTS, ENDS)
         for upper_u in range(2):
             on_u = precise_add(middle, load_vector(features, high_u if upper_u else low_u))
@@ -113,9 +113,9 @@ def precise_boxes(
 
 @inlined
 def _reachable(middle: Vector, radius: float, column: Vector, half_size: float) -> tuple[float, float]:
-    """The range (m) of a box along `column` that the sphere may reach: what lies farther away is cut off.
+    """Return the range (m) of a box along `column` that the sphere may reach; farther parts are cut off.
 
-    A box much larger than the sphere so costs no digits.
+    So a box much larger than the sphere costs no digits.
     """
     place = -dot(middle, column)
     reach = LARGEST_REACH * radius + 1e-5 * (abs(middle[0]) + abs(middle[1]) + abs(middle[2]))
@@ -132,7 +132,7 @@ def _multiple(factor: float, column: Vector) -> PreciseVector:
 
 @inlined
 def _side(vertices: FloatArray, pair: int, corner: int, scale: float) -> PreciseVector:
-    """The exact vector from the first corner to another, times `scale`."""
+    """Return the exact vector from the first corner to another, times `scale`."""
     return (
         two_sum(scale * vertices[pair, corner, 0], -scale * vertices[pair, 0, 0]),
         two_sum(scale * vertices[pair, corner, 1], -scale * vertices[pair, 0, 1]),
@@ -142,7 +142,7 @@ def _side(vertices: FloatArray, pair: int, corner: int, scale: float) -> Precise
 
 @inlined
 def _scaled_radius(radius: float) -> tuple[float, float]:
-    """(the radius between 1 and 2, the power of two that makes it so)."""
+    """Return (the radius scaled to between 1 and 2, the power of two that scales it)."""
     if radius == 0.0:
         return 0.0, 1.0
     _, exponent = math.frexp(radius)
@@ -154,7 +154,7 @@ def _scaled_radius(radius: float) -> tuple[float, float]:
 def _store(
     pair: int, overlap: Overlap, unit: float, volumes: FloatArray, gradients: FloatArray, areas: FloatArray
 ) -> None:
-    """Put the results of `pair` into m², m³ from lengths in units of `unit` (m)."""
+    """Store the results of `pair` in m² and m³, converted from lengths in units of `unit` (m)."""
     volume, gradient, area = overlap
     volumes[pair] = volume * unit * unit * unit
     for axis in range(3):

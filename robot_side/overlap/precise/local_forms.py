@@ -1,10 +1,10 @@
-"""Overlaps of a sphere with a lone corner or edge of a solid, all of whose terms are positive.
+"""Overlaps of a sphere with a single corner or edge of a solid, as sums of positive terms.
 
-Where the sphere bulges by a fraction of the overlap only, a straight-sided solid is most of it: the tetrahedron
-between a corner and the points where its edges leave the ball, or a stack of such triangles along an edge. The rest
-is a factor on it, smooth and little above 1: a ray from the corner reaches the sphere s times as far as that flat
-side. Its mean is taken by quadrature, so that nothing cancels and the relative accuracy is that of the inputs,
-however small the overlap. The relative error of the quadrature is below 1e-12 within SHARP_CORNER and SHARP_EDGE.
+If the sphere bulges by only a fraction of the overlap, a straight-sided solid is most of it. That is the tetrahedron
+between a corner and the points where its edges leave the ball, or a stack of such triangles along an edge. The rest is
+a smooth factor little above 1: a ray from the corner reaches the sphere at s times the distance of that flat side. The
+factor's mean is taken by Gauss quadrature. So nothing cancels, and the relative accuracy is that of the inputs for
+every size of the overlap. The relative error of the quadrature is below 1e-12 within SHARP_CORNER and SHARP_EDGE.
 """
 
 import math
@@ -23,13 +23,13 @@ from robot_side.overlap.digits.double_double_vectors import (
 )
 
 SHARP_CORNER = 4e-4
-"""The largest (length of an edge in the ball) / (distance of the centre from the corner along that edge)."""
+"""Largest (length of an edge in the ball) / (distance of the centre from the corner along that edge)"""
 SHARP_EDGE = 0.05
-"""The largest (half the length of the edge in the ball) / (distance of the centre from the edge along a face)."""
+"""Largest (half the length of the edge in the ball) / (distance of the centre from the edge along a face)"""
 
 
 def _triangle_rule() -> tuple[FloatArray, FloatArray]:
-    """Radon's rule of 7 points and degree 5: (barycentric coordinates, weights)."""
+    """Return Radon's rule of 7 points and degree 5: (barycentric coordinates, weights)."""
     root = math.sqrt(15.0)
     points, weights = [[1.0 / 3.0] * 3], [9.0 / 40.0]
     for sign in (-1.0, 1.0):
@@ -43,15 +43,15 @@ def _triangle_rule() -> tuple[FloatArray, FloatArray]:
 TRIANGLE_POINTS, TRIANGLE_WEIGHTS = _triangle_rule()
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 ALONG_NODES, ALONG_WEIGHTS = _NODES[4:].copy(), 2.0 * _WEIGHTS[4:]
-"""Gauss's rule of 8 points for even functions on [-1, 1]: the positive half of them."""
+"""Gauss-Legendre rule of 8 points for even functions on [-1, 1]: the positive nodes"""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 ACROSS_NODES, ACROSS_WEIGHTS = 0.5 + 0.5 * _NODES, 0.5 * _WEIGHTS
-"""Gauss's rule of 4 points on [0, 1]."""
+"""Gauss-Legendre rule of 4 points on [0, 1]"""
 
 
 @inlined
 def reach(outward: float, power: float) -> float:
-    """How far a ray stays in the ball (m); it starts at p with `power` R² - |p|² > 0, `outward` = p · direction."""
+    """Return the length (m) of a ray in the ball; from p with `power` R² - |p|² > 0, `outward` = p · direction."""
     root = math.sqrt(outward * outward + power)
     return power / (outward + root) if outward > 0.0 else root - outward
 
@@ -63,7 +63,7 @@ def corner_overlap(
     edges: tuple[PreciseVector, PreciseVector, PreciseVector],
     radius: float,
 ) -> tuple[Overlap, float]:
-    """The overlap of the ball about the origin with the cone that three edges span, and its sharpness.
+    """Return the overlap of the ball about the origin with the cone that three edges span, and its sharpness.
 
     `corner` lies in the ball, its `power` R² - |corner|² (m²) is positive; `edges` are unit vectors.
     """
@@ -103,7 +103,7 @@ def edge_overlap(
     sides: tuple[PreciseVector, PreciseVector],
     radius: float,
 ) -> tuple[Overlap, float]:
-    """The overlap of the ball about the origin with the wedge of two faces, and its sharpness.
+    """Return the overlap of the ball about the origin with the wedge of two faces, and its sharpness.
 
     `foot` is the point of the edge nearest to the centre, its `power` R² - |foot|² (m²) is positive; `sides` are
     unit vectors in the faces, across the edge and away from it.
@@ -138,7 +138,7 @@ def edge_overlap(
 
 @inlined
 def _within_cap(overlap: Overlap, power: float, radius: float) -> Overlap:
-    """No more than the cap beyond the plane across the direction to the nearest point.
+    """Bound the overlap by the cap beyond the plane across the direction to the nearest point.
 
     A cone or wedge that is not sharp may reach deeper into the ball elsewhere than at its corner or edge.
     """
@@ -150,9 +150,9 @@ def _within_cap(overlap: Overlap, power: float, radius: float) -> Overlap:
 
 @inlined
 def _stretch(origin: Vector, ray: Vector, along: float, power: float) -> tuple[float, float, Vector]:
-    """(s, surface per volume, direction times R) where the ray from `origin` meets the sphere at s · `ray`.
+    """Return (s, surface per volume, direction times R) where the ray from `origin` meets the sphere at s · `ray`.
 
-    `along` is origin · ray. The surface is per that of a cone of the same base, over its number of dimensions.
+    `along` is origin · ray. The surface is relative to that of a cone of the same base, over its number of dimensions.
     """
     length_2 = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2]
     root = math.sqrt(along * along + power * length_2)

@@ -1,8 +1,8 @@
-"""The overlap of a sphere with a tetrahedron or a box, to the accuracy of the input at every size of the overlap.
+"""Overlap of a sphere with a tetrahedron or a box, to the accuracy of the input at every size of the overlap.
 
-Caps, and lone edges and corners that hardly reach the ball, have forms of their own, in which nothing cancels. All
-else is the sum over faces in double-double. That leaves about 1e-31 of the sphere's volume, more if the solid is much
-larger than the sphere; what comes out smaller than that is replaced by the form of the feature reached deepest.
+Caps, and single edges and corners that hardly reach the ball, have own forms, in which nothing cancels. All other cases
+take the sum over faces in double-double. Its error is about 1e-31 of the sphere's volume, more if the solid is much
+larger than the sphere. A smaller result is replaced by the form of the feature that reaches deepest.
 """
 
 import math
@@ -54,19 +54,19 @@ from robot_side.overlap.precise.local_forms import SHARP_CORNER, SHARP_EDGE, cor
 from robot_side.overlap.precise.screening import ANYTHING, CORNER, EDGE, FACE, NOTHING, WHOLE_SPHERE, screened
 
 NOISE = 1e-29
-"""What rounding may leave of a sum over faces, in R³, or in R² times the size of the solid if that is larger."""
+"""Rounding error of a sum over faces, in R³, or in R² times the size of the solid if that is larger"""
 
 
 @building_block
 def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, solid_volume: float) -> Overlap:
-    """The overlap of the ball about the origin with the solid whose corners are in `features`; 1 <= `radius` < 2.
+    """Return the overlap of the ball about the origin with the solid of the corners in `features`; 1 <= `radius` < 2.
 
-    `solid` is its kind and `solid_volume` its volume, which is 0 for nothing else than a solid without volume.
+    `solid` is its kind and `solid_volume` its volume, which is 0 only for a solid without volume.
     """
     if solid_volume == 0.0 or radius == 0.0:
         return nothing()
     if _is_inside(features, solid, radius):
-        # So small a solid may be that directions and angles of it are no numbers any more.
+        # The solid may be so small that its directions and angles are not finite.
         return whole_solid(solid_volume)
     reached, number = screened(features, solid, radius)
     if reached != ANYTHING:
@@ -88,14 +88,14 @@ def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, sol
     most = min(noise, solid_volume)
     reached, number = _deepest(features, solid)
     local, _ = _local_form(features, solid, radius, reached, number)
-    # A corner or edge within the ball has some volume there, if too thin for its faces to be told apart.
+    # A corner or edge within the ball has some volume there, even if its faces coincide by rounding.
     thin = most if reached in (CORNER, EDGE) else 0.0
     return _below_noise(local, summed, most, thin, radius)
 
 
 @inlined
 def _is_inside(features: FloatArray, solid: np.int64, radius: float) -> bool:
-    """Whether the ball contains all corners, by more than rounding."""
+    """Return whether the ball contains all corners, by more than rounding."""
     farthest_2 = 0.0
     for corner in range(CORNERS[solid]):
         x, y, z = features[POINTS + corner, 0, 0], features[POINTS + corner, 1, 0], features[POINTS + corner, 2, 0]
@@ -105,9 +105,9 @@ def _is_inside(features: FloatArray, solid: np.int64, radius: float) -> bool:
 
 @inlined
 def _below_noise(local: Overlap, summed: Overlap, most: float, thin: float, radius: float) -> Overlap:
-    """The form of a lone feature where the sum's volume is noise, with the sum's surface where that is not.
+    """Return the form of a single feature if the sum's volume is noise, with the sum's surface if that is not noise.
 
-    The volume is at most `most`, and `thin` where the form has none.
+    The volume is at most `most`, and `thin` if the form has none.
     """
     volume, gradient, area = local
     volume = thin if volume == 0.0 else volume
@@ -124,7 +124,7 @@ def _below_noise(local: Overlap, summed: Overlap, most: float, thin: float, radi
 def _local_form(
     features: FloatArray, solid: np.int64, radius: float, reached: int, number: int
 ) -> tuple[Overlap, float]:
-    """The overlap with the reached feature alone, and its sharpness: 0 where that is the whole truth."""
+    """Return the overlap with the reached feature alone, and its sharpness: 0 if that is exact."""
     overlap, sharpness = nothing(), math.inf
     if reached == NOTHING:
         sharpness = 0.0
@@ -142,7 +142,7 @@ def _local_form(
 
 @building_block
 def _measure_lone(features: FloatArray, solid: np.int64, radius: float, reached: int, number: int) -> None:
-    """Fill in what the form of a lone feature needs."""
+    """Fill the measures for the form of a single feature."""
     if reached == FACE:
         measure_face(features, solid, number)
     elif reached == EDGE:
@@ -158,14 +158,14 @@ def _measure_lone(features: FloatArray, solid: np.int64, radius: float, reached:
 
 @building_block
 def _deepest(features: FloatArray, solid: np.int64) -> tuple[int, int]:
-    """The corner, else edge, else face that reaches deepest into the ball, with nearly nothing in common with it."""
+    """Return the corner, else edge, else face that reaches deepest into the ball, for a tiny overlap."""
     deepest, reached, number = 0.0, NOTHING, 0
     for corner in range(CORNERS[solid]):
         if features[POWERS + corner, 0, 0] > deepest:
             deepest, reached, number = features[POWERS + corner, 0, 0], CORNER, corner
     if reached == NOTHING:
         for edge in range(EDGES[solid]):
-            # An edge that does not pass its line's nearest point is no deeper than its corners.
+            # An edge without its line's nearest point is no deeper than its corners.
             passes = features[STARTS + edge, 0, 0] < 0.0 < features[ENDS + edge, 0, 0]
             if passes and features[HALF_CHORDS + edge, 0, 0] > deepest:
                 deepest, reached, number = features[HALF_CHORDS + edge, 0, 0], EDGE, edge
@@ -205,6 +205,6 @@ def _corner_cone(features: FloatArray, solid: np.int64, corner: int, radius: flo
 
 @inlined
 def _away_from(features: FloatArray, solid: np.int64, corner: int, edge: int) -> PreciseVector:
-    """The direction of an edge from one of its ends to the other."""
+    """Return the direction of an edge from `corner` to its other end."""
     direction = load_vector(features, DIRECTIONS + edge)
     return direction if EDGE_ENDS[solid, edge, 0] == corner else precise_negative(direction)

@@ -1,4 +1,4 @@
-"""Which features of a solid the ball can reach, in float64 with a margin: a cheap way to the simple cases."""
+"""Screening in float64, with a margin, of the features of a solid that the ball can reach: finds the simple cases."""
 
 import math
 
@@ -22,21 +22,21 @@ from robot_side.overlap.precise.features import (
 )
 
 NOTHING, WHOLE_SPHERE, FACE, EDGE, CORNER, ANYTHING = 0, 1, 2, 3, 4, 5
-"""What `screened` can say."""
+"""Results of `screened`"""
 _APART, _PIERCED, _UNCERTAIN = 0, 1, 2
-"""Of a face whose sides the ball does not reach: the ball does not reach it; the ball's disc lies within it."""
+"""States of a face whose sides the ball does not reach: not reached; contains the ball's disc; uncertain"""
 _MARGIN = 1e-14
 
 
 @building_block
 def screened(features: FloatArray, solid: np.int64, radius: float) -> tuple[int, int]:
-    """(what the ball reaches, the number of that feature) from the corners in `features` and `radius` (m).
+    """Return (the kind of feature that the ball reaches, its number) from the corners in `features` and `radius` (m).
 
     - NOTHING or WHOLE_SPHERE: no point of the surface lies inside the ball, which is outside or inside the solid;
     - FACE: no edge has a point inside the ball, and one face at most;
     - EDGE: no corner lies in the ball, and no other edge and no face but its own two has a point there;
     - CORNER: no other corner and only edges and faces that meet in this one have a point inside the ball;
-    - ANYTHING: what rounding may decide, and everything else.
+    - ANYTHING: all other cases, and cases that rounding may decide.
     """
     farthest_2 = 0.0
     for candidate in range(CORNERS[solid]):
@@ -71,7 +71,7 @@ def screened(features: FloatArray, solid: np.int64, radius: float) -> tuple[int,
 
 @building_block
 def _screened_faces(features: FloatArray, solid: np.int64, radius: float, farthest: float) -> tuple[int, int]:
-    """`screened` where the ball reaches no edge."""
+    """Do as `screened`, if the ball reaches no edge."""
     pierced, pierced_face, all_above = 0, 0, True
     for face in range(FACES[solid]):
         state, above = _pierced(features, solid, face, radius, farthest)
@@ -93,7 +93,7 @@ def _point(features: FloatArray, corner: int) -> Vector:
 
 @building_block
 def _side(features: FloatArray, start: int, end: int) -> Vector:
-    """The vector from one corner to another, to full relative accuracy."""
+    """Return the vector from one corner to another, with full relative accuracy."""
     a, b = load_vector(features, POINTS + start), load_vector(features, POINTS + end)
     return (
         (b[0][0] - a[0][0]) + (b[0][1] - a[0][1]),
@@ -104,12 +104,12 @@ def _side(features: FloatArray, start: int, end: int) -> Vector:
 
 @inlined
 def _is_near(features: FloatArray, solid: np.int64, edge: int, within_2: float) -> bool:
-    """Whether a point of the edge lies nearer to the centre than the square root of `within_2` (m²)."""
+    """Return whether a point of the edge lies nearer to the centre than the square root of `within_2` (m²)."""
     start_corner, end_corner = EDGE_ENDS[solid, edge]
     start, end = _point(features, start_corner), _point(features, end_corner)
     side = _side(features, start_corner, end_corner)
     start_2, end_2, length_2 = dot(start, start), dot(end, end), dot(side, side)
-    # From the nearer end, as it rounds less.
+    # From the nearer end, which rounds less.
     along = -dot(start, side) if start_2 <= end_2 else dot(end, side)
     nearest_2 = min(start_2, end_2)
     if 0.0 < along < length_2:
@@ -119,12 +119,12 @@ def _is_near(features: FloatArray, solid: np.int64, edge: int, within_2: float) 
 
 @building_block
 def _pierced(features: FloatArray, solid: np.int64, face: int, radius: float, farthest: float) -> tuple[int, bool]:
-    """(how the ball stands to a face none of whose sides it reaches, whether the centre is over R below its plane)."""
+    """Return (state of a face whose sides the ball does not reach, whether the centre is over R below its plane)."""
     corners, sides = FACE_CORNERS[solid, face], SIDES[solid]
     first, second = _side(features, corners[0], corners[1]), _side(features, corners[1], corners[2])
     normal = cross(first, second)
     area_2 = math.sqrt(dot(normal, normal))
-    # All of what follows is times `area_2`, the length of the normal.
+    # All distances below are multiplied by `area_2`, the length of the normal.
     margin = _MARGIN * farthest * (area_2 + math.sqrt(dot(first, first) * dot(second, second)))
     height = dot(_point(features, corners[1]), normal)
     if not margin < 0.25 * radius * area_2:
@@ -146,7 +146,7 @@ def _pierced(features: FloatArray, solid: np.int64, face: int, radius: float, fa
 
 @inlined
 def _is_one_of(number: int, numbers: IntArray, count: int) -> bool:
-    """Whether `number` is among the first `count` numbers."""
+    """Return whether `number` is among the first `count` numbers."""
     found = False
     for index in range(count):
         found = found or numbers[index] == number

@@ -1,1 +1,1 @@
-"""The kinds of primitives that objects are made of, one to a file: arrays, bounds, nearest point, contact, overlap."""
+"""Kinds of primitives that objects consist of, one a file: arrays, bounds, nearest point, contact, overlap."""

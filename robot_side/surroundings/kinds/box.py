@@ -25,7 +25,7 @@ from robot_side.surroundings.kinds.layout import (
 
 @inlined
 def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Write one box's bounds; its volume in m³."""
+    """Write one box's bounds; return its volume in m³."""
     half = numbers[k, 12], numbers[k, 13], numbers[k, 14]
     for axis in range(3):
         bounds[row, axis] = numbers[k, axis]
@@ -37,7 +37,7 @@ def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
 def placed(
     sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
 ) -> None:
-    """Write the numbers of a box at a pose; sizes: its centre in its own frame, and half sizes."""
+    """Write the numbers of a box at a pose; sizes: the centre in the posed frame, and half sizes."""
     write_pose(posed(position, turns, turn, sizes[k, 0], sizes[k, 1], sizes[k, 2]), turns, turn, numbers, row)
     for axis in range(3):
         numbers[row, 12 + axis] = sizes[k, 3 + axis]
@@ -45,19 +45,19 @@ def placed(
 
 @inlined
 def _axis(shapes: FloatArray, row: int, k: int) -> Vector:
-    """The unit vector along the box's edge k: a column of Q."""
+    """Return the unit vector along the box's edge k: a column of Q."""
     return shapes[row, 3 + k], shapes[row, 6 + k], shapes[row, 9 + k]
 
 
 @inlined
 def _along(shapes: FloatArray, row: int, k: int, point: Vector) -> float:
-    """How far `point` lies from the centre along edge k."""
+    """Return the coordinate of `point` along edge k, from the centre."""
     return dot(_axis(shapes, row, k), subtract(point, (shapes[row, 0], shapes[row, 1], shapes[row, 2])))
 
 
 @building_block
 def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
-    """The nearest point of the surface of the box in `row`; from inside that of the nearest face."""
+    """Return the nearest point of the surface of the box in `row`; from inside, on the nearest face."""
     local = _along(shapes, row, 0, point), _along(shapes, row, 1, point), _along(shapes, row, 2, point)
     beyond = abs(local[0]) - shapes[row, 12], abs(local[1]) - shapes[row, 13], abs(local[2]) - shapes[row, 14]
     excess = max(beyond[0], 0.0), max(beyond[1], 0.0), max(beyond[2], 0.0)
@@ -76,9 +76,9 @@ def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
 
 @building_block
 def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, reach: float) -> Contact:
-    """Where a sphere that moves along the unit vector `along` first touches the box.
+    """Return the first contact of a sphere that moves along the unit vector `along`.
 
-    In the box's own frame: each step ends at the plane that touches the box at its nearest point.
+    In the box's own frame. Each step ends at the tangent plane at the box's nearest point.
     """
     x, y, z = _along(shapes, row, 0, start), _along(shapes, row, 1, start), _along(shapes, row, 2, start)
     u, v, w = (
@@ -105,13 +105,13 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
         if moved > reach:
             return NEVER
         x, y, z = x + step * u, y + step * v, z + step * w
-    # A sphere that still moves grazes: it has not touched so far.
+    # A sphere that still moves grazes the box: it has not touched up to here.
     return moved, 1.0
 
 
 @building_block
 def _beyond_edge(a: float, b: float) -> tuple[float, float, float]:
-    """The part of the unit ball with x >= a and y >= b, and the areas of its flat sides at a and at b.
+    """Return the volume of the unit ball with x >= a and y >= b, and the areas of its flat sides at a and at b.
 
     V = (S - a A - b B) / 3, where the spherical part's area S follows from its boundary's curvature (Gauss and Bonnet).
     """
@@ -128,7 +128,7 @@ def _beyond_edge(a: float, b: float) -> tuple[float, float, float]:
 
 @inlined
 def _arc_cosine(near: float, far: float) -> float:
-    """The angle whose cosine is near / far; 0 or π beyond."""
+    """Return the angle whose cosine is near / far; 0 or π beyond."""
     if abs(near) >= far:
         return 0.0 if near > 0.0 else math.pi
     return math.acos(near / far)
@@ -136,7 +136,7 @@ def _arc_cosine(near: float, far: float) -> float:
 
 @inlined
 def _reaches_corner(a: float, b: float, c: float) -> bool:
-    """Whether the unit ball reaches beyond three faces at once."""
+    """Return whether the unit ball reaches beyond three faces at once."""
     return max(a, 0.0) ** 2 + max(b, 0.0) ** 2 + max(c, 0.0) ** 2 < 1.0
 
 
@@ -151,9 +151,9 @@ def overlap_one_box(
     _meshes: IntArray,
     push: FloatArray,
 ) -> float:
-    """The overlap with a box: the ball less its parts beyond each face, and plus those beyond two; the lane at corners.
+    """Return the overlap with a box: the ball less its parts beyond each face, plus those beyond two faces.
 
-    In radii, with faces named 0 to 2 for the upper ones of each axis, 3 to 5 for the lower ones.
+    `box_lane` takes over at corners. Units are radii. Faces 0 to 2 are the upper ones of each axis, 3 to 5 the lower.
     """
     a, b, c = x - shapes[row, 0], y - shapes[row, 1], z - shapes[row, 2]
     axes = (

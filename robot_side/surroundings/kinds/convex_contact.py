@@ -10,11 +10,11 @@ from robot_side.surroundings.kinds.layout import CLOSING, LEAST_WAY_M, MOST_STEP
 
 
 def convex_contact(nearest: Callable[..., Any]) -> Callable[..., Any]:
-    """Make the function `contact` of a kind from its `nearest` (see `Kind`)."""
+    """Return the function `contact` of a kind, built from its `nearest` (see `Kind`)."""
 
     @building_block
     def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, reach: float) -> Contact:
-        # Each step ends at the plane that touches the primitive at its nearest point.
+        # Each step ends at the tangent plane at the primitive's nearest point.
         moved, point = 0.0, start
         for _ in range(MOST_STEPS):
             distance, towards = nearest(shapes, row, point)
@@ -31,7 +31,7 @@ def convex_contact(nearest: Callable[..., Any]) -> Callable[..., Any]:
             if moved > reach:
                 return NEVER
             point = add(point, scale(step, along))
-        # A sphere that still moves grazes: it has not touched so far.
+        # A sphere that still moves grazes the primitive: it has not touched up to here.
         return moved, 1.0
 
     return contact

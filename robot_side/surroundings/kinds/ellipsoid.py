@@ -26,7 +26,7 @@ _NEWTON_STEPS: Final = 60
 
 @inlined
 def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Write one ellipsoid's bounds; its volume in m³."""
+    """Write one ellipsoid's bounds; return its volume in m³."""
     volume = box.place(numbers, k, bounds, row)
     bounds[row, 3] = max(numbers[k, 12], numbers[k, 13], numbers[k, 14])
     return math.pi / 6.0 * volume
@@ -68,7 +68,7 @@ def _local(shapes: FloatArray, row: int, point: Vector) -> Vector:
 
 @building_block
 def _surface(a: Vector, x: Vector) -> tuple[float, Vector]:
-    """Signed distance of a point from the surface, and the unit normal at the nearest point, in the own frame.
+    """Return the signed distance of a point from the surface, and the unit normal at the nearest point; own frame.
 
     The nearest point is y_i = a_i² x_i / (a_i² + t), where t solves F(t) = Σ (a_i x_i / (a_i² + t))² - 1 = 0. F falls
     and is convex, and starts at 2 or less where its largest term is 1: Newton's method climbs to the root from there.
@@ -94,7 +94,7 @@ def _surface(a: Vector, x: Vector) -> tuple[float, Vector]:
     u, v, w = a[0] * x[0] / p, a[1] * x[1] / q, a[2] * x[2] / r
     missing = 1.0 - u * u - v * v - w * w
     if missing > 0.0:
-        # On the plane of the two longer axes, near the middle: the nearest points lie above and below it.
+        # On the plane of the two longer axes, near the middle: the nearest points lie above and below the plane.
         if least == 0:
             u = math.copysign(math.sqrt(u * u + missing), x[0])
         elif least == 1:
@@ -108,7 +108,7 @@ def _surface(a: Vector, x: Vector) -> tuple[float, Vector]:
 
 @building_block
 def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
-    """The nearest point of the surface of the ellipsoid in `row`."""
+    """Return the nearest point of the surface of the ellipsoid in `row`."""
     distance, normal = _surface((shapes[row, 12], shapes[row, 13], shapes[row, 14]), _local(shapes, row, point))
     return distance, _turned(shapes, row, scale(-1.0, normal))
 
@@ -127,7 +127,7 @@ def overlap_one_ellipsoid(
     _meshes: IntArray,
     push: FloatArray,
 ) -> float:
-    """The overlap with an ellipsoid, by sections across the axis that the nearest normal is closest to; in radii."""
+    """Return the overlap with an ellipsoid, by sections across the axis closest to the nearest normal; in radii."""
     half = scale(1.0 / radius, (shapes[row, 12], shapes[row, 13], shapes[row, 14]))
     center = scale(1.0 / radius, _local(shapes, row, (x, y, z)))
     distance, normal = _surface(half, center)
@@ -146,7 +146,7 @@ def overlap_one_ellipsoid(
     between = min(max(center[2] - distance * normal[2], low), high)
     below, downward = sum_slices(center, half, low, between)
     above, upward = sum_slices(center, half, between, high)
-    # Back from the order of the axes: rolling by 1 - axis undoes it.
+    # Undo the roll of the axes.
     pushed = add(downward, upward)
     pushed = (
         (pushed[2], pushed[0], pushed[1]) if axis == 0 else ((pushed[1], pushed[2], pushed[0]) if axis == 1 else pushed)

@@ -1,7 +1,7 @@
-"""The ball's part of an ellipsoid: an integral of plane sections, each a disc ∩ an ellipse in closed form.
+"""Overlap of the unit ball and an ellipsoid: integral of plane sections, each a disc ∩ an ellipse in closed form.
 
-Adaptive quadrature by Gauss and Kronrod's pair of 7 and 15 nodes. The regret: where they meet, two such curves cross in
-the roots of a quartic, and sections begin and end like powers of 3/2, which no fixed rule takes well.
+Adaptive Gauss-Kronrod quadrature with 7 and 15 nodes. The regret: circle and ellipse cross at the roots of a quartic,
+and sections begin and end like powers of 3/2, for which no fixed rule is good.
 """
 
 import math
@@ -13,16 +13,16 @@ from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, add, norm, scale
 
 _TOLERANCE: Final = 1e-10
-"""Of the ball's cube of radius: two rules may differ by this over a piece, of which the finer one errs by a tenth."""
+"""Largest difference of the two rules over a piece, in cubes of the radius; the finer rule errs by a tenth of that."""
 _NO_PUSH: Final = (0.0, 0.0, 0.0)
 _TOLERANCE_OF_GRADIENT: Final = 1e-5
-"""Of its square; it is less smooth than the volume, and tells of corners that two rules happen to agree on."""
+"""Largest difference of the gradients, in squares of the radius; they show corners that both rules miss."""
 _HARDLY: Final = 1e-4
-"""rad"""
+"""Largest angle, in rad, by which rounding turns an arc back"""
 _AT_POLE: Final = 1e-12
-"""A section this much smaller than the largest, by its square, is a point."""
+"""Squared size of a section, over that of the largest, below which the section is a point"""
 _FINEST: Final = 1 << 12
-"""Pieces, at most, of the range of sections."""
+"""Most pieces of the range of sections"""
 _NODES: Final = np.array(
     [
         0.99145537112081263,
@@ -59,19 +59,19 @@ _COARSE: Final = np.array(
         0.41795918367346938,
     ]
 )
-"""Gauss and Kronrod's pair of 7 and 15 nodes."""
+"""Gauss-Kronrod weights of 7 nodes; above: nodes, and weights of all 15"""
 
 
 @inlined
 def _excess(angle: float, u: float, v: float, rho: float, alpha: float, beta: float) -> float:
-    """How far outside the ellipse a point of the circle is: ≤ 0 within."""
+    """Return the value of the ellipse's equation at a point of the circle: ≤ 0 inside the ellipse."""
     x, y = (u + rho * math.cos(angle)) / alpha, (v + rho * math.sin(angle)) / beta
     return x * x + y * y - 1.0
 
 
 @inlined
 def _pair(half: float, rest: float) -> tuple[float, float]:
-    """The roots of y² + 2 half y + rest; NaN for none."""
+    """Return the roots of y² + 2 half y + rest; NaN if there are none."""
     inside = half * half - rest
     if inside < 0.0:
         return math.nan, math.nan
@@ -81,7 +81,7 @@ def _pair(half: float, rest: float) -> tuple[float, float]:
 
 @inlined
 def _largest_root(a: float, b: float, c: float) -> float:
-    """The largest real root of m³ + a m² + b m + c (Cardano), made exact by Newton's method."""
+    """Return the largest real root of m³ + a m² + b m + c (Cardano), refined by Newton's method."""
     p, q = (b - a * a / 3.0) / 3.0, (a * (2.0 * a * a / 27.0 - b / 3.0) + c) / 2.0
     inside = q * q + p * p * p
     if inside >= 0.0:
@@ -101,10 +101,10 @@ def _largest_root(a: float, b: float, c: float) -> float:
 def _crossings(  # noqa: PLR0912
     u: float, v: float, rho: float, alpha: float, beta: float
 ) -> tuple[int, Vector, float]:
-    """How many angles of the circle lie on the ellipse, and these, rising: three and a fourth.
+    """Return the number of the circle's angles on the ellipse, and these, rising: three and a fourth.
 
-    The excess is C0 + C1 cos φ + S1 sin φ + C2 cos 2φ, a quartic in tan(φ/2) (Ferrari), with φ from where |excess| is
-    greatest of four, so that no root is at infinity.
+    The excess is C0 + C1 cos φ + S1 sin φ + C2 cos 2φ, a quartic in tan(φ/2) (Ferrari). φ begins at that of four
+    angles where |excess| is greatest, so that no root is at infinity.
     """
     p, q = 1.0 / (alpha * alpha), 1.0 / (beta * beta)
     c0 = u * u * p + v * v * q - 1.0 + 0.5 * rho * rho * (p + q)
@@ -124,7 +124,7 @@ def _crossings(  # noqa: PLR0912
     f = c - 6.0 * shift * shift
     g = d - 2.0 * c * shift + 8.0 * shift * shift * shift
     h = e - d * shift + c * shift * shift - 3.0 * shift * shift * shift * shift
-    # The largest root of m³ + f m² + (f²/4 - h) m - g²/8, which is not negative.
+    # The largest root of m³ + f m² + (f²/4 - h) m - g²/8 is not negative.
     m = _largest_root(f, 0.25 * f * f - h, -0.125 * g * g)
     if m > 1e-14 * max(abs(f), math.sqrt(abs(h))):
         s = math.sqrt(2.0 * m)
@@ -144,7 +144,7 @@ def _crossings(  # noqa: PLR0912
                 if abs(value) < 1e-2 * abs(slope):
                     angle -= value / slope
             angle = (angle + turn) % (2.0 * math.pi)
-            # Into its place among those that are known.
+            # Insert the angle in order.
             if count == 0 or angle < first:
                 first, second, third, fourth = angle, first, second, third
             elif count == 1 or angle < second:
@@ -159,10 +159,10 @@ def _crossings(  # noqa: PLR0912
 
 @building_block
 def _section(u: float, v: float, rho: float, alpha: float, beta: float) -> tuple[float, Vector, int]:
-    """The area that a disc about (u, v) has in common with an ellipse about the origin, its derivatives, and its sort.
+    """Return the area of the intersection of a disc about (u, v) and an ellipse about the origin, and its sort.
 
-    These are by u, by v, and by the disc's radius. Sorts: 0 nothing, 1 the disc, 2 the ellipse, 3 a part of both. By
-    Green's theorem over arcs of the circle within the ellipse, and arcs of the ellipse between them.
+    With its derivatives by u, v and the disc's radius. Sorts: 0 nothing, 1 the disc, 2 the ellipse, 3 a part of both.
+    By Green's theorem over arcs of the circle within the ellipse, and arcs of the ellipse between them.
     """
     count, angles, last = _crossings(u, v, rho, alpha, beta)
     if count < 2:
@@ -182,14 +182,14 @@ def _section(u: float, v: float, rho: float, alpha: float, beta: float) -> tuple
             area += 0.5 * (rho * rho * (end - start) + u * (to_y - from_y) - v * (to_x - from_x))
             along_u, along_v, arcs = along_u + to_y - from_y, along_v - (to_x - from_x), arcs + end - start
         else:
-            # The ellipse's own arc from where the circle leaves it to where it enters again.
+            # Arc of the ellipse from the circle's exit to its next entry.
             turn = math.atan2(to_y / beta, to_x / alpha) - math.atan2(from_y / beta, from_x / alpha)
-            # Where rounding makes two crossings of one, there is hardly an arc, of the circle neither.
+            # Where rounding makes two crossings of one, both arcs are tiny.
             if turn < 0.0 and (turn < -_HARDLY or end - start > 1.0):
                 turn += 2.0 * math.pi
             area += 0.5 * alpha * beta * turn
     if not any_arc:
-        # It touches from outside, or from around.
+        # The circle touches the ellipse from outside, or encloses it.
         apart = (alpha - u) * (alpha - u) + v * v > rho * rho
         return (0.0, _NO_PUSH, 0) if apart else (math.pi * alpha * beta, _NO_PUSH, 2)
     return area, (along_u, along_v, rho * arcs), 3
@@ -197,7 +197,7 @@ def _section(u: float, v: float, rho: float, alpha: float, beta: float) -> tuple
 
 @building_block
 def _slice(z: float, x: Vector, a: Vector) -> tuple[float, Vector, int]:
-    """The area of a section at height z of the unit ball about x with an ellipsoid, its gradient by x, and its sort."""
+    """Return area, gradient by x, and sort of the section at height z of a unit ball about x and an ellipsoid."""
     up = z - x[2]
     rho, size = math.sqrt(max(1.0 - up * up, 0.0)), math.sqrt(max(1.0 - z * z / (a[2] * a[2]), 0.0))
     if rho == 0.0 or size == 0.0:
@@ -208,7 +208,7 @@ def _slice(z: float, x: Vector, a: Vector) -> tuple[float, Vector, int]:
 
 @building_block
 def _pole_sort(z: float, x: Vector, a: Vector) -> int:
-    """The sort of sections at a pole of the ball, or of the ellipsoid, where there is none; -1 at any other height."""
+    """Return the sort of sections next to a pole of the ball or the ellipsoid; -1 at any other height."""
     up, size_2 = z - x[2], 1.0 - z * z / (a[2] * a[2])
     if 1.0 - up * up < _AT_POLE:
         return 1 if (x[0] / a[0]) ** 2 + (x[1] / a[1]) ** 2 <= size_2 else 0
@@ -224,10 +224,10 @@ def _height(low: float, high: float, t: float) -> float:
 
 @building_block
 def sum_slices(x: Vector, a: Vector, low: float, high: float) -> tuple[float, Vector]:
-    """The integral of sections from `low` to `high`: pieces are halved until both rules agree on them.
+    """Integrate the sections from `low` to `high`, with the gradient. Pieces are halved until both rules agree.
 
-    Where sections begin or end like powers of 3/2, that is smooth in t. Elsewhere, each halving divides the error of
-    such a power by 5. A piece is halved, too, where its end has another sort of section than its outermost node.
+    At `low` and `high`, powers of 3/2 are smooth in t. Elsewhere, each halving divides the error of such a power by 5.
+    A piece is halved, too, if the section at its end has another sort than that at its outermost node.
     """
     volume, gradient, place, size, first, last = 0.0, (0.0, 0.0, 0.0), 0, _FINEST, 0, 0
     while place < _FINEST:
@@ -264,7 +264,7 @@ def sum_slices(x: Vector, a: Vector, low: float, high: float) -> tuple[float, Ve
 
 @inlined
 def reach_up(normal_z: float, distance: float) -> float:
-    """How high the part of the unit ball reaches that lies beyond a plane at this distance from its centre."""
+    """Return the greatest height of the unit ball's part beyond a plane at this distance from the centre."""
     if -normal_z >= distance:
         return 1.0
     across = max(1.0 - distance * distance, 0.0) * max(1.0 - normal_z * normal_z, 0.0)
@@ -273,7 +273,7 @@ def reach_up(normal_z: float, distance: float) -> float:
 
 @inlined
 def rolled(vector: Vector, by: int) -> Vector:
-    """The same vector in axes that follow each other from `by` + 1 on."""
+    """Return the vector with its axes rolled, so that they begin with `by` + 1."""
     if by == 0:
         return vector[1], vector[2], vector[0]
     return (vector[2], vector[0], vector[1]) if by == 1 else vector

@@ -14,7 +14,7 @@ from robot_side.surroundings.kinds.layout import CLOSING, LEAST_WAY_M, NEVER, TO
 
 @inlined
 def place(_numbers: FloatArray, _k: int, bounds: FloatArray, row: int) -> float:
-    """Write one half-space's bounds; its volume has no end."""
+    """Write one half-space's bounds; return its volume, infinity."""
     for axis in range(3):
         bounds[row, axis] = 0.0
     bounds[row, 3] = math.inf
@@ -25,7 +25,7 @@ def place(_numbers: FloatArray, _k: int, bounds: FloatArray, row: int) -> float:
 def placed(
     _sizes: FloatArray, _k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
 ) -> None:
-    """Write the numbers of the half-space below a plane at a pose, whose normal is the third axis."""
+    """Write the numbers of the half-space below a plane at a pose; the plane's normal is the third axis."""
     normal = turns[turn, 2], turns[turn, 5], turns[turn, 8]
     for axis in range(3):
         numbers[row, axis] = normal[axis]
@@ -34,14 +34,14 @@ def placed(
 
 @inlined
 def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
-    """The nearest point of the plane in `row`."""
+    """Return the nearest point of the plane in `row`."""
     normal = shapes[row, 0], shapes[row, 1], shapes[row, 2]
     return dot(normal, point) - shapes[row, 3], negative(normal)
 
 
 @inlined
 def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, _reach: float) -> Contact:
-    """Where a sphere that moves along the unit vector `along` touches the plane."""
+    """Return the contact of a sphere that moves along the unit vector `along` with the plane."""
     normal = shapes[row, 0], shapes[row, 1], shapes[row, 2]
     gap, closing = dot(normal, start) - shapes[row, 3] - radius, -dot(normal, along)
     if gap < -TOUCHING_M:
@@ -51,7 +51,7 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
 
 @inlined
 def overlap(shapes: FloatArray, row: int, center: Vector, radius: float) -> Overlap:
-    """The exact overlap of a sphere with the half-space in `row` (eq. 12)."""
+    """Return the exact overlap of a sphere with the half-space in `row` (eq. 12)."""
     return half_space_overlap(center, radius, (shapes[row, 0], shapes[row, 1], shapes[row, 2]), shapes[row, 3])
 
 

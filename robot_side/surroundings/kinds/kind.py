@@ -1,7 +1,7 @@
-"""What a kind of primitive says of itself: one descriptor a kind, from which every list of kinds follows.
+"""Descriptor of a kind of primitive; every list of kinds follows from the descriptors.
 
 The rule: a kind is one file with one `KIND`, named once in `perceived.KINDS` beside its arrays. The regret: a kernel
-takes no list of arrays, so `by_kind` builds its if-chain of closures, one inside another, and types end at `Any`.
+takes no list of arrays, so `by_kind` builds an if-chain of nested closures, and types end at `Any`.
 """
 
 import math
@@ -18,11 +18,11 @@ from robot_side.compiled.kernel import Compiled, inlined
 from robot_side.surroundings.kinds.layout import NUMBERS, rows
 
 Row = tuple[int, ...]
-"""The shape of an array's rows."""
+"""Shape of an array's rows"""
 
 
 class Check(Enum):
-    """What the numbers of an array must be, besides finite."""
+    """Condition on the numbers of an array, besides that they are finite."""
 
     FINITE = auto()
     NOT_NEGATIVE = auto()
@@ -32,7 +32,7 @@ class Check(Enum):
 
 
 class Array(NamedTuple):
-    """An array of a frame with a row for each primitive of a kind."""
+    """Array of a frame with a row for each primitive of a kind."""
 
     name: str
     row: Row
@@ -40,52 +40,52 @@ class Array(NamedTuple):
 
     @property
     def type(self) -> type:
-        """The type of the values."""
+        """Type of the values"""
         return np.int64 if self.check is Check.INDEX else np.float64
 
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """One kind of primitive; k counts its primitives, `columns` are arrays as `read` returns them."""
+    """Kind of primitive; k counts its primitives, `columns` are the arrays that `read` returns."""
 
     name: str
     arrays: tuple[Array, ...]
-    """Where it is, and how large"""
+    """Arrays of poses and sizes"""
     placed: Callable[..., None]
-    """(sizes (k, 20), k, position, turns (g, 9), turn, numbers (n, 20), row): write the numbers of a primitive whose
-    own frame is there, of sizes in this frame. Compiled, as all below."""
+    """(sizes (k, 20), k, position, turns (g, 9), turn, numbers (n, 20), row): write the numbers of a primitive of these
+    sizes, given in its own frame, at this pose. Compiled, as all below."""
     place: Callable[..., float]
-    """(numbers, k, bounds (n, 4), row) to the volume in m³: make the numbers the shape's, and write the bounds"""
+    """(numbers, k, bounds (n, 4), row) to the volume in m³: convert the numbers to the shape, and write the bounds"""
     nearest: Callable[..., Any]
     """(shapes (n, 15), row, point) to Nearest"""
     contact: Callable[..., Any]
     """(shapes (n, 15), row, start, radius, along, reach) to Contact"""
     overlap: Callable[..., Any] | None = None
-    """(shapes (n, 15), row, center, radius) to Overlap, where that is short; else `kernel` has it"""
+    """(shapes (n, 15), row, center, radius) to Overlap, if the closed form is short; else `kernel` computes it"""
     kernel: Compiled | None = None
-    """The kernel of overlaps with the signature OVERLAP; a scene loads those of its own kinds alone"""
+    """Overlap kernel with the signature OVERLAP; a scene loads only those of its own kinds"""
     centers: Callable[..., Any] | None = None
-    """(columns) to centres (k, 3) in metres; None where it has no end"""
+    """(columns) to centres (k, 3) in metres; None for an infinite kind"""
     in_box: bool = False
-    """Whether its columns are a box around it: centres (k, 3), rotations (k, 3, 3), half sizes (k, 3)"""
+    """Whether the columns are a bounding box: centres (k, 3), rotations (k, 3, 3), half sizes (k, 3)"""
     derive: Callable[[Any], tuple[Any, ...]] | None = None
-    """Makes such columns from a frame, where they are not the arrays"""
+    """(frame) to the columns, if these are not the arrays"""
     more: Callable[[Any], FloatArray] | None = None
-    """From a frame to the numbers that follow those of the arrays"""
+    """(frame) to the numbers that follow those of the arrays"""
 
     @cached_property
     def owner(self) -> str:
-        """The field that holds each primitive's object."""
+        """Name of the field that holds each primitive's object"""
         return f"{self.name}_object"
 
     @cached_property
     def fields(self) -> tuple[str, ...]:
-        """The names of the arrays that may differ from frame to frame: all but indices."""
+        """Names of the arrays that may differ from frame to frame: all but indices"""
         return tuple(array.name for array in self.arrays if array.check is not Check.INDEX)
 
     @cached_property
     def parts(self) -> Mapping[str, tuple[slice, Row]]:
-        """Where in a primitive's numbers the values of these arrays are, and the shape of their rows."""
+        """Places of the values of `fields` in a primitive's numbers, and the shape of their rows"""
         found, end = {}, 0
         for array in self.arrays:
             if array.check is not Check.INDEX:
@@ -94,17 +94,17 @@ class Kind:
         return found
 
     def numbers(self, objects: Any) -> FloatArray:
-        """The numbers (k, 20) of each primitive of a frame."""
+        """Return the numbers (k, 20) of each primitive of a frame."""
         further = () if self.more is None else (self.more(objects),)
         return rows(*(getattr(objects, name) for name in self.fields), *further, width=NUMBERS)
 
     def read(self, objects: Any) -> tuple[Any, ...]:
-        """The columns of a frame."""
+        """Return the columns of a frame."""
         return self.derive(objects) if self.derive else tuple([getattr(objects, name) for name in self.fields])
 
 
 def by_kind(functions: Sequence[Callable[..., Any]], first: int = 0) -> Any:
-    """Make the function of a kind's number and arguments that calls the one at this place, the last for any other."""
+    """Return a function (kind, arguments) that calls the function of this kind; other numbers call the last one."""
     function, *others = functions
     if not others:
 

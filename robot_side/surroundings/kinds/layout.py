@@ -1,4 +1,4 @@
-"""What the kinds share: their numbers, and a row of 15 numbers for the shape of any of them."""
+"""Common layout of the kinds: their numbers, and a row of 15 numbers for the shape of each."""
 
 import math
 from typing import Any, Final
@@ -18,25 +18,25 @@ HALF_SPACE: Final = 3
 MESH: Final = 4
 """A mesh has the layout of the box around it. Contact and overlap come from `placed_meshes`, by address."""
 SHAPE_NUMBERS: Final = 15
-"""Of a primitive as a table has it"""
+"""Numbers of a primitive in a table"""
 NUMBERS: Final = 20
-"""Of a primitive as a frame has it: the values of its arrays, and of a mesh what its library says of it."""
+"""Numbers of a primitive in a frame: the values of its arrays, for a mesh also its sizes from the library"""
 VELOCITY: Final = 12
-"""Among the numbers of an object, its velocity follows its position and rotation."""
+"""Index of the velocity in an object's numbers, after position and rotation"""
 
 Nearest = tuple[float, Vector]
 """Signed distance, positive outside, and the unit vector along which it falls fastest: towards the nearest point from
 outside, away from it from inside, the same on both sides of a face."""
 Contact = tuple[float, float]
-"""The distance along û at which a moving sphere first touches, and û·n of the plane in which it does so: 0 and 1 where
-it overlaps already; infinite and 0 for never, or beyond a given reach."""
+"""Distance along û at which a moving sphere first touches, and û·n of the contact plane. 0 and 1 if it overlaps
+already; infinite and 0 without contact, or beyond a given reach."""
 NEVER: Final[Contact] = (math.inf, 0.0)
 ANY_DIRECTION: Final = (0.0, 0.0, 1.0)
-"""For a point from which every way is as long."""
+"""Direction for a point that is equally far in all directions"""
 
 
 def rows(*columns: FloatArray, width: int = SHAPE_NUMBERS) -> FloatArray:
-    """Shapes (k, 15) from columns (k, ...) that follow each other, the rest 0."""
+    """Return shapes (k, width) from consecutive columns (k, ...), the rest 0."""
     count = len(columns[0])
     flat = [column.reshape(count, math.prod(column.shape[1:])) for column in columns]
     used = sum(column.shape[1] for column in flat)
@@ -44,32 +44,32 @@ def rows(*columns: FloatArray, width: int = SHAPE_NUMBERS) -> FloatArray:
 
 
 OVERLAP: Final[tuple[Any, ...]] = (*(input_array(2), COUNT, NUMBER, NUMBER, NUMBER, NUMBER, BUNDLE, output_array(1)),)
-"""What a kernel of overlaps takes: shapes (n, 15), the row, the sphere's centre and radius, the scene's meshes, and
-room (3,) for dV/dcentre. It returns V."""
+"""Argument types of an overlap kernel: shapes (n, 15), the row, the sphere's centre and radius, the scene's meshes, and
+an output (3,) for dV/dcentre. It returns V."""
 CONTACT: Final[tuple[Any, ...]] = (BUNDLE, COUNT, *(NUMBER,) * 8, TRUTH)
-"""What a kernel of contacts with meshes takes (see `placed_meshes`)."""
+"""Argument types of the contact kernel of meshes (see `placed_meshes`)"""
 MESH_CONTACT: Final[Any] = together(NUMBER, NUMBER)
-"""And returns: a `Contact`."""
+"""Return type of the contact kernel of meshes: a `Contact`"""
 TOUCHING_M: Final = 1e-7
-"""What is no farther off, and no deeper, than this touches: it overlaps by nothing yet, and may go on to do so."""
+"""Largest gap and depth at which bodies touch: they do not overlap yet, and may begin to."""
 LEAST_WAY_M: Final = 1e-12
-"""The way to what is touched already; 0 is that to what overlaps."""
+"""Contact distance of bodies that touch already; 0 is that of bodies that overlap."""
 CLOSING: Final = 1e-9
-"""Slower than this share of the way, what is beside does not come nearer."""
+"""Least û·n of an approach: below it a surface is beside the path and does not come nearer."""
 MOST_STEPS: Final = 60
 ENLARGED: Final = 1.0 + 1e-9
-"""Bounds around meshes are enlarged by this, so that rounding never passes over what is touched."""
+"""Factor on bounds around meshes, so that rounding never misses a contact"""
 
 
 @inlined
 def way_by(part: float) -> float:
-    """The way on which what moves by `part` of it moves by a metre, at most 1e15 m."""
+    """Return 1 / part: the distance along the path for a metre along an axis, at most 1e15 m."""
     return 1.0 / part if abs(part) > 1e-15 else 1e15
 
 
 @inlined
 def posed(position: Vector, turns: FloatArray, k: int, x: float, y: float, z: float) -> Vector:
-    """The point (x, y, z) of an own frame in the world; turns (g, 9) by rows."""
+    """Return the point (x, y, z) of a frame at this pose in world coordinates; turns (g, 9) by rows."""
     return (
         position[0] + (turns[k, 0] * x + turns[k, 1] * y + turns[k, 2] * z),
         position[1] + (turns[k, 3] * x + turns[k, 4] * y + turns[k, 5] * z),
@@ -88,7 +88,7 @@ def write_pose(position: Vector, turns: FloatArray, k: int, numbers: FloatArray,
 
 @inlined
 def take_over(volume: float, gradient: Vector, size: float, radius: float, push: FloatArray) -> float:
-    """Take over what was found in units of `size`; the whole sphere where the numbers overflowed, which is early."""
+    """Convert an overlap from units of `size` to metres; after an overflow, the whole sphere, which warns early."""
     area = size * size
     if not math.isfinite(volume + gradient[0] + gradient[1] + gradient[2]):
         push[0] = push[1] = push[2] = 0.0

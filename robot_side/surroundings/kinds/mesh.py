@@ -1,4 +1,4 @@
-"""Closed meshes as a kind: rows of the boxes around them; contact and overlap come from `placed_meshes`, by address."""
+"""Closed meshes: rows of the boxes around them; contact and overlap come from `placed_meshes`, by address."""
 
 from typing import Any, Final
 
@@ -14,7 +14,7 @@ from robot_side.surroundings.kinds.layout import ENLARGED, NEVER, NUMBERS, TOUCH
 
 @inlined
 def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Make a mesh's numbers those of the box around it, and write its bounds; its volume in m³."""
+    """Convert a mesh's numbers to those of the box around it, and write its bounds; return its volume in m³."""
     x, y, z = numbers[k, 0], numbers[k, 1], numbers[k, 2]
     for axis in range(3):
         first = 3 + 3 * axis
@@ -31,14 +31,14 @@ def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
 def placed(
     sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
 ) -> None:
-    """Write the numbers of a mesh at a pose; sizes: what follows the pose."""
+    """Write the numbers of a mesh at a pose; sizes: the numbers that follow the pose."""
     write_pose(position, turns, turn, numbers, row)
     for entry in range(12, NUMBERS):
         numbers[row, entry] = sizes[k, entry - 12]
 
 
 def of_library(library: Any, index: IntArray) -> FloatArray:
-    """Half sizes of the boxes around meshes of the library, their middles, their radii, and the volumes (q, 8)."""
+    """Return half sizes, middles and radii of the bounds of the library's meshes, and their volumes (q, 8)."""
     if library is None:
         return np.empty((0, 8))
     around = library.bounds
@@ -48,7 +48,7 @@ def of_library(library: Any, index: IntArray) -> FloatArray:
 
 @inlined
 def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, reach: float) -> Contact:
-    """Where a sphere enters the box around a mesh, enlarged by the radius: no later than it touches the mesh."""
+    """Return where a sphere enters the box around a mesh, enlarged by the radius: at or before its contact."""
     enter, leave, grown = 0.0, reach, radius * ENLARGED + TOUCHING_M
     offset = subtract(start, load(shapes, row))
     for k in range(3):
@@ -60,7 +60,7 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
 
 
 def _derive(objects: Any) -> tuple[FloatArray, ...]:
-    """Middles, rotations and half sizes of the boxes around meshes."""
+    """Return middles, rotations and half sizes of the boxes around meshes."""
     library, index = objects.mesh_library, objects.mesh_index
     if library is None:
         return objects.mesh_positions_m, objects.mesh_rotations, np.empty((0, 3))

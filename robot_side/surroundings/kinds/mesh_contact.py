@@ -1,8 +1,8 @@
-"""Closed meshes, convex or not: where a moving sphere begins to enter one.
+"""Contact of a moving sphere with a closed mesh, convex or not.
 
 The overlap rises only by the part of the surface that faces the motion and lies in the ball: dV/dE = -∫ n·û dA. So
 only the triangles in front count, those with n·û < 0: the next rise begins where the sphere next touches one.
-Everything here is in the mesh's own frame; the walks are those of `tree_queries`.
+All coordinates are in the mesh's own frame; the trees are walked as in `tree_queries`.
 """
 
 import math
@@ -23,14 +23,14 @@ from robot_side.surroundings.kinds.layout import CLOSING, ENLARGED, TOUCHING_M, 
 
 
 class Sweep(NamedTuple):
-    """A sphere that moves from `start` along the unit vector `along`, as far as `reach`."""
+    """Sphere that moves from `start` along the unit vector `along`, by at most `reach`."""
 
     start: Vector
     along: Vector
     radius: float
     reach: float
     by_axis: Vector
-    """The way on which it moves by a metre along each axis"""
+    """Distance along the path for a metre along each axis"""
 
 
 @inlined
@@ -41,7 +41,7 @@ def swept(start: Vector, along: Vector, radius: float, reach: float) -> Sweep:
 
 @building_block
 def overlaps(tables: MeshTables, mesh: int, sweep: Sweep) -> bool:
-    """Whether a sphere overlaps a mesh at its start, deeper than what only touches."""
+    """Return whether a sphere overlaps a mesh at its start, by more than a touch."""
     if is_clear_of(tables, mesh, sweep.start, sweep.radius):
         return False
     return touches_surface(tables, mesh, sweep.start, sweep.radius - TOUCHING_M) or is_inside(tables, mesh, sweep.start)
@@ -49,7 +49,7 @@ def overlaps(tables: MeshTables, mesh: int, sweep: Sweep) -> bool:
 
 @inlined
 def _enters(tables: MeshTables, node: int, sweep: Sweep, reach: float) -> float:
-    """The way at which a node's box, enlarged by the radius, is entered; infinite beyond the reach."""
+    """Return the distance at which a node's box, enlarged by the radius, is entered; infinite beyond the reach."""
     enter, leave = 0.0, reach
     grown = sweep.radius * ENLARGED + TOUCHING_M
     for axis in range(3):
@@ -61,7 +61,7 @@ def _enters(tables: MeshTables, node: int, sweep: Sweep, reach: float) -> float:
 
 @inlined
 def _is_passed(tables: MeshTables, triangle: int, sweep: Sweep, reach: float) -> bool:
-    """Whether the sweep misses the ball around a triangle, or the triangle faces away."""
+    """Return whether the sweep misses the ball around a triangle, or the triangle faces away."""
     normal = corner_of(tables, triangle, 3)
     if dot(normal, sweep.along) >= -CLOSING:
         return True
@@ -74,9 +74,9 @@ def _is_passed(tables: MeshTables, triangle: int, sweep: Sweep, reach: float) ->
 
 @building_block
 def _touch(tables: MeshTables, triangle: int, sweep: Sweep, best: float) -> float:
-    """The way at which the sphere first touches a triangle in front, 0 where it does; `best` or more if it is beyond.
+    """Return the contact distance to a triangle in front, 0 if the sphere touches; `best` or more if it is beyond.
 
-    The triangle enlarged by the radius is a prism, three cylinders and three balls: the first of these counts.
+    The triangle enlarged by the radius is a prism, three cylinders and three balls; the first contact counts.
     """
     start, along, radius = sweep.start, sweep.along, sweep.radius
     normal = corner_of(tables, triangle, 3)
@@ -110,7 +110,7 @@ def _touch(tables: MeshTables, triangle: int, sweep: Sweep, best: float) -> floa
 
 @inlined
 def _corner_touch(corner: Vector, along: Vector, radius: float) -> float:
-    """The way at which a sphere that starts at the origin, clear of it, touches a corner."""
+    """Return the contact distance to a corner, for a sphere that starts at the origin and is clear of the corner."""
     ahead, apart = dot(corner, along), dot(corner, corner) - radius * radius
     inside = ahead * ahead - apart
     if ahead <= 0.0 or inside < 0.0:
@@ -121,11 +121,11 @@ def _corner_touch(corner: Vector, along: Vector, radius: float) -> float:
 
 @inlined
 def _edge_touch(first: Vector, second: Vector, along: Vector, radius: float) -> float:
-    """And an edge, between its ends."""
+    """Return the contact distance to an edge between its ends, for a sphere as in `_corner_touch`."""
     edge = subtract(second, first)
     squared_length = dot(edge, edge)
     slant, lean = dot(edge, along), dot(edge, first)
-    # What is across the edge, of the way and of the way to the edge, by squares of its length.
+    # Components across the edge, of the path and of the offset to the edge, times the edge's squared length.
     across = squared_length - slant * slant
     ahead = squared_length * dot(first, along) - lean * slant
     apart = squared_length * (dot(first, first) - radius * radius) - lean * lean
@@ -139,9 +139,9 @@ def _edge_touch(first: Vector, second: Vector, along: Vector, radius: float) -> 
 
 @building_block
 def next_touch(tables: MeshTables, mesh: int, sweep: Sweep, nodes: IntArray, enters: FloatArray) -> tuple[float, int]:
-    """The way at which the sphere next touches a triangle in front, 0 where it does, and which; infinite for none.
+    """Return the contact distance to the next triangle in front, 0 if it touches, and its index; infinite for none.
 
-    The boxes that are entered first come first. nodes, enters: room for those that wait, one for each level.
+    Boxes come in the order in which they are entered. nodes, enters: scratch for waiting boxes, one for each level.
     """
     best, touched, node, waiting = math.inf, -1, tables.roots[mesh], 0
     reach = sweep.reach
@@ -163,7 +163,7 @@ def next_touch(tables: MeshTables, mesh: int, sweep: Sweep, nodes: IntArray, ent
                 if not _is_passed(tables, triangle, sweep, reach):
                     found = _touch(tables, triangle, sweep, best)
                     if found < best:
-                        # Nothing beyond the nearest touch so far counts.
+                        # Nothing beyond the nearest contact so far counts.
                         best, touched, reach = found, triangle, min(reach, found)
         if waiting == 0:
             break
@@ -174,7 +174,7 @@ def next_touch(tables: MeshTables, mesh: int, sweep: Sweep, nodes: IntArray, ent
 
 @building_block
 def closing_at(tables: MeshTables, triangle: int, sweep: Sweep, way: float) -> float:
-    """û·n of the plane in which the sphere touches a triangle after a way."""
+    """Return û·n of the plane in which the sphere touches a triangle after the distance `way`."""
     towards = to_triangle(tables, triangle, add(sweep.start, scale(way, sweep.along)))
     distance = norm(towards)
     return max(dot(towards, sweep.along) / distance, CLOSING) if distance > 0.0 else 1.0

@@ -14,7 +14,7 @@ from robot_side.surroundings.kinds.layout import ANY_DIRECTION, LEAST_WAY_M, NEV
 
 @inlined
 def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Write one sphere's bounds; its volume in m³."""
+    """Write one sphere's bounds; return its volume in m³."""
     for axis in range(4):
         bounds[row, axis] = numbers[k, axis]
     return 4.0 / 3.0 * math.pi * float(numbers[k, 3] ** 3)
@@ -32,7 +32,7 @@ def placed(
 
 @inlined
 def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
-    """The nearest point of the sphere in `row`."""
+    """Return the nearest point of the sphere in `row`."""
     offset = subtract((shapes[row, 0], shapes[row, 1], shapes[row, 2]), point)
     length = norm(offset)
     return length - shapes[row, 3], unit(offset) if length > 0.0 else ANY_DIRECTION
@@ -40,7 +40,7 @@ def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
 
 @inlined
 def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, _reach: float) -> Contact:
-    """Where a sphere that moves along the unit vector `along` touches the one in `row`."""
+    """Return the contact of a sphere that moves along the unit vector `along` with the sphere in `row`."""
     offset = subtract((shapes[row, 0], shapes[row, 1], shapes[row, 2]), start)
     reach = shapes[row, 3] + radius
     ahead, apart = dot(offset, along), dot(offset, offset) - reach * reach
@@ -55,7 +55,7 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
 
 @inlined
 def overlap(shapes: FloatArray, row: int, center: Vector, radius: float) -> Overlap:
-    """The exact overlap of a sphere with the one in `row` (eq. 11)."""
+    """Return the exact overlap of a sphere with the sphere in `row` (eq. 11)."""
     return sphere_overlap(center, radius, (shapes[row, 0], shapes[row, 1], shapes[row, 2]), shapes[row, 3])
 
 

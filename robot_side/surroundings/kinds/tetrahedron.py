@@ -22,13 +22,13 @@ Vertices = tuple[Vector, Vector, Vector, Vector]
 
 @inlined
 def _corner(shapes: FloatArray, row: int, k: int, point: Vector) -> Vector:
-    """Vertex k, seen from `point`."""
+    """Return vertex k relative to `point`."""
     return subtract((shapes[row, 3 * k], shapes[row, 3 * k + 1], shapes[row, 3 * k + 2]), point)
 
 
 @inlined
 def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Write one tetrahedron's bounds; its volume in m³."""
+    """Write one tetrahedron's bounds; return its volume in m³."""
     for axis in range(3):
         p, q, r, s = numbers[k, axis], numbers[k, 3 + axis], numbers[k, 6 + axis], numbers[k, 9 + axis]
         bounds[row, axis] = 0.5 * (min(p, q, r, s) + max(p, q, r, s))
@@ -56,7 +56,7 @@ def placed(
 
 @inlined
 def _edge_foot(start: Vector, end: Vector) -> Vector:
-    """The point of an edge that is nearest to the origin."""
+    """Return the point of an edge that is nearest to the origin."""
     edge = subtract(end, start)
     squared_length = dot(edge, edge)
     if squared_length == 0.0:
@@ -67,7 +67,7 @@ def _edge_foot(start: Vector, end: Vector) -> Vector:
 
 @inlined
 def _face(a: Vector, b: Vector, c: Vector, orientation: float) -> tuple[float, Vector, bool]:
-    """The origin's height over the face abc, the face's outward normal, and whether the origin's foot lies within."""
+    """Return the origin's height over the face abc, its outward normal, and whether the origin's foot is inside."""
     raw = cross(subtract(b, a), subtract(c, a))
     area = norm(raw)
     if area == 0.0:
@@ -80,7 +80,7 @@ def _face(a: Vector, b: Vector, c: Vector, orientation: float) -> tuple[float, V
 
 @building_block
 def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
-    """The nearest point of the surface of the tetrahedron in `row`; one of zero volume is a plate without an inside."""
+    """Return the nearest surface point of the tetrahedron in `row`; without volume it is a plate, without an inside."""
     a, b = _corner(shapes, row, 0, point), _corner(shapes, row, 1, point)
     c, d = _corner(shapes, row, 2, point), _corner(shapes, row, 3, point)
     vertices = a, b, c, d
@@ -103,7 +103,7 @@ def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
     face = 0
     for k in range(4):
         height, normal, foot_inside = faces[k]
-        # A foot that rounding puts just off its face does no harm: the edge there is as near.
+        # A foot that rounding puts just off its face does no harm: the edge is equally near.
         if foot_inside and height * height < squared_distance:
             foot, squared_distance = scale(-height, normal), height * height
         if height > faces[face][0]:
@@ -112,7 +112,7 @@ def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
     if distance > 0.0 and (six_volumes == 0.0 or faces[face][0] > 0.0):
         return distance, scale(1.0 / distance, foot)
     direction = negative(faces[face][1])
-    # On a tetrahedron without any area there is no face to take the normal of.
+    # A tetrahedron without area has no normal.
     return faces[face][0], direction if dot(direction, direction) > 0.0 else ANY_DIRECTION
 
 
@@ -130,7 +130,7 @@ def overlap_one_tetrahedron(
     _meshes: IntArray,
     push: FloatArray,
 ) -> float:
-    """The overlap with a tetrahedron."""
+    """Return the overlap with a tetrahedron."""
     size, center = power_of_two_below(radius), (x, y, z)
     part = 1.0 / size
     corners = (

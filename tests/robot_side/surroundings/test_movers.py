@@ -81,5 +81,5 @@ def test_other_objects_than_the_movers_are_refused() -> None:
     for things in ([4, 0], [0, 0], [-1], [len(first.names)]):
         with pytest.raises(ValueError, match="rising places"):
             Movers(first, np.array(things))
-    with pytest.raises(ValueError, match="says all"):
+    with pytest.raises(ValueError, match="complete frame"):
         Movers(movers.frame(0.0, movers.at_first, first.roles), np.array([0]))
