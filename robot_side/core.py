@@ -1,7 +1,7 @@
-"""The robot side without I/O: payloads in, payloads out, and `now` with every call.
+"""Robot side without I/O: payloads in, payloads out, and `now` with every call.
 
 payloads ─▶ receive ─▶ newest command ─▶ safety ─▶ tool motion ─▶ arm
-arm ─▶ kinematics ─▶ law: what is ahead ─▶ stiffness fields, telemetry ─▶ payloads
+arm ─▶ kinematics ─▶ law: contact ahead ─▶ stiffness fields, telemetry ─▶ payloads
 """
 
 import math
@@ -48,7 +48,7 @@ class RobotParts:
     limits: JointLimits
     motion: ToolMotionSettings
     truth: Observer | None = None
-    """Reports true contacts and distances to the figures; None where nobody knows them"""
+    """Observer of true contacts and distances, for the figures; None where they are unknown"""
     held_covers: HeldCovers | None = None
     assists: bool = False
     """Cap the speed along the triggers (see `speed_assist`)"""

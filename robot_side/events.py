@@ -44,7 +44,7 @@ class Tick(NamedTuple):
     """Time at which the newest accepted command was sent, on its sender's clock; NaN without one"""
     outgoing: Sequence[Outgoing]
     found: Found | None
-    """None for a failed tick"""
+    """Results; None for a failed tick"""
 
 
 class Listener:

@@ -80,8 +80,8 @@ class RobotSettings(SideOptions):
     insecure: bool = False
     """Listen beyond this machine without keys: anyone who reaches the port can move the arm."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
-    """Any MJCF arm with actuators instead of the built-in one. It starts at its keyframe named home, else at its first
-    keyframe, else in the middle of its joints' ranges."""
+    """Any MJCF arm with actuators instead of the built-in one. It starts at the keyframe named home, else at the first
+    keyframe, else in the middle of the joints' ranges."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """The model's site between the fingertips."""
     arm: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None

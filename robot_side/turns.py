@@ -1,4 +1,4 @@
-"""Work of the robot side in each turn of its loop: sockets and clocks around the core."""
+"""Work of the robot side in each turn of the loop: sockets and clocks around the core."""
 
 import secrets
 from collections.abc import Sequence

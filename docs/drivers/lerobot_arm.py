@@ -31,7 +31,7 @@ LONGEST_TURN_S = 0.1
 SMOOTHING_S = 0.05
 """Time constant, in seconds, of the velocities, which are filtered differences of positions."""
 GRIPPER_PER_S = 150.0
-"""Full speed of the gripper, in hundredths of its travel a second"""
+"""Full speed of the gripper, in hundredths of the travel a second"""
 HELD = 8.0
 """Distance from its goal, in hundredths, at which a closing gripper that stands holds something"""
 STANDS = 0.5

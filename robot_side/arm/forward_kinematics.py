@@ -37,7 +37,7 @@ JOINT: Final = np.dtype(
     ]
 )
 """Joint in the frame of its link: a hinge about the unit axis through the anchor, or a slide along the axis. reading:
-index among the arm's or the fingers' readings. Only the arm's joints move the tool and are columns of its Jacobian."""
+index among the arm's or the fingers' readings. Only the arm's joints move the tool and are columns of the Jacobian."""
 POINT: Final = np.dtype([("link", np.int64), ("position", np.float64, (3,))])
 """Point that is fixed to a link, in the link's frame."""
 

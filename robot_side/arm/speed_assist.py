@@ -1,7 +1,7 @@
 """Cap of the speed along the triggers by the robot side (`--assist speed`), from the field that the fingers feel.
 
-Stiffness is advice, which a strong finger overcomes. With this assist the robot is no faster than a speed u from which
-it stops within w_8, the onset distance of full strength, with acceleration a:
+Stiffness is advice, which a strong finger overcomes. This assist limits the speed u. From there, with acceleration a,
+the robot stops within w_8, the onset distance of full strength:
 
     u τ + u²/2a <= w_8        τ: delay until the arm follows a command
 """

@@ -21,7 +21,7 @@ _BORNE_SHARE: Final = 0.5
 """Fall as a share of the weight. A tool that starts to sink accelerates by less than half of g, so it carries more."""
 _HARDLY: Final = 0.25
 _STALLED_S: Final = 0.15
-"""Time, in seconds, for which a tool without measured loads must sink at less than a quarter of its commanded speed to
+"""Time, in seconds, for which a tool without measured loads must sink at less than a quarter of the commanded speed to
 stand. An arm needs less time to begin to move."""
 _SINKS_M_S: Final = 1e-3
 _LEAVES_M: Final = 3e-3
@@ -61,7 +61,7 @@ class TouchingDown:
 
     @property
     def gives_way(self) -> bool:
-        """Whether the object has just come to stand."""
+        """Whether the object has just touched down"""
         return self.stands and self._time_s - self._since_s < _GIVES_WAY_S
 
     def update(self, carried_n: float | None, height_m: float, told_m_s: float, time_s: float) -> None:

@@ -21,7 +21,7 @@ class Solid:
     """Closed solid, or a polyhedron around it."""
 
     corners_m: FloatArray
-    """(t, 3, 3) triangles of its surface; corners anticlockwise as seen from outside"""
+    """(t, 3, 3) triangles of the surface; corners anticlockwise as seen from outside"""
     depth_m: Callable[[FloatArray], FloatArray]
     """Function from points (n, 3) to lower bounds (n,) of their depths below this surface; negative outside"""
     excess_m: float = 0.0
@@ -53,7 +53,7 @@ def convex_solid(points_m: FloatArray, excess_m: float = 0.0) -> Solid | None:
     corners[inward] = corners[inward][:, ::-1]
 
     def depth_m(points: FloatArray) -> FloatArray:
-        # A point's depth in a convex polyhedron is the distance to the nearest of its planes.
+        # A point's depth in a convex polyhedron is the distance to the nearest face's plane.
         pieces = range(0, len(points), _POINTS_AT_A_TIME)
         nearest = [(offsets - points[first : first + _POINTS_AT_A_TIME] @ normals.T).min(axis=1) for first in pieces]
         return np.concatenate([np.empty(0), *nearest])
@@ -106,7 +106,7 @@ def halved(corners_m: FloatArray) -> FloatArray:
 
 
 def corner_points(corners_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return each corner of triangles (t, 3, 3) once (p, 3), and the means of its faces' normals (p, 3)."""
+    """Return each corner of triangles (t, 3, 3) once (p, 3), and the means of the faces' normals (p, 3)."""
     across = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
     lengths = np.linalg.norm(across, axis=1, keepdims=True)
     units = np.divide(across, lengths, out=np.zeros_like(across), where=lengths > 0.0)

@@ -95,7 +95,7 @@ def _cover_box(half_sizes_m: tuple[float, ...], stand_out_m: float) -> tuple[Flo
 
 
 def _spread(span_m: float, count: int) -> list[float]:
-    """Return `count` positions from minus to plus the span, each the exact negative of its mirror image."""
+    """Return `count` positions from minus to plus the span, exactly symmetric about 0."""
     return [span_m * ((2 * place - count + 1) / (count - 1)) for place in range(count)] if count > 1 else [0.0]
 
 

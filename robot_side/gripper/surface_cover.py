@@ -2,8 +2,8 @@
 
 Every sphere's centre is inside, and its radius is the centre's depth plus the allowed stand-out. Candidate centres are
 below points of the surface, in several depths; a set cover chooses enough of them to contain many of these points.
-Then the whole surface is checked, down to cells that are smaller than the margin of the radii. Points that are not
-contained yet are added to the points.
+Then the whole surface is checked, down to small cells: a sphere that contains a corner contains the cell, within the
+margin of the radii. Corners that are not contained yet are added to the points.
 """
 
 from collections.abc import Sequence
@@ -55,7 +55,7 @@ class _Union:
         return deepest
 
     def cells(self, longest_m: float) -> list[FloatArray]:
-        """Return, for each solid, the triangles (t, 3, 3) of its surface, with edges up to `longest_m`."""
+        """Return, for each solid, the triangles (t, 3, 3) of the surface, with edges up to `longest_m`."""
         return [triangles_within(solid.corners_m, longest_m) for solid in self._solids]
 
     def points(self, longest_m: float, margin_m: float) -> tuple[FloatArray, FloatArray]:
@@ -86,7 +86,7 @@ def cover_surface(
     normal to axes of `frames` (3, 3) or to its principal axes. The result depends on nothing else.
     """
     union = _Union(solids)
-    # Bound from the area of the largest discs that spheres can cover.
+    # Skip hopeless searches: discs of radius √30 s, those of centres 14.5 s deep, cannot cover the area.
     while union.area_m2 > most * 30.0 * stand_out_m**2 * np.pi:
         stand_out_m *= _COARSER
     while True:
@@ -99,7 +99,7 @@ def cover_surface(
 def _cover(union: _Union, stand_out_m: float, frames: Sequence[FloatArray], most: int) -> Spheres | None:
     """Return the spheres; None if more than `most` are needed."""
     cell_m = _CELL * stand_out_m
-    # Every point of a cell is nearer than this to one of its corners.
+    # Every point of a cell is nearer than this to one of the corners.
     margin_m = cell_m / np.sqrt(3.0)
     coarse, _ = union.points(float(np.sqrt(union.area_m2 / 200.0)), margin_m)
     origin, images = mirror_images(coarse, union.depth_m, frames)

@@ -42,7 +42,7 @@ class Announcements:
         self._noticed_token = 0
 
     def stamp(self, now_s: float, link: LinkEnd | None = None) -> Header:
-        """Return the next header of our epoch, in one sequence for all receivers; `link` None: to no known one."""
+        """Return the next header of our epoch, in one sequence for all receivers; `link` None: no certain one."""
         return (link or self._link).stamp(now_s, next(self._sequence))
 
     def stamp_shown(self, now_s: float) -> Header:

@@ -31,11 +31,11 @@ class Participant:
         self.noticed: list[object] = []
         """Content of the last lease notice sent to it."""
         self.tuned = 0
-        """Number of its newest request to tune."""
+        """Number of the newest request to tune."""
 
     @property
     def state(self) -> SessionState:
-        """State of its session."""
+        """State of the session"""
         return self.session.state
 
 

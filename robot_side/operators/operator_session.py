@@ -147,7 +147,7 @@ class OperatorSession:
         return [] if owner is None else [self._receiver(owner, now_s)]
 
     def observers(self, now_s: float) -> list[Receiver]:
-        """Return the receivers of the observers' stiffness now."""
+        """Return the receivers of the observers' stiffness."""
         return [self._receiver(one, now_s) for one in self.lease.observers()]
 
     def shown_header(self, now_s: float) -> Header:

@@ -78,5 +78,5 @@ class Tuning:
         return notes
 
     def summary(self) -> dict[str, Any]:
-        """Return what was granted, with times, and how many requests were refused."""
+        """Return the granted requests, with times, and the count of refused ones."""
         return {"permitted": self.permitted, "granted": list(self._granted), "refused": self.refused}

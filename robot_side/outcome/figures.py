@@ -165,7 +165,7 @@ class RunFigures(Listener):
             self._lifted_m = max(self._lifted_m, height_m - self._rest_height_m)
 
     def summary(self) -> dict[str, Any]:
-        """Return this part of the summary, in the units of its keys."""
+        """Return this part of the summary, in the units that the keys name."""
         self._read()
         self._take_in()
         grasp_s = None

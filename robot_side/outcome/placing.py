@@ -28,15 +28,15 @@ class Placing:
         self.placed_s: float | None = None
         self.contact_speed_m_s: float | None = None
         self.felt_s: float | None = None
-        """Time between the begin of the last warning and the contact with the support"""
+        """Time from the start of the last warning to the contact with the support"""
         self.felt_m: float | None = None
-        """Distance to the support at the begin of that warning"""
+        """Distance to the support at the start of that warning"""
         self._lifted = False
         self._touched = False
         self._before: TargetTruth | None = None
         self._stood_m: FloatArray | None = None
         self._warned: tuple[float, float] | None = None
-        """Begin of the present warning, and the gap then"""
+        """Start of the present warning, and the gap then"""
         self._warned_last_s = -math.inf
 
     def observe(self, target: TargetTruth, held: bool, warned: bool, now_s: float) -> None:

@@ -10,7 +10,7 @@ class TargetTruth:
     """True pose and motion of the target."""
 
     position_m: FloatArray
-    """(3,) position of its body, in the world frame"""
+    """(3,) position of the target's body, in the world frame"""
     support_gap_m: float
     """Distance to the nearest support, negative inside it; at most 1 m"""
     sinking_m_s: float
@@ -31,4 +31,4 @@ class Truth:
     contacts: frozenset[tuple[str, str]]
     """(gripper geom, object) pairs now in contact, supports included"""
     target: TargetTruth | None = None
-    """None without a target"""
+    """Truth of the target; None without one"""

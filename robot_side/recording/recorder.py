@@ -1,4 +1,4 @@
-"""Recording of every input of the core and of its messages, so that a replay can compute the run again bit for bit.
+"""Recording of the core's inputs and messages, so that a replay can compute the run again bit for bit.
 
 In a tick this costs an append; the idle time encodes the notes (common/recording/side.py).
 """

@@ -14,7 +14,7 @@ Triple = tuple[float, float, float]
 
 
 class Viewpoint(msgspec.Struct, frozen=True):
-    """Viewpoint of a view: a camera of the model, or else a pose in the frame of one of its bodies."""
+    """Viewpoint of a view: a camera of the model, or else a pose in the frame of a body."""
 
     camera: int | None = None
     body: int = 0

@@ -54,14 +54,14 @@ class SceneModel:
         return False
 
     def link_shapes(self) -> Iterator[Shape]:
-        """Yield the robot's shapes, in the frames of its bodies."""
+        """Yield the robot's shapes, in the frames of the bodies."""
         model, owners = self._model, {int(body): index for index, body in enumerate(self.bodies)}
         for geom in self._link_geoms:
             owner = owners[int(model.geom_bodyid[geom])]
             yield self._shape(int(geom), owner, True, model.geom_pos[geom], model.geom_quat[geom])
 
     def object_shapes(self, index: int) -> Iterator[Shape]:
-        """Yield the shapes of one object, in the frame of its first geom; inner joints keep their start positions."""
+        """Yield the shapes of one object, in the first geom's frame; inner joints keep their start positions."""
         positions_m, rotations = self._start
         first = self._geoms[index][0]
         yield self._shape(first, index, False, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))

@@ -12,7 +12,7 @@ _DOWN_DEG, _ASIDE_DEG = 55.0, 20.0
 """Angles of the overview, which looks down over the arm's shoulder: ahead is up and the arm hides little."""
 _SHORTEST_REACH_M = 0.3
 _LEAST_ALONG = 0.5
-"""Cosine of the largest angle, 60°, between the approach and a camera that sees what is ahead."""
+"""Cosine of the largest angle, 60°, between the approach and a camera that shows it."""
 _CLEARANCE_M = 0.05
 _WIDE_DEG = 70.0
 

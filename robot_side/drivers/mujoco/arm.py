@@ -29,7 +29,7 @@ class Stand(NamedTuple):
     """Properties of the arm at its start, with the gripper open."""
 
     travel: GripperTravel | None
-    """None without a gripper"""
+    """Travel of the gripper; None without one"""
     ends_rad: tuple[FloatArray, FloatArray]
     """Lower and upper ends of the joints, (n,) each"""
 

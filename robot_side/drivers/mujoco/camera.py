@@ -103,7 +103,7 @@ class MujocoCamera:
         return movers.frame(now_s, numbers, self._roles)
 
     def _whole(self, now_s: float, offsets_m: FloatArray) -> PerceivedObjects:
-        """Return a frame of all objects; later frames update only the moved ones."""
+        """Return a frame of all objects; later frames update only the movable ones."""
         scene, data, things = self._scene, self._scene.data, self._things
         positions_m = data.geom_xpos[self._first_geoms] + offsets_m
         velocities_m_s: FloatArray = np.zeros((len(scene.objects), 3))

@@ -38,7 +38,7 @@ class GripperCover:
 
 @dataclass(frozen=True)
 class _Part:
-    """Geom in the frame of its link's first geom; hashable, so that links of the same shape share one cover."""
+    """Geom in the frame of the link's first geom; hashable, so that links of the same shape share one cover."""
 
     kind: int
     size: tuple[float, ...]
@@ -53,7 +53,7 @@ def cover_gripper(
 ) -> GripperCover:
     """Cover the colliding geoms `geoms` (k,) of a compiled MuJoCo model.
 
-    A mesh counts as its convex hull, which is the colliding shape. No sphere stands out of its link's geoms by more
+    A mesh counts as its convex hull, which is the colliding shape. No sphere stands out of the link's geoms by more
     than `stand_out_m`, unless a geom would need more than 2000 spheres. Links of the same shape get the same spheres.
     searching: called before each search, but not for a stored cover.
     """

@@ -163,7 +163,7 @@ def travel_from_sweep(sweep: GripperSweep, force_lead: float, lag_s: float) -> G
     jaws = jaws[:, jaws[-1] <= jaws[-1].min() + _GRASP_BAND_M]
     openings = np.maximum(jaws.min(axis=1), 0.0)
     closures = (lengths - lengths[0]) / (lengths[-1] - lengths[0])
-    # Fingers that press on each other stop the drive before the end of its input.
+    # Fingers that press on each other stop the drive before the last input.
     highest_before = np.concatenate([[-np.inf], np.maximum.accumulate(closures)[:-1]])
     moving = closures > highest_before + 1e-3
     return GripperTravel(

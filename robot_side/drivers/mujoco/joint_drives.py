@@ -46,7 +46,7 @@ class JointDrives:
     """Greatest torque, N m, or force, N; infinite without a limit in the model"""
 
     def windup_rad(self, least_rad: float) -> FloatArray:
-        """Return the largest lead of a reference over each joint (n,): where a servo gives an eighth of its maximum.
+        """Return the largest lead of a reference over each joint (n,): where a servo gives an eighth of `strongest`.
 
         The lead is at least least_rad and at most 20 mrad; other drives have the 20 mrad.
         """

@@ -80,7 +80,7 @@ def load_scene(
     """Load the built-in arm at its table, or the MJCF file `model_path` whose tool is the site `site`.
 
     A file with only a robot and planes gets the built-in scene `name`, drawn from `seed`, in front of the robot.
-    The arm starts at the keyframe `home`, else the first keyframe, else the middle of its joints' ranges.
+    The arm starts at the keyframe `home`, else the first keyframe, else the middle of the joints' ranges.
     `roles` overrides the roles by name. ConfigurationError, one line, for an unusable file, model or site.
     """
     mujoco.set_mju_user_warning(_log_warning)

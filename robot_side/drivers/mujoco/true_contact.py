@@ -18,7 +18,7 @@ _MOST_STEPS = 200
 
 @dataclass(frozen=True)
 class ContactOnset:
-    """Begin of a contact."""
+    """Onset of a contact."""
 
     thing: str
     """Name of the object"""

@@ -22,7 +22,7 @@ class Wire(Protocol):
 
 
 class RemoteArm(Arm):
-    """Arm by a driver's states and commands. `time_s` of a state is the earliest possible time of its measurement."""
+    """Arm by a driver's states and commands. `time_s` of a state is the earliest possible time of measurement."""
 
     joint_count = 0
 
