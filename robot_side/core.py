@@ -1,7 +1,7 @@
-"""The robot side without I/O: payloads in, payloads out, and `now` with every call.
+"""Robot side without I/O: payloads in, payloads out, and `now` with every call.
 
 payloads ─▶ receive ─▶ newest command ─▶ safety ─▶ tool motion ─▶ arm
-arm ─▶ kinematics ─▶ law: what is ahead ─▶ stiffness fields, telemetry ─▶ payloads
+arm ─▶ kinematics ─▶ law: contact ahead ─▶ stiffness fields, telemetry ─▶ payloads
 """
 
 import math
@@ -36,7 +36,7 @@ from robot_side.surroundings.surroundings import Sight, Surroundings
 
 @dataclass(frozen=True, kw_only=True)
 class RobotParts:
-    """What a core is made of; `replace` one to use another arm, camera or law. One core for each set of parts."""
+    """Parts of a core; `replace` one to use another arm, camera or law. Each set of parts serves one core only."""
 
     arm: Arm
     kinematics: GripperKinematics
@@ -48,22 +48,22 @@ class RobotParts:
     limits: JointLimits
     motion: ToolMotionSettings
     truth: Observer | None = None
-    """Tells the figures what is true, where somebody knows it"""
+    """Observer of true contacts and distances, for the figures; None where they are unknown"""
     held_covers: HeldCovers | None = None
     assists: bool = False
-    """Cap the speed along the triggers (see `speed_assist`)."""
+    """Cap the speed along the triggers (see `speed_assist`)"""
     full_rate: bool = False
-    """Send a stiffness in every tick."""
+    """Send a stiffness in every tick"""
     seed: int = 0
     notes: tuple[str, ...] = ()
-    """What a person should know about the scene before the run"""
+    """Notes about the scene for a person, shown before the run"""
 
 
 class RobotSide:
-    """The pipeline of one robot, with one operator at a time and others that observe."""
+    """Pipeline of one robot, with one operator at a time and others that observe."""
 
     def __init__(self, parts: RobotParts, listeners: Sequence[Listener] = ()) -> None:
-        """listeners: they hear of each turn; so do the run's figures."""
+        """listeners: notified of each turn, as are the run's figures."""
         self.parts, self.session = parts, parts.session
         self.sight = Sight(parts.camera, parts.surroundings)
         self.grip = Grip(parts.surroundings, parts.held_covers)
@@ -71,7 +71,7 @@ class RobotSide:
         self.reports = Reports(parts.session, parts.law, full_rate=parts.full_rate)
         self.figures = RunFigures(parts.seed, parts.truth)
         self.newest: tuple[Sensed, Situation] | None = None
-        """What the last tick found out, and where."""
+        """Result of the law in the last tick, and the situation that it was computed for"""
         self._joints = JointEstimate()
         self._measured: ArmState | None = None
         self._found: Found | None = None
@@ -79,20 +79,20 @@ class RobotSide:
 
     @property
     def held(self) -> str | None:
-        """The name of the object that the gripper holds; None for none."""
+        """Name of the object that the gripper holds; None for none."""
         return None if self.grip.held is None else self.grip.held.name
 
     def loop_age_s(self, now_s: float) -> float:
-        """The delay that is reckoned with at `now_s`: t_d of eq. 8."""
+        """Return the loop age used at `now_s`, in seconds: t_d of eq. 8."""
         return self.parts.loop_age.value(now_s)
 
     def receive(self, peer: bytes, payload: bytes, now_s: float) -> None:
-        """Take one control payload from `peer`; what is invalid, late or not the operator's never gets further."""
+        """Take one control payload from `peer`; drop it if it is invalid, late or not the operator's."""
         self._heard.on_received(peer, payload, now_s)
         self.session.receive(peer, payload, now_s)
 
     def tick(self, now_s: float) -> list[Outgoing]:
-        """Run the pipeline once at `now_s`; return what to send. Listeners hear of a tick that fails, too."""
+        """Run the pipeline once at `now_s`; return the messages to send. Listeners hear of a failed tick, too."""
         outgoing: list[Outgoing] = []
         self._found = None
         try:
@@ -147,9 +147,9 @@ class RobotSide:
         return outgoing
 
     def _follow_operator(self, now_s: float, late_s: float) -> float:
-        """Follow who owns the arm and how old the loop is; return t_d of eq. 8.
+        """Update the arm's owner and the loop age; return t_d of eq. 8.
 
-        late_s: how late the arm's states come. What it is told takes about as long to reach it.
+        late_s: lateness of the arm's states, in seconds. Commands take about as long to reach the arm.
         """
         session, loop_age = self.session, self.parts.loop_age
         session.update(now_s)
@@ -163,14 +163,14 @@ class RobotSide:
         return loop_age.update(age_s + late_s, now_s)
 
     def observe(self, now_s: float) -> None:
-        """After the messages of the tick at `now_s` have left: take in a frame, and let listeners work."""
+        """Take in a frame, and let listeners work; called after the messages of the tick at `now_s` have left."""
         self._heard.on_step("frame")
         self.sight.see(now_s)
         self._heard.on_step("end")
         self._heard.on_sent(now_s)
 
     def status(self, now_s: float) -> RobotStatus:
-        """What a person is shown; what the process knows beside it is not in it."""
+        """Return the status that a person sees, without the process's part."""
         lease, safety, command = self.session.lease, self.session.safety, self.session.safety.command
         delay_s = self.session.link.delay.mean
         status = RobotStatus(
@@ -205,7 +205,7 @@ class RobotSide:
         )
 
     def summary(self) -> dict[str, Any]:
-        """This side's part of the run's summary."""
+        """Return this side's part of the run's summary."""
         stops = [
             {"time_s": self.figures.since_start_s(when_s), "reason": reason}
             for when_s, reason in self.session.safety.stops

@@ -1,6 +1,6 @@
-"""What a robot side says of each turn, to all who listen: recording, timing, figures, experiments.
+"""Events of each turn, for listeners: recording, timing, figures, experiments.
 
-A listener changes nothing: what it hears are the core's own values, not copies.
+A listener changes nothing: it gets the core's own values, not copies.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -20,13 +20,13 @@ left. `end`: no step until the next one."""
 
 
 class Found(NamedTuple):
-    """What a tick worked out."""
+    """Results of a tick."""
 
     permission: Permission
     commanded_rad_s: FloatArray | None
     """(n,) joint velocities; None: stand still"""
     state: ArmState
-    """As measured, with estimated joint positions"""
+    """The measured state, with estimated joint positions"""
     situation: Situation
     sensed: Sensed
     holds_target: bool
@@ -35,39 +35,39 @@ class Found(NamedTuple):
 
 
 class Tick(NamedTuple):
-    """What a tick took in, found and sent."""
+    """Input, results and messages of a tick."""
 
     now_s: float
     measured: ArmState | None
     frame: PerceivedObjects | None
     command_sent_s: float
-    """When the newest accepted command was sent, on its sender's clock; NaN without one"""
+    """Time at which the newest accepted command was sent, on its sender's clock; NaN without one"""
     outgoing: Sequence[Outgoing]
     found: Found | None
-    """None of a tick that failed"""
+    """Results; None for a failed tick"""
 
 
 class Listener:
-    """Hears what happens to a core; a method that is left as it is costs nothing."""
+    """Receiver of a core's events; a method that is not overridden costs nothing."""
 
     steps: Collection[Step] = ()
-    """The steps that `on_step` hears of"""
+    """Steps that `on_step` receives"""
 
     def on_received(self, peer: bytes, payload: bytes, now_s: float) -> None:
-        """Hear of a control payload, before it is judged."""
+        """Take a control payload, before it is validated."""
 
     def on_step(self, step: Step) -> None:
-        """Hear which step of the turn begins: one of `steps`."""
+        """Take the step of the turn that begins: one of `steps`."""
 
     def on_tick(self, tick: Tick) -> None:
-        """Hear of a tick, before its messages leave."""
+        """Take the data of a tick, before its messages leave."""
 
     def on_sent(self, now_s: float) -> None:
-        """Hear that the messages of the tick at `now_s` have left."""
+        """Note that the messages of the tick at `now_s` have left."""
 
 
 class Listeners(Listener):
-    """Tells each listener what it has a method of its own for."""
+    """Dispatcher: calls each listener only for the methods that it overrides."""
 
     def __init__(self, listeners: Sequence[Listener]) -> None:
         own: Final = {

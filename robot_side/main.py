@@ -38,23 +38,23 @@ _OPEN_TO_ALL: Final = "WITHOUT KEYS: anyone who reaches the port can move the ar
 
 
 Adapted = tuple[RobotParts, Sequence[Listener]]
-"""What an experiment makes of the parts, and who listens besides."""
+"""Parts as an experiment changed them, and its listeners."""
 
 
 def main() -> None:
-    """The console script."""
+    """Run the console script."""
     run_command("feelahead-robot", command)
 
 
 def as_built(parts: RobotParts) -> Adapted:
-    """Change nothing."""
+    """Return the parts unchanged."""
     return parts, ()
 
 
 def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = as_built) -> int:
-    """Run the robot side until --duration, Ctrl-C or SIGTERM; the arm stands still on every way out.
+    """Run the robot side until --duration, Ctrl-C or SIGTERM; the arm stands still on every exit.
 
-    adapt: gives an experiment's parts and listeners.
+    adapt: returns an experiment's parts and listeners.
     """
     settings = parse_settings(RobotSettings, "feelahead-robot", arguments)
     keys = None if settings.keys is None else RobotKeys.load(settings.keys)
@@ -65,7 +65,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         epoch, recording = secrets.randbits(53), process.recording
         beside = Beside(settings.arm, settings.objects, process.note, insecure=settings.insecure, keys=keys)
         process.stack.enter_context(beside)
-        # A port that is taken is said at once, by the ports just opened, too.
+        # Fail at once for an occupied port, even if `beside` has just taken it.
         open_sockets().close()
         parts = build_parts(settings, epoch, clock_domain(), announce=process.note, beside=beside)
         recorder = [] if recording is None else [Recorder(recording.noted.append)]

@@ -14,25 +14,25 @@ from robot_side.operators.safety import Permission
 
 
 class Motion:
-    """Commands the arm, and keeps what it was told last."""
+    """Commands the arm, and keeps the last command."""
 
     def __init__(self, arm: Arm, limits: JointLimits, settings: ToolMotionSettings, *, assists: bool = False) -> None:
         """assists: cap the speed along the triggers (see `speed_assist`)."""
         self.commanded_rad_s: FloatArray | None = None
         """(n,) joint velocities; None: stand still"""
         self.told_m_s = self.rises_m_s = 0.0
-        """The tool's commanded speed: along the direction in which R2 advances; upwards while something is held"""
+        """Commanded speeds of the tool: along the direction in which R2 advances; upwards while an object is held"""
         self._arm, self._limits, self._settings, self._assists = arm, limits, settings, assists
         self._still: FloatArray = np.zeros(arm.joint_count)
 
     def follow(
         self, permission: Permission, pose: GripperPose, state: ArmState, grip: Grip, felt: Sensed | None, now_s: float
     ) -> None:
-        """Command the arm; without permission nothing is commanded, and it stops. felt: by the tick before."""
+        """Command the arm; stop it without permission. felt: the law's result of the tick before."""
         command = permission.command
         if command is None or grip.touching_down.gives_way:
             self.commanded_rad_s, self.told_m_s, self.rises_m_s = None, 0.0, 0.0
-            # No longer valid: a command that runs out between two physics steps would let a load sink, each time anew.
+            # Valid until the state's time: expiry between two physics steps would let a load sink, each time.
             self._arm.command(self._still, state.time_s)
             self._arm.command_gripper(0.0, now_s)
             return

@@ -1,4 +1,4 @@
-"""Make the parts of a robot side from its settings: arm and camera, simulated or beside, and all in between."""
+"""Make the parts of a robot side from its settings. Arm and camera are simulated or connected drivers."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -41,16 +41,16 @@ from robot_side.surroundings.surroundings import Surroundings
 
 _SEARCHING = "searching for spheres that cover gripper and objects, seconds for each shape; the next start is quick"
 _NAMED_OBJECTS = 8
-"""So many objects are named in a note about all of them."""
+"""Most objects that a note names."""
 _LIBRARY = (
     *("robot_side.overlap.kernels.", "robot_side.overlap.lanes.", "robot_side.overlap.precise."),
     "robot_side.arm.resolved_rate.",
 )
-"""Batches, precise forms and joint velocities alone are for programs that use them as a library: no tick runs them."""
+"""Kernels of library functions that no tick runs: batches, precise forms, joint velocities alone."""
 
 
 class SimulationObserver:
-    """Tells the figures what is true in the simulation, which the pipeline itself never sees."""
+    """Observer of the simulation's ground truth, which the pipeline itself never sees."""
 
     def __init__(self, scene: Scene) -> None:
         self._truth = GroundTruth(scene)
@@ -58,31 +58,31 @@ class SimulationObserver:
         self._roles = scene.roles
 
     def observe(self, figures: RunFigures, now_s: float) -> None:
-        """Tell `figures` the true distances and contacts."""
+        """Report the true distances and contacts to `figures`."""
         figures.truth(self._truth.observe(), self._roles, now_s)
 
     def watch(self, figures: RunFigures, now_s: float) -> None:
-        """Tell `figures` the first contact; before it nothing can be held."""
+        """Report the first contact to `figures`; before it nothing can be held."""
         if not figures.touched and (onset := self._contact.update(None)) is not None:
             figures.first_contact(onset.thing, onset.closing_speed_m_s, now_s)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SceneParts(RobotParts):
-    """Parts in front of a scene, and the scene: simulated, or followed where arm or objects are beside."""
+    """Parts with their scene, which is simulated, or follows the drivers of arm or objects."""
 
     kinematics: MujocoKinematics
     scene: Scene
     any_objects: bool
-    """Whether objects of any kind may come"""
+    """Whether objects of any kind may appear during the run"""
     explains: Explains
-    """The settings' own law, whatever stands in for it"""
+    """Law of the settings, even where an experiment replaces `law`"""
 
     @property
     def kernels(self) -> list[Compiled]:
-        """What ticks may run: a scene without primitives of a kind needs no kernel for their overlaps.
+        """Kernels that ticks may run; the overlap kernel of a kind that the scene lacks is left out.
 
-        Its primitives are the same throughout, and counted here with those of the objects that are ignored now.
+        A scene's primitives stay the same during a run. Those of ignored objects count, too.
         """
         seen = _as_loaded(self.scene, dict.fromkeys(self.scene.roles, Role.OBSTACLE))
         unneeded = {kind.kernel for kind in KINDS if not (self.any_objects or len(getattr(seen, kind.owner)))}
@@ -101,13 +101,13 @@ def build_parts(
 ) -> SceneParts:
     """Make the parts; ConfigurationError for a model that cannot be used.
 
-    scene: instead of loading the one that the settings name, so that the caller can look at it. announce: told once,
-    in one line, what takes long. beside: the arm and the objects that it has take the place of simulated ones.
+    scene: used instead of the one that the settings name. announce: called once, with one line, before a long search.
+    beside: the connected drivers, whose arm and objects replace simulated ones.
     """
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
         raise ConfigurationError(f"{given} is given without {missing}; valid: both, or neither for the built-in arm")
-    # What is perceived elsewhere is not known yet.
+    # A driver's objects are not known yet.
     roles = settings.roles if settings.objects is None else {}
     scene = scene or load_scene(settings.model, settings.site, roles, settings.scene or "table", settings.seed)
     noise, camera_noise = np.random.SeedSequence(settings.seed).generate_state(2)
@@ -164,7 +164,7 @@ def build_parts(
 def _arm(
     scene: Scene, encoder: Encoder, limits: MotionLimits, beside: Beside | None
 ) -> tuple[MujocoArm | RemoteArm, tuple[FloatArray, FloatArray]]:
-    """The arm of the scene, simulated unless it is beside; and where its joints end."""
+    """Return the arm, simulated or a driver's, and its joints' lower and upper ends, (n,) each."""
     if beside is None or not beside.has_arm:
         simulated = MujocoArm(scene, encoder, limits)
         return simulated, simulated.ends_rad
@@ -176,7 +176,7 @@ def _arm(
 
 
 def _joint_names(scene: Scene) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The names of the arm's joints and of the fingers', in the model's order."""
+    """Return the names of the arm's joints and of the fingers', in the model's order."""
     model, robot = scene.model, scene.robot
     names = {int(model.jnt_qposadr[joint]): model.joint(joint).name or f"joint{joint}" for joint in range(model.njnt)}
     arm, fingers = (
@@ -191,7 +191,7 @@ def _camera(settings: RobotSettings, scene: Scene, seed: int) -> MujocoCamera:
 
 
 def _notes(scene: Scene, settings: RobotSettings) -> tuple[str, ...]:
-    """What a person should know before the run: objects and roles, start pose, and what is not quite as modelled."""
+    """Return the notes before the run: start pose, objects and roles, and inexact shapes."""
     notes = [f"starts at {scene.start_pose}"]
     if settings.arm is not None:
         joints, fingers = (", ".join(names) or "none" for names in _joint_names(scene))
@@ -224,13 +224,13 @@ def _notes(scene: Scene, settings: RobotSettings) -> tuple[str, ...]:
 
 
 def _as_loaded(scene: Scene, roles: Mapping[str, Role]) -> PerceivedObjects:
-    """The objects where the scene has them at its start, but the primitives of those that are ignored."""
+    """Return the objects as the scene starts, without the primitives of ignored ones."""
     nowhere = np.zeros((len(scene.objects), 3))
     return scene.primitives.place(0.0, roles, nowhere, scene.data.geom_xpos, scene.data.geom_xmat)
 
 
 def _cover_notes(cover: GripperCover, asked_m: float, held: HeldCovers) -> list[str]:
-    """What a person should know about the spheres."""
+    """Return the notes about spheres that stand out farther than asked."""
     notes = []
     if cover.stand_out_m > asked_m * (1.0 + 1e-9):
         notes.append(
@@ -245,7 +245,7 @@ def _cover_notes(cover: GripperCover, asked_m: float, held: HeldCovers) -> list[
 
 
 def _roles(roles: Mapping[str, Role]) -> str:
-    """The objects by role, the target first."""
+    """Return the names of the objects by role, the target first."""
     shown = []
     for role in (Role.TARGET, Role.OBSTACLE, Role.SUPPORT, Role.IGNORED):
         names = [name for name, has in roles.items() if has is role]
@@ -256,16 +256,16 @@ def _roles(roles: Mapping[str, Role]) -> str:
 
 
 def _prediction_errors(settings: RobotSettings, scene: Scene) -> tuple[PredictionErrors, tuple[str, ...]]:
-    """The table that holds for this arm, and what a person should know about it."""
+    """Return the table for this arm, and a note where it has not been measured."""
     if settings.prediction_errors is not None:
         return load_prediction_errors(settings.prediction_errors), ()
     built_in = load_prediction_errors(BUILT_IN)
-    # It was measured in the simulation: an arm that is only built alike may move otherwise.
+    # Measured in the simulation: a real arm of the same model may move differently.
     if built_in.arm == scene.robot.fingerprint and settings.arm is None:
         return built_in, ()
     note = (
-        "what the prediction of the commands under way misses on this arm has not been measured: a fifth of the way"
-        " that full speed goes in the loop age is added (to measure it: feelahead bench error --table FILE.toml, then"
+        "the prediction error of the commands under way has not been measured on this arm: a fifth of the distance at"
+        " full speed in the loop age is added (to measure it: feelahead bench error --table FILE.toml, then"
         " --prediction-errors FILE.toml)"
     )
     return PredictionErrors(), (note,)

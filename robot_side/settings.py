@@ -1,4 +1,4 @@
-"""Everything about the robot side that a person may set, on the command line or in a TOML file."""
+"""Settings of the robot side, from the command line or a TOML file."""
 
 import math
 from dataclasses import dataclass, field
@@ -28,12 +28,12 @@ _Spread = Annotated[float, Meta(ge=0.0, le=1.0)]
 
 @dataclass(frozen=True)
 class EncoderSettings:
-    """The joint encoders' error (eq. 3): assumptions of a usual class, not one arm's specification."""
+    """Error of the joint encoders (eq. 3): assumed values of a usual class, not one arm's specification."""
 
     sigma_rad: _Spread = 2e-4
     """Standard deviation of a reading's noise."""
     resolution_rad: _Spread = 2.0 * math.pi / 2**15
-    """Quantisation step: 15 bits a turn."""
+    """Quantisation step: 15 bits a revolution."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -41,14 +41,14 @@ class EncoderSettings:
 
 @dataclass(frozen=True)
 class CameraSettings:
-    """The camera's error of each perceived position, per axis (eq. 1-2); the enlargement knows these figures."""
+    """Error of the camera's perceived positions, per axis (eq. 1-2); the enlargement uses these values."""
 
     mean_m: float | Vector3 = 0.0
-    """μ_c, true minus perceived, of every axis of the world or of each."""
+    """μ_c, true minus perceived: one value for all axes of the world, or one for each."""
     sd_m: _Spread = 0.003
-    """Drawn once for each object: 3 mm is a depth camera at half a metre (assumed)."""
+    """Standard deviation, drawn once for each object: 3 mm is a depth camera at half a metre (assumed)."""
     frame_sd_m: _Spread = 0.0
-    """Drawn anew in each frame, on top."""
+    """Standard deviation of an additional error, drawn in each frame."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -57,64 +57,64 @@ class CameraSettings:
 
     @property
     def mean_vector_m(self) -> Vector3:
-        """μ_c along each axis."""
+        """Mean error μ_c along each axis."""
         return self.mean_m if isinstance(self.mean_m, tuple) else (self.mean_m,) * 3
 
 
 @dataclass(frozen=True)
 class RobotSettings(SideOptions):
-    """The robot side: a simulated arm that knows how wrong it may be, and warns of what is ahead.
+    """Robot side: a simulated arm that warns of contact ahead and allows for its own measurement errors.
 
-    It listens for an operator side, moves as that one asks while commands keep coming, and answers with the
-    stiffness of the two triggers. Any MJCF arm: --model FILE.xml --site NAME, the site between the fingertips
-    with its z axis along the approach. A model that holds nothing but the arm gets the built-in table.
+    It listens for an operator side, moves while commands keep coming, and answers with the stiffness of the two
+    triggers. Any MJCF arm: --model FILE.xml --site NAME, the site between the fingertips with its z axis along the
+    approach. A model of the arm alone gets the built-in table.
     """
 
     bind: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT")] = "tcp://127.0.0.1:5555"
-    """Where to listen for the operator side; port 0 takes any free one."""
+    """Address to listen at for the operator side; port 0 takes any free one."""
     view_bind: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """Where to publish what the screen shows; the port after the control port unless given."""
+    """Address to publish the views at; the port after the control port unless given."""
     keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """Let in only operators whose keys FOLDER allows, and encrypt everything; needed beyond this machine. Made by:
+    """Admit only operators whose keys FOLDER allows, and encrypt everything; needed beyond this machine. Made by:
     feelahead keys make robot; then, for each operator: feelahead keys allow NAME KEY."""
     insecure: bool = False
     """Listen beyond this machine without keys: anyone who reaches the port can move the arm."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
-    """Any MJCF arm with actuators instead of the built-in one. It starts at its keyframe named home, else at its first
-    keyframe, else in the middle of its joints' ranges."""
+    """Any MJCF arm with actuators instead of the built-in one. It starts at the keyframe named home, else at the first
+    keyframe, else in the middle of the joints' ranges."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """The model's site between the fingertips."""
     arm: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """Where a driver of an arm of yours connects: that arm moves instead of a simulated one (docs/drivers.md). --model
-    says how it is built. With --keys a driver needs a key that is allowed, as an operator does."""
+    """Address at which the driver of your arm connects; that arm moves instead of a simulated one (docs/drivers.md).
+    --model describes the arm. With --keys a driver needs an allowed key, as an operator does."""
     objects: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """Where a process of yours connects that perceives objects, instead of a simulated camera (docs/drivers.md)."""
+    """Address at which your perception process connects, instead of a simulated camera (docs/drivers.md)."""
     scene: SceneName | None = None
-    """What the built-in arm stands before. table: a cluttered table, unless given. wall: a wall 10 to 60 mm behind the
-    target. slot: two posts on the way, 15 to 40 mm to spare on each side. shelf: a shelf with a raised front edge to
+    """Scene of the built-in arm. table (the default): a cluttered table. wall: a wall 10 to 60 mm behind the target.
+    slot: two posts on the way, with 15 to 40 mm of clearance on each side. shelf: a shelf with a raised front edge to
     reach over. The last three are drawn from the seed."""
     law: LawName = "swept"
-    """How what is ahead is felt. swept: in time to let go, along each trigger. paper: the paper's plain law, to compare
-    with."""
+    """Law of stiffness. swept: along each trigger, early enough to release it in time. paper: the paper's plain law,
+    for comparison."""
     assist: Assist = "none"
-    """What the robot side adds to stiffness, which is advice. speed: it caps the speed along the triggers, so that the
-    arm stops where full strength is due, however hard the finger pulls."""
+    """Help besides stiffness, which is only advice. speed: the robot side caps the speed along the triggers, so that
+    the arm stops where full strength is due, however hard the finger pulls."""
     cover_m: Annotated[float, Meta(ge=0.0005, le=0.05)] = 0.003
-    """How far the spheres that cover the gripper may stand out of it: fewer of them for more."""
+    """Largest distance by which the spheres that cover the gripper may stand out; a larger one needs fewer spheres."""
     prediction_errors: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """What the prediction of the commands under way misses on this arm, from: feelahead bench error --table FILE.toml.
-    Known for the built-in arm; without it a fifth of the way that full speed goes in the loop age is added."""
+    """Prediction errors of the commands under way on this arm, from: feelahead bench error --table FILE.toml. Known for
+    the built-in arm; without it a fifth of the distance at full speed in the loop age is added."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
-    """How often a warning must come before the contact, between 0 and 1 (eq. 10). With a camera of 3 mm 0.9
-    enlarges the gripper by 4 mm, and 0.99 by 7 mm. An edge nearer than that to the way makes a trigger stiff."""
+    """Share of approaches in which the warning must come before the contact, between 0 and 1 (eq. 10). With a camera of
+    3 mm, 0.9 enlarges the gripper by 4 mm and 0.99 by 7 mm. An edge nearer to the path makes a trigger stiff."""
     permit_tuning: bool = False
-    """Let the operator that owns the robot change the probability and this side's emulated link while it runs."""
+    """Let the owner of the lease change the probability and this side's emulated link during the run."""
     assumed_delay_s: Annotated[float, Meta(ge=0.001, le=60.0)] = 1.0
-    """The loop age that is reckoned with while none has been measured."""
+    """Loop age used until one has been measured."""
     kinematic_mean_m: Vector3 = (0.0, 0.0, 0.0)
-    """μ_ee, the mean error of the forward kinematics in the world frame, true minus estimated."""
+    """μ_ee, mean error of the forward kinematics in the world frame, true minus estimated."""
     roles: Annotated[dict[str, Role], tyro.conf.Suppress] = field(default_factory=dict)
-    """TOML only: [roles] name = "obstacle", "target", "support" or "ignored"; else the names tell."""
+    """TOML only: [roles] name = "obstacle", "target", "support" or "ignored"; by default from the names."""
     encoder: EncoderSettings = field(default_factory=EncoderSettings)
     camera: CameraSettings = field(default_factory=CameraSettings)
     cameras: CamerasSettings = field(default_factory=CamerasSettings)
@@ -131,7 +131,7 @@ class RobotSettings(SideOptions):
         self.uncertainty(PredictionErrors())
 
     def uncertainty(self, prediction: PredictionErrors) -> Uncertainty:
-        """What eq. 10 is computed from; ConfigurationError for a probability outside (0, 1)."""
+        """Return the inputs of eq. 10; ConfigurationError for a probability outside (0, 1)."""
         return Uncertainty(
             probability=self.probability,
             camera_mean_m=self.camera.mean_vector_m,

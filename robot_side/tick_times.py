@@ -1,4 +1,4 @@
-"""The time that ticks take, and whether the arm keeps up with real time."""
+"""Durations of ticks, and the arm's share of real time."""
 
 from collections import deque
 from collections.abc import Callable
@@ -14,17 +14,17 @@ _LATEST: Final = 1000
 
 
 class TickTimes:
-    """Measures each tick; `paced` tells of those since it was last called."""
+    """Measures each tick; `paced` reports the ticks since its last call."""
 
     def __init__(self, loop: Loop, arm: Arm, note: Callable[[str], None], seed: int) -> None:
-        """note: hears once that the arm does not keep up."""
+        """note: called once if the arm does not keep up."""
         self._loop, self._arm, self._note = loop, arm, note
         self._wall, self._processor = RunningStatistics(seed), RunningStatistics(seed)
         self._latest_s: deque[float] = deque(maxlen=_LATEST)
         self._told_slow = False
 
     def begin(self) -> tuple[float, float]:
-        """Return both clocks, for `end`."""
+        """Return the readings of the wall clock and of the processor clock, for `end`."""
         return self._loop.clock.now(), self._loop.computed.now()
 
     def end(self, began: tuple[float, float]) -> float:
@@ -36,7 +36,7 @@ class TickTimes:
         return took_s
 
     def paced(self) -> dict[str, float | int]:
-        """Return the status's figures of the ticks since the last call."""
+        """Return the status's figures for the ticks since the last call."""
         share = self._arm.take_share_of_real_time()
         if max(share, self._arm.share_of_real_time) < SLOW and not self._told_slow:
             self._told_slow = True

@@ -1,4 +1,4 @@
-"""Count the time of a turn's steps to its stages."""
+"""Attribution of a turn's steps to its timed stages."""
 
 from typing import Final
 
@@ -6,8 +6,8 @@ from common.realtime.stages import Stages
 from robot_side.events import Listener, Step
 
 STAGES: Final = ("sockets", "messages", "physics", "sensing")
-"""Of a turn: sending and receiving; decoding and judging what arrived; the arm's state, for which a simulation
-advances; the law. All else of a tick is the rest."""
+"""Stages of a turn: sending and receiving; decoding and judging messages; the arm's state, which advances a
+simulation; the law. Everything else in a tick is the rest."""
 HELPS: Final = {
     "sockets": "fewer views and observers",
     "messages": "fewer observers",
@@ -15,12 +15,12 @@ HELPS: Final = {
     "sensing": "fewer or simpler objects, or a coarser cover (cover_m)",
     "": "fewer views, or a faster machine",
 }
-"""What makes each of them shorter."""
+"""Advice that shortens each stage; the empty name is the rest."""
 _OF_STEPS: Final[dict[Step, str]] = {"arm": "physics", "law": "sensing"}
 
 
 class StageTiming(Listener):
-    """Tells `stages` where each step belongs."""
+    """Listener that begins the stage of each step in `stages`."""
 
     def __init__(self, stages: Stages) -> None:
         self._stages = stages

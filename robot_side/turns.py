@@ -1,4 +1,4 @@
-"""The work of the robot side in the turns of its loop: sockets and clocks around the core."""
+"""Work of the robot side in each turn of the loop: sockets and clocks around the core."""
 
 import secrets
 from collections.abc import Sequence
@@ -22,11 +22,11 @@ from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.scene_view import SceneView
 
 KEYS_PERIOD_S: Final = 0.2
-"""From one look at the allow-list to the next: a revoked operator is out within a second."""
+"""Period of reading the allow-list: a revoked operator is out within a second."""
 
 
 class RobotTurns:
-    """Ticks, messages, and what is shown."""
+    """Ticks, messages and views."""
 
     def __init__(
         self,
@@ -38,7 +38,7 @@ class RobotTurns:
         process: Process,
         beside: Beside,
     ) -> None:
-        """cameras: None where no pictures are made."""
+        """cameras: None without pictures."""
         self._process, self._core, self._sockets, self._beside = process, core, sockets, beside
         core.parts.arm.give_way(process.loop.clock)
         self._times = TickTimes(process.loop, core.parts.arm, process.note, settings.seed)
@@ -56,16 +56,16 @@ class RobotTurns:
 
     @property
     def resting(self) -> bool:
-        """The arm is not armed."""
+        """Whether the arm is not armed."""
         return self._core.session.safety.state != "armed"
 
     def take(self, received: Sequence[tuple[bytes, bytes]], now_s: float) -> None:
-        """Give the core the payloads that are worth a look."""
+        """Give the admitted payloads to the core."""
         for peer, payload in self._admission.admitted(received, self._core.session.owner_peer):
             self._hear(peer, payload, now_s)
 
     def turn(self, now_s: float) -> None:
-        """Tick."""
+        """Run one tick and queue its messages."""
         self._admission.begin_tick()
         began = self._times.begin()
         self._core.reports.felt.interval_s = self._sending.budget.haptic_interval_s
@@ -74,14 +74,14 @@ class RobotTurns:
         self._sending.push(outgoing, now_s)
 
     def send(self) -> None:
-        """Let go of what is due."""
+        """Send the messages that are due."""
         session = self._core.session
         self._sending.send(
             None if session.owner_peer is None else session.link.outgoing, self._process.loop.clock.now()
         )
 
     def rest(self, now_s: float, turned_s: float) -> None:
-        """Make what people look at, record, report, look at keys; then take in what came of the tick."""
+        """Make views, record, report, refresh keys, pass on tuning; then let the core observe."""
         process = self._process
         seen = self._looking.idle(now_s, turned_s)
         self._sending.push(seen, now_s)
@@ -109,11 +109,11 @@ class RobotTurns:
         return replace(self._core.status(now_s), **self._reporter.status())
 
     def close(self) -> None:
-        """End the companion that renders."""
+        """End the rendering companion process."""
         self._looking.close()
 
     def summary(self) -> dict[str, Any]:
-        """Return the core's figures and the process's."""
+        """Return the figures of the core and the process."""
         sockets, stages = self._sockets, self._process.loop.stages.summary()
         figures = {
             "physics_us": stages["physics"]["wall_us"],

@@ -1,4 +1,4 @@
-"""A driver of an arm that follows velocities perfectly: the built-in model's six joints and two fingers.
+"""Driver of an arm that follows velocities exactly: the built-in model's six joints and two fingers.
 
 Usage: python example_arm.py [tcp://127.0.0.1:5601]. It needs pyzmq and msgpack, and nothing of feelahead.
 """
@@ -17,7 +17,7 @@ PERIOD_S, FINGER_OPEN_M, FINGER_SPEED_M_S = 0.005, 0.04248, 0.07
 def main(address: str) -> None:
     """Drive until a signal ends it."""
     socket = zmq.Context().socket(zmq.DEALER)
-    socket.setsockopt(zmq.SNDHWM, 2)  # an old state is worth nothing
+    socket.setsockopt(zmq.SNDHWM, 2)  # old states are useless
     socket.setsockopt(zmq.LINGER, 0)
     socket.connect(address)
     joints, velocities, finger_m = list(HOME_RAD), [0.0] * 6, FINGER_OPEN_M
@@ -49,7 +49,7 @@ def main(address: str) -> None:
             "finger_positions": [finger_m, finger_m],
             "opening_m": 2 * finger_m,
         }
-        with contextlib.suppress(zmq.Again):  # nobody is there
+        with contextlib.suppress(zmq.Again):  # no robot side yet
             socket.send(msgpack.packb(state), zmq.NOBLOCK)
         time.sleep(PERIOD_S)
 

@@ -1,4 +1,4 @@
-"""What perceives objects, made up: a table, a target on it, and a ball that goes to and fro at 30 Hz.
+"""Source of made-up objects at 30 Hz: a table, a target on it, and a ball that moves to and fro.
 
 Usage: python example_objects.py [tcp://127.0.0.1:5602]. It needs pyzmq and msgpack, and nothing of feelahead.
 """
@@ -22,7 +22,7 @@ while True:
     target = {"name": "target", "box": [0.02, 0.02, 0.05], "position_m": [0.6, 0.0, 0.05], "sd_m": 0.003}
     ball = {"name": "ball", "sphere": 0.03, "position_m": [0.5, side_m, 0.2], "velocity_m_s": [0.0, speed_m_s, 0.0]}
     frame = {"version": 1, "sequence": sequence, "sent_s": now_s, "taken_s": now_s, "objects": [table, target, ball]}
-    with contextlib.suppress(zmq.Again):  # nobody is there
+    with contextlib.suppress(zmq.Again):  # no robot side yet
         socket.send(msgpack.packb(frame), zmq.NOBLOCK)
     while socket.poll(0):
         print("refused:", msgpack.unpackb(socket.recv())["refused"], flush=True)

@@ -1,1 +1,1 @@
-"""From a command to joint velocities, and the port of any arm."""
+"""Joint velocities of a command, and the port of any arm."""

@@ -1,4 +1,4 @@
-"""Find what the arm can do along a direction in one pose: its speed there, and how fast that changes."""
+"""Speed and acceleration of the tool along a direction in one pose, within the joints' limits."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,27 +13,27 @@ from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, out
 from robot_side.compiled.stack import on_stack
 
 _MET = 1e-6
-"""A tool that moves as asked but for this share is held back by nothing."""
+"""Largest deviation of the tool's motion that counts as none, as a share of full speed."""
 _LEAST_SPEED_M_S = 1e-6
 _LEAST_RATE_RAD_S = 1e-9
 FOUND: Final = 3
-"""`find_ability` finds this many numbers, then the joints' rates."""
+"""Count of the numbers that `find_ability` fills before the joints' rates."""
 _twist = on_stack(6)
 
 
 @dataclass(frozen=True)
 class JointLimits:
-    """What the arm's own controller allows its joints, (n,) each; metres for a prismatic joint."""
+    """Limits of the joints in the arm's own controller, (n,) each; metres for a prismatic joint."""
 
     velocity_rad_s: FloatArray
     acceleration_rad_s2: FloatArray
     lower_rad: FloatArray | None = None
-    """Where each joint ends; None for one that nobody knows, or for none."""
+    """Lower end of each joint; None where unknown or without ends"""
     upper_rad: FloatArray | None = None
 
     @cached_property
     def ends_rad(self) -> tuple[FloatArray, FloatArray]:
-        """`lower_rad` and `upper_rad`; infinite where there are none."""
+        """Lower and upper ends of the joints; infinite where there are none."""
         infinite = np.full(self.velocity_rad_s.size, np.inf)
         return (
             -infinite if self.lower_rad is None else np.ascontiguousarray(self.lower_rad),
@@ -43,20 +43,20 @@ class JointLimits:
 
 @dataclass(frozen=True)
 class Ability:
-    """What the arm can do along one direction."""
+    """Speed and acceleration of the tool along one direction."""
 
     full_speed_m_s: float
-    """v_max here: what full travel gives, once the joints' limits and the damping at a singularity are through."""
+    """v_max here: speed at full travel, after the joints' limits and the damping at a singularity."""
     acceleration_m_s2: float
-    """a here: the least that the speed can change, with the joint that moves most at its limit."""
+    """a here: least acceleration along the direction, with one joint at its limit."""
     within_reach: bool
-    """Full travel moves the tool as it is meant to."""
+    """Whether full travel moves the tool as commanded."""
 
 
 def ability(pose: GripperPose, limits: JointLimits, direction: FloatArray, full_speed_m_s: float) -> Ability:
-    """Resolve full travel along the unit vector `direction` (3,) into joint speeds, and see what they come to.
+    """Resolve full travel along the unit vector `direction` (3,) into joint speeds; return the tool's resulting motion.
 
-    full_speed_m_s: v_max as it is set.
+    full_speed_m_s: v_max of the settings.
     """
     found = np.empty(FOUND + limits.velocity_rad_s.size)
     direction = np.ascontiguousarray(direction)
@@ -82,9 +82,9 @@ def find_ability(
     accelerations: FloatArray,
     found: FloatArray,
 ) -> bool:
-    """Fill `found` (3 + n,): speed, least acceleration, by how much the tool's motion differs at most, joints' rates.
+    """Fill `found` (3 + n,): speed, least acceleration, largest deviation of the tool's motion, joints' rates.
 
-    jacobian (6, n), direction (3,), limits and accelerations (n,). False where `resolve` can use none of them.
+    jacobian (6, n), direction (3,), limits and accelerations (n,). False where `resolve` refuses them.
     """
     twist, rates = _twist(), found[FOUND:]
     for i in range(3):
@@ -106,15 +106,15 @@ def find_ability(
 
 
 def along_approach(pose: GripperPose, limits: JointLimits, full_speed_m_s: float) -> Ability:
-    """The same along the tool's approach axis."""
+    """Return the ability along the tool's approach axis."""
     return ability(pose, limits, pose.tool_rotation[:, 2], full_speed_m_s)
 
 
 def change_times_s(pose: GripperPose, limits: JointLimits, twists: FloatArray) -> FloatArray:
-    """Work out how long (n, 5) each joint takes from rest to full travel of R2, and to each fully deflected stick.
+    """Return each joint's times K (n, 5) from rest to full travel of R2, and to each full stick deflection.
 
-    K of a change Δ (5,) of travel and deflections, which takes max |K Δ|: the joint that changes most limits all.
-    twists (5, 6): `tool_motion.full_twists`. ValueError as `joint_velocities`.
+    A change Δ (5,) of travel and deflections takes max |K Δ|: the joint that changes most limits all. twists (5, 6):
+    from `tool_motion.full_twists`. ValueError as for `joint_velocities`.
     """
     times_s = np.empty((len(twists), limits.velocity_rad_s.size))
     jacobian, rotation = np.ascontiguousarray(pose.tool_jacobian), np.ascontiguousarray(pose.tool_rotation)

@@ -1,4 +1,4 @@
-"""From a command to the joints' velocities, in one compiled call a tick."""
+"""Joint velocities of a command, in one compiled call a tick."""
 
 import math
 
@@ -14,7 +14,7 @@ from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, out
 from robot_side.compiled.stack import on_stack
 
 _AT_END_RAD = 0.002
-"""A joint that holds at its end is this near to it: encoders are noisy."""
+"""Distance from its end within which a joint counts as at the end, in rad: allows for encoder noise."""
 _twist = on_stack(6)
 
 
@@ -27,11 +27,10 @@ def commanded(
     *,
     stands: bool = False,
 ) -> tuple[FloatArray, float]:
-    """The velocities (n,) in rad/s to command the joints at these positions (n,), by `joint_velocities`.
+    """Return the joint velocities (n,) in rad/s, by `joint_velocities`, and the speed along the approach axis.
 
-    And the speed along the approach axis (m/s) that the arm is thereby told: of joints at their ends, which go no
-    farther, nothing comes. stands: nothing moves the tool downwards. ValueError for a pose that is not finite: nothing
-    must move by it.
+    The speed, in m/s, leaves out joints that are commanded beyond their ends. joint_positions_rad (n,). stands: no
+    motion downwards. ValueError for a pose that is not finite: nothing must move by it.
     """
     linear, angular = tool_motion(command, settings)
     velocity = np.empty(joint_positions_rad.size)
@@ -72,7 +71,7 @@ def _command_loop(
     stands: bool,
     velocity: FloatArray,
 ) -> float:
-    """Fill `velocity`; the speed along the approach axis, NaN where an argument is none."""
+    """Fill `velocity`; return the speed along the approach axis, NaN for an unusable argument."""
     if not jacobian.shape[1] == positions.size == limits.size == lower.size == upper.size:
         return math.nan
     twist = _twist()

@@ -1,4 +1,4 @@
-"""Forward kinematics (eq. 4) of a robot's tree of links: from readings to tool, Jacobian and spheres in one pass."""
+"""Forward kinematics (eq. 4) of a robot's tree of links: tool, Jacobian and spheres from joint readings in one pass."""
 
 import math
 from typing import Any, Final, NamedTuple
@@ -10,9 +10,9 @@ from robot_side.compiled.kernel import TRUTH, building_block, compiled, inlined,
 from robot_side.compiled.vectors import Vector, add, cross, scale, subtract
 
 Quaternion = tuple[float, float, float, float]
-"""w first"""
+"""Quaternion, w first"""
 Rotation = tuple[Vector, Vector, Vector]
-"""Rows of the matrix"""
+"""Rows of a rotation matrix"""
 Records = np.ndarray[Any, Any]
 
 LINK: Final = np.dtype(
@@ -24,8 +24,8 @@ LINK: Final = np.dtype(
         ("quaternion", np.float64, (4,)),
     ]
 )
-"""One link: its row's parent stands before it; its joints; and how it stands to its parent while these are at their
-references. The first row is the world, whose parent is itself."""
+"""Link: its parent's row, which is an earlier one; its joints; and its pose in the parent's frame with these at their
+references. The first row is the world, which is its own parent."""
 JOINT: Final = np.dtype(
     [
         ("reading", np.int64),
@@ -36,17 +36,17 @@ JOINT: Final = np.dtype(
         ("axis", np.float64, (3,)),
     ]
 )
-"""One joint, in the frame of its link: a hinge about its unit axis through its anchor, or a slide along it. reading:
-its place among the arm's readings, or the fingers'; only the arm's move the tool, and are columns of its Jacobian."""
+"""Joint in the frame of its link: a hinge about the unit axis through the anchor, or a slide along the axis. reading:
+index among the arm's or the fingers' readings. Only the arm's joints move the tool and are columns of the Jacobian."""
 POINT: Final = np.dtype([("link", np.int64), ("position", np.float64, (3,))])
-"""A point that is fixed to a link, in that link's frame."""
+"""Point that is fixed to a link, in the link's frame."""
 
 _UNIT: Final = 1e-15
-"""A quaternion is no nearer to the length 1 than this, for want of digits."""
+"""Deviation from the length 1 below which a quaternion is not normalised: rounding."""
 
 
 class LinkTree(NamedTuple):
-    """A robot, and what of it is to be known."""
+    """Links and joints of a robot, with the tool and the points to place."""
 
     links: Records
     """(l,) of LINK"""
@@ -55,13 +55,13 @@ class LinkTree(NamedTuple):
     tool: Records
     """(1,) of POINT"""
     tool_quaternion: FloatArray
-    """(4,) of the tool's frame in its link's, w first"""
+    """(4,) orientation of the tool's frame in its link's, w first"""
     points: Records
     """(m,) of POINT"""
 
 
 class Placed(NamedTuple):
-    """Where readings put it, in the world frame; every array is new."""
+    """Placed tool and points, in the world frame; every array is new."""
 
     tool_position_m: FloatArray
     """(3,)"""
@@ -74,10 +74,10 @@ class Placed(NamedTuple):
 
 
 def place(tree: LinkTree, arm_readings: FloatArray, finger_readings: FloatArray, link_poses: FloatArray) -> Placed:
-    """Put the tree where the readings of the arm's joints (n,) and of the fingers' (f,) say (eq. 4).
+    """Place the tree by the readings of the arm's joints (n,) and of the fingers' (f,) (eq. 4).
 
-    link_poses (l, 7): filled with each link's position and quaternion, w first. ValueError for other numbers of
-    readings than joints.
+    link_poses (l, 7): filled with each link's position and quaternion, w first. ValueError unless there is one reading
+    for each joint.
     """
     placed = Placed(np.empty(3), np.empty((3, 3)), np.empty((6, arm_readings.size)), np.empty((tree.points.size, 3)))
     if not _place(*tree, arm_readings, finger_readings, link_poses, *placed):
@@ -100,7 +100,7 @@ def _product(a: Quaternion, b: Quaternion) -> Quaternion:
 
 @inlined
 def _turned(q: Quaternion, v: Vector) -> Vector:
-    """V turned by a unit quaternion: v + 2 u × (w v + u × v) with its vector part u."""
+    """Return `v` rotated by a unit quaternion: v + 2 u × (w v + u × v) with its vector part u."""
     x = q[0] * v[0] + q[2] * v[2] - q[3] * v[1]
     y = q[0] * v[1] + q[3] * v[0] - q[1] * v[2]
     z = q[0] * v[2] + q[1] * v[1] - q[2] * v[0]
@@ -113,7 +113,7 @@ def _turned(q: Quaternion, v: Vector) -> Vector:
 
 @inlined
 def _rotation(q: Quaternion) -> Rotation:
-    """The rotation matrix of a unit quaternion."""
+    """Return the rotation matrix of a unit quaternion."""
     ww, xx, yy, zz = q[0] * q[0], q[1] * q[1], q[2] * q[2], q[3] * q[3]
     wx, wy, wz, xy, xz, yz = q[0] * q[1], q[0] * q[2], q[0] * q[3], q[1] * q[2], q[1] * q[3], q[2] * q[3]
     return (
@@ -125,7 +125,7 @@ def _rotation(q: Quaternion) -> Rotation:
 
 @inlined
 def _on_link(pose: FloatArray, rotation: Rotation, v: Vector) -> Vector:
-    """Where in the world the point v of a link is that stands so."""
+    """Return the point `v` of a link with this pose and rotation in the world frame."""
     return (
         rotation[0][0] * v[0] + rotation[0][1] * v[1] + rotation[0][2] * v[2] + pose[0],
         rotation[1][0] * v[0] + rotation[1][1] * v[1] + rotation[1][2] * v[2] + pose[1],
@@ -167,9 +167,9 @@ def _place_links(
     poses: FloatArray,
     axes: FloatArray,
 ) -> None:
-    """Fill the links' poses (l, 7), and in columns (6, n) each arm joint's axis and anchor, in the world.
+    """Fill the links' poses (l, 7), and each arm joint's axis and anchor as columns (6, n), in the world frame.
 
-    In MuJoCo's order of operations, so that nearly all digits are the same.
+    The order of operations is MuJoCo's, so that nearly all digits are the same.
     """
     for row in range(links.size):
         link = links[row]
@@ -223,7 +223,7 @@ def _place(
         of_arm += joints[number].of_arm
     if arm.size != of_arm or fingers.size != joints.size - of_arm or poses.shape[0] != links.size:
         return False
-    # The Jacobian holds the axes and anchors until the tool's place is known.
+    # The Jacobian's array holds the axes and anchors until the tool's position is known.
     _place_links(links, joints, arm, fingers, poses, jacobian)
 
     carrier = tool[0].link

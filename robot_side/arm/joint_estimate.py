@@ -1,8 +1,8 @@
-"""Where the joints and fingers are, by more than their last readings: the noise of single ones is averaged out.
+"""Estimate of joint and finger positions: a filter averages the noise of single readings.
 
-A reading says where a joint is, with noise; the drive's velocity says how it has moved since, with little. So the
-estimate moves with the velocity, and is drawn to the readings over a time constant (a complementary filter): no lag,
-and about a sixth of the noise at 1 kHz. The fingers' velocity is not measured: it is estimated, too (an α-β filter).
+Position readings are noisy; the drive's velocity is less so. The estimate moves with the velocity and is drawn to the
+readings over a time constant (a complementary filter). It has no lag, and about a sixth of the noise at 1 kHz. The
+fingers' velocity is not measured, but estimated as well (an α-β filter).
 """
 
 import math
@@ -15,28 +15,28 @@ from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, out
 
 TIME_CONSTANT_S = 0.02
 _LOST_S = 0.1
-"""After so long without a reading, the estimate begins anew."""
+"""Time without a reading after which the estimate restarts, in seconds."""
 _AT_ONCE_S = 2e-3
-"""A state that is no older is taken for the present one: a simulation's is a step old."""
+"""Age up to which a state counts as present, in seconds: a simulation's is one step old."""
 _LOST = 0.01
-"""So far from a reading, too, in rad or m: something else than noise has happened."""
+"""Distance from a reading, in rad or m, at which the estimate restarts: larger than any noise."""
 
 
 def lateness_s(measured: ArmState, now_s: float) -> float:
-    """Return how old a state is at `now_s`; 0 up to 2 ms."""
+    """Return the age of a state at `now_s`, in seconds; 0 up to 2 ms."""
     age_s = now_s - measured.time_s
     return age_s if age_s > _AT_ONCE_S else 0.0
 
 
 class JointEstimate:
-    """Filters what an arm measures of its joints and fingers; it holds from one state to the next."""
+    """Filter of an arm's joint and finger readings, from one state to the next."""
 
     def __init__(self) -> None:
         self._last: ArmState | None = None
         self._finger_velocities: FloatArray = np.empty(0)
 
     def update(self, measured: ArmState) -> ArmState:
-        """`measured` with estimated positions; a state that was seen already changes nothing."""
+        """Return `measured` with estimated positions; a state of the same time changes nothing."""
         last = self._last
         since_s = math.inf if last is None else measured.time_s - last.time_s
         if last is None or not 0.0 <= since_s < _LOST_S:
@@ -63,9 +63,9 @@ class JointEstimate:
         return self._last
 
     def carried(self, late_s: float) -> ArmState:
-        """Return the state `late_s` after the last was measured, if each joint and finger goes on as it did then.
+        """Return the state extrapolated by `late_s` from the last one, with constant velocities.
 
-        At most 0.1 s on: an arm that says nothing for longer may stand. ValueError before the first `update`.
+        At most by 0.1 s: an arm that is silent for longer may stand still. ValueError before the first `update`.
         """
         last = self._last
         if last is None:
@@ -106,7 +106,7 @@ def _estimate_loop(
     fingers: FloatArray,
     finger_velocities: FloatArray,
 ) -> bool:
-    """Fill `joints` (n,) and `fingers` (f,), and draw `finger_velocities` (f,) on; False for what is far off."""
+    """Fill `joints` (n,) and `fingers` (f,), update `finger_velocities` (f,); False for readings too far off."""
     near = last_joints.size == last_velocities.size == velocities.size == joints.size
     near &= last_fingers.size == finger_velocities.size == fingers.size
     if not near:
@@ -116,7 +116,7 @@ def _estimate_loop(
         off = read_joints[joint] - expected
         near &= abs(off) < _LOST
         joints[joint] = expected + share * off
-    # Of an α-β filter that neither overshoots nor lags behind a steady motion.
+    # Gain of an α-β filter that neither overshoots nor lags behind a steady motion.
     drawn = share * share / (2.0 - share) / since
     for finger in range(fingers.size):
         expected = last_fingers[finger] + since * finger_velocities[finger]

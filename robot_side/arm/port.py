@@ -1,4 +1,4 @@
-"""The Arm port: what feelahead asks of a robot, simulated or real, and what it gets back."""
+"""Port of an arm, simulated or real: commands, measured states and forward kinematics."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,10 +12,10 @@ from common.clock import Clock
 
 @dataclass
 class ArmState:
-    """What the arm measures of itself: never the truth, always what its sensors say. Its arrays are contiguous."""
+    """State of the arm as its sensors measure it, never the truth. The arrays are contiguous."""
 
     time_s: float
-    """When it was measured, on the clock of the `now` that `state` was given."""
+    """Time of the measurement, on the clock of `state`'s `now_s`."""
     joint_positions_rad: FloatArray
     """(n,) encoder readings, with their noise and quantisation; metres for a prismatic joint."""
     joint_velocities_rad_s: FloatArray
@@ -23,29 +23,29 @@ class ArmState:
     finger_positions: FloatArray
     """(f,) readings of the gripper's joints, in the model's order; empty without a gripper."""
     gripper_opening_m: float
-    """The free gap between the fingers; 0 without a gripper."""
+    """Free gap between the fingers; 0 without a gripper."""
     gripper_holding: bool
-    """The fingers were told to close and something between them stopped them."""
+    """Whether something between the fingers stopped them while they were commanded to close."""
     joint_loads_nm: FloatArray | None = None
-    """(n,) what the drives give beyond what moves and holds the arm itself: what it carries, less what bears it; N for
-    a prismatic joint. None from an arm that does not know."""
+    """(n,) drive torques beyond those that move and hold the arm itself: from the weight that it carries, less what
+    supports it; N for a prismatic joint. None from an arm that does not measure them."""
 
 
 class Arm(Protocol):
-    """A velocity-controlled arm that stops by itself when it is no longer told to go on.
+    """Velocity-controlled arm that stops by itself without new commands.
 
-    The last three say how a simulation keeps up; an arm that derives from this class runs in real time.
+    The last three methods concern a simulation's pace; by default an arm of a derived class runs in real time.
     """
 
     @property
     def joint_count(self) -> int:
-        """The number n of joints between the base and the tool."""
+        """Number n of joints between the base and the tool."""
         ...
 
     def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
         """Follow `joint_velocity_rad_s` (n,) until `valid_until_s`, then decelerate from the measured state.
 
-        ValueError for a wrong shape or a value that is not finite: nothing of it is applied.
+        ValueError for a wrong shape or a value that is not finite; then nothing is applied.
         """
         ...
 
@@ -54,11 +54,11 @@ class Arm(Protocol):
         ...
 
     def state(self, now_s: float) -> ArmState:
-        """The measured state at `now_s`; a simulated arm advances its physics up to then first."""
+        """Return the measured state at `now_s`; a simulated arm first advances its physics up to then."""
         ...
 
     def give_way(self, clock: Clock) -> None:
-        """From now on fall behind real time, by `clock`, rather than hold up the caller of `state`."""
+        """Fall behind real time, by `clock`, from now on, rather than block the caller of `state`."""
         del clock
 
     @property
@@ -67,21 +67,21 @@ class Arm(Protocol):
         return 1.0
 
     def take_share_of_real_time(self) -> float:
-        """Return the same since the last call."""
+        """Return simulated time over real time since the last call."""
         return 1.0
 
 
 @dataclass
 class GripperPose:
-    """Where forward kinematics puts the tool and the gripper's spheres, in the world frame (eq. 4).
+    """Tool and spheres of the gripper by forward kinematics, in the world frame (eq. 4).
 
-    Its arrays are contiguous, and stay as they are: a pose is kept for as long as a field that was looked at from it.
+    The arrays are contiguous and never change: a field keeps the pose that it was computed from.
     """
 
     tool_position_m: FloatArray
     """(3,)"""
     tool_rotation: FloatArray
-    """(3, 3) tool to world; the approach axis is one of its columns."""
+    """(3, 3) tool to world; the approach axis is the last column."""
     tool_jacobian: FloatArray
     """(6, n) linear rows first, world frame."""
     sphere_centers_m: FloatArray
@@ -93,7 +93,7 @@ class GripperPose:
 
     @cached_property
     def sphere_jacobians(self) -> FloatArray:
-        """(m, 3, n) positional Jacobian of each centre, as it moves with the tool: v + ω × r for each joint."""
+        """(m, 3, n) positional Jacobian of each centre, which moves with the tool: v + ω × r for each joint."""
         lever = self.sphere_centers_m - self.tool_position_m
         turned = np.cross(self.tool_jacobian[3:].T, lever[:, None])
         jacobians: FloatArray = self.tool_jacobian[:3] + turned.swapaxes(1, 2)
@@ -101,7 +101,7 @@ class GripperPose:
 
 
 class GripperKinematics(Protocol):
-    """Forward kinematics of the estimated configuration: it sees encoder readings, not the simulation."""
+    """Forward kinematics of the estimated configuration, from encoder readings, not the simulation."""
 
     @property
     def has_fingers(self) -> bool:
@@ -109,5 +109,5 @@ class GripperKinematics(Protocol):
         ...
 
     def pose(self, state: ArmState) -> GripperPose:
-        """The gripper at `state`."""
+        """Return the gripper's pose at `state`."""
         ...

@@ -1,4 +1,4 @@
-"""Resolved-rate control: the joint velocity that moves the tool as asked, by damped least squares.
+"""Resolved-rate control: joint velocities for a commanded twist, by damped least squares.
 
 Nakamura and Hanafusa, 1986; Chiaverini, Siciliano and Egeland, 1994.
 """
@@ -13,10 +13,10 @@ from robot_side.compiled.kernel import TRUTH, building_block, compiled, inlined,
 from robot_side.compiled.stack import on_stack
 
 _THRESHOLD_2: Final = 0.06 * 0.06
-"""Of the singular values, squared"""
+"""Square of the singular value below which the damping begins"""
 _LARGEST_DAMPING: Final = 0.06
 _HALVINGS: Final = 60
-"""After so many the smallest eigenvalue is known to the last digit."""
+"""Bisections that find the smallest eigenvalue to the last digit"""
 _gram, _factor, _solution = on_stack(6, 6), on_stack(6, 6), on_stack(6)
 
 
@@ -27,11 +27,11 @@ def joint_velocities(
 ) -> FloatArray:
     """Find joint velocities (n,) in rad/s that give the tool `twist`, at most `velocity_limits_rad_s` (n,) each.
 
-    jacobian (6, n) and twist (6,), linear rows first, are in one frame. There is no damping while the smallest of the
-    Jacobian's min(6, n) singular values is above 0.06. Then the twist is met exactly; by an arm with fewer than six
-    joints, in the least-squares sense. Below 0.06, λ² = λ_max² (1 - (σ_min/σ_0)²): no joint runs away at a singularity.
-    A joint over its limit slows all of them alike, which keeps the direction.
-    Metres and radians are mixed in the singular values: the defaults suit an arm of about one metre's reach.
+    jacobian (6, n) and twist (6,), linear rows first, are in one frame. Without damping, the twist is met exactly, or
+    with fewer than six joints in the least-squares sense. The damping begins where the smallest of the Jacobian's
+    min(6, n) singular values is below σ_0 = 0.06: λ² = λ_max² (1 - (σ_min/σ_0)²), so that no joint runs away at a
+    singularity. A joint over its limit slows all joints by the same factor, which keeps the direction. The singular
+    values mix metres and radians: the defaults suit an arm of about one metre's reach.
     ValueError for a wrong shape, a limit that is not above 0, or a value that is not finite.
     """
     if (jacobian.shape, twist.shape) != ((6, velocity_limits_rad_s.size), (6,)):
@@ -43,7 +43,7 @@ def joint_velocities(
 
 
 def refuse(jacobian: FloatArray, twist: FloatArray, velocity_limits_rad_s: FloatArray) -> NoReturn:
-    """Raise the ValueError that names what `resolve` could not use."""
+    """Raise the ValueError that names the argument that `resolve` refused."""
     for name, values in (("jacobian", jacobian), ("twist", twist)):
         require_finite(name, values)
     if not (velocity_limits_rad_s > 0.0).all():
@@ -53,7 +53,7 @@ def refuse(jacobian: FloatArray, twist: FloatArray, velocity_limits_rad_s: Float
 
 @building_block
 def _factorise(matrix: FloatArray, shift: float, factor: FloatArray) -> bool:
-    """Cholesky's lower `factor` of a symmetric matrix less `shift` times 1; False where it is not positive definite."""
+    """Fill Cholesky's lower `factor` of a symmetric matrix minus `shift` I; False if not positive definite."""
     for column in range(matrix.shape[0]):
         for row in range(column, matrix.shape[0]):
             rest = matrix[row, column] - (shift if row == column else 0.0)
@@ -70,11 +70,11 @@ def _factorise(matrix: FloatArray, shift: float, factor: FloatArray) -> bool:
 
 @building_block
 def _factorise_damped(gram: FloatArray, factor: FloatArray) -> bool:
-    """Cholesky's factor of G + λ²; False for what is no Gram matrix of finite numbers.
+    """Fill Cholesky's factor of G + λ² I; False unless G is a Gram matrix of finite numbers.
 
-    The eigenvalues of G = A Aᵀ are the squares of A's singular values: all of these are above the threshold where
-    G - threshold² has a factor. That costs a fraction of a singular value decomposition. Elsewhere the largest s for
-    which G - s has one, by bisection, is σ_min².
+    The eigenvalues of G = A Aᵀ are the squares of A's singular values. All of these are above the threshold if
+    G - threshold² I has a factor. This test costs a fraction of a singular value decomposition. Otherwise σ_min² is
+    the largest s for which G - s I has a factor, by bisection.
     """
     below, above = 0.0, _THRESHOLD_2
     if _factorise(gram, above, factor):
@@ -90,7 +90,7 @@ def _factorise_damped(gram: FloatArray, factor: FloatArray) -> bool:
 
 @building_block
 def _solve_damped(gram: FloatArray, solution: FloatArray) -> bool:
-    """Solve (G + λ²) x = `solution` in place."""
+    """Solve (G + λ² I) x = `solution` in place; False as for `_factorise_damped`."""
     size, factor = gram.shape[0], _factor()
     if not _factorise_damped(gram, factor):
         return False
@@ -107,7 +107,7 @@ def _solve_damped(gram: FloatArray, solution: FloatArray) -> bool:
 
 @inlined
 def _of_rows(jacobian: FloatArray, wide: bool, row: int, k: int) -> float:
-    """An element of A, whose rows are the shorter side: A = J, or Jᵀ with fewer than six joints."""
+    """Return an element of A, whose rows are the shorter side: A = J, or Jᵀ with fewer than six joints."""
     return float(jacobian[row, k] if wide else jacobian[k, row])
 
 
@@ -118,11 +118,10 @@ def resolve(
     limits: FloatArray,
     velocity: FloatArray,
 ) -> bool:
-    """Fill `velocity` (n,) as `joint_velocities` says; False for what is not finite, or for a limit that is none.
+    """Fill `velocity` (n,) as in `joint_velocities`; False for values that are not finite or limits not above 0.
 
-    By the normal equations of the shorter side: (J Jᵀ + λ²) y = v and q = Jᵀ y, or (JᵀJ + λ²) q = Jᵀ v with fewer
-    than six joints. Singular values from 0.06 to 3 make a condition of 2500, so that squaring them takes few of the
-    digits.
+    Solves the normal equations of the shorter side: (J Jᵀ + λ² I) y = v and q = Jᵀ y, or (JᵀJ + λ² I) q = Jᵀ v with
+    fewer than six joints. Singular values from 0.06 to 3 make a condition number of 2500, so few digits are lost.
     """
     wide = velocity.size >= 6
     size, length = (6, velocity.size) if wide else (velocity.size, 6)
@@ -146,7 +145,7 @@ def resolve(
 
 @building_block
 def _limit(velocity: FloatArray, limits: FloatArray) -> bool:
-    """Slow all joints alike so that none is over its limit; False for what is no velocity or no limit."""
+    """Scale all joints by one factor so that none is over its limit; False for an invalid velocity or limit."""
     excess = 1.0
     for joint in range(velocity.size):
         # An infinite limit is no limit; NaN fails the comparison.

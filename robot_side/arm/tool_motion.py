@@ -1,7 +1,7 @@
-"""Trigger travel and sticks to the tool's motion; the robot side owns this mapping, as stiffness depends on it.
+"""Map from trigger travel and sticks to the tool's motion; on the robot side, as stiffness depends on it.
 
 The tool frame is a camera's optical frame: z forward along the approach axis, x right, y down. R2 advances
-along +z and L2 retreats; the left stick moves across, the right stick turns the tool about its own point.
+along +z and L2 retreats. The left stick moves the tool sideways, the right stick turns it about its origin.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _Speed = Annotated[float, Meta(gt=0.0, le=5.0)]
 
 @dataclass(frozen=True)
 class ToolMotionSettings:
-    """What full travel and full deflection mean."""
+    """Speeds of the tool at full travel and full deflection."""
 
     trigger_speed_m_s: _Speed = 0.25
     """ISO 10218's reduced speed for an arm near people."""
@@ -32,11 +32,11 @@ class ToolMotionSettings:
 
 
 def tool_motion(command: MotionCommand, settings: ToolMotionSettings) -> tuple[Vector3, Vector3]:
-    """The commanded velocity of the tool and its angular velocity, each (3,) in the tool frame, in m/s and rad/s."""
+    """Return the tool's commanded linear and angular velocity, each (3,) in the tool frame, in m/s and rad/s."""
     right, up = command.lateral
     turn_right, turn_up = command.turning
     across, turn = settings.stick_speed_m_s, settings.turn_speed_rad_s
-    # To look right is a turn about y, which points down; to look up, one about x.
+    # Looking right is a rotation about y, which points down; looking up, about x.
     return (
         (across * right, -across * up, settings.trigger_speed_m_s * (command.r2 - command.l2)),
         (turn * turn_up, turn * turn_right, 0.0),
@@ -44,7 +44,7 @@ def tool_motion(command: MotionCommand, settings: ToolMotionSettings) -> tuple[V
 
 
 def full_twists(settings: ToolMotionSettings) -> FloatArray:
-    """Lay out the tool's twists (5, 6), linear part first, of full travel of R2 and of each fully deflected stick."""
+    """Return the tool's twists (5, 6), linear part first, at full travel of R2 and at each full stick deflection."""
     travel, across, turn = settings.trigger_speed_m_s, settings.stick_speed_m_s, settings.turn_speed_rad_s
     twists = np.zeros((5, 6))
     twists[0, 2], twists[1, 0], twists[2, 1], twists[3, 4], twists[4, 3] = travel, across, -across, turn, turn

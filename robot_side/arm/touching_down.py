@@ -1,10 +1,10 @@
-"""Notice when a held object comes to stand on something: the arm carries less of its weight than before.
+"""Detection of a held object's touchdown on something: the arm then carries less of the weight than before.
 
     carried ─▶ stands ─▶ carried
-            │         └ the tool has risen by 3 mm, or the object is let go
+            │         └ the tool has risen by 3 mm, or the object is released
             └ the tool is commanded to sink, and the load has fallen by more than 5 N and half of the weight
 
-The robot side then ends motion downwards, and releases what the drives have wound up.
+The robot side then stops motion downwards, and relaxes the torque that the drives have built up.
 """
 
 import math
@@ -16,18 +16,18 @@ from common.arrays import FloatArray
 from robot_side.arm.resolved_rate import joint_velocities
 
 _BORNE_N: Final = 5.0
-"""More than the error of a measured load changes by in a second."""
+"""Fall of the load at touchdown, in N: more than a measured load's error changes in a second."""
 _BORNE_SHARE: Final = 0.5
-"""Share of the weight. A tool that begins to sink accelerates by less than half of gravity, so that it carries more."""
+"""Fall as a share of the weight. A tool that starts to sink accelerates by less than half of g, so it carries more."""
 _HARDLY: Final = 0.25
 _STALLED_S: Final = 0.15
-"""Without measured loads: a tool that sinks at less than a quarter of its commanded speed for this time stands. An arm
-needs less time to begin to move."""
+"""Time, in seconds, for which a tool without measured loads must sink at less than a quarter of the commanded speed to
+stand. An arm needs less time to begin to move."""
 _SINKS_M_S: Final = 1e-3
 _LEAVES_M: Final = 3e-3
 _PERIOD_S: Final = 0.004
 _GIVES_WAY_S: Final = 0.01
-"""For this time the arm halts where it is measured. It is longer than a step of the physics or of a controller."""
+"""Time for which the arm halts at its measured position, in seconds: longer than a step of physics or controller."""
 _NOISE_S: Final = 0.01
 _USUAL_S: Final = 1.0
 """Time constants of the present load and of the usual one, which follows a lift and errors of the arm's model."""
@@ -47,7 +47,7 @@ def carried_n(tool_jacobian: FloatArray, joint_loads_nm: FloatArray | None) -> f
 
 
 class TouchingDown:
-    """State of one object, from grip to release."""
+    """Touchdown state of one object, from grip to release."""
 
     def __init__(self) -> None:
         self.stands = False
@@ -56,18 +56,18 @@ class TouchingDown:
         self._carried_n = self._usual_n = 0.0
 
     def due(self, time_s: float) -> bool:
-        """Tell whether a load is wanted at `time_s`, every 4 ms: to work one out takes a tenth of a tick."""
+        """Return whether a load is due at `time_s`, every 4 ms: computing one takes a tenth of a tick."""
         return time_s - self._time_s >= _PERIOD_S
 
     @property
     def gives_way(self) -> bool:
-        """Whether it has just come to stand."""
+        """Whether the object has just touched down"""
         return self.stands and self._time_s - self._since_s < _GIVES_WAY_S
 
     def update(self, carried_n: float | None, height_m: float, told_m_s: float, time_s: float) -> None:
-        """Take in the load, None where unknown, and the tool's height, as measured at `time_s`.
+        """Take the load, None where unknown, and the tool's height, as measured at `time_s`.
 
-        told_m_s: the tool's commanded speed upwards until then.
+        told_m_s: commanded speed of the tool upwards until then.
         """
         passed_s, sunk_m = time_s - self._time_s, self._height_m - height_m
         if passed_s <= 0.0:

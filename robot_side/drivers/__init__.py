@@ -1,1 +1,1 @@
-"""What the robot side drives: each driver implements the ports of arm and surroundings, and knows no law."""
+"""Drivers of arms and cameras: each implements the ports of arm and surroundings, independently of the law."""

@@ -1,1 +1,1 @@
-"""Shape of the gripper and of a held object."""
+"""Shapes of the gripper and of a held object."""

@@ -1,4 +1,4 @@
-"""A capsule's spheres: a row along its middle line. A ball is a capsule of no length, and its own cover."""
+"""Cover of a capsule by a row of spheres along its axis. A ball is a capsule of length 0, and its own cover."""
 
 import math
 
@@ -10,14 +10,14 @@ from common.arrays import FloatArray
 def cover_capsule(
     radius_m: float, half_length_m: float, stand_out_m: float, most: int = 2000
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Centres (m, 3) on the z axis, radii (m,), and how far they stand out of the points within `radius_m` of the line.
+    """Return centres (m, 3), radii (m,) and the distance by which the spheres stand out of the capsule.
 
-    The line goes from -half_length_m to half_length_m on the z axis. The ends are as the capsule's, and between two
-    neighbours their spheres still reach its radius. More than `most` are as many, and stand out farther.
+    The capsule's axis goes from -half_length_m to half_length_m on the z axis. The ends are those of the capsule. Two
+    neighbouring spheres meet at its radius. There are at most `most` spheres, which then stand out farther.
     """
     if half_length_m <= 0.0:
         return np.zeros((1, 3)), np.array([radius_m]), 0.0
-    # Half the distance of two spheres of the radius r + s that meet at r is √(2 r s + s²).
+    # Two spheres of radius r + s that meet at r are 2 √(2 r s + s²) apart.
     reach_m = math.sqrt(2.0 * radius_m * stand_out_m + stand_out_m**2)
     count = min(1 + math.ceil(half_length_m / reach_m), most)
     half_step_m = half_length_m / (count - 1)

@@ -1,4 +1,4 @@
-"""The choice of few spheres that together contain all of many points."""
+"""Greedy set cover: few spheres that together contain many points."""
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -9,8 +9,8 @@ _ROWS_AT_A_TIME = 512
 
 
 def containing(centers_m: FloatArray, radii_m: FloatArray, points_m: FloatArray) -> BoolArray:
-    """(m, p): whether each sphere, centres (m, 3), radii (m,), contains each point (p, 3)."""
-    # Squared distances by one product; a few parts in 1e15 of the frame's size are nothing beside the margins.
+    """Return (m, p): whether each sphere, centres (m, 3), radii (m,), contains each point (p, 3)."""
+    # Squared distances by one matrix product; the rounding, some 1e-15 of the frame's size, is far below the margins.
     inside: BoolArray = (centers_m**2).sum(axis=1)[:, None] - 2.0 * centers_m @ points_m.T + (points_m**2).sum(
         axis=1
     ) <= (radii_m**2)[:, None]
@@ -18,7 +18,7 @@ def containing(centers_m: FloatArray, radii_m: FloatArray, points_m: FloatArray)
 
 
 def contained_points(centers_m: FloatArray, radii_m: FloatArray, points_m: FloatArray, images: FloatArray) -> csr_array:
-    """(m, p), true where an image of a sphere contains the point; `images` (g, 3, 3) turn or mirror the centres."""
+    """Return (m, p), true if an image of the sphere contains the point; `images` (g, 3, 3) map the centres."""
     pieces = [(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))]
     for first in range(0, len(centers_m), _ROWS_AT_A_TIME):
         rows = slice(first, first + _ROWS_AT_A_TIME)
@@ -32,11 +32,10 @@ def contained_points(centers_m: FloatArray, radii_m: FloatArray, points_m: Float
 
 
 def few_that_contain_all(inside: csr_array, costs: FloatArray) -> IntArray:
-    """Rows of `inside` (m, p) that together have a true in every column that has one; `costs` (m,) each.
+    """Choose rows of `inside` (m, p) that together cover every column that any row covers; `costs` (m,).
 
-    The next column is that for which the best row would bring least, as a corner is: nothing better will come for it.
-    Its best row is taken. So rows grow together from corners and edges inwards instead of leaving slivers there.
-    Rows that turn out to be in vain are left out again.
+    The next column is the one hardest to cover, such as a corner: its best row gains least. That row is chosen. Thus
+    the cover grows from corners and edges inwards, without slivers there. Redundant rows are removed at the end.
     """
     of_column = inside.T.tocsr()
     bearing = np.flatnonzero(np.diff(of_column.indptr))
@@ -45,7 +44,7 @@ def few_that_contain_all(inside: csr_array, costs: FloatArray) -> IntArray:
     best = np.zeros(inside.shape[1])
     if len(bearing):
         best[bearing] = np.maximum.reduceat(sizes[of_column.indices], starts)
-    # A column that only small rows reach is worth more.
+    # Columns covered only by small rows count more.
     weights = np.divide(1.0, best, out=np.zeros_like(best), where=best > 0.0)
     gains = inside @ weights
     left = best > 0.0
@@ -67,7 +66,7 @@ def few_that_contain_all(inside: csr_array, costs: FloatArray) -> IntArray:
 
 
 def without_vain(inside: csr_array, chosen: IntArray, costs: FloatArray) -> IntArray:
-    """The rows of `chosen` less those all of whose columns other rows have; the dearest and smallest go first."""
+    """Return the rows of `chosen` without redundant ones; the costliest and smallest are removed first."""
     times: FloatArray = np.asarray(inside[chosen].sum(axis=0), dtype=np.float64).ravel()
     sizes = np.diff(inside.indptr)
     kept = []

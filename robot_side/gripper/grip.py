@@ -1,4 +1,4 @@
-"""Follow what the gripper holds, from grip to release, and whether that stands on something."""
+"""State of the held object, from grip to release, and whether it stands on something."""
 
 from typing import Final
 
@@ -12,14 +12,14 @@ from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 
 _LET_GO_S: Final = 0.1
-"""Fingers that move for a moment, as they follow a slipping object, still hold it."""
+"""Time without holding after which an object is released, in seconds: fingers may move as they follow a slip."""
 
 
 class Grip:
-    """The held object, or none."""
+    """Held object, or none."""
 
     def __init__(self, surroundings: Surroundings, covers: HeldCovers | None = None) -> None:
-        """covers: spheres of what can be held, made beforehand; None: made when something is gripped."""
+        """covers: spheres of the objects, made beforehand; None: made when an object is gripped."""
         self.held: HeldObject | None = None
         self.touching_down = TouchingDown()
         self._surroundings, self._covers = surroundings, covers
@@ -27,13 +27,13 @@ class Grip:
 
     @property
     def index(self) -> int | None:
-        """The held object's index among the perceived ones; None for none."""
+        """Index of the held object among the perceived ones; None for none."""
         return None if self.held is None else self.held.index
 
     def follow(self, objects: PerceivedObjects, pose: GripperPose, state: ArmState, rises_m_s: float) -> None:
-        """Notice when an object is gripped or released, and when it comes to stand.
+        """Detect grip, release and touchdown of an object.
 
-        rises_m_s: the tool's commanded speed upwards until now.
+        rises_m_s: commanded speed of the tool upwards until now.
         """
         if state.gripper_holding:
             self._held_s = state.time_s

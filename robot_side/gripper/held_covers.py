@@ -1,4 +1,4 @@
-"""The spheres of whatever may be held, found when the objects are first known: a tick has no time for it."""
+"""Spheres of the objects that may be held, found when the objects are first known: a tick has no time for it."""
 
 from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from robot_side.overlap.meshes.mesh_library import MeshLibrary
 
 _MOST_SHAPES = 32
-"""Most meshes and objects of tetrahedra to cover closely; each takes up to seconds the first time."""
+"""Most meshes and objects of tetrahedra that get a search; each takes up to seconds the first time."""
 _MOST_TETRAHEDRA = 64
 _WIDEST_M = 0.2
-"""An object wider than this in every direction fits no gripper."""
+"""Width, in m, beyond which an object, if so in every direction, fits no gripper."""
 _SAME_VOLUME = 1e-6
 _SLIVER = 1e-3
 _DIGITS = 9
@@ -30,11 +30,11 @@ _Spheres = tuple[FloatArray, FloatArray]
 
 
 class HeldCovers:
-    """Covers of all objects of a scene, whose shapes do not change while they move.
+    """Covers of all objects of a scene, whose shapes stay constant.
 
-    Balls need no search, and boxes a short one. A mesh is covered in its own frame, once for each shape. The spheres of
-    tetrahedra are kept as shares of their vertices. What is too large to grip, has too many parts or comes after 32
-    others has a box's spheres, or a ball around each tetrahedron.
+    Balls need no search, and boxes a short one. A mesh is covered in its own frame, once for each shape. Spheres of
+    tetrahedra are stored by barycentric coordinates. An object that is too large to grip, has too many parts or comes
+    after 32 others gets the spheres of a box, or a ball around each tetrahedron.
     """
 
     def __init__(
@@ -44,9 +44,9 @@ class HeldCovers:
         fixed: Collection[str] = (),
         searching: Callable[[], None] | None = None,
     ) -> None:
-        """Search covers for any frame of the objects. fixed: names of objects that nobody lifts, left out.
+        """Search covers for any frame of the objects. fixed: names of immovable objects, left out.
 
-        searching: called before each search, but not for a cover of an earlier run.
+        searching: called before each search, but not for a stored cover.
         """
         self._stand_out_m = stand_out_m
         self._meshes: dict[int, _Spheres] = {}
@@ -70,7 +70,7 @@ class HeldCovers:
                     stand_outs.append(found[2])
             vertices = objects.tetrahedron_vertices_m[objects.tetrahedron_object == index]
             if 0 < len(vertices) <= _MOST_TETRAHEDRA and self._may_search(vertices):
-                # Relative and rounded, so that the same shape elsewhere is found again.
+                # Relative and rounded, so that the same shape elsewhere has the same cover.
                 vertices = (vertices - vertices[0, 0]).round(_DIGITS)
                 solids = _tetrahedra_solids(vertices)
                 if solids:
@@ -85,10 +85,10 @@ class HeldCovers:
                 coarse[name] = max(stand_outs)
         self._plan_boxes(objects, fixed)
         self.coarse: tuple[tuple[str, float], ...] = tuple(coarse.items())
-        """Names of what was searched for and still stands out farther, with by how much (m)."""
+        """(name, distance in m) of objects whose spheres stand out by more than asked, despite a search."""
 
     def _plan_boxes(self, objects: PerceivedObjects, fixed: Collection[str]) -> None:
-        """Cover a box of each size once: it is remembered, and takes several ticks the first time."""
+        """Cover a box of each size once, for the cache: the first time takes several ticks."""
         names_and_roles = zip(objects.names, objects.roles, strict=True)
         lifted = [role is not Role.SUPPORT and name not in fixed for name, role in names_and_roles]
         for kind in KINDS:
@@ -103,7 +103,7 @@ class HeldCovers:
         return few and float(np.ptp(points_m.reshape(-1, 3), axis=0).min()) <= _WIDEST_M
 
     def spheres(self, objects: PerceivedObjects, index: int) -> _Spheres:
-        """Centres (m, 3) in the world and radii (m,) of the object `index`, where `objects` has it."""
+        """Return centres (m, 3) in the world frame and radii (m,) for the object `index` at its pose in `objects`."""
         balls = objects.sphere_object == index
         found = [(objects.sphere_centers_m[balls], objects.sphere_radii_m[balls])]
         for row in np.flatnonzero(objects.mesh_object == index).tolist():
@@ -133,10 +133,10 @@ class HeldCovers:
 def _near_ellipsoids(
     spheres: _Spheres, middles_m: FloatArray, rotations: FloatArray, half_axes_m: FloatArray
 ) -> _Spheres:
-    """Those of the spheres that may reach any of the ellipsoids (e,).
+    """Return the spheres that may reach any of the ellipsoids (e,).
 
-    A sphere that reaches an ellipsoid has its centre in one whose half axes are longer by the radius, times the ratio
-    of the longest half axis to the shortest.
+    If a sphere reaches an ellipsoid, its centre is in an enlarged one. Each half axis of that one is longer by the
+    radius times the ratio of the longest half axis to the shortest.
     """
     centers_m, radii_m = spheres
     own = np.einsum("eij,mei->mej", rotations, centers_m[:, None] - middles_m)
@@ -147,7 +147,7 @@ def _near_ellipsoids(
 
 
 def _mesh_solid(library: "MeshLibrary", mesh: int, corners_m: FloatArray) -> Solid:
-    """A mesh of a library in its own frame."""
+    """Return the solid of a library's mesh in the mesh's frame."""
     hull = convex_solid(np.unique(corners_m.reshape(-1, 3), axis=0))
     if hull is not None and _fills(hull, float(library.tables.volumes[mesh])):
         return hull
@@ -163,14 +163,14 @@ def _mesh_solid(library: "MeshLibrary", mesh: int, corners_m: FloatArray) -> Sol
 
 
 def _fills(hull: Solid, volume_m3: float) -> bool:
-    """Whether a solid of this volume is its own convex hull."""
+    """Return whether a solid of this volume is its own convex hull."""
     a, b, c = np.moveaxis(hull.corners_m - hull.corners_m[0, 0], 1, 0)
     around_m3 = float(np.sum(a * np.cross(b, c)) / 6.0)
     return abs(volume_m3 - around_m3) <= _SAME_VOLUME * around_m3
 
 
 def _tetrahedra_solids(vertices_m: FloatArray) -> list[Solid]:
-    """Tetrahedra (t, 4, 3) as one solid where they fill a convex one, else each; those without volume are left out."""
+    """Return tetrahedra (t, 4, 3) as one solid if they fill a convex one, else each, without flat ones."""
     volumes = np.abs(np.linalg.det(vertices_m[:, 1:] - vertices_m[:, :1])) / 6.0
     whole = convex_solid(vertices_m.reshape(-1, 3))
     if whole is None:
@@ -181,9 +181,9 @@ def _tetrahedra_solids(vertices_m: FloatArray) -> list[Solid]:
 
 
 def _shares(vertices_m: FloatArray, centers_m: FloatArray) -> tuple[IntArray, FloatArray]:
-    """For centres (m, 3): the rows (m,) of the tetrahedra (t, 4, 3) that they are in, and their shares (m, 4)."""
+    """Return the tetrahedra (m,) of (t, 4, 3) that contain centres (m, 3), and barycentric coordinates (m, 4)."""
     volumes = np.abs(np.linalg.det(vertices_m[:, 1:] - vertices_m[:, :1]))
-    # A sliver tells nothing of where something is.
+    # Slivers are ill-conditioned as frames of reference.
     rows = np.flatnonzero(volumes >= _SLIVER * volumes.max())
     edges = np.moveaxis(vertices_m[rows, 1:] - vertices_m[rows, :1], 1, 2)
     along = np.linalg.solve(edges, (centers_m - vertices_m[rows, :1]).transpose(0, 2, 1)).transpose(0, 2, 1)

@@ -1,4 +1,4 @@
-"""An object between the fingers moves with them: it leaves the surroundings and joins the gripper as spheres."""
+"""Held object: it leaves the surroundings, and moves with the gripper as spheres."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ from robot_side.surroundings.scene_table import SceneTable
 
 @dataclass(frozen=True)
 class HeldObject:
-    """The spheres that cover it, as they stood in the tool frame when it was gripped."""
+    """Object with its spheres, fixed in the tool frame since the grip."""
 
     index: int
     """Index among the perceived objects' names."""
@@ -25,16 +25,16 @@ class HeldObject:
     centers_in_tool_m: FloatArray
     """(k, 3) contiguous"""
     radii_m: FloatArray
-    """(m + k,) of the gripper's own spheres and of these"""
+    """(m + k,) radii of the gripper's spheres and of these"""
     on_finger: BoolArray
     """(m + k,) whether the sphere belongs to a finger"""
 
 
 def gripped_object(scene: SceneTable, tool_position_m: FloatArray, reach_m: float) -> int | None:
-    """The object nearest to the point between the fingertips, within `reach_m`; None when there is none.
+    """Return the object nearest to the point between the fingertips, within `reach_m`; None without one.
 
-    Supports are never held: an arm that closes its fingers on the table does not lift it. Nor is anything with a
-    half-space, which has no end to be lifted by, whatever its role.
+    Supports are never held: an arm that closes its fingers on the table does not lift it. Nor is an object with a
+    half-space, whatever its role, as it is unbounded.
     """
     objects = scene.objects
     unbounded = set(objects.half_space_object.tolist())
@@ -49,10 +49,9 @@ def gripped_object(scene: SceneTable, tool_position_m: FloatArray, reach_m: floa
 
 
 def grip(objects: PerceivedObjects, index: int, pose: GripperPose, covers: HeldCovers | None = None) -> HeldObject:
-    """The object `index`, fixed to the tool from now on.
+    """Return the object `index`, fixed to the tool from now on.
 
-    `covers`: made from an earlier frame of the same objects; without them they are made now, which takes longer than
-    a tick.
+    covers: made from an earlier frame of the same objects; None: made now, which takes longer than a tick.
     """
     in_world, radii = (HeldCovers(objects) if covers is None else covers).spheres(objects, index)
     return HeldObject(
@@ -65,7 +64,7 @@ def grip(objects: PerceivedObjects, index: int, pose: GripperPose, covers: HeldC
 
 
 def with_held(pose: GripperPose, held: HeldObject) -> GripperPose:
-    """Join the gripper's spheres and the held object's, which move with the tool."""
+    """Return the pose with the gripper's spheres and the held object's, which move with the tool."""
     centers_m = np.empty((len(held.radii_m), 3))
     _join(pose.sphere_centers_m, held.centers_in_tool_m, pose.tool_position_m, pose.tool_rotation, centers_m)
     spheres = centers_m, held.radii_m, held.on_finger
@@ -74,7 +73,7 @@ def with_held(pose: GripperPose, held: HeldObject) -> GripperPose:
 
 @compiled(input_array(2), input_array(2), input_array(1), input_array(2), output_array(2))
 def _join(own: FloatArray, held: FloatArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray) -> None:
-    """Fill centers (m + k, 3) by the gripper's own (m, 3) and those in the tool frame (k, 3): t + R c."""
+    """Fill `centers` (m + k, 3) with the gripper's `own` (m, 3) and with `held` (k, 3) from the tool frame: t + R c."""
     first = own.shape[0]
     for i in range(first):
         for axis in range(3):

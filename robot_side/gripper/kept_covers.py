@@ -1,4 +1,4 @@
-"""Covers that took seconds to find, kept on disk for the next start."""
+"""Covers that take seconds to find, stored on disk for the next start."""
 
 import contextlib
 import hashlib
@@ -13,7 +13,7 @@ from common.arrays import FloatArray
 from common.files.user_folders import cache_folder
 
 _Cover = tuple[FloatArray, FloatArray, float]
-"""Centres (m, 3), radii (m,), and how far they stand out."""
+"""Centres (m, 3), radii (m,), and the distance by which they stand out, in m."""
 
 
 def kept_cover(
@@ -22,9 +22,9 @@ def kept_cover(
     folder: Path | None = None,
     searching: Callable[[], None] | None = None,
 ) -> _Cover:
-    """Return the cover that `make` gives for a `shape`, from disk if the same code made it before.
+    """Return the cover that `make` computes for a `shape`, from disk if the same code made it before.
 
-    An unreadable file is replaced. A folder without write permission keeps nothing. `searching` is called before
+    An unreadable file is replaced. A folder without write permission stores nothing. `searching` is called before
     `make`, so that a person learns the reason for waiting.
     """
     name = hashlib.sha256(_code() + shape).hexdigest()[:32]
@@ -39,7 +39,7 @@ def kept_cover(
     rows = np.column_stack([centers, radii, np.full(len(radii), stand_out_m)])
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        # Renamed when whole, so that another process never reads half of it.
+        # Renamed when complete, so that another process never reads a part.
         part = path.with_name(f"{name}.{os.getpid()}.npy")
         np.save(part, rows)
         part.replace(path)
@@ -48,6 +48,6 @@ def kept_cover(
 
 @cache
 def _code() -> bytes:
-    """A digest of all that a cover is worked out by."""
+    """Return a digest of all code that computes covers."""
     files = sorted(Path(__file__).parent.glob("*.py"))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files) + np.__version__.encode()).digest()

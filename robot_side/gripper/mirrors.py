@@ -1,4 +1,4 @@
-"""Planes in which a solid is its own mirror image."""
+"""Mirror planes of a solid."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -8,16 +8,16 @@ import numpy as np
 from common.arrays import FloatArray
 
 _SAME_M = 5e-5
-"""A solid out of a drawing is as symmetric as its vertices were rounded."""
+"""Tolerance of symmetry, in m: the rounding of a drawn solid's vertices."""
 
 
 def mirror_images(
     points_m: FloatArray, depth_m: Callable[[FloatArray], FloatArray], frames: Sequence[FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """(origin (3,), images (g, 3, 3)): mirrors through the origin, the identity first, that leave a solid as it is.
+    """Return the origin (3,) and the images (g, 3, 3), identity first, that map a solid to itself by mirrors.
 
-    points_m (p, 3) are on its surface, `depth_m` says how deep points are. The planes are sought across the axes of
-    `frames` (3, 3), and across the points' own principal axes; of all frames, that with the most planes counts.
+    points_m (p, 3) are on the surface; `depth_m` gives the depth of points. Candidate planes are normal to the axes of
+    `frames` (3, 3) and to the points' principal axes; the frame with the most planes counts.
     """
     middle = 0.5 * (points_m.min(axis=0) + points_m.max(axis=0))
     principal = np.linalg.eigh(np.cov(points_m.T))[1]
@@ -28,7 +28,7 @@ def mirror_images(
         mirrors = []
         for axis in frame.T:
             mirror = np.eye(3) - 2.0 * np.outer(axis, axis)
-            # Mirrored into itself it is its own image, as a mirror keeps volumes.
+            # An image inside the solid is the solid itself, as a mirror preserves volume.
             if depth_m((points_m - origin) @ mirror + origin).min() >= -_SAME_M:
                 mirrors.append(mirror)
         if 2 ** len(mirrors) > len(best):

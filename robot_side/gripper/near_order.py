@@ -1,4 +1,4 @@
-"""Spheres in an order in which those that follow each other are near each other."""
+"""Order of spheres in which consecutive ones are near each other."""
 
 import numpy as np
 
@@ -6,9 +6,9 @@ from common.arrays import FloatArray, IntArray
 
 
 def near_order(centers_m: FloatArray, size: int) -> IntArray:
-    """An order (m,) of points (m, 3) in which each run of `size` lies close together.
+    """Return an order (m,) of points (m, 3) in which each run of `size` is close together.
 
-    The points are halved across their longest extent, again and again, so that all runs but the last are whole.
+    The points are halved across their longest extent recursively, so that all runs but the last are full.
     """
     order = np.arange(len(centers_m))
     waiting = [(0, len(order))]

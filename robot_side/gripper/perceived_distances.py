@@ -15,22 +15,22 @@ _FARTHEST_M = 3.2
 
 @dataclass(frozen=True)
 class PerceivedDistances:
-    """From the surface of the gripper's spheres, not enlarged, to the objects' perceived surfaces; negative inside."""
+    """Distances from the gripper's spheres, not enlarged, to the objects' perceived surfaces; negative inside."""
 
     nearest: str | None = None
-    """The nearest object that is no support and not held; None where there is none within 3 m."""
+    """Nearest object that is no support and not held; None without one within 3 m"""
     nearest_m: float | None = None
     target_m: float | None = None
-    """To the target; None for none, for a held one, and for one that is farther off."""
+    """Distance to the target; None without one, for a held one, and for one farther away"""
 
 
 def perceived_distances(
     pose: GripperPose, scene: SceneTable, target: int | None, held: int | None
 ) -> PerceivedDistances:
-    """The distances in one frame; `target` and `held` are indices of objects, or None."""
+    """Return the distances in one frame; `target` and `held` are indices of objects, or None."""
     wanted = target if target != held else None
     objects, reach_m, distances_m = scene.objects, _FIRST_REACH_M, np.full(len(scene.objects.names), np.inf)
-    # No object that is nearer than the reach is missed, so that the search ends as soon as both are.
+    # No object within the reach is missed, so the search can end once both are found.
     while reach_m <= _FARTHEST_M:
         distances_m = object_distances(pose.sphere_centers_m, pose.sphere_radii_m, scene, reach_m)
         for index in np.flatnonzero(np.isfinite(distances_m)):

@@ -1,4 +1,4 @@
-"""Closed shapes as what covering them takes: their surface as triangles, and how deep a point is inside."""
+"""Closed shapes to cover: the surface as triangles, and the depth of points inside."""
 
 import math
 from collections.abc import Callable
@@ -11,24 +11,24 @@ from common.arrays import FloatArray
 from robot_side.overlap.meshes.mesh_shapes import capsule_mesh, ellipsoid_mesh
 
 _POINTS_AT_A_TIME = 2048
-# An open round solid stands for a polyhedron around it: farther out by this share of its least radius at most.
+# Excess of the prism around a cylinder, as a share of the radius.
 _EXCESS = 0.003
 _SUBDIVISIONS = 16
 
 
 @dataclass(frozen=True)
 class Solid:
-    """A closed solid, or one around it."""
+    """Closed solid, or a polyhedron around it."""
 
     corners_m: FloatArray
-    """(t, 3, 3) triangles that together are its surface; the corners run anticlockwise seen from outside"""
+    """(t, 3, 3) triangles of the surface; corners anticlockwise as seen from outside"""
     depth_m: Callable[[FloatArray], FloatArray]
-    """Points (n, 3) to (n,): how far each is below this surface, or less, never more; negative outside"""
+    """Function from points (n, 3) to lower bounds (n,) of their depths below this surface; negative outside"""
     excess_m: float = 0.0
     """Largest distance outside the true solid"""
 
     def placed(self, rotation: FloatArray, position_m: FloatArray) -> "Solid":
-        """Place the solid by `rotation` (3, 3) and `position_m` (3,) of the frame."""
+        """Return the solid at the pose `rotation` (3, 3), `position_m` (3,)."""
         return Solid(
             self.corners_m @ rotation.T + position_m,
             lambda points: self.depth_m((points - position_m) @ rotation),
@@ -37,9 +37,9 @@ class Solid:
 
 
 def convex_solid(points_m: FloatArray, excess_m: float = 0.0) -> Solid | None:
-    """The convex hull of `points_m` (n, 3), which is farther out than the true solid by `excess_m` at most.
+    """Return the convex hull of `points_m` (n, 3), which exceeds the true solid by at most `excess_m`.
 
-    None for points in one plane, which enclose nothing.
+    None for coplanar points, which enclose nothing.
     """
     try:
         hull = ConvexHull(points_m)
@@ -53,7 +53,7 @@ def convex_solid(points_m: FloatArray, excess_m: float = 0.0) -> Solid | None:
     corners[inward] = corners[inward][:, ::-1]
 
     def depth_m(points: FloatArray) -> FloatArray:
-        # A point's distance to a convex polyhedron's surface is that to the nearest of its planes.
+        # A point's depth in a convex polyhedron is the distance to the nearest face's plane.
         pieces = range(0, len(points), _POINTS_AT_A_TIME)
         nearest = [(offsets - points[first : first + _POINTS_AT_A_TIME] @ normals.T).min(axis=1) for first in pieces]
         return np.concatenate([np.empty(0), *nearest])
@@ -62,7 +62,7 @@ def convex_solid(points_m: FloatArray, excess_m: float = 0.0) -> Solid | None:
 
 
 def cylinder(radius_m: float, half_length_m: float) -> Solid | None:
-    """About the z axis, as a prism around it; None without volume."""
+    """Return a prism around a cylinder about the z axis; None without volume."""
     sides = math.ceil(math.pi / math.acos(1.0 / (1.0 + _EXCESS)))
     # A multiple of four has the cylinder's mirror planes.
     sides += -sides % 4
@@ -74,19 +74,19 @@ def cylinder(radius_m: float, half_length_m: float) -> Solid | None:
 
 
 def ellipsoid(semi_axes_m: FloatArray) -> Solid | None:
-    """Along the axes, semi axes (3,), as a polyhedron around it; None without volume."""
+    """Return a polyhedron around an ellipsoid with semi-axes (3,) along the axes; None without volume."""
     around = ellipsoid_mesh(semi_axes_m, _SUBDIVISIONS)
     return convex_solid(around.vertices, around.stands_out_m)
 
 
 def capsule(radius_m: float, half_length_m: float) -> Solid | None:
-    """The points within `radius_m` of a line along the z axis, as a polyhedron around it; None without volume."""
+    """Return a polyhedron around a capsule along the z axis; None without volume."""
     around = capsule_mesh(radius_m, half_length_m, _SUBDIVISIONS)
     return convex_solid(around.vertices, around.stands_out_m)
 
 
 def triangles_within(corners_m: FloatArray, longest_m: float) -> FloatArray:
-    """Triangles (k, 3, 3) that together are `corners_m` (t, 3, 3), none with an edge above `longest_m`."""
+    """Return the triangles `corners_m` (t, 3, 3) subdivided to (k, 3, 3), with edges up to `longest_m`."""
     done = []
     while len(corners_m):
         lengths = np.linalg.norm(corners_m - np.roll(corners_m, -1, axis=1), axis=2)
@@ -97,7 +97,7 @@ def triangles_within(corners_m: FloatArray, longest_m: float) -> FloatArray:
 
 
 def halved(corners_m: FloatArray) -> FloatArray:
-    """Each triangle of (t, 3, 3) cut across its longest edge: (2 t, 3, 3)."""
+    """Return each triangle of (t, 3, 3) halved at its longest edge: (2 t, 3, 3)."""
     lengths = np.linalg.norm(corners_m - np.roll(corners_m, -1, axis=1), axis=2)
     rows, first = np.arange(len(corners_m)), lengths.argmax(axis=1)
     a, b, c = (corners_m[rows, (first + turn) % 3] for turn in range(3))
@@ -106,7 +106,7 @@ def halved(corners_m: FloatArray) -> FloatArray:
 
 
 def corner_points(corners_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(points (p, 3), normals (p, 3)): each corner of triangles (t, 3, 3) once, with the mean of its faces' normals."""
+    """Return each corner of triangles (t, 3, 3) once (p, 3), and the means of the faces' normals (p, 3)."""
     across = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
     lengths = np.linalg.norm(across, axis=1, keepdims=True)
     units = np.divide(across, lengths, out=np.zeros_like(across), where=lengths > 0.0)
@@ -115,7 +115,7 @@ def corner_points(corners_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         (points / 1e-7).round().astype(np.int64), axis=0, return_index=True, return_inverse=True
     )
     place = place.ravel()
-    # Each face at a sharp edge counts once, however finely it is cut.
+    # Each face at a sharp edge counts once, for any subdivision.
     faces = np.column_stack([place, np.repeat((units * 1e3).round().astype(np.int64), 3, axis=0)])
     different = np.unique(faces, axis=0, return_index=True)[1]
     normals = np.zeros((len(first), 3))

@@ -1,10 +1,10 @@
 """Cover a gripper's boxes with spheres: the volume that is enlarged and overlapped (§4.1).
 
-Every sphere's centre is in its box, and its radius is the depth of the centre below the nearest face plus what a
-sphere may stand out. Such a sphere covers a disc of each face that it reaches. From the edges inwards, frames of
-spheres cover a band of every face each: one sphere near each corner of the box, and rows along the edges between them.
-Deeper frames have larger spheres. What is left when a frame is as deep as the box is thick is covered by one layer of
-spheres in the middle of the box, each of which reaches both sides. A thin box has that layer only.
+Every sphere's centre is in its box. Its radius is the centre's depth below the nearest face plus the allowed
+stand-out. Such a sphere covers a disc of each face that it reaches. From the edges inwards, each frame of spheres
+covers a band of every face: one sphere near each corner of the box, and rows along the edges between them. Deeper
+frames have larger spheres. When a frame is as deep as half the box, one layer of spheres in the middle, each of which
+reaches both sides, covers the rest. A thin box has only that layer.
 """
 
 import math
@@ -18,30 +18,30 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 
 _MOST_SPHERES_OF_A_BOX = 2000
-# A plan leaves this part of the stand-out unused, far above rounding: no corner is left just outside.
+# Unused share of the stand-out in a plan, far above rounding, so that no corner is just outside.
 _MARGIN = 1e-6
 _FRACTIONS = tuple(0.40 + 0.04 * step for step in range(15))
 
 
 @dataclass(frozen=True)
 class SphereCover:
-    """Spheres whose union contains the surface of every box that they were made for.
+    """Spheres whose union contains the surfaces of the boxes.
 
-    The inside of a thick box may be empty: what comes from outside meets a sphere at the surface first.
+    The inside of a thick box may be empty: from outside, a sphere at the surface is met first.
     """
 
     centers_m: FloatArray
-    """(m, 3) each in the frame that its box was given in"""
+    """(m, 3) in the frame of the given boxes"""
     radii_m: FloatArray
     """(m,)"""
     box: IntArray
-    """(m,) the index of the box that a sphere covers a part of, ascending"""
+    """(m,) index of each sphere's box, ascending"""
     stand_out_m: FloatArray
-    """(k,) how far the spheres of a box stand out of it: what was asked for, or more for a very large box"""
+    """(k,) distances by which the spheres stand out of each box: as asked, or more for a very large box"""
 
 
 class _Lattice(NamedTuple):
-    """Evenly spaced centres from minus to plus a span along each axis; a count of 1 is in the middle."""
+    """Evenly spaced centres from minus to plus a span along each axis; a count of 1 means the middle."""
 
     spans_m: tuple[float, ...]
     counts: tuple[int, ...]
@@ -50,11 +50,11 @@ class _Lattice(NamedTuple):
 def cover_boxes(
     centers_m: FloatArray, rotations: FloatArray, half_sizes_m: FloatArray, stand_out_m: float = 0.003
 ) -> SphereCover:
-    """Cover the surface of oriented boxes with spheres, none of which stands out of its box by more than stand_out_m.
+    """Cover the surface of oriented boxes with spheres that stand out by at most `stand_out_m`.
 
     centers_m (k, 3), rotations (k, 3, 3) box to frame, half_sizes_m (k, 3); a half size may be 0. The spheres of a
     box are mirror-symmetric in its three middle planes, and in a fixed order. A box that would need more than 2000
-    gets as much more stand-out as it takes for 2000.
+    spheres gets the least stand-out that needs at most 2000.
     """
     covers = [_cover_box(tuple(half_sizes.tolist()), float(stand_out_m)) for half_sizes in half_sizes_m]
     box = np.repeat(np.arange(len(covers)), [len(radii) for _, radii, _ in covers])
@@ -69,7 +69,7 @@ def cover_boxes(
 
 @lru_cache(maxsize=256)
 def _cover_box(half_sizes_m: tuple[float, ...], stand_out_m: float) -> tuple[FloatArray, FloatArray, float]:
-    """Centres (m, 3) in the box's own frame, radii (m,), and the stand-out of one box."""
+    """Return centres (m, 3) in the box's frame, radii (m,), and the stand-out of one box."""
     axes = sorted(range(3), key=lambda axis: half_sizes_m[axis])
     ascending = tuple(half_sizes_m[axis] for axis in axes)
     plan = _fewest(ascending, stand_out_m)
@@ -95,12 +95,12 @@ def _cover_box(half_sizes_m: tuple[float, ...], stand_out_m: float) -> tuple[Flo
 
 
 def _spread(span_m: float, count: int) -> list[float]:
-    """`count` places from minus to plus the span, each the exact negative of its mirror image."""
+    """Return `count` positions from minus to plus the span, exactly symmetric about 0."""
     return [span_m * ((2 * place - count + 1) / (count - 1)) for place in range(count)] if count > 1 else [0.0]
 
 
 def _fewest(half_sizes_m: tuple[float, ...], stand_out_m: float) -> list[_Lattice]:
-    """The frames and the layer with the fewest spheres for ascending half sizes; empty where 2000 are too few."""
+    """Return the frames and the layer with the fewest spheres for ascending half sizes; empty if 2000 are too few."""
     usable_m = stand_out_m * (1.0 - _MARGIN)
     fewest, best = _MOST_SPHERES_OF_A_BOX + 1, list[_Lattice]()
     for at_edges, deeper in product(_FRACTIONS, _FRACTIONS):
@@ -118,10 +118,10 @@ def _fewest(half_sizes_m: tuple[float, ...], stand_out_m: float) -> list[_Lattic
 
 
 def _corner_depth(done_m: float, stand_out_m: float) -> float:
-    """How deep below three faces a sphere may be whose discs still reach the corners of what is not covered yet.
+    """Return the greatest depth below three faces at which a sphere's discs reach the corners of the uncovered rest.
 
-    At the depth t its discs' radius is √(2 t stand_out + stand_out²). With a band of the width `done` covered along
-    every edge, the corner of a face's rest is √2 (t - done) from the disc's middle. With 0 it is the box's own corner.
+    At depth t the discs' radius is √(2 t stand_out + stand_out²). With a band of width `done` covered along every
+    edge, the corner of a face's rest is √2 (t - done) from the disc's centre. With done = 0 it is the box's corner.
     """
     return done_m + 0.5 * stand_out_m + 0.5 * math.sqrt(4.0 * done_m * stand_out_m + 3.0 * stand_out_m**2)
 
@@ -129,15 +129,15 @@ def _corner_depth(done_m: float, stand_out_m: float) -> float:
 def _frame(
     half_sizes_m: tuple[float, ...], done_m: float, fraction: float, stand_out_m: float
 ) -> tuple[list[_Lattice], float]:
-    """Spheres that widen the covered band along every edge of every face, and how wide it is with them.
+    """Return spheres that widen the covered band along every edge of every face, and the new width.
 
-    Of the row that is as deep as can be, the discs only just touch the covered band. `fraction` is of that row's way.
+    The discs of the deepest possible row just touch the covered band. fraction: share of that row's depth beyond done.
     """
     corner = _corner_depth(done_m, stand_out_m)
-    # The corner's sphere covers a square of every face, from done to here.
+    # The corner's sphere covers a square of every face, from `done` to here.
     corner_end = 2.0 * corner - done_m
     way = stand_out_m + math.sqrt(2.0 * done_m * stand_out_m + 2.0 * stand_out_m**2)
-    # In the middle of the box a row is that of the opposite edge, too.
+    # In the middle of the box a row also serves the opposite edge.
     depth = min(done_m + fraction * way, half_sizes_m[0])
     half_step = math.sqrt(2.0 * depth * stand_out_m + stand_out_m**2 - (depth - done_m) ** 2)
     lattices = [_Lattice(tuple(half - corner for half in half_sizes_m), (2, 2, 2))]
@@ -152,10 +152,10 @@ def _frame(
 
 
 def _layer(half_sizes_m: tuple[float, ...], done_m: float, stand_out_m: float) -> _Lattice:
-    """Spheres in the middle of the shortest axis that cover all that is more than `done` away from the edges.
+    """Return spheres in the middle of the shortest axis that cover everything farther than `done` from the edges.
 
-    They stand in a rectangular lattice whose cells both large faces' discs contain. Where the narrow faces have a
-    strip left, the outermost spheres are near enough to contain that, too.
+    They form a rectangular lattice; the discs on both large faces contain its cells. The outermost spheres are near
+    enough to the narrow faces to contain a strip that is left there.
     """
     thin, *sides = half_sizes_m
     radius, strip = thin + stand_out_m, max(thin - done_m, 0.0)

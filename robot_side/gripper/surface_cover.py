@@ -1,9 +1,9 @@
 """Few spheres that contain the surface of any closed solid, or of several that overlap, and hardly stand out.
 
-Every sphere's centre is inside, and its radius is the centre's depth plus what a sphere may stand out. Centres are
-sought below points of the surface, in several depths; enough of them are chosen to contain many points of the surface.
-Then all of the surface is looked at, down to cells so small that a sphere that contains a corner has them whole but for
-a margin that the radii have; what is not contained yet joins the points.
+Every sphere's centre is inside, and its radius is the centre's depth plus the allowed stand-out. Candidate centres are
+below points of the surface, in several depths; a set cover chooses enough of them to contain many of these points.
+Then the whole surface is checked, down to small cells: a sphere that contains a corner contains the cell, within the
+margin of the radii. Corners that are not contained yet are added to the points.
 """
 
 from collections.abc import Sequence
@@ -21,9 +21,9 @@ _MOST_CENTERS = 2500
 _MOST_ROUNDS = 40
 _CHOSEN_ANEW = 5
 _CELL = 0.03
-"""The smallest cells' longest edge, as a share of the stand-out."""
+"""Longest edge of the smallest cells, as a share of the stand-out."""
 _CHOSEN_WITH = 0.97
-"""Share of the stand-out while spheres are chosen for points; the rest contains most of the surface between."""
+"""Share of the stand-out used in choosing spheres for points; the rest contains most of the surface between."""
 _DEPTHS = np.array([0.15, 0.35, 0.6, 1.0, 1.5, 2.2, 3.0, 4.0, 5.5, 7.5, 10.0, 14.0, 20.0, 30.0])
 """Depths as multiples of the stand-out."""
 _COARSER = 1.2
@@ -34,19 +34,19 @@ Spheres = tuple[FloatArray, FloatArray]
 
 
 class _Union:
-    """Several solids as one; what lies within another one is no surface."""
+    """Union of solids; parts within another solid are no surface."""
 
     def __init__(self, solids: Sequence[Solid]) -> None:
         self._solids = solids
         self.area_m2 = float(sum(_area_m2(solid.corners_m) for solid in solids))
 
     def depth_m(self, points_m: FloatArray) -> FloatArray:
-        """(n,): in the solid in which a point (n, 3) is deepest."""
+        """Return (n,): greatest depth of each point (n, 3) in any solid."""
         depths: FloatArray = np.max([solid.depth_m(points_m) for solid in self._solids], axis=0)
         return depths
 
     def room_m(self, points_m: FloatArray) -> FloatArray:
-        """(n,): how deep in the true solid a point (n, 3) is at least; -infinity outside."""
+        """Return (n,): lower bound of each point's (n, 3) depth in a true solid; -infinity outside."""
         rooms = []
         for solid in self._solids:
             depths = solid.depth_m(points_m)
@@ -55,11 +55,11 @@ class _Union:
         return deepest
 
     def cells(self, longest_m: float) -> list[FloatArray]:
-        """For each solid, triangles (t, 3, 3) that are its surface, with edges up to `longest_m`."""
+        """Return, for each solid, the triangles (t, 3, 3) of the surface, with edges up to `longest_m`."""
         return [triangles_within(solid.corners_m, longest_m) for solid in self._solids]
 
     def points(self, longest_m: float, margin_m: float) -> tuple[FloatArray, FloatArray]:
-        """(points (p, 3), normals (p, 3)) of the union's surface, neighbours not farther apart than `longest_m`."""
+        """Return points (p, 3) and normals (p, 3) of the union's surface, neighbours up to `longest_m` apart."""
         found = []
         for number, corners in enumerate(self.cells(longest_m)):
             points, normals = corner_points(corners)
@@ -69,7 +69,7 @@ class _Union:
         return both[:, :3], both[:, 3:]
 
     def outside(self, solid: int, points_m: FloatArray, margin_m: float) -> BoolArray:
-        """(n,): which points (n, 3) of a solid's surface no other one contains, `margin_m` below its own surface."""
+        """Return (n,): whether no other solid contains a point (n, 3) of a solid's surface at least `margin_m` deep."""
         outside = np.ones(len(points_m), dtype=np.bool_)
         for number, other in enumerate(self._solids):
             if number != solid:
@@ -80,13 +80,13 @@ class _Union:
 def cover_surface(
     solids: Sequence[Solid], stand_out_m: float, frames: Sequence[FloatArray] = (), most: int = 2000
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Centres (m, 3), radii (m,), and by how much they stand out of the union of `solids` at most.
+    """Return centres (m, 3), radii (m,), and the greatest distance by which they stand out of the union of `solids`.
 
-    That is `stand_out_m`, or as much more as it takes for `most` spheres. Where the union has mirror planes across
-    axes of `frames` (3, 3), or its own principal axes, the spheres have them, too. The result depends on nothing else.
+    The distance is `stand_out_m`, or as much more as `most` spheres need. The spheres share the union's mirror planes
+    normal to axes of `frames` (3, 3) or to its principal axes. The result depends on nothing else.
     """
     union = _Union(solids)
-    # Discs of this radius are the largest that a sphere could cover of a plane with a solid a tenth of it deep.
+    # Skip hopeless searches: discs of radius √30 s, those of centres 14.5 s deep, cannot cover the area.
     while union.area_m2 > most * 30.0 * stand_out_m**2 * np.pi:
         stand_out_m *= _COARSER
     while True:
@@ -97,9 +97,9 @@ def cover_surface(
 
 
 def _cover(union: _Union, stand_out_m: float, frames: Sequence[FloatArray], most: int) -> Spheres | None:
-    """The spheres; None where it takes more than `most`."""
+    """Return the spheres; None if more than `most` are needed."""
     cell_m = _CELL * stand_out_m
-    # A point of a cell is nearer to one of its corners than this.
+    # Every point of a cell is nearer than this to one of the corners.
     margin_m = cell_m / np.sqrt(3.0)
     coarse, _ = union.points(float(np.sqrt(union.area_m2 / 200.0)), margin_m)
     origin, images = mirror_images(coarse, union.depth_m, frames)
@@ -122,7 +122,7 @@ def _cover(union: _Union, stand_out_m: float, frames: Sequence[FloatArray], most
             return spheres
         missed, _ = _first_images(missed, missed, origin, images)
         if turn < _CHOSEN_ANEW:
-            # Among the others such a point hardly costs a sphere of its own.
+            # Chosen together with the others, such a point hardly costs another sphere.
             points = np.concatenate([points, missed])
         else:
             before, points, cells = spheres, missed, left
@@ -139,7 +139,7 @@ def _below(
     images: FloatArray,
     origin_m: FloatArray,
 ) -> FloatArray:
-    """Centres (c, 3) below points of the surface, down to where the solid is thickest, and there on mirror planes."""
+    """Return centres (c, 3) below points of the surface, down to the thickest place, and these on mirror planes."""
     every = max(1, -(-len(points_m) // _MOST_STARTS))
     points_m, normals = points_m[::every], normals[::every]
     steps = np.concatenate([[0.0], _DEPTHS]) * stand_out_m
@@ -165,8 +165,8 @@ def _below(
 
 
 def _between(points_m: FloatArray, centers_m: FloatArray, depths_m: FloatArray) -> FloatArray:
-    """Centres (c, 3) between points that were missed (p, 3) and the centres that reach nearest to them."""
-    # A point itself is one, too, so that none is left in the end.
+    """Return centres (c, 3) between missed points (p, 3) and the centres that reach nearest to them."""
+    # The points themselves are included, so that none is left in the end.
     found = [points_m]
     for point in points_m[:: max(1, -(-len(points_m) // 200))]:
         near = np.argsort(np.linalg.norm(centers_m - point, axis=1) - depths_m, kind="stable")[:4]
@@ -175,19 +175,19 @@ def _between(points_m: FloatArray, centers_m: FloatArray, depths_m: FloatArray) 
 
 
 def _alike(union: _Union, centers_m: FloatArray, origin_m: FloatArray, images: FloatArray) -> Spheres:
-    """Keep centres (c, 3) that are inside, with depths (c,) of the shallowest image, so that none stands out more."""
+    """Return the centres (c, 3) inside, and depths (c,) of their shallowest images, so that none stands out more."""
     depths = np.min([union.room_m((centers_m - origin_m) @ image.T + origin_m) for image in images], axis=0)
     inside = np.isfinite(depths)
     return centers_m[inside], depths[inside]
 
 
 def _onto_planes(points_m: FloatArray, images: FloatArray) -> FloatArray:
-    """Points (n, 3) moved onto each mirror plane, and onto where they meet: (k, 3)."""
+    """Return points (n, 3) projected onto each mirror plane and onto their intersections: (k, 3)."""
     return np.concatenate([np.empty((0, 3)), *(0.5 * (points_m + points_m @ image.T) for image in images[1:])])
 
 
 def _first_images(points_m: FloatArray, normals: FloatArray, origin_m: FloatArray, images: FloatArray) -> Spheres:
-    """Points (n, 3) and normals (n, 3) mirrored to the first side of every mirror plane, each point once."""
+    """Return points (n, 3) and normals (n, 3) mirrored to the first side of every mirror plane, each point once."""
     points_m = points_m - origin_m
     for image in images[1:]:
         if np.isclose(np.trace(image), 1.0):
@@ -201,7 +201,7 @@ def _first_images(points_m: FloatArray, normals: FloatArray, origin_m: FloatArra
 
 
 def _orbit_sizes(centers_m: FloatArray, images: FloatArray) -> FloatArray:
-    """(n,): how many different images each centre (n, 3) has."""
+    """Return (n,): number of different images of each centre (n, 3)."""
     still = [np.linalg.norm(centers_m @ image.T - centers_m, axis=1) < 1e-7 for image in images]
     sizes: FloatArray = len(images) / np.sum(still, axis=0)
     return sizes
@@ -217,7 +217,7 @@ def _all_images(centers_m: FloatArray, radii_m: FloatArray, origin_m: FloatArray
 def _not_contained(
     union: _Union, cells: Sequence[FloatArray], centers_m: FloatArray, radii_m: FloatArray, smallest_m: float
 ) -> tuple[list[FloatArray], FloatArray]:
-    """The cells that no one sphere contains, however they are cut, and corners (n, 3) of them that are in none."""
+    """Return the cells that no single sphere contains even when subdivided, and their corners (n, 3) outside all."""
     left, points = [], [np.empty((0, 3))]
     for number, of_solid in enumerate(cells):
         waiting, still = of_solid, [np.empty((0, 3, 3))]
@@ -239,7 +239,7 @@ def _not_contained(
 
 
 def _within_one(cells: FloatArray, centers_m: FloatArray, radii_m: FloatArray) -> BoolArray:
-    """(t,): whether one sphere contains all three corners, and so the triangle (t, 3, 3)."""
+    """Return (t,): whether one sphere contains all three corners, and so the triangle (t, 3, 3)."""
     pieces = []
     for first in range(0, len(cells), 2048):
         corners = cells[first : first + 2048]

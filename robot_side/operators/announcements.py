@@ -24,11 +24,11 @@ class Answer(NamedTuple):
     peer: bytes
     payload: bytes
     everywhere: bool
-    """Over every connection: it says something new."""
+    """Send over every connection, as it says something new."""
 
 
 class Announcements:
-    """Answers and lease notices, bounded however fast strangers knock."""
+    """Answers and lease notices, at a bounded rate even for many strangers."""
 
     def __init__(self, new_link: Callable[[], LinkEnd], lease: Lease, tuning: Tuning) -> None:
         self._lease = lease
@@ -42,15 +42,15 @@ class Announcements:
         self._noticed_token = 0
 
     def stamp(self, now_s: float, link: LinkEnd | None = None) -> Header:
-        """The next header of our epoch, in one sequence for all receivers; `link` None: to nobody named."""
+        """Return the next header of our epoch, in one sequence for all receivers; `link` None: no certain one."""
         return (link or self._link).stamp(now_s, next(self._sequence))
 
     def stamp_shown(self, now_s: float) -> Header:
-        """The next header of a message made between ticks, in a separate sequence: viewers change no core message."""
+        """Return the next header for messages made between ticks; their own sequence changes no core message."""
         return self._link.stamp(now_s, next(self._shown))
 
     def answer(self, participant: Participant, now_s: float) -> None:
-        """Answer a Hello, at a bounded rate: ours, and where it stands."""
+        """Answer a Hello with ours and a lease notice, at a bounded rate."""
         if now_s - participant.answered_s < _ANSWER_PERIOD_S:
             return
         participant.answered_s = now_s
@@ -58,7 +58,7 @@ class Announcements:
         self._notice(participant, now_s)
 
     def refuse(self, peer: bytes, session: SessionState, why: str, now_s: float) -> None:
-        """Tell somebody who was not admitted that we are here, and why they are not let in; at a bounded rate."""
+        """Answer a refused peer with our Hello and the reason, at a bounded rate."""
         if now_s - self._answered_stranger_s < _ANSWER_PERIOD_S:
             return
         self._answered_stranger_s = now_s
@@ -70,7 +70,7 @@ class Announcements:
         self._answers.append(Answer(peer, encode(notice), everywhere=True))
 
     def take(self, now_s: float) -> list[Answer]:
-        """Answers to send now, and a notice for everyone when anything changed or the last ones are old."""
+        """Return the answers to send now, with notices for all when something changed or the last ones are old."""
         standing = [(one.epoch, one.session.state, one.tuned) for one in self._lease.present()]
         changed = standing != self._noticed or self._lease.token != self._noticed_token
         if changed or now_s - self._noticed_s >= _NOTICE_PERIOD_S:

@@ -11,48 +11,48 @@ from robot_side.operators.safety import Safety
 
 
 class Participant:
-    """One epoch of one operator side."""
+    """Operator side in one epoch."""
 
     def __init__(self, epoch: int, peer: bytes, link: LinkEnd, now_s: float) -> None:
         self.epoch = epoch
         self.link = link
         self.session = Session()
         self.peer = peer
-        """The connection that its newest message came over."""
+        """Connection that its newest message came over."""
         self.heard_s = now_s
         self.waiting_since_s = now_s
-        """Since when it observes; the longest is the next to own."""
+        """Time since which it observes; the longest waiting is the next owner."""
         self.answered_s = -math.inf
-        """When its Hello was answered last."""
+        """Time of the last answer to its Hello."""
         self.next_target_was_down = True
         self.hand_over_was_down = True
         self.told_state: MotionState | None = None
-        """The arm's, as it was told last with a stiffness."""
+        """State of the arm in the last stiffness sent to it."""
         self.noticed: list[object] = []
-        """What it was told last of the lease."""
+        """Content of the last lease notice sent to it."""
         self.tuned = 0
-        """The number of its newest wish to tune."""
+        """Number of the newest request to tune."""
 
     @property
     def state(self) -> SessionState:
-        """Its session's."""
+        """State of the session"""
         return self.session.state
 
 
 MOST_OBSERVERS = 8
 MOST_AWAY = 8
-"""Operators that went away and are remembered, the newest; memory stays bounded however many come and go."""
+"""Most absent operators that are remembered, the newest; this bounds the memory."""
 _ENDED_EPOCHS = 64
 
 
 class Lease:
-    """Passes the arm from operator to operator; each one that gets it begins disarmed."""
+    """Passes the arm from operator to operator; each new owner begins disarmed."""
 
     def __init__(self, safety: Safety) -> None:
         self.token = 0
         """Current or latest lease token; 0 before the first."""
         self.stale = 0
-        """Late messages of operators that are forgotten by now."""
+        """Late messages of operators that are forgotten now."""
         self._safety = safety
         self._participants: dict[int, Participant] = {}
         self._owner: Participant | None = None
@@ -60,32 +60,32 @@ class Lease:
 
     @property
     def owner(self) -> Participant | None:
-        """The one whose commands count; None while the lease is free."""
+        """Operator whose commands count; None while the lease is free."""
         return self._owner
 
     def find(self, epoch: int) -> Participant | None:
-        """The operator of this epoch, unless it is unknown or forgotten."""
+        """Return the operator of this epoch; None if it is unknown or forgotten."""
         return self._participants.get(epoch)
 
     def has_ended(self, epoch: int) -> bool:
-        """Whether this epoch is over: it never comes back."""
+        """Return whether this epoch is over; it never comes back."""
         return epoch in self._ended
 
     def observers(self) -> list[Participant]:
-        """Those who wait, the longest first."""
+        """Return the observers, the longest waiting first."""
         waiting = [one for one in self._participants.values() if one.state is SessionState.OBSERVING]
         return sorted(waiting, key=lambda one: one.waiting_since_s)
 
     def present(self) -> list[Participant]:
-        """The owner and the observers."""
+        """Return the owner and the observers."""
         return [one for one in self._participants.values() if one.session.state is not SessionState.AWAY]
 
     def known(self) -> Iterator[Participant]:
-        """All remembered operators."""
+        """Return all remembered operators."""
         return iter(self._participants.values())
 
     def ask(self, participant: Participant, now_s: float) -> bool:
-        """Grant the lease when it is free, else let it observe; False when there is no room for another observer."""
+        """Grant the lease if it is free, else admit as an observer; False without room for another observer."""
         if self._owner is None:
             participant.session.handle(SessionEvent.ASKED_WHILE_FREE)
             self._own(participant, now_s)
@@ -99,7 +99,7 @@ class Lease:
         return True
 
     def hand_over(self, now_s: float) -> bool:
-        """Pass the lease on to the observer that has waited longest; False and no change when nobody waits."""
+        """Pass the lease to the observer that has waited longest; False and no change when nobody waits."""
         if self._owner is None or not self._alive(self.observers(), now_s):
             return False
         self._owner.waiting_since_s = now_s
@@ -107,12 +107,12 @@ class Lease:
         return True
 
     def end_epoch_of(self, peer: bytes, epoch: int, now_s: float) -> None:
-        """Another epoch than `epoch` that came over the same connection is over: its process restarted."""
+        """End any other epoch than `epoch` of the same connection: its process restarted."""
         for one in [one for one in self._participants.values() if one.peer == peer and one.epoch != epoch]:
             self._forget(one, SessionEvent.NEW_EPOCH, now_s)
 
     def expire(self, now_s: float) -> None:
-        """Drop participants that were silent for `lease_s` or longer."""
+        """Mark participants as away after `lease_s` of silence, and forget the oldest beyond `MOST_AWAY`."""
         limit_s = self._safety.settings.lease_s
         for one in self._participants.values():
             if now_s - one.heard_s >= limit_s and one.state is not SessionState.AWAY:
@@ -127,7 +127,7 @@ class Lease:
                 self._forget(one, SessionEvent.FORGOTTEN, now_s)
 
     def _own(self, participant: Participant, now_s: float) -> None:
-        # Milliseconds of the monotonic clock keep it growing even when this process restarts.
+        # Milliseconds of the monotonic clock: the token grows even when this process restarts.
         self.token = max(self.token + 1, int(1e3 * now_s))
         self._owner = participant
         self._safety.begin(participant.session)
@@ -136,7 +136,7 @@ class Lease:
         waiting = self.observers()
         self._safety.end(event, now_s)
         self._owner = None
-        # An observer that has just fallen silent, too, would only hold it up.
+        # A silent observer would only hold the lease up.
         alive = self._alive(waiting, now_s)
         if alive:
             alive[0].session.handle(SessionEvent.LEASE_PASSED)

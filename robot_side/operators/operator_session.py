@@ -1,4 +1,4 @@
-"""Which operators the robot side knows, whose commands count, and the newest that the owner said."""
+"""Operators that the robot side knows, and the judgement of their messages."""
 
 import math
 from collections.abc import Callable
@@ -20,41 +20,41 @@ from robot_side.operators.watchers import Watchers
 
 
 class Receiver(NamedTuple):
-    """Where to send what an operator is to feel, and the header to send it under."""
+    """Peer to send a stiffness to, and the header for it."""
 
     peer: bytes
     header: Header
     everywhere: bool
-    """Over every connection: the state is another one than it was told last."""
+    """Send over every connection, as the arm's state has changed."""
 
 
 class OperatorSession:
-    """One owner and its observers: admits, orders and judges what arrives."""
+    """One owner and its observers: admits peers, and judges the order and validity of their messages."""
 
     def __init__(
         self, new_link: Callable[[], LinkEnd], safety: Safety, seed: int = 0, tuning: Tuning | None = None
     ) -> None:
-        """`new_link` makes our end towards one more operator; all of them have our one epoch."""
+        """new_link: makes our end of the link to one more operator; all ends share our epoch."""
         self.safety = safety
         self.tuning = tuning or Tuning()
         self.lease = Lease(safety)
         self.rejected = 0
-        """Payloads that were no valid message, or came from somebody who was not admitted."""
+        """Payloads that were no valid message, or came from a peer that was not admitted."""
         self.other_version = 0
-        """Those of them that were of another version of the protocol."""
+        """Rejected payloads of another version of the protocol."""
         self.refused = 0
-        """Those of them that asked to be admitted: there was no room, or the epoch had ended."""
+        """Refused requests to be admitted: there was no room, or the epoch had ended."""
         self.not_owners = 0
-        """Commands that were not the owner's, or not under its present lease; never applied."""
+        """Commands not from the owner, or not under its present lease; never applied."""
         self.motion_received = 0
         """All motion commands, of owners and others."""
         self.driving_delay = RunningStatistics(seed)
-        """One-way delay in seconds of what arrives from the owner while the arm is armed."""
+        """One-way delay, in seconds, of the owner's commands while the arm is armed."""
         self.applied_age = RunningStatistics(seed)
-        """Age in seconds of the command that moves the arm, in every tick in which one does."""
+        """Age, in seconds, of the command that moves the arm, in every tick with one."""
         self.leases_granted = 0
         self.watchers = Watchers()
-        """Who looks at what"""
+        """Views that each operator watches"""
         self._new_link = new_link
         self._announcements = Announcements(new_link, self.lease, self.tuning)
         self._owner_link = new_link()
@@ -68,22 +68,22 @@ class OperatorSession:
 
     @property
     def link(self) -> LinkEnd:
-        """Our end towards the present owner, or else the last one."""
+        """Our end of the link to the owner, or else to the last one."""
         return self._owner_link
 
     @property
     def owner_peer(self) -> bytes | None:
-        """From where the owner speaks; None while there is no owner."""
+        """Connection of the owner; None while there is no owner."""
         owner = self.lease.owner
         return None if owner is None else owner.peer
 
     @property
     def stale(self) -> int:
-        """Messages of all operators that came too late to be applied."""
+        """Messages of all operators that came too late to be applied"""
         return self.lease.stale + sum(one.link.stale for one in self.lease.known())
 
     def receive(self, peer: bytes, payload: bytes, now_s: float) -> None:
-        """Take one control payload from `peer`; what is invalid, late or not the owner's never moves the arm."""
+        """Take one control payload from `peer`; only a valid, timely one of the owner can move the arm."""
         self.update(now_s)
         try:
             message = decode(payload)
@@ -101,12 +101,12 @@ class OperatorSession:
             return
         participant = self.lease.find(message.header.epoch) or self._admit(peer, message, now_s)
         if participant is None or key_part(participant.peer) != key_part(peer):
-            # An epoch belongs to the key that began it, whatever the connection.
+            # An epoch belongs to the key that began it, over any connection.
             self.rejected += 1
             return
         arrival = participant.link.arrived(message, now_s)
         if arrival.fresh:
-            # Only what is new shows that an operator lives, and where: a replay proves nothing.
+            # Only a new message proves that an operator is there, and at which peer; a replay does not.
             participant.heard_s, participant.peer = now_s, peer
             if participant.state is SessionState.AWAY:
                 self.lease.ask(participant, now_s)
@@ -121,7 +121,7 @@ class OperatorSession:
             self._follow(participant, message, now_s)
 
     def _follow(self, participant: Participant, message: Hello | Tune | Watch, now_s: float) -> None:
-        """What is no command."""
+        """Follow a message that is no command."""
         if isinstance(message, Watch):
             self.watchers.heard(participant.epoch, message, now_s)
         elif isinstance(message, Hello):
@@ -133,61 +133,61 @@ class OperatorSession:
                 participant.link.expect_other_delay()
 
     def update(self, now_s: float) -> None:
-        """Drop participants that were silent for too long; to be called in every tick."""
+        """Update the lease for participants that were silent too long; to be called in every tick."""
         if now_s == self._updated_s:
-            return  # a flood that arrives at once costs this once
+            return  # once for all messages that arrive together
         self._updated_s = now_s
         self.tuning.begin(now_s)
         self.lease.expire(now_s)
         self._follow_owner()
 
     def owners(self, now_s: float) -> list[Receiver]:
-        """Where to send the owner's stiffness now; none while there is no owner."""
+        """Return the receiver of the owner's stiffness now; empty while there is no owner."""
         owner = self.lease.owner
         return [] if owner is None else [self._receiver(owner, now_s)]
 
     def observers(self, now_s: float) -> list[Receiver]:
-        """Where to send now what observers may feel."""
+        """Return the receivers of the observers' stiffness."""
         return [self._receiver(one, now_s) for one in self.lease.observers()]
 
     def shown_header(self, now_s: float) -> Header:
-        """The header of pictures and of the scene, which are made between the ticks."""
+        """Return the header of pictures and of the scene, which are made between ticks."""
         return self._announcements.stamp_shown(now_s)
 
     def view_header(self, now_s: float) -> Header:
-        """The header of messages to viewers."""
+        """Return the header of messages to viewers."""
         return self._announcements.stamp(now_s)
 
     def loop_age_s(self, now_s: float) -> float | None:
-        """How old the stamp of ours is that the newest accepted command echoes; None before the first (eq. 8).
+        """Return the age of our stamp that the newest accepted command echoes (eq. 8); None before the first.
 
-        Of silences, the peer's and ours, what counts (common/silence.py).
+        Of a silence, the peer's or ours, only a part counts (common/silence.py).
         """
         return None if self._loop_age_s is None else self._loop_age_s + counted_s(now_s - self._accepted_s)
 
     def permission(self, now_s: float) -> Permission:
-        """What may reach the arm in this tick."""
+        """Return the command that may reach the arm in this tick, if any."""
         permission = self.safety.permission(now_s)
         if permission.command is not None and self._sent_s is not None:
             self.applied_age.add(now_s - self._sent_s)
         return permission
 
     def take_owner_changed(self) -> bool:
-        """Whether another operator, or the same under another lease, became the owner since the last call."""
+        """Return whether an operator got a new lease since the last call."""
         began, self._began = self._began, False
         return began
 
     def take_next_target(self) -> bool:
-        """Whether the button for the next target was pressed since the last call."""
+        """Return whether the button for the next target was pressed since the last call."""
         pressed, self._next_target_pressed = self._next_target_pressed, False
         return pressed
 
     def take_answers(self, now_s: float) -> list[Answer]:
-        """What to send besides stiffness."""
+        """Return the messages to send besides stiffness."""
         return self._announcements.take(now_s)
 
     def summary(self) -> dict[str, Any]:
-        """Who asked for the lease, and what came of it."""
+        """Return the counts of the lease, of refusals and of tuning."""
         return {
             "granted": self.leases_granted,
             "token": self.lease.token,
@@ -200,11 +200,11 @@ class OperatorSession:
         }
 
     def _admit(self, peer: bytes, message: Hello | MotionCommand | Tune | Watch, now_s: float) -> Participant | None:
-        """Make room for a new epoch, which only a Hello can begin; None for an epoch that is turned away."""
+        """Admit a new epoch, which only a Hello can begin; None for a refused epoch."""
         epoch = message.header.epoch
         if self.lease.has_ended(epoch):
             self.refused += isinstance(message, Hello)
-            self._announcements.refuse(peer, SessionState.ENDED, "this epoch has ended; start anew", now_s)
+            self._announcements.refuse(peer, SessionState.ENDED, "this epoch has ended; begin a new one", now_s)
             return None
         if not isinstance(message, Hello):
             self._announcements.refuse(peer, SessionState.UNKNOWN, "no Hello yet", now_s)
@@ -230,7 +230,7 @@ class OperatorSession:
         if not self.safety.receive(command, arrival, now_s):
             return
         self._loop_age_s, self._accepted_s = arrival.loop_age_s, now_s
-        # On our own clock, so that it ages from tick to tick.
+        # On our own clock, so that the age grows from tick to tick.
         self._sent_s = None if arrival.one_way_s is None else now_s - arrival.one_way_s
         self._next_target_pressed |= command.next_target and not participant.next_target_was_down
         participant.next_target_was_down = command.next_target
@@ -243,7 +243,7 @@ class OperatorSession:
         return participant is self.lease.owner and command.token == self.lease.token
 
     def _follow_owner(self) -> None:
-        """Forget what the last owner said as soon as there is another lease."""
+        """Forget the last owner's commands as soon as there is another lease."""
         owner = self.lease.owner
         if owner is None or self.lease.token == self._token:
             return

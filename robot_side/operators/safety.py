@@ -1,9 +1,9 @@
-"""Which command may move the arm, and until when.
+"""Check of the command that may move the arm, and until when.
 
-Two limits, not one. *Gap*: the time since the last accepted command; within it the last command holds, past
-it the robot side disarms, and the arm itself decelerates from its measured state because nothing renewed
-`valid_until`. *Age*: how much longer than the link's own minimum a command took; an old one is discarded,
-while a steady delay, however long, ages nothing.
+There are two limits. *Gap*: time since the last accepted command. Within the limit the last command holds. Beyond it
+the robot side disarms, and the arm itself decelerates from its measured state, as nothing renewed `valid_until`.
+*Age*: delay of a command beyond the link's own minimum. An old command is discarded; a steady delay, however long,
+adds no age.
 """
 
 from collections import deque
@@ -18,7 +18,7 @@ from common.protocol.messages import MotionCommand, MotionState
 from common.protocol.session import Session, SessionEvent, SessionState
 
 RELEASED_TRAVEL = 0.02
-"""Travel below this counts as released: a calibrated trigger at rest reads 0, give or take a count."""
+"""Largest travel, 0 to 1, that counts as released: a calibrated trigger at rest reads 0, give or take a count."""
 _REMEMBERED_STOPS = 1000
 
 _Limit = Annotated[float, Meta(gt=0.0, lt=60.0)]
@@ -27,22 +27,22 @@ _Allowance = Annotated[float, Meta(ge=0.0, lt=60.0)]
 
 @dataclass(frozen=True)
 class SafetySettings:
-    """The limits; all in seconds. None of them can be switched off: 0 is refused, or means no allowance at all."""
+    """Limits, all in seconds. None can be switched off: 0 is refused, or means no allowance."""
 
     gap_s: _Limit = 0.1
-    """Without an accepted command for this long the arm stops."""
+    """Silence without an accepted command after which the arm stops."""
     age_s: _Limit = 0.1
-    """A command that queued for longer than this plus `jitter_s` is discarded."""
+    """Queueing age beyond which, plus `jitter_s`, a command is discarded."""
     jitter_s: _Allowance = 0.08
-    """The link's own spread that is not a queue: eight times the 10 ms of the reference link."""
+    """Jitter of the link itself, not of a queue: eight times the 10 ms of the reference link."""
     max_delay_s: _Limit = 2.0
-    """A loop age above this disarms."""
+    """Loop age above which the arm is disarmed."""
     healthy_s: _Allowance = 1.0
-    """How long commands must have come, with released triggers, before arming."""
+    """Time for which commands must have come, with released triggers, before arming."""
     arm_s: _Limit = 0.1
-    """An arm whose newest state is older is lost."""
+    """Age of the arm's newest state above which the arm is lost."""
     lease_s: _Limit = 0.9
-    """An operator that was silent for this long loses the lease: within a second, a tick included."""
+    """Silence after which an operator loses the lease: within a second, a tick included."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -51,28 +51,28 @@ class SafetySettings:
 
 
 class Permission(NamedTuple):
-    """What may reach the arm in this tick."""
+    """Command that may reach the arm in this tick, if any."""
 
     state: MotionState
     command: MotionCommand | None
-    """The command to follow; None means stand still."""
+    """Command to follow; None: stand still."""
     valid_until_s: float
 
 
 class Safety:
-    """Guards the arm against a stream that is broken, old, or not meant. It listens to the lease's owner alone.
+    """Guard of the arm against broken, old or unintended commands. Only the lease's owner is heard.
 
     An emergency stop is latched: it outlasts its operator, until somebody arms again.
     """
 
     def __init__(self, settings: SafetySettings) -> None:
         self.stops: deque[tuple[float, str]] = deque(maxlen=_REMEMBERED_STOPS)
-        """(when, why) of each transition out of armed, and of each emergency stop."""
+        """(time, reason) of each transition out of armed, and of each emergency stop."""
         self.discarded_by_age = 0
         self.settings = settings
         self._stopped = False
         self._stop_followed = (-1, -1)
-        """Epoch and sequence number of the newest stop that was followed."""
+        """Epoch and sequence number of the newest stop that was obeyed."""
         self._session: Session | None = None
         self._arm_lost = False
         self._forget()
@@ -86,31 +86,31 @@ class Safety:
 
     @property
     def state(self) -> MotionState:
-        """The robot's state under any owner."""
+        """State of the robot, under any owner."""
         if self._session is not None and self._session.state is SessionState.ARMED:
             return "armed"
         return "stopped" if self._stopped else "disarmed"
 
     @property
     def command(self) -> MotionCommand | None:
-        """The newest accepted one, whether it moves the arm or not; None once it is past the gap limit."""
+        """Newest accepted command, whether it moves the arm or not; None beyond the gap limit."""
         return self._command
 
     def begin(self, session: Session) -> None:
-        """Listen to another owner; nothing of the one before counts."""
+        """Begin with another owner; forget the commands of the last one."""
         self._forget()
         self._session = session
         if self._stopped:
             session.handle(SessionEvent.EMERGENCY_STOP)
 
     def end(self, event: SessionEvent, now_s: float) -> None:
-        """The owner leaves; `event` says how."""
+        """End with the owner, who leaves by `event`."""
         self._handle(event, now_s)
         self._forget()
         self._session = None
 
     def receive(self, command: MotionCommand, arrival: Arrival, now_s: float) -> bool:
-        """Judge one command of the owner; True when it was accepted. An emergency stop counts however late it is."""
+        """Judge one command of the owner; True if accepted. An emergency stop counts, however late."""
         self.hear_stop(command, now_s)
         if not arrival.fresh:
             return False
@@ -126,9 +126,9 @@ class Safety:
         return True
 
     def hear_stop(self, command: MotionCommand, now_s: float) -> None:
-        """Stop if `command` says so, however late it comes; a stop that has been followed counts no second time.
+        """Stop if `command` says so, however late; a stop that was obeyed counts only once.
 
-        A late copy of it, by another connection, must not undo an arming since.
+        A late copy of it, over another connection, must not undo an arming since.
         """
         order = command.header.epoch, command.header.sequence
         followed = self._stop_followed
@@ -137,12 +137,12 @@ class Safety:
             self.emergency_stop(now_s)
 
     def emergency_stop(self, now_s: float) -> None:
-        """Stop whatever goes on; nothing happens while it stands stopped already."""
+        """Stop in any state but stopped."""
         if self._session is not None and self._session.state is not SessionState.STOPPED:
             self._handle(SessionEvent.EMERGENCY_STOP, now_s)
 
     def permission(self, now_s: float) -> Permission:
-        """What may move in this tick."""
+        """Return the command that may move the arm in this tick, if any."""
         self.check(now_s)
         state = self.state
         if state != "armed" or self._command is None or self._accepted_s is None or not self._command.run:
@@ -150,13 +150,13 @@ class Safety:
         return Permission(state, self._command, self._accepted_s + self.settings.gap_s)
 
     def arm_measured(self, age_s: float, now_s: float) -> None:
-        """Stop while the arm's newest state is too old; to be called in every tick. Without an arm nothing is lost."""
+        """Stop if the arm's newest state, of `age_s`, is too old; to be called in every tick."""
         self._arm_lost = age_s > self.settings.arm_s
         if self._arm_lost:
             self._handle(SessionEvent.ARM_LOST, now_s, f"arm lost: its newest state is {1e3 * age_s:.0f} ms old")
 
     def check(self, now_s: float) -> None:
-        """Whether silence or the loop's age has to stop the arm by now."""
+        """Stop the arm if the gap or the loop age is beyond its limit."""
         self._check_gap(now_s)
         self._check_loop(now_s)
 
@@ -174,7 +174,7 @@ class Safety:
             self._handle(SessionEvent.OLD_LOOP, now_s, f"loop age of {age}")
 
     def _loop_is_young(self, now_s: float) -> bool:
-        # No echo yet is no measured loop age: the conservative reading is that it is too old.
+        # Without an echo the loop age is unknown: conservatively, too old.
         return self._echoed_s is not None and now_s - self._echoed_s <= self.settings.max_delay_s
 
     def _follow_buttons(self, command: MotionCommand, now_s: float) -> None:
@@ -198,7 +198,7 @@ class Safety:
         return self._healthy_since_s is not None and now_s - self._healthy_since_s >= self.settings.healthy_s
 
     def _handle(self, event: SessionEvent, now_s: float, why: str | None = None) -> None:
-        """Follow the table; every event but HEALTHY restarts the healthy second."""
+        """Follow the session's table; every event but HEALTHY restarts the time `healthy_s`."""
         if event is not SessionEvent.HEALTHY:
             self._healthy_since_s = None
         if event is SessionEvent.EMERGENCY_STOP:

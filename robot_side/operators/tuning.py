@@ -1,4 +1,4 @@
-"""What the owner may change while the run goes on: the probability P of eq. 10, and the emulated link."""
+"""Changes that the owner may make during a run: the probability P of eq. 10, and the emulated link."""
 
 from collections import deque
 from collections.abc import Callable
@@ -13,12 +13,12 @@ _NOTES: Final = 20
 
 
 class Tuning:
-    """Grants wishes where the run permits it, and remembers what was granted when; the rest it counts."""
+    """Grants requests where the run permits it; records the granted ones with their time, and counts the refused."""
 
     def __init__(self, probability: float | None = None, expect: Callable[[float], None] | None = None) -> None:
-        """`probability`: P at the start; `expect` makes another one hold; None permits no tuning at all."""
+        """probability: P at the start. expect: applies another P; None permits no tuning."""
         self.probability = probability
-        """P as it is now."""
+        """Present P."""
         self.refused = 0
         self._expect = expect
         self._start_s: float | None = None
@@ -29,16 +29,16 @@ class Tuning:
 
     @property
     def permitted(self) -> bool:
-        """Whether the run permits it."""
+        """Whether the run permits tuning"""
         return self._expect is not None
 
     def begin(self, now_s: float) -> None:
-        """The first call says when the run began."""
+        """Set the start of the run; only the first call counts."""
         if self._start_s is None:
             self._start_s = now_s
 
     def take(self, tune: Tune, now_s: float, *, owns: bool) -> bool:
-        """One wish, of the owner if `owns`: granted whole or not at all; whether it was."""
+        """Grant a request as a whole or refuse it; return whether it was granted. owns: it is the owner's."""
         if self._expect is None or not owns:
             why = "only the owner may" if self.permitted else "valid with: --permit-tuning"
             return self._refuse(why)
@@ -61,22 +61,22 @@ class Tuning:
 
     def _refuse(self, why: str) -> bool:
         self.refused += 1
-        if why != self._refused_because:  # one line, however often somebody asks
+        if why != self._refused_because:  # one note for repeated requests
             self._refused_because = why
             self._notes.append(f"tuning refused: {why}")
         return False
 
     def take_link(self) -> str | None:
-        """The link that was asked for since the last call, for the side's own line; None for none."""
+        """Return the link granted since the last call, for the emulation of this side's messages; None for none."""
         link, self._link = self._link, None
         return link
 
     def take_notes(self) -> list[str]:
-        """What a person should be told since the last call."""
+        """Return the notes for a person since the last call."""
         notes = list(self._notes)
         self._notes.clear()
         return notes
 
     def summary(self) -> dict[str, Any]:
-        """What was tuned when, and how often that was refused."""
+        """Return the granted requests, with times, and the count of refused ones."""
         return {"permitted": self.permitted, "granted": list(self._granted), "refused": self.refused}

@@ -1,4 +1,4 @@
-"""Who looks at what: each Watch counts for a second after it arrived."""
+"""Views that operators watch: each Watch counts for a second after its arrival."""
 
 from common.protocol.messages import Watch
 
@@ -8,11 +8,11 @@ _NOBODY: frozenset[str] = frozenset()
 
 
 class Watchers:
-    """The newest Watch of each operator; the session admits only those of owner and observers."""
+    """Newest Watch of each operator; the session admits only those of owner and observers."""
 
     def __init__(self) -> None:
         self.scene_begun = 0
-        """How often somebody began to look at the scene."""
+        """Number of times that somebody began to watch the scene."""
         self._watching: dict[int, tuple[Watch, float]] = {}
 
     def heard(self, epoch: int, watch: Watch, now_s: float) -> None:
@@ -23,7 +23,7 @@ class Watchers:
         self._watching[epoch] = watch, now_s
 
     def lacks(self, now_s: float) -> tuple[int, int] | None:
-        """The newest pictures that somebody lacks, by view; None when not all who look at pictures show H.264."""
+        """Return the newest picture that a watcher lacks, for both views; None unless all of them show H.264."""
         looking = [
             watch.lacks
             for watch, heard_s in self._watching.values()
@@ -36,7 +36,7 @@ class Watchers:
         return first, second
 
     def looked_at(self, now_s: float) -> frozenset[str]:
-        """What somebody looks at: of `overview`, `first_person` and `scene`, those that are."""
+        """Return the watched ones of `overview`, `first_person` and `scene`."""
         if not self._watching:
             return _NOBODY
         for epoch in [epoch for epoch, (_, heard_s) in self._watching.items() if now_s - heard_s >= WATCH_S]:

@@ -1,1 +1,1 @@
-"""A run judged: its figures, and how near the truth says that things came."""
+"""Outcome of a run: its figures, and true distances and contacts."""

@@ -1,4 +1,4 @@
-"""The robot side's figures of one run, gathered tick by tick for the summary."""
+"""Figures of the robot side in one run, collected tick by tick for the summary."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ if TYPE_CHECKING:
 
 TRUTH_PERIOD_S = 0.01
 MOVING_M_S = 0.01
-"""A tool faster than this counts as moving."""
+"""Speed above which the tool counts as moving."""
 _CONTACT_REST_S = 0.1
-"""A contact with an object that comes back within this time, on any part of the gripper, is the same one: a sliding
-touch chatters, and two fingers do not close at the same instant."""
+"""Time within which a repeated contact with an object, on any part of the gripper, counts as the same one, in seconds:
+a sliding touch chatters, and two fingers do not close simultaneously."""
 
 
 _L2_STIFFNESS, _R2_STIFFNESS = L2 * OF_A_SIDE + STIFFNESS, R2 * OF_A_SIDE + STIFFNESS
 _MOST_ROWS = 8 * BLOCK
-"""That many ticks wait at most to be reckoned with, if nobody asks for it between ticks."""
+"""Most ticks that wait to be evaluated."""
 
 
 class RunFigures(Listener):
-    """Statistics over the ticks; nothing here is read back by the control."""
+    """Statistics over the ticks; the control reads none of them."""
 
     def __init__(self, seed: int = 0, truth: Observer | None = None) -> None:
-        """truth: sees what really happens, where there is a simulation to see it in."""
+        """truth: observer of the simulation; None without one."""
         self.ticks = 0
         self._observer = truth
         self._knows_truth = truth is not None
@@ -52,7 +52,7 @@ class RunFigures(Listener):
         self._next_truth_s = -np.inf
         self._loop_age = RunningStatistics(seed)
         self._rows: list[tuple[FloatArray, bool]] = []
-        """Of the newest ticks: the numbers of `Sensed`, and whether the arm was armed."""
+        """Numbers of `Sensed`, and whether the arm was armed, in the newest ticks"""
         self._enlargement = RunningStatistics(seed)
         self._enlargement_moving = RunningStatistics(seed)
         self._overlap = RunningStatistics(seed)
@@ -74,13 +74,13 @@ class RunFigures(Listener):
         self._unread: list[Tick] = []
 
     def on_tick(self, tick: Tick) -> None:
-        """Keep the tick for when its messages have left."""
+        """Store the tick until its messages have left."""
         if self._start_s is None:
             self._start_s = tick.now_s
         self._unread.append(tick)
 
     def on_sent(self, now_s: float) -> None:
-        """Reckon with a block of ticks at once, which costs each of them less, and see what is true."""
+        """Evaluate a block of ticks at once, which is cheaper, and observe the truth."""
         self._read()
         if len(self._rows) >= BLOCK:
             self._take_in()
@@ -95,7 +95,7 @@ class RunFigures(Listener):
         return time_s - (self._start_s or 0.0)
 
     def _read(self) -> None:
-        """Take in the ticks; one that failed found nothing."""
+        """Take the stored ticks, without failed ones."""
         for tick in self._unread:
             if (found := tick.found) is None:
                 continue
@@ -107,7 +107,7 @@ class RunFigures(Listener):
         self._unread.clear()
 
     def tick(self, sensed: Sensed, *, armed: bool = True) -> None:
-        """One tick's enlargement, overlap and stiffness; nobody feels any while the arm is not armed."""
+        """Add a tick's enlargement, overlap and stiffness; nobody feels stiffness unless the arm is armed."""
         self._newest = sensed.numbers
         self._rows.append((sensed.numbers, armed))
         self.ticks += 1
@@ -127,7 +127,7 @@ class RunFigures(Listener):
         self._r2.extend((armed * numbers[:, _R2_STIFFNESS]).tolist())
 
     def truth(self, truth: Truth, roles: dict[str, Role], now_s: float) -> None:
-        """What really happened, from the simulation: distances and contact onsets."""
+        """Add true distances and contacts from the simulation; count contact onsets."""
         self._knows_truth = True
         self._min_distance_m = _smaller(self._min_distance_m, truth.min_distance_m)
         self._min_obstacle_distance_m = _smaller(self._min_obstacle_distance_m, truth.min_obstacle_distance_m)
@@ -142,16 +142,16 @@ class RunFigures(Listener):
 
     @property
     def touched(self) -> bool:
-        """Whether the first contact has been."""
+        """Whether there has been a contact"""
         return self._first_contact is not None
 
     def first_contact(self, thing: str, closing_speed_m_s: float, now_s: float) -> None:
-        """Note the gripper's first contact with something that is no support."""
+        """Store the gripper's first contact with an object that is no support."""
         speed_mm_s = 1e3 * closing_speed_m_s
         self._first_contact = {"with": thing, "speed_mm_s": speed_mm_s, "time_s": self.since_start_s(now_s)}
 
     def task(self, armed: bool, held: bool, target_center_m: FloatArray | None, now_s: float) -> None:
-        """How far the task has come: armed, grasped, lifted; the target's centre (3,) as perceived."""
+        """Update the task's progress: armed, grasped, lifted. target_center_m: (3,) as perceived."""
         self._held = held
         if armed and self._armed_s is None:
             self._armed_s = now_s
@@ -159,13 +159,13 @@ class RunFigures(Listener):
             self._grasped_s = now_s
         if target_center_m is not None:
             height_m = float(target_center_m[2])
-            # Where it last stood by itself: another target, or this one after a push, stands elsewhere.
+            # Height at which the target last stood: another target, or a pushed one, stands elsewhere.
             if not held or self._rest_height_m is None:
                 self._rest_height_m = height_m
             self._lifted_m = max(self._lifted_m, height_m - self._rest_height_m)
 
     def summary(self) -> dict[str, Any]:
-        """Return the summary's keys that come from here, in the units of their names."""
+        """Return this part of the summary, in the units that the keys name."""
         self._read()
         self._take_in()
         grasp_s = None
@@ -200,14 +200,14 @@ class RunFigures(Listener):
 
 
 class Observer(Protocol):
-    """Sees what really happens, where there is a simulation to see it in."""
+    """Observer of the truth in a simulation."""
 
     def observe(self, figures: RunFigures, now_s: float) -> None:
-        """Tell `figures` the true distances and contacts."""
+        """Report the true distances and contacts to `figures`."""
         ...
 
     def watch(self, figures: RunFigures, now_s: float) -> None:
-        """Tell `figures` the first contact, in every turn."""
+        """Report the first contact to `figures`; called in every turn."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""What came of setting down what was lifted: when, where, how fast, and whether it was felt before it was touched."""
+"""Result of placing a lifted target: when, where, how fast, and whether it was felt before the contact."""
 
 from __future__ import annotations
 
@@ -13,34 +13,34 @@ if TYPE_CHECKING:
     from robot_side.outcome.truth import TargetTruth
 
 LIFTED_M: Final = 0.01
-"""So far off every support it counts as lifted."""
+"""Distance from every support at which the target counts as lifted."""
 STANDING_M: Final = 0.001
 UPRIGHT_RAD: Final = math.radians(10.0)
 _SAME_WARNING_S: Final = 0.5
-"""A warning that comes back within this time has not ended."""
+"""Time within which a repeated warning counts as the same one, in seconds."""
 
 
 class Placing:
-    """Watches the true target from its grasp until it stands by itself."""
+    """Observer of the true target from its grasp until it stands by itself."""
 
     def __init__(self) -> None:
         self.placed = False
         self.placed_s: float | None = None
         self.contact_speed_m_s: float | None = None
         self.felt_s: float | None = None
-        """How long before the contact with the support the last spell of warnings began."""
+        """Time from the start of the last warning to the contact with the support"""
         self.felt_m: float | None = None
-        """And how far off the support it was then."""
+        """Distance to the support at the start of that warning"""
         self._lifted = False
         self._touched = False
         self._before: TargetTruth | None = None
         self._stood_m: FloatArray | None = None
         self._warned: tuple[float, float] | None = None
-        """When the present spell of warnings began, and the gap then"""
+        """Start of the present warning, and the gap then"""
         self._warned_last_s = -math.inf
 
     def observe(self, target: TargetTruth, held: bool, warned: bool, now_s: float) -> None:
-        """Take in the truth at `now_s`; `warned`: rumble or stiffness was being sent."""
+        """Take the truth at `now_s`. warned: whether rumble or stiffness was above 0."""
         if self._stood_m is None:
             self._stood_m = target.position_m
         if now_s - self._warned_last_s > _SAME_WARNING_S:
@@ -49,7 +49,7 @@ class Placing:
             self._warned_last_s = now_s
             self._warned = self._warned or (now_s, target.support_gap_m)
         if target.support_gap_m > LIFTED_M:
-            # What falls out of the fingers is not placed, however it comes to stand.
+            # A target that falls out of the fingers is never placed, even if it stands.
             self._lifted, self._touched = held, False
         if self._lifted and not self._touched and target.support_gap_m <= 0.0:
             self._touched = True
@@ -66,7 +66,7 @@ class Placing:
         self._before = target
 
     def summary(self, began_s: float | None) -> dict[str, Any]:
-        """The summary's `placing`; times count from `began_s`."""
+        """Return the summary's `placing`; times count from `began_s`."""
         known = None if self.placed_s is None or began_s is None else self.placed_s - began_s
         now = self._before
         moved_m = None
@@ -85,5 +85,5 @@ class Placing:
 
 
 def scaled(value: float | None, factor: float) -> float | None:
-    """`value` in another unit; None for None."""
+    """Return `value` in another unit; None for None."""
     return None if value is None else value * factor

@@ -1,4 +1,4 @@
-"""What nobody on the robot side can see; told by whoever runs the world, for a run's figures alone."""
+"""Ground truth from the simulation, for a run's figures alone; the robot side itself never uses it."""
 
 from dataclasses import dataclass
 
@@ -7,28 +7,28 @@ from common.arrays import FloatArray
 
 @dataclass(frozen=True)
 class TargetTruth:
-    """Where the target really is."""
+    """True pose and motion of the target."""
 
     position_m: FloatArray
-    """(3,) of its body"""
+    """(3,) position of the target's body, in the world frame"""
     support_gap_m: float
-    """To the nearest support, negative inside it; at most 1 m"""
+    """Distance to the nearest support, negative inside it; at most 1 m"""
     sinking_m_s: float
-    """Downwards"""
+    """Speed downwards"""
     tilt_rad: float
-    """Between what was upwards at the start and upwards"""
+    """Angle between its direction that was upwards at the start and upwards"""
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What nobody on the robot side can see: where the gripper really is among the objects."""
+    """True distances and contacts of the gripper."""
 
     min_distance_m: float | None
-    """From the true, unenlarged gripper to the nearest object that is no support, negative inside it; None beyond
-    the distance that was looked for."""
+    """Distance from the true, unenlarged gripper to the nearest object that is no support, negative inside it; None
+    beyond the observer's range."""
     min_obstacle_distance_m: float | None
-    """The same over obstacles alone."""
+    """Distance to the nearest obstacle, likewise"""
     contacts: frozenset[tuple[str, str]]
-    """(gripper geom, object) now in contact, supports included"""
+    """(gripper geom, object) pairs now in contact, supports included"""
     target: TargetTruth | None = None
-    """None without a target"""
+    """Truth of the target; None without one"""

@@ -1,1 +1,1 @@
-"""A run recorded: what the core hears, as entries of a file."""
+"""Recording of a run: the core's inputs as entries of a file."""

@@ -1,11 +1,11 @@
-"""What the robot side's core gets beside payloads, as bytes and back: arm states and frames of perceived objects.
+"""Encoding and decoding of the core's inputs other than payloads: arm states and frames of perceived objects.
 
     state   time f64, n u16, positions n f64, velocities n f64, f u16, fingers f f64, opening f64, holding u8,
             loads n f64 or nothing
     frame   time f64, whole u8, then for each array of ARRAYS: tag u8, rows u32, and by the tag
-              0   nothing: as in the frame before        1   rows x width values
+              0   nothing: same as in the frame before   1   rows x width values
               2   count u32, count row numbers u32, count x width values: these rows, the others as before
-              3   nothing: there is no such array
+              3   nothing: the array is None
             names: length u32 and MessagePack, in whole frames only; roles: one u8 an object
 
 Values are float64 or int64, bit for bit as the core got them.
@@ -31,7 +31,7 @@ ARRAYS: Final[Mapping[str, tuple[type, tuple[int, ...]]]] = {
         (kind.owner, (np.int64, ())),
     )
 } | {"velocities_m_s": (np.float64, (3,))}
-"""The arrays of a frame in their order, with the kind of their values and the shape of a row."""
+"""Arrays of a frame in their order, with the type of their values and the shape of a row"""
 _SAME, _WHOLE, _ROWS, _NONE = range(4)
 _FRAME: Final = struct.Struct("<dB")
 _ARRAY: Final = struct.Struct("<BI")
@@ -39,7 +39,7 @@ _ROLES: Final = tuple(Role)
 
 
 def pack_state(state: ArmState) -> bytes:
-    """One state."""
+    """Encode a state."""
     joints, fingers = state.joint_positions_rad, state.finger_positions
     return b"".join(
         (
@@ -55,7 +55,7 @@ def pack_state(state: ArmState) -> bytes:
 
 
 def unpack_state(content: bytes) -> ArmState:
-    """One state; ValueError or struct.error for what is none."""
+    """Decode a state; ValueError or struct.error for invalid content."""
     time_s, joints = struct.unpack_from("<dH", content)
     position = 10
 
@@ -76,17 +76,17 @@ def unpack_state(content: bytes) -> ArmState:
 
 
 class FramePacker:
-    """Frames as what is new in them: most objects stand still."""
+    """Encoder of frames by their changes: most objects stand still."""
 
     def __init__(self) -> None:
         self._last: PerceivedObjects | None = None
 
     def begin_anew(self) -> None:
-        """Tell the next frame whole."""
+        """Encode the next frame whole."""
         self._last = None
 
     def pack(self, frame: PerceivedObjects) -> bytes:
-        """One frame."""
+        """Encode a frame."""
         last, self._last = self._last, frame
         if last is not None and last.names is not frame.names and last.names != frame.names:
             last = None
@@ -108,7 +108,7 @@ def _packed(values: Any, last: Any) -> list[bytes]:
         return [_ARRAY.pack(_WHOLE, rows), values.tobytes()]
     if rows == 0:
         return [_ARRAY.pack(_SAME, 0)]
-    # By their bits: NaN is no reason to differ, and the sign of a zero is one.
+    # Compare bits: NaN equals itself, and 0 differs from -0.
     bits, before = (np.ascontiguousarray(array).view(np.int64).reshape(rows, -1) for array in (values, last))
     changed = np.flatnonzero((bits != before).any(axis=1)).astype("<u4")
     if len(changed) == 0:
@@ -119,10 +119,10 @@ def _packed(values: Any, last: Any) -> list[bytes]:
 
 
 class FrameUnpacker:
-    """Frames from what is new in them."""
+    """Decoder of frames from their changes."""
 
     def __init__(self, scene: PerceivedObjects) -> None:
-        """scene: any frame of the same scene: the shapes of its meshes do not change and are not recorded.
+        """scene: any frame of the same scene, for the meshes' shapes, which do not change and are not recorded.
 
         Frames without meshes may be of other objects.
         """
@@ -130,10 +130,10 @@ class FrameUnpacker:
         self._last: PerceivedObjects | None = None
 
     def unpack(self, content: bytes) -> PerceivedObjects:
-        """One frame; ValueError or struct.error for what is none, or for one that follows a gap."""
+        """Decode a frame; ValueError or struct.error for invalid content, or for changes after a gap."""
         time_s, whole = _FRAME.unpack_from(content)
         if not whole and self._last is None:
-            raise ValueError("a frame that tells only what is new, without one before it")
+            raise ValueError("a frame of changes alone, without a frame before it")
         last, position = None if whole else self._last, _FRAME.size
         arrays: dict[str, Any] = {}
         for name, (kind, shape) in ARRAYS.items():

@@ -1,6 +1,6 @@
-"""Note every input of the core and what it sent, so that a replay makes them again bit for bit.
+"""Recording of the core's inputs and messages, so that a replay can compute the run again bit for bit.
 
-In a tick this costs an append; bytes are made of it in the idle time (common/recording/side.py).
+In a tick this costs an append; the idle time encodes the notes (common/recording/side.py).
 """
 
 import struct
@@ -20,7 +20,7 @@ _HAPTICS: Final = "haptics"
 
 
 class Recorder(Listener):
-    """Passes to `note` what arrives and each tick."""
+    """Listener that passes each payload and each tick to `note`."""
 
     def __init__(self, note: Callable[[Any], None]) -> None:
         self._note = note
@@ -30,12 +30,12 @@ class Recorder(Listener):
         self._note((now_s, peer, payload))
 
     def on_tick(self, tick: Tick) -> None:
-        """Note a tick, and one that failed."""
+        """Note a tick, even a failed one."""
         self._note(tick)
 
 
 class RobotEncoder:
-    """Turns these notes into entries."""
+    """Encoder of the recorder's notes to entries."""
 
     def __init__(self) -> None:
         self._frames = FramePacker()
@@ -43,12 +43,12 @@ class RobotEncoder:
         self._frame: PerceivedObjects | None = None
 
     def begin_anew(self) -> None:
-        """Tell state and frame whole the next time."""
+        """Encode state and frame whole the next time."""
         self._frames.begin_anew()
         self._state = self._frame = None
 
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
-        """When it happened, and its entries; telemetry goes to `views`."""
+        """Return a note's time and entries; telemetry goes to `views`."""
         if not isinstance(noted, Tick):
             now_s, peer, payload = noted
             return now_s, entry(Kind.RECEIVED, now_s, text(peer), payload)
@@ -70,5 +70,5 @@ class RobotEncoder:
 
 
 def robot_header(settings: RobotSettings, epoch: int, clock_domain: str) -> dict[str, Any]:
-    """What the core was made from; to be told once its kernels are there."""
+    """Return the provenance of the core; to be called once its kernels are compiled."""
     return provenance(settings, epoch, clock_domain) | {"kernels": kernel_digests()}

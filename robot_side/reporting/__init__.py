@@ -1,1 +1,1 @@
-"""What leaves for the operator side: which message, when, and by which way."""
+"""Messages to the operator side: content, time and link."""

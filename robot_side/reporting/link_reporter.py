@@ -1,4 +1,4 @@
-"""What the link gives, told to the owner and to whoever reads the robot side's status."""
+"""Reports of the link's figures, to the owner and for the robot side's status."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -16,7 +16,7 @@ _NAMES: Final = {"video": "pictures"}
 
 
 class LinkReporter:
-    """Makes a report twice a second, while there is an owner."""
+    """Maker of a report every 0.5 s, while there is an owner."""
 
     def __init__(
         self,
@@ -25,7 +25,7 @@ class LinkReporter:
         pictures: Callable[[], Mapping[str, float | int] | None],
         tcp: Callable[[bytes], TcpFigures],
     ) -> None:
-        """`pictures`: rate_hz, quality and size, None without cameras. `tcp`: the kernel's figures of a peer."""
+        """pictures: rate_hz, quality and size; None without cameras. tcp: the operating system's figures of a peer."""
         self._session = session
         self._budget = budget
         self._pictures = pictures
@@ -37,11 +37,11 @@ class LinkReporter:
         self._report: LinkReport | None = None
 
     def status(self) -> dict[str, float | str | None]:
-        """The values of the newest report; the rate and the queue as they are now."""
+        """Return the values of the newest report, with the present rate and queue."""
         return ({} if self._report is None else self._report.values()) | self._budget.status()
 
     def due(self, now_s: float) -> list[Outgoing]:
-        """The report to send at `now_s`, if one is due."""
+        """Return the report to send at `now_s`, if one is due."""
         peer = self._session.owner_peer
         if now_s < self._next_s or peer is None:
             return []
@@ -51,7 +51,7 @@ class LinkReporter:
         self._peer, self._before = peer, now
         figures = self._budget.status()
         self._report = LinkReport(
-            # In a sequence of its own: a replay, which knows no link, must send the same of everything else.
+            # In a separate sequence: a replay has no link and must send all other messages identically.
             self._session.shown_header(now_s),
             rate_kbit_s=figures["rate_kbit_s"],
             queue_ms=figures["queue_ms"],

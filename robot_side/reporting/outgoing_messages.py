@@ -1,4 +1,4 @@
-"""What leaves the robot side: stiffness for those who feel, telemetry for those who look."""
+"""Messages of the robot side: stiffness for operators, telemetry for viewers."""
 
 import math
 from typing import Final, Literal, NamedTuple
@@ -17,30 +17,30 @@ from robot_side.operators.operator_session import Receiver
 
 OutgoingStream = Literal["haptics", "telemetry", "video", "scene"]
 TOPICS: Final[dict[OutgoingStream, bytes]] = {"telemetry": b"telemetry", "video": VIDEO_TOPIC, "scene": SCENE_TOPIC}
-"""Of what goes to whoever looks; scene is a stream of its own, as its large messages would hold up telemetry."""
+"""Topics of the streams to viewers; the scene has an own stream, as its large messages would delay telemetry."""
 
 SHOWN_NAME = 100
-"""Characters of an object's name that are sent and shown; a message has a limit."""
+"""Most characters of an object's name that are sent and shown; messages are limited."""
 _AROUND_S: Final = 0.1
 _AROUND_AGAIN_S: Final = 0.4
-"""A lost one is missed for no longer."""
+"""Period of an unchanged map, in seconds: a lost one is missing for no longer."""
 _NO_HEADER = Header(0, 0, 0.0)
 _FASTEST_M_S, _LARGEST_M = 100.0, 100.0
-"""A simulation about to become unstable shows wild figures, and must get as far as saying so."""
+"""Limits of sent values: a simulation about to become unstable must still be able to report its figures."""
 
 
 class Outgoing(NamedTuple):
-    """One payload to send: haptics to `peer` over the control port, all else to all who look."""
+    """Payload to send: haptics to `peer` over the control port, other streams to all viewers."""
 
     stream: OutgoingStream
     peer: bytes
     payload: bytes
     everywhere: bool = False
-    """Over every connection of `peer`, as something that must arrive soon; else over the next in turn."""
+    """Send over every connection of `peer`, as it must arrive soon; else over the next in turn"""
 
 
 class MapSchedule:
-    """Decide which messages bring a map: ten a second while it changes, and else two."""
+    """Schedule of maps in messages: ten a second while the map changes, and one every 0.4 s otherwise."""
 
     def __init__(self) -> None:
         self._sent: Around | None = None
@@ -66,9 +66,9 @@ def stiffness_message(
     stands: bool = False,
     around: Around | None = None,
 ) -> Outgoing:
-    """What `receiver` is to feel. told_m_s: what the arm is told, along the direction in which R2 advances.
+    """Return the stiffness for `receiver`. told_m_s: commanded speed along the direction in which R2 advances.
 
-    stands: what is held does. around: in messages in which it is due.
+    stands: the held object stands on something. around: the map, in messages in which it is due.
     """
     update = StiffnessUpdate(
         receiver.header,
@@ -94,9 +94,9 @@ def telemetry(
     *,
     holding: bool,
 ) -> Telemetry:
-    """What anyone who looks is shown, still without a header.
+    """Return the telemetry for viewers, still without a header.
 
-    `target`: a name and where its centre (3,) is, in metres, NaN where unknown.
+    target: name, and centre (3,) in metres, NaN where unknown.
     """
     target_in_tool = None
     if target is not None and target[1] is not None and np.isfinite(target[1]).all():

@@ -1,15 +1,15 @@
-"""The moment at which a stiffness leaves, and a telemetry: the receiver would be wrong by more than is felt, or seen.
+"""Perceptual deadband for stiffness and telemetry: they leave when the receiver's error would be felt, or seen.
 
-This is a perceptual deadband with a predictor (Hinterseer, Hirche, Chaudhuri, Steinbach and Buss 2008; IEEE 1918.1.1).
-The receiver holds the ways of the last message and moves the gripper on from there. It does so by its own commands, at
-most at the acceleration in that message (operator_side/feel/commands_under_way.py). The same model runs here, by the
-commands that have arrived.
+The deadband has a predictor (Hinterseer, Hirche, Chaudhuri, Steinbach and Buss 2008; IEEE 1918.1.1). The receiver holds
+the onset distances of the last message and extrapolates the gripper's motion. It uses its own commands and at most the
+acceleration in that message (operator_side/feel/commands_under_way.py). The same model runs here, with the commands
+that have arrived.
 
-A way counts as wrong by more than 1 mm, or 2 % of it: fingers stop an arm to a few millimetres.
-- A way that is longer than the receiver believes makes triggers stiff too early. It may wait for 10 ms after the last
-  message: a controller can be written no sooner.
-- A way that is shorter makes them stiff too late. It leaves at once, from a quarter of the deadband on. With the wire's
-  own step that is less than half a millimetre, to which stops are asked to be equal.
+An error of a distance counts above 1 mm and 2 % of it: fingers stop an arm to a few millimetres.
+- A distance longer than the receiver believes makes triggers stiff too early. It may wait for 10 ms after the last
+  message: a controller cannot be written sooner.
+- A shorter distance makes them stiff too late. It leaves at once, from a quarter of the deadband on. With the wire's
+  resolution that is less than half a millimetre, the required repeatability of stops.
 """
 
 import math
@@ -41,9 +41,9 @@ from robot_side.laws.sensed import (
 _DEADBAND_M: Final = 1e-3
 _DEADBAND_SHARE: Final = 0.02
 _NEARER: Final = 0.25
-"""Share of the deadband from which on something nearer leaves at once."""
+"""Share of the deadband above which a shorter distance leaves at once."""
 _HALF_A_TICK_S: Final = 0.5e-3
-"""The tick that is nearest to a deadline counts."""
+"""Tolerance of a deadline, in seconds: the nearest tick counts."""
 _EIGHTHS: Final = 8.0
 _STATES: Final[dict[MotionState, int]] = {state: number for number, state in enumerate(get_args(MotionState))}
 _ARMED: Final = _STATES["armed"]
@@ -54,26 +54,26 @@ _BELIEF: Final = np.dtype(
         *((name, np.int64) for name in ("known", "state", "obeyed")),
     ]
 )
-"""The receiver's belief. sent, now: times (s). way, speed, target: along R2, since the message, by commands.
-told: the arm's commanded speed in the message (m/s). known: a message has been sent. state: that of motion, and _STANDS
-more where what is held stands. obeyed: the newest command."""
+"""Belief of the receiver. sent, now: times (s). way, speed, target: motion along R2 since the message, by commands.
+told: the arm's commanded speed in the message (m/s). known: a message has been sent. state: that of motion, plus
+_STANDS if the held object stands. obeyed: sequence number of the newest command."""
 
 _follow = inlined(follow)
 
 
 class StiffnessDeadband:
-    """The belief of one receiver, from message to message."""
+    """Deadband for one receiver, with its belief from message to message."""
 
     def __init__(self, *, full_rate: bool = False) -> None:
-        """full_rate: a stiffness leaves in every tick."""
+        """full_rate: send a stiffness in every tick."""
         self._full_rate = full_rate
         self.interval_s = 0.0
-        """At least this lies between two that leave, where the link carries no more; a change of state never waits."""
+        """Least time between two stiffnesses, set by the link's rate; a change of state never waits"""
         self._sent: FloatArray = np.zeros(NUMBERS)
         self.forget()
 
     def forget(self) -> None:
-        """Another receiver, which knows nothing yet."""
+        """Begin with another receiver, which knows nothing yet."""
         self._belief: np.ndarray = np.zeros(1, dtype=_BELIEF)
 
     def due(
@@ -85,10 +85,10 @@ class StiffnessDeadband:
         command: MotionCommand | None,
         now_s: float,
     ) -> bool:
-        """Decide if this leaves at `now_s`; then the receiver is taken to know it.
+        """Decide whether this leaves at `now_s`; then the receiver is assumed to know it.
 
-        told_m_s: the speed that the arm is commanded from this tick on, along the direction in which R2 advances, by
-        `command`; None: nothing moves. stands: what is held does.
+        told_m_s: commanded speed from this tick on, along the direction in which R2 advances, by `command`; None:
+        nothing moves. stands: the held object stands on something.
         """
         obeyed, travel, by_operator = 0, 0.0, True
         if command is not None:
@@ -109,9 +109,10 @@ def _braking_m(speed: float, acceleration: float) -> float:
 
 @inlined
 def _wrong(numbers: FloatArray, sent: FloatArray, side: int, moved: float, patient: bool) -> bool:
-    """Compare the ways with those that were sent, less `moved` (m); `patient`: none that is farther counts.
+    """Compare the distances with the sent ones minus `moved` (m); return whether an error counts.
 
-    A way at the horizon is no nearer: nothing is known from there on, and the last message still holds.
+    patient: longer distances do not count. A distance at the horizon is no shorter one: nothing is known beyond it, and
+    the last message still holds.
     """
     for place in range(side * OF_A_SIDE, side * OF_A_SIDE + DISPLACEMENT):
         way = numbers[place]
@@ -138,9 +139,9 @@ def _matters(
     patient, shown = since < WRITE_S, numbers[RUMBLE] != sent[RUMBLE]
     for side in (R2, L2):
         first, sign = side * OF_A_SIDE, 1.0 if side == R2 else -1.0
-        # A receiver that does not reckon adds δ of the message.
+        # A receiver that does not compute δ adds δ of the message.
         moved = sign * belief.way if by_operator else sent[first + DISPLACEMENT] - numbers[first + DISPLACEMENT]
-        # The way to brake from a speed above the trigger's comes on top of δ: at most this.
+        # The braking distance from a speed above the trigger's adds to δ: at most this.
         moved += _braking_m(sign * belief.speed, sent[first + ACCELERATION])
         moved -= _braking_m(sign * numbers[SPEED], numbers[first + ACCELERATION])
         if _wrong(numbers, sent, side, moved, patient):
@@ -178,14 +179,14 @@ def _due(
     full_rate: bool,
     now: float,
 ) -> bool:
-    """Decide, and note what the receiver believes from now on; sent, numbers (NUMBERS,): of `Sensed`."""
+    """Decide, and update the receiver's belief; sent, numbers (NUMBERS,): those of `Sensed`."""
     belief = beliefs[0]
     if belief.known == 1:
         acceleration = sent[R2 * OF_A_SIDE + ACCELERATION]
         belief.way, belief.speed = _follow(belief.way, belief.speed, belief.target, acceleration, now - belief.now)
     belief.now = now
     if belief.known == 1 and not full_rate and not _matters(belief, sent, numbers, state, by_operator, interval, now):
-        # The receiver does not know yet how fast a later command lets the arm go.
+        # The receiver does not know yet how fast the arm follows a later command.
         later = travel * sent[R2 * OF_A_SIDE + FULL_SPEED]
         belief.target = belief.told if obeyed == belief.obeyed else later
         return False
@@ -197,14 +198,14 @@ def _due(
 
 
 _SEEN_M: Final = 0.5e-3
-"""Metres, and metres a second."""
+"""Visible change, in m or m/s"""
 _SEEN_SHARE: Final = 0.01
 _SEEN_PERIOD_S: Final = 0.02
 _SEEN_AT_LEAST_S: Final = 0.1
 
 
 class TelemetryDeadband:
-    """The last view of those who look."""
+    """Deadband for the viewers, with the last telemetry."""
 
     def __init__(self) -> None:
         self._sent: Telemetry | None = None
@@ -212,7 +213,7 @@ class TelemetryDeadband:
         self._looked_s = self._sent_s = -math.inf
 
     def may_be_due(self, words: tuple[Any, ...], now_s: float) -> bool:
-        """Whether to make a telemetry, to be asked of `due`: where the words in it differ, and 50 times a second."""
+        """Return whether to make a telemetry for `due`: when its words change, and 50 times a second."""
         changed = words != self._words
         if not changed and now_s - self._looked_s + _HALF_A_TICK_S < _SEEN_PERIOD_S:
             return False
@@ -222,7 +223,7 @@ class TelemetryDeadband:
         return True
 
     def due(self, view: Telemetry, now_s: float) -> bool:
-        """Whether it is to leave: it differs by what can be seen, or the last one left 0.1 s ago."""
+        """Return whether it leaves: its change is visible, or the last one left 0.1 s ago."""
         sent = self._sent
         if sent is not None and now_s - self._sent_s + _HALF_A_TICK_S < _SEEN_AT_LEAST_S and _alike(view, sent):
             return False

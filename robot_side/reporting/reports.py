@@ -1,4 +1,4 @@
-"""Decide what leaves in a tick: answers, stiffness for those who feel, telemetry for those who look."""
+"""Messages of a tick: answers, stiffness for operators, telemetry for viewers."""
 
 from typing import Final
 
@@ -18,17 +18,17 @@ from robot_side.reporting.perceptual_deadband import StiffnessDeadband, Telemetr
 from robot_side.surroundings.surroundings import Sight
 
 OBSERVER_PERIOD_S: Final = 0.02
-"""Period of stiffness for those who only observe"""
+"""Period of stiffness for observers, in seconds"""
 
 
 class Reports:
-    """Deadbands and schedules of what leaves."""
+    """Deadbands and schedules of the messages."""
 
     def __init__(self, session: OperatorSession, law: Law, *, full_rate: bool = False) -> None:
-        """full_rate: a stiffness in every tick."""
+        """full_rate: send a stiffness in every tick."""
         self.stiffness_sent = 0
         self.felt = StiffnessDeadband(full_rate=full_rate)
-        """When a stiffness leaves"""
+        """Deadband that decides when a stiffness leaves"""
         self._session, self._law = session, law
         self._around, self._seen = MapSchedule(), TelemetryDeadband()
         self._next_observers_s = -np.inf
@@ -47,7 +47,7 @@ class Reports:
         parts: tuple[Sight, Grip, Motion],
         now_s: float,
     ) -> list[Outgoing]:
-        """Make the messages that are due."""
+        """Return the messages that are due."""
         session, (sight, grip, motion) = self._session, parts
         felt = sensed, motion.told_m_s, permission.state, grip.touching_down.stands
         outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]

@@ -1,4 +1,4 @@
-"""The way out of the robot side: through one budget, the emulated link, and the sockets."""
+"""Sending of the robot side's messages: through one budget, the emulated link, and the sockets."""
 
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple, Protocol
@@ -16,14 +16,14 @@ _PACED: Final[tuple[OutgoingStream, ...]] = ("video", "scene")
 
 
 class Sockets(Protocol):
-    """The sockets, as far as messages leave by them."""
+    """Sockets for sending."""
 
     def send(self, peer: bytes, payload: bytes, *, everywhere: bool) -> bool:
         """Send to one peer."""
         ...
 
     def publish(self, topic: bytes, payload: bytes) -> None:
-        """Send to all who look."""
+        """Send to all viewers."""
         ...
 
 
@@ -37,10 +37,10 @@ def _corrupted(leaving: _Leaving, flip: BitFlip) -> _Leaving:
 
 
 class Sending:
-    """Haptics leave at once, telemetry where there is room, pictures and the scene piece by piece between the ticks."""
+    """Sender: haptics leave at once, telemetry if there is room, pictures and the scene in pieces between ticks."""
 
     def __init__(self, link: LinkSpec, sockets: Sockets, first_number: int) -> None:
-        """first_number: of what leaves in pieces; another one in each run."""
+        """first_number: first number of messages that leave in pieces; different in each run."""
         self.budget: Budget[OutgoingStream] = Budget(_PACED, first_number)
         self._link, self._sockets = link, sockets
         self._lines: dict[Stream, DelayLine[_Leaving]] = {
@@ -48,7 +48,7 @@ class Sending:
         }
 
     def push(self, messages: Sequence[Outgoing], now_s: float) -> None:
-        """Take in what the core or who looks made."""
+        """Queue messages of the core or of the views."""
         for message in messages:
             size_bytes = len(message.payload)
             if message.stream in _PACED:
@@ -60,7 +60,7 @@ class Sending:
                 self._enter(message, TOPICS[message.stream], now_s)
 
     def send(self, queue: OutgoingQueue | None, now_s: float) -> None:
-        """Let go of what is due. queue: in front of the owner's messages; None while there is no owner."""
+        """Send the messages that are due. queue: of the owner's link; None while there is no owner."""
         self.budget.hear(queue, now_s)
         for stream, payload, is_piece in self.budget.take(now_s):
             topic = TOPICS[stream] + (PIECE if is_piece else b"")
@@ -76,29 +76,29 @@ class Sending:
         self._lines[message.stream].push(now_s, _Leaving(message, topic), len(message.payload))
 
     def tune(self, words: str) -> None:
-        """Do to messages what `words` say, from now on."""
+        """Emulate the link described by `words` from now on."""
         self._link = tuned_link(self._link, words)
         for stream, line in self._lines.items():
             line.change(self._link.profile("to_operator", stream))
 
     def next_due(self) -> float | None:
-        """When the next message is due in the emulated link; None while nothing waits there."""
+        """Return the time at which the next message is due in the emulated link; None if it is empty."""
         return min((due_s for line in self._lines.values() if (due_s := line.next_due()) is not None), default=None)
 
     @property
     def left_bit_s(self) -> float:
-        """Bits a second that haptics and telemetry leave."""
+        """Rate that haptics and telemetry leave, in bit/s"""
         return self.budget.left_bit_s
 
     @property
     def begins(self) -> bool:
-        """Whether the link has shown no limit yet."""
+        """Whether the link has shown no limit yet"""
         return self.budget.controller.begins
 
     def backlog_s(self, stream: OutgoingStream, now_s: float) -> float:
-        """Seconds that a message made for `stream` now would wait, for the budget or in the emulated link."""
+        """Return the queueing delay of a new message of `stream`, in seconds, by the budget or in the emulated link."""
         return max(self.budget.waiting_s(stream), self._lines[stream].backlog_s(now_s))
 
     def summary(self) -> dict[str, Any]:
-        """`link`, as it was emulated."""
+        """Return the summary's `link`: figures of the emulation."""
         return link_summary("to_operator", {name: line for name, line in self._lines.items() if line.figures.sent})

@@ -1,1 +1,1 @@
-"""What people see of the scene: pictures, rendered beside the robot side, and the shapes of what is there."""
+"""Views of the scene: pictures, rendered in a separate process, and shapes."""

@@ -1,6 +1,6 @@
-"""The process that renders: `python -m robot_side.viewing.companion FD [TROUBLE ...]`, started by `Cameras`.
+"""Rendering process: `python -m robot_side.viewing.companion FD [TROUBLE ...]`, started by `Cameras`.
 
-TROUBLE: what was wrong with the ways to render that were tried before, one each.
+TROUBLE: fault of each rendering backend that was tried before.
 """
 
 import contextlib
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from robot_side.viewing.rendering import Renderer
 
 _LATER = 5
-"""By so much niceness behind the process that ticks."""
+"""Niceness added to that of the ticking process."""
 
 
 def main() -> None:
@@ -47,7 +47,7 @@ def main() -> None:
 
 
 def _step_back() -> None:
-    """What the robot side's own priority and real-time scheduling are for is not this."""
+    """Give up the inherited real-time scheduling and priority: rendering does not need them."""
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     with contextlib.suppress(OSError):
@@ -79,7 +79,7 @@ def _serve(channel: Channel) -> None:
 
 
 def _renderer_of(setup: Setup) -> "Renderer":
-    from robot_side.viewing.rendering import Renderer  # noqa: PLC0415  # after the choice of a way to render
+    from robot_side.viewing.rendering import Renderer  # noqa: PLC0415  # after the choice of a backend
 
     with silenced():
         return Renderer(setup)
@@ -92,10 +92,10 @@ class _Drawing:
         self.ready = _tried() if setup.h264 else Ready(h264=False)
 
     def picture(self, order: Order) -> tuple[tuple[int, ...], bytes, int, bool]:
-        """Its shape, its bytes, its number, 0 for JPEG, and whether it is a whole one."""
-        import simplejpeg  # noqa: PLC0415  # may be missing, which `main` says
+        """Render a picture; return its shape, bytes, number (0 for JPEG), and whether it is a whole one."""
+        import simplejpeg  # noqa: PLC0415  # may be missing, which `main` reports
 
-        from robot_side.viewing.rendering import halved  # noqa: PLC0415  # after the choice of a way to render
+        from robot_side.viewing.rendering import halved  # noqa: PLC0415  # after the choice of a backend
 
         picture = self._renderer.picture(order.view, order.positions, order.mocap_poses)
         if order.halved:
@@ -113,14 +113,14 @@ class _Drawing:
 
 
 def _tried() -> Ready:
-    """Whether H.264 can be made, by making some: this imports PyAV before the first order, too."""
+    """Try to encode H.264, which also imports PyAV before the first order."""
     if importlib.util.find_spec("av") is None:
         return Ready(h264=False)
     try:
         from robot_side.viewing.h264 import H264  # noqa: PLC0415  # an extra
 
         H264().encode(np.zeros((16, 16, 3), np.uint8), 75)
-    except Exception as error:  # of PyAV's own kind, or of its import; JPEG is there
+    except Exception as error:  # PyAV's errors or an ImportError; JPEG remains
         return Ready(h264=False, trouble=f"{type(error).__name__}: {error}")
     return Ready(h264=True)
 

@@ -1,4 +1,4 @@
-"""What the robot side and the process that renders for it say to each other.
+"""Messages between the robot side and its rendering process.
 
 robot side ── Setup, Order ──▶ companion
 robot side ◀── Ready, Picture, Refusal ── companion
@@ -14,24 +14,24 @@ Triple = tuple[float, float, float]
 
 
 class Viewpoint(msgspec.Struct, frozen=True):
-    """From where a view is seen: a camera of the model, or else a pose in the frame of one of its bodies."""
+    """Viewpoint of a view: a camera of the model, or else a pose in the frame of a body."""
 
     camera: int | None = None
     body: int = 0
     position_m: Triple = (0.0, 0.0, 0.0)
     forward: Triple = (1.0, 0.0, 0.0)
-    """Unit"""
+    """Unit vector"""
     up: Triple = (0.0, 0.0, 1.0)
-    """Unit, at right angles to `forward`"""
+    """Unit vector, orthogonal to `forward`"""
     fovy_deg: float = 45.0
-    """From the picture's lower edge to its upper one"""
+    """Angle from the picture's lower edge to its upper one"""
 
 
 class Setup(msgspec.Struct, frozen=True, tag=True):
-    """The first message: what to render, and how."""
+    """First message: model, size and viewpoints."""
 
     model: bytes
-    """As MuJoCo saves it"""
+    """Model in MuJoCo's binary format"""
     width: int
     height: int
     viewpoints: dict[ViewName, Viewpoint]
@@ -40,51 +40,51 @@ class Setup(msgspec.Struct, frozen=True, tag=True):
 
 
 class Order(msgspec.Struct, frozen=True, tag=True):
-    """Render one picture of this state."""
+    """Order of one picture of this state."""
 
     view: ViewName
     captured_s: float
     positions: bytes
     """qpos, float64"""
     mocap_poses: bytes
-    """(b, 7) float64: positions and quaternions of bodies that are moved by hand"""
+    """(b, 7) float64: positions and quaternions of mocap bodies"""
     quality: int
-    """As JPEG's, 1 to 100"""
+    """Quality as of JPEG, 1 to 100"""
     halved: bool = False
-    """Half as wide and half as high"""
+    """Half the width and height"""
     h264: bool = False
-    """Instead of JPEG"""
+    """H.264 instead of JPEG"""
     whole: bool = False
-    """Make a whole picture: somebody lacks the picture before this one"""
+    """Make a whole picture: a viewer lacks the picture before this one"""
 
 
 class Ready(msgspec.Struct, frozen=True, tag=True):
-    """The answer to Setup: orders are served from now on."""
+    """Answer to Setup: orders are served from now on."""
 
     h264: bool
     trouble: str = ""
-    """Why PyAV, which is installed, makes no H.264"""
+    """Reason why the installed PyAV makes no H.264"""
 
 
 class Picture(msgspec.Struct, frozen=True, tag=True):
-    """What was ordered."""
+    """Ordered picture."""
 
     view: ViewName
     captured_s: float
-    """The order's"""
+    """Time of the order's state"""
     width: int
     height: int
     content: bytes
     took_s: float
-    """From reading the order to the finished picture"""
+    """Time from reading the order to the finished picture"""
     number: int = 0
-    """Of a picture in H.264, growing by one for each of a view; 0: it is JPEG"""
+    """Number of an H.264 picture, growing by one in each view; 0 for JPEG"""
     whole: bool = True
-    """Whether it can be shown without any other"""
+    """Whether it can be shown without another"""
 
 
 class Refusal(msgspec.Struct, frozen=True, tag=True):
-    """Nothing will ever be rendered here: why, and what would help."""
+    """Refusal of all orders, with the reason and a remedy."""
 
     reason: str
 

@@ -1,4 +1,4 @@
-"""Pictures give way to a narrow link: first their rate, then their quality, then their size."""
+"""Adaptation of pictures to a narrow link: first their rate, then their quality, then their size."""
 
 import math
 from typing import Final, NamedTuple
@@ -8,14 +8,14 @@ _LEAST_QUALITY: Final = 30
 _QUALITY_STEP: Final = 15
 _RATE_STEP: Final = 0.75
 _HALF_COST: Final = 0.4
-"""Bytes of a picture of half the width and height, as a share."""
+"""Bytes of a picture of half the width and height, as a share"""
 _ROOM: Final = 0.8
-"""Pictures come back where the next step would take at most this share of what is left."""
+"""Share of the remaining rate that the next better step may take at most: hysteresis."""
 _PATIENCE_S: Final = 1.0
 _EAGER_S: Final = 0.15
-"""The same before the link has shown a limit."""
+"""Wait before a better step, in seconds, while the link has not shown a limit."""
 _FIRST_BYTES: Final = {False: 20_000.0, True: 1_500.0}
-"""Of a picture of quality 75 and full size as JPEG and as H.264, before the first one is known."""
+"""Assumed bytes of a picture of quality 75 and full size, H.264 or not, before the first one is known."""
 
 
 class Step(NamedTuple):
@@ -24,19 +24,19 @@ class Step(NamedTuple):
     rate_hz: float
     quality: int
     halved: bool
-    """Half as wide and half as high."""
+    """Half the width and height"""
 
     def bytes_share(self, *, h264: bool = False) -> float:
-        """Bytes of a picture as a share of one of quality 75 and full size; measured on rendered scenes.
+        """Return the bytes of a picture as a share of quality 75 and full size; measured on rendered scenes.
 
-        h264: of one that follows another.
+        h264: for a picture that follows another.
         """
         of_quality = math.exp(0.032 * (self.quality - 75)) if h264 else 0.13 + 0.0116 * self.quality
         return of_quality * (_HALF_COST if self.halved else 1.0)
 
 
 def steps(rate_hz: float, quality: int) -> tuple[Step, ...]:
-    """Every step from what was asked for down to the least."""
+    """Return all steps, from the asked one down to the least."""
     made = [Step(rate_hz, quality, halved=False)]
     while (rate := made[-1].rate_hz) > _LEAST_RATE_HZ:
         made.append(made[-1]._replace(rate_hz=max(_LEAST_RATE_HZ, _RATE_STEP * rate)))
@@ -46,31 +46,31 @@ def steps(rate_hz: float, quality: int) -> tuple[Step, ...]:
 
 
 class GivingWay:
-    """Chooses the step for all views together: down at once, up by one step after a second in which it had room."""
+    """Controller of the step of all views: down at once, up by one step after a second with room for it."""
 
     def __init__(self, rate_hz: float, quality: int) -> None:
         self._steps = steps(rate_hz, quality)
         self._at = 0
         self._h264 = False
         self._full_bytes: dict[bool, float] = {}
-        """Of a picture of quality 75 and full size, as JPEG and as H.264."""
+        """Bytes of a picture of quality 75 and full size, H.264 or not"""
         self._crowded_s = -math.inf
 
     @property
     def step(self) -> Step:
-        """The present step."""
+        """Present step"""
         return self._steps[self._at]
 
     def made(self, size_bytes: int, step: Step, *, h264: bool = False) -> None:
-        """Take note of a picture that was made in that step."""
+        """Update the known size by a picture that was made in `step`."""
         full_bytes = size_bytes / step.bytes_share(h264=h264)
         known_bytes = self._full_bytes.get(h264, full_bytes)
         self._full_bytes[h264] = known_bytes + 0.1 * (full_bytes - known_bytes)
 
     def update(self, left_bit_s: float, views: int, now_s: float, *, eager: bool = False, h264: bool = False) -> Step:
-        """Choose for the number of views that somebody looks at, and bits a second that are left for pictures.
+        """Choose the step for `views` watched views and the rate left for pictures, in bit/s.
 
-        eager: the link has not shown a limit yet. h264: how pictures are made.
+        eager: the link has not shown a limit yet. h264: pictures are H.264.
         """
         if h264 != self._h264:
             self._h264, self._at = h264, 0

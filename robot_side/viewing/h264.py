@@ -1,4 +1,4 @@
-"""Pictures in H.264 (ITU-T H.264, by x264 through PyAV): a whole one, and then what changes from one to the next."""
+"""Pictures in H.264 (ITU-T H.264, by x264 through PyAV): a whole one, then the changes from one to the next."""
 
 from fractions import Fraction
 from typing import Final
@@ -15,24 +15,24 @@ _ENDLESS: Final = 1 << 30
 
 
 class H264:
-    """Encodes one view. It looks at no later picture and back at one alone, so that it adds no delay in pictures."""
+    """Encoder of one view. It uses only the picture before, no later one, so that it adds no delay in pictures."""
 
     def __init__(self, preset: str = "superfast", refresh: int = _ENDLESS) -> None:
-        """preset: of x264. refresh: pictures within which a column that is made new sweeps over the view.
+        """preset: of x264. refresh: pictures in which a column of intra refresh sweeps over the view.
 
-        av.FFmpegError, ValueError: where this FFmpeg has no x264.
+        av.FFmpegError, ValueError: if this FFmpeg has no x264.
         """
         self._preset, self._refresh = preset, refresh
         self._reformatter = VideoReformatter()
         self._kind: tuple[int, int, int] | None = None
         self._encoder: VideoCodecContext = CodecContext.create("libx264", "w")
         self.number = 0
-        """The number of the newest picture, from 1"""
+        """Number of the newest picture, from 1"""
 
     def encode(self, rgb: npt.NDArray[np.uint8], quality: int, *, whole: bool = False) -> tuple[bytes, bool]:
-        """Encode the next picture, RGB (height, width, 3), even sizes; the bytes, and whether it needs no other one.
+        """Encode the next picture, RGB (height, width, 3), even sizes; return the bytes, and whether it is a whole one.
 
-        quality: as JPEG's, 1 to 100. Another one, or another size, makes this picture a whole one.
+        quality: as of JPEG, 1 to 100. Another quality or size makes this picture a whole one.
         """
         height, width, _ = rgb.shape
         if self._kind != (kind := (width, height, constant_rate_factor(quality))):
@@ -55,12 +55,12 @@ class H264:
             "crf": str(factor),
             "forced-idr": "1",
             "intra-refresh": str(int(self._refresh < _ENDLESS)),
-            # A cut would make a whole picture by itself, which nobody asked for.
+            # Without detection of cuts, which would make whole pictures unasked.
             "sc_threshold": "0",
         }
         return encoder
 
 
 def constant_rate_factor(quality: int) -> int:
-    """x264's factor, less is better, at which pictures are at least as near (SSIM) as JPEG's of `quality`: 75, 26."""
+    """Return x264's constant rate factor with at least the SSIM of JPEG's `quality`: 26 for 75; less is better."""
     return round(45.0 - 0.25 * quality)

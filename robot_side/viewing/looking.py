@@ -1,4 +1,4 @@
-"""What people look at, made in the time between ticks, and only while somebody does: pictures and the scene's state."""
+"""Views made between ticks, while somebody watches: pictures and the scene's state."""
 
 import math
 from collections import deque
@@ -17,33 +17,33 @@ SCENE_PERIOD_S: Final = 1.0 / 30.0
 SHAPES_PERIOD_S: Final = 3.0
 _SHAPES_BYTES_PER_S: Final = 400_000.0
 _SHAPES_SHARE: Final = 0.1
-"""Large shapes are repeated less often, so that they take no more of a link than this, in bytes and as a share."""
+"""Most of a link that repeated shapes take, in bytes a second and as a share: large ones are repeated less often."""
 _BACKLOG_S: Final = 0.03
-"""While that much waits to leave, nothing more is made: the newest is worth more than the next."""
+"""Queueing delay, in seconds, above which nothing is made: the wait would age it."""
 _SEEN_TO_S: Final = 0.1
 _FIGURES_S: Final = 1.0
 
 
 class Room(Protocol):
-    """The room that a link has for what is made here."""
+    """Capacity that a link has for the views."""
 
     @property
     def left_bit_s(self) -> float:
-        """Bits a second that are left for it."""
+        """Rate left for the views, in bit/s"""
         ...
 
     @property
     def begins(self) -> bool:
-        """Whether the link has shown no limit yet."""
+        """Whether the link has shown no limit yet"""
         ...
 
     def backlog_s(self, stream: OutgoingStream, now_s: float) -> float:
-        """Seconds that a message made for `stream` now would wait for those before it."""
+        """Return the queueing delay of a new message of `stream`, in seconds."""
         ...
 
 
 class Looking:
-    """Decides what is to be made in each turn; never more of one kind than the rate, never what nobody looks at."""
+    """Scheduler of the views in each turn: each at most at its rate, and only while it is watched."""
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class Looking:
         always: Collection[str] = (),
         seed: int = 0,
     ) -> None:
-        """always: of `overview`, `first_person` and `scene`, what is made although nobody looks: it is recorded."""
+        """always: those of `overview`, `first_person` and `scene` that are made unwatched, for the recording."""
         self._core = core
         self._scene_view = scene_view
         self._cameras = cameras
@@ -73,12 +73,12 @@ class Looking:
         self._frame_age = RunningStatistics(seed)
 
     def ticked(self, took_s: float, overruns: int) -> None:
-        """Take note of a tick, for SceneState."""
+        """Count a tick, for SceneState."""
         self._ticks_s.append(took_s)
         self._ticks.overruns = overruns
 
     def idle(self, now_s: float, taken_s: float) -> list[Outgoing]:
-        """What to send now. `taken_s`: when the newest tick was, whose state is shown."""
+        """Return the messages to send now. taken_s: time of the newest tick, whose state is shown."""
         looked_at = self._core.session.watchers.looked_at(now_s) | self._always
         if not looked_at and now_s < self._next_look_s:
             return []
@@ -96,7 +96,7 @@ class Looking:
         return outgoing
 
     def summary(self) -> dict[str, Any]:
-        """`looked_at`: of each view and of the scene what was sent and what was not, and why."""
+        """Return the summary's `looked_at`: sent and unsent counts of each view and of the scene, with reasons."""
         cameras, counts = self._cameras, {name: dict(counts) for name, counts in self._counts.items()}
         counts["scene"]["shapes"] = self._shapes_sent
         took_s = sorted(cameras.took_s) if cameras is not None else []
@@ -107,7 +107,7 @@ class Looking:
 
     @property
     def pictures(self) -> dict[str, float | int] | None:
-        """Pictures as they are made now: `rate_hz`, `quality`, `size` (share of the width); None without cameras."""
+        """Present `rate_hz`, `quality` and `size` (share of the width) of pictures; None without cameras"""
         if self._cameras is None:
             return None
         step = self._cameras.giving_way.step
@@ -119,10 +119,10 @@ class Looking:
             self._cameras.close()
 
     def _turns(self, name: str, now_s: float) -> int:
-        """How often something has become due since this was last asked; 0 for not yet."""
+        """Return how often `name` has become due since the last call."""
         rate_hz = None if name == "scene" or self._cameras is None else self._cameras.giving_way.step.rate_hz
         period_s = SCENE_PERIOD_S if rate_hz is None else 1.0 / rate_hz
-        # The views take turns, so that neither waits for the other.
+        # The views alternate, so that neither waits for the other.
         next_s = self._next_s.setdefault(name, now_s + (0.5 * period_s if name == VIEW_NAMES[1] else 0.0))
         if now_s < next_s:
             return 0
@@ -137,13 +137,13 @@ class Looking:
         if cameras is None:
             return []
         views = len(looked_at & set(VIEW_NAMES))
-        # What is recorded is JPEG: replay and export begin anywhere.
+        # Recorded pictures are JPEG: replay and export begin anywhere.
         lacks = None if self._always else self._core.session.watchers.lacks(now_s)
         h264 = cameras.makes_h264(lacks)
         cameras.giving_way.update(self._room.left_bit_s, views, now_s, eager=self._room.begins, h264=h264)
         wanted: list[ViewName] = []
         full = self._room.backlog_s("video", now_s) > _BACKLOG_S
-        # A late view comes as soon as there is room: at its next turn, the other one could again be before it.
+        # A late view is made as soon as there is room: at its next turn the other one could be first again.
         self._late &= looked_at
         for name in VIEW_NAMES:
             if cameras.works and (name in due or name in self._late):

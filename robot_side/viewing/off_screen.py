@@ -1,6 +1,6 @@
-"""Which of MuJoCo's ways to render without a screen works on this machine.
+"""Choice of MuJoCo's off-screen rendering backend on this machine.
 
-MuJoCo and PyOpenGL settle on one when they are imported, so that another one takes another process.
+MuJoCo and PyOpenGL fix the backend at import, so that another one needs another process.
 """
 
 import contextlib
@@ -11,25 +11,25 @@ from pathlib import Path
 from typing import Final
 
 BACKENDS: Final = ("egl", "osmesa") if sys.platform == "linux" else ("",)
-"""In the order in which they are tried; the empty one is what MuJoCo takes by itself."""
+"""Backends in the order of trial; the empty name is MuJoCo's default."""
 REMEDY: Final = "sudo apt-get install libegl1 libgl1-mesa-dri (or: libosmesa6)"
 
 
 def choose(backend: str) -> None:
-    """Take `backend`, before MuJoCo is imported for the first time."""
+    """Select `backend`, before MuJoCo is imported for the first time."""
     if backend:
         os.environ["MUJOCO_GL"] = backend
     os.environ.pop("PYOPENGL_PLATFORM", None)
-    # Mesa would take every processor, also the one that ticks.
+    # Mesa would use every processor, also the one that ticks.
     os.environ.setdefault("LP_NUM_THREADS", "0")
 
 
 def trouble_with(backend: str) -> str | None:
-    """Why nothing can be rendered by way of `backend`, in one line; None if it can. In a process of its own."""
+    """Return the fault of `backend`, in one line; None if it works. To be called in a separate process."""
     choose(backend)
     try:
         with silenced():
-            import mujoco  # type: ignore[import-untyped]  # noqa: PLC0415  # only now is chosen how it renders
+            import mujoco  # type: ignore[import-untyped]  # noqa: PLC0415  # after the choice of a backend
 
             context = mujoco.GLContext(16, 16)
             context.make_current()
@@ -42,7 +42,7 @@ def trouble_with(backend: str) -> str | None:
 
 @contextlib.contextmanager
 def silenced() -> Iterator[None]:
-    """What drivers write to standard error by themselves is not for people."""
+    """Discard standard error, where graphics drivers write directly."""
     sys.stderr.flush()
     kept = os.dup(2)
     with Path(os.devnull).open("wb") as nowhere:

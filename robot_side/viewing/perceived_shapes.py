@@ -1,4 +1,4 @@
-"""The shapes of objects that are perceived elsewhere, for whoever draws them; they change from frame to frame."""
+"""Shapes of objects from a perception process, for drawing; they change from frame to frame."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -16,7 +16,7 @@ _CORNERS: Final = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]], dtype="
 
 
 class PerceivedModel(SceneModel):
-    """The links of a scene's robot, and whatever objects the newest frame has."""
+    """Links of a scene's robot, and the objects of the newest frame."""
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
@@ -24,7 +24,7 @@ class PerceivedModel(SceneModel):
         self._known: tuple[object, ...] = ()
 
     def follow(self, objects: PerceivedObjects) -> bool:
-        """Take over a frame's objects; whether there are others now, or of other shapes."""
+        """Take a frame's objects; return whether objects or shapes are different now."""
         if objects is self._frame:
             return False
         arrays = [*(kind.owner for kind in KINDS), *_SIZES.values()]
@@ -37,7 +37,7 @@ class PerceivedModel(SceneModel):
         return True
 
     def object_shapes(self, index: int) -> Iterator[Shape]:
-        """Of one object, in its own frame."""
+        """Yield the shapes of one object, in its frame."""
         frame = self._frame
         if frame is None or frame.positions_m is None or frame.rotations is None:
             return
@@ -49,7 +49,7 @@ class PerceivedModel(SceneModel):
             yield Shape(index, False, "plane", (0.0, 0.0, 0.0), _IN_PLACE)
         for corners in frame.tetrahedron_vertices_m[frame.tetrahedron_object == index]:
             own = (corners - frame.positions_m[index]) @ frame.rotations[index]
-            # Seen from outside, whichever way round its corners are.
+            # Anticlockwise as seen from outside, for either orientation of the corners.
             triangles = _CORNERS if np.linalg.det(own[1:] - own[0]) < 0.0 else _CORNERS[:, ::-1]
             yield Shape(
                 *(index, False, "mesh", (1.0, 1.0, 1.0), _IN_PLACE),

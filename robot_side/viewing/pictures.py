@@ -1,4 +1,4 @@
-"""The robot side's end of rendering: orders pictures of a companion and takes them, without ever waiting for it."""
+"""Robot side's end of rendering: orders pictures from a companion process and takes them, without ever waiting."""
 
 import math
 import threading
@@ -20,48 +20,48 @@ from robot_side.viewing.viewpoints import viewpoints
 
 MODULE: Final = "robot_side.viewing.companion"
 IDLE_S: Final = 60.0
-"""A companion that nobody has needed for so long is ended."""
+"""Time without use after which a companion is ended, in seconds."""
 RETRY_S: Final = 5.0
-"""One that has died is started again no sooner."""
+"""Time before a failed companion is started again, in seconds."""
 _SILENT_S: Final = 30.0
-"""An order that is not answered within this: it hangs. A slow machine takes a while to start."""
+"""Time without an answer to an order after which the companion hangs, in seconds: slow machines start slowly."""
 _ENDING_S: Final = 5.0
 _WHOLE_S: Final = 0.5
-"""Whole pictures in H.264 are ordered no more often, as a viewer that asks for many takes the share of others."""
+"""Least period of whole H.264 pictures, in seconds: a viewer that asks for many takes the share of others."""
 _SETUP: Final = "setup"
-"""Among the orders, as it is answered like one"""
+"""Name of the setup among the orders, as it is answered like one"""
 _NEVER_BEGAN: Final = 2
-"""After so many starts in a row that came to no picture, no other one follows."""
+"""Starts in a row without any picture, after which no further one follows"""
 
 
 def saved_model(scene: Scene) -> bytes:
-    """Save the model of a scene as MuJoCo does, for `Setup`."""
+    """Return the model of a scene in MuJoCo's binary format, for `Setup`."""
     saved = np.zeros(mujoco.mj_sizeModel(scene.model), dtype=np.uint8)
     mujoco.mj_saveModel(scene.model, None, saved)
     return saved.tobytes()
 
 
 class Renders(Protocol):
-    """A `Companion`, as far as it is needed here."""
+    """Interface of a `Companion` that is used here."""
 
     channel: Channel
 
     @property
     def running(self) -> bool:
-        """Whether it has not ended yet."""
+        """Whether the process has not ended yet"""
         ...
 
     def close(self, limit_s: float = ...) -> bool:
-        """End it."""
+        """End the process."""
         ...
 
 
 Start = Callable[[Callable[[Renders | str], None]], None]
-"""Starts a companion, and hands it, or why there is none, to the function that it is given, at once or later."""
+"""Function that starts a companion and passes it, or the reason of a failure, to its argument, at once or later"""
 
 
 def start_beside(done: Callable[[Renders | str], None]) -> None:
-    """In a thread, as starting a process takes milliseconds; what is waited for there holds nobody up."""
+    """Start a companion in a thread, as starting a process takes milliseconds."""
 
     def begin() -> None:
         try:
@@ -73,7 +73,7 @@ def start_beside(done: Callable[[Renders | str], None]) -> None:
 
 
 class Cameras:
-    """Keeps one order of each view under way while it is wanted; starts the companion when it is needed first."""
+    """Keeps one order of each wanted view under way; starts the companion at the first need."""
 
     def __init__(
         self,
@@ -82,18 +82,18 @@ class Cameras:
         note: Callable[[str], None],
         start: Start = start_beside,
     ) -> None:
-        """note: told in one line what does not work, and what would help."""
+        """note: called with one line for each fault, with a remedy."""
         self._h264 = settings.codec == "auto"
-        """Whether the companion makes H.264; believed until it says no"""
+        """Whether the companion makes H.264; assumed until it denies"""
         shape = settings.width, settings.height
         self._setup = encode(Setup(saved_model(scene), *shape, viewpoints(scene), self._h264))
         self.giving_way = GivingWay(settings.rate_hz, settings.quality)
-        """Chooses how often and how well pictures are made"""
+        """Controller of the pictures' rate, quality and size"""
         self.starts = 0
         self.took_s: list[float] = []
-        """How long the companion was at the newest pictures, at most a thousand."""
+        """Companion's times for the newest pictures, in seconds, at most a thousand"""
         self._whole: dict[ViewName, tuple[int, float]] = {}
-        """The number of the newest whole picture in H.264, and when it came"""
+        """Number and arrival time of the newest whole H.264 picture"""
         self._data = scene.data
         self._note = note
         self._start = start
@@ -101,7 +101,7 @@ class Cameras:
         self._handed_over: list[Renders | str] = []
         self._companion: Renders | None = None
         self._ended: list[tuple[Renders, float]] = []
-        """Those that may take until then to end by themselves."""
+        """Ended companions, with the time until which they may exit by themselves"""
         self._ordered_s: dict[str, float] = {}
         self._ordered_as: dict[ViewName, Step] = {}
         self._wanted_s = -math.inf
@@ -114,24 +114,24 @@ class Cameras:
 
     @property
     def works(self) -> bool:
-        """False once it is known that nothing can be rendered, or where nothing is to be."""
+        """Whether pictures can be rendered, as far as known, and are wanted by the settings"""
         return not self._hopeless
 
     @property
     def process(self) -> Renders | None:
-        """The companion, while there is one."""
+        """Companion, while there is one"""
         return self._companion
 
     def busy(self, view: ViewName) -> bool:
-        """Whether an order of `view` is under way."""
+        """Return whether an order of `view` is under way."""
         return view in self._ordered_s
 
     def makes_h264(self, lacks: tuple[int, int] | None) -> bool:
-        """Whether pictures are H.264 for those who lack `lacks`, as in `Watch`; None: they show JPEG alone."""
+        """Return whether pictures are H.264 for viewers that lack `lacks`, as in `Watch`; None: they show only JPEG."""
         return self._h264 and lacks is not None
 
     def message(self, picture: Picture, header: Header) -> VideoFrame | VideoStep:
-        """Make what is published of a picture."""
+        """Return the published message of a picture."""
         place = header, picture.view, picture.captured_s, picture.width, picture.height
         if picture.number == 0:
             return VideoFrame(*place, picture.content)
@@ -140,10 +140,10 @@ class Cameras:
     def update(
         self, now_s: float, captured_s: float, wanted: Collection[ViewName], lacks: tuple[int, int] | None = None
     ) -> list[Picture]:
-        """Order the `wanted` views that are not under way, of the state as it is; what has been finished.
+        """Order `wanted` views that are not under way, of the present state; return the finished pictures.
 
-        lacks: as `makes_h264`'s, the newest of all who look. captured_s: when that state was so. To be
-        called in every turn while `wanted` is not empty, and now and then otherwise.
+        lacks: as for `makes_h264`, the newest of all viewers. captured_s: time of the state. To be called in every turn
+        while `wanted` is not empty, and sometimes otherwise.
         """
         if wanted:
             self._wanted_s = now_s
@@ -169,7 +169,7 @@ class Cameras:
         return pictures
 
     def close(self) -> None:
-        """End the companion, within a moment."""
+        """End the companion, within a short time."""
         self._hopeless = True
         if self._companion is not None:
             self._end(self._companion, -math.inf)
@@ -199,7 +199,7 @@ class Cameras:
         mocap = np.concatenate([data.mocap_pos, data.mocap_quat], axis=1).tobytes() if len(data.mocap_pos) else b""
         step, h264 = self.giving_way.step, self.makes_h264(lacks)
         number, came_s = self._whole.get(view, (0, -math.inf))
-        # One that was lost is newer than the newest whole one.
+        # A lost picture is newer than the newest whole one.
         lost = lacks is not None and lacks[VIEW_NAMES.index(view)] > number
         whole = h264 and lost and now_s - came_s >= _WHOLE_S
         positions = data.qpos.tobytes()
@@ -221,7 +221,7 @@ class Cameras:
             self._ordered_s.pop(message.view, None)
             self._failures, self._has_worked = 0, True
             if message.number and message.whole:
-                # Seldom, and ten times a step: it says nothing of those that follow.
+                # Whole pictures are rare, and ten times as large as the following ones: not counted.
                 self._whole[message.view] = message.number, now_s
             else:
                 step = self._ordered_as[message.view]
@@ -263,6 +263,6 @@ class Cameras:
         self._whole.clear()
 
     def _follow_ends(self, now_s: float) -> None:
-        """See those off that have been told to end; who does not is killed."""
+        """Follow ended companions until they exit; kill one that does not."""
         if self._ended and (not self._ended[0][0].running or now_s >= self._ended[0][1]):
             self._ended.pop(0)[0].close(0.0)

@@ -1,4 +1,4 @@
-"""Pictures of a MuJoCo model, rendered off-screen; imported only where rendering works (see `off_screen`)."""
+"""Off-screen rendering of a MuJoCo model; imported only where rendering works (see `off_screen`)."""
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
@@ -10,11 +10,11 @@ from robot_side.viewing.exchange import Setup, Viewpoint
 
 _MODEL = "model.mjb"
 _BESIDE_GEOMS = 1000
-"""Room in a picture for what is no geom: sites, tendons, skins."""
+"""Capacity of a picture for elements other than geoms: sites, tendons, skins."""
 
 
 class Renderer:
-    """Renders one model from its viewpoints."""
+    """Renderer of one model from its viewpoints."""
 
     def __init__(self, setup: Setup) -> None:
         model = mujoco.MjModel.from_binary_path(_MODEL, {_MODEL: setup.model})
@@ -29,7 +29,7 @@ class Renderer:
             self._renderer.scene.flags[flag] = 0
 
     def picture(self, view: ViewName, positions: bytes, mocap_poses: bytes = b"") -> npt.NDArray[np.uint8]:
-        """RGB (height, width, 3) of the state with qpos `positions`; ValueError for one of another length."""
+        """Return RGB (height, width, 3) of the state with qpos `positions`; ValueError for another length."""
         model, data = self._model, self._data
         data.qpos[:] = np.frombuffer(positions)
         mocap = np.frombuffer(mocap_poses).reshape(-1, 7)
@@ -49,7 +49,7 @@ class Renderer:
         return picture
 
     def close(self) -> None:
-        """Free what the driver holds."""
+        """Free the graphics resources."""
         self._renderer.close()
 
     def _look_from(self, viewpoint: Viewpoint) -> None:
@@ -58,12 +58,12 @@ class Renderer:
             camera.pos, camera.forward, camera.up = position_m, forward, up
             top = camera.frustum_near * np.tan(np.radians(0.5 * viewpoint.fovy_deg))
             camera.frustum_bottom, camera.frustum_top = -top, top
-            # Without a width, the picture's own shape counts.
+            # A width of 0 takes the picture's aspect ratio.
             camera.frustum_center = camera.frustum_width = 0.0
 
 
 def halved(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    """Take the means of two by two pixels (2h, 2w, 3) into one (h, w, 3); an odd last row or column is left out."""
+    """Return the means of two by two pixels, (2h, 2w, 3) to (h, w, 3); an odd last row or column is left out."""
     height, width = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2
     rows = picture[0:height:2].astype(np.uint16) + picture[1:height:2]
     half: npt.NDArray[np.uint8] = ((rows[:, 0:width:2] + rows[:, 1:width:2] + 2) >> 2).astype(np.uint8)
@@ -71,7 +71,7 @@ def halved(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
 
 
 def placed(viewpoint: Viewpoint, data: mujoco.MjData) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Where a viewpoint without a camera is now, looks to, and has above: (3,) each, in the world frame."""
+    """Return position, forward and up of a viewpoint without a camera: (3,) each, in the world frame."""
     rotation = data.xmat[viewpoint.body].reshape(3, 3)
     position_m: FloatArray = data.xpos[viewpoint.body] + rotation @ viewpoint.position_m
     return position_m, rotation @ viewpoint.forward, rotation @ viewpoint.up

@@ -1,4 +1,4 @@
-"""The scene as the robot side believes it is, as messages for whoever looks: what there is, where, and what it adds."""
+"""Messages of the perceived scene for viewers: shapes, poses and the law's results."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -21,17 +21,17 @@ from robot_side.viewing.shapes import SceneModel, bytes_of
 
 _TRIGGERS: Final[tuple[Trigger, Trigger]] = ("l2", "r2")
 _FEW: Final = 64
-"""So many objects have their poses in every SceneState, whether they move or not."""
+"""Most objects for which every SceneState has all poses, even of objects at rest."""
 _STANDS_M: Final = 1e-6
 _MOST_SHAPES_BYTES: Final = VIEW_MAXIMUM_BYTES - 65536
 _ENTRY_BYTES: Final = 40
-"""What an object takes beside its name and its shapes."""
+"""Bytes of an object besides its name and its shapes"""
 _SHAPES_AT_ONCE: Final = 4
 
 
 @dataclass
 class TickFigures:
-    """How long the latest ticks took, and how many were not taken."""
+    """Durations of the latest ticks, and the count of skipped ones."""
 
     p50_us: float = 0.0
     p99_us: float = 0.0
@@ -40,7 +40,7 @@ class TickFigures:
 
 @dataclass(frozen=True)
 class _Begun:
-    """A SceneState that is not finished yet."""
+    """SceneState in progress."""
 
     sensed: Sensed
     situation: Situation
@@ -53,12 +53,12 @@ class _Begun:
 
 
 class SceneView:
-    """Makes SceneShapes and SceneState. What it says of shapes stays as it is until `begin_shapes` is called."""
+    """Maker of SceneShapes and SceneState. Shapes stay the same until `begin_shapes` is called."""
 
     def __init__(self, model: SceneModel, kinematics: MujocoKinematics, law: Explains) -> None:
         self.version = 0
         self.shapes: Prepared | None = None
-        """SceneShapes, once `work_on_shapes` has finished it"""
+        """SceneShapes, once finished by `work_on_shapes`"""
         self.shapes_bytes = 0
         self.left_out = 0
         self._model = model
@@ -66,25 +66,25 @@ class SceneView:
         self._law = law
         self._links: tuple[tuple[Shape, ...], int] | None = None
         self._base: PerceivedObjects | None = None
-        """As they stood when the shapes were made"""
+        """Objects at the time of the shapes"""
         self._making: Iterator[None] | None = None
         self._begun: _Begun | None = None
 
     @property
     def complete(self) -> bool:
-        """Whether there are shapes, and of everything."""
+        """Whether there are shapes, of all objects"""
         return self.shapes is not None and self.left_out == 0
 
     def outdated(self, objects: PerceivedObjects) -> bool:
-        """Whether there are other objects in this frame than before, or of other shapes."""
+        """Return whether this frame has other objects or shapes than before."""
         return self._model.follow(objects)
 
     def begin_shapes(self, header: Header, situation: Situation) -> None:
-        """Begin to put SceneShapes together anew, the objects nearest to the tool first."""
+        """Begin to make SceneShapes again, the objects nearest to the tool first."""
         self._making = self._make_shapes(header, situation.objects, situation.pose.tool_position_m)
 
     def work_on_shapes(self) -> bool:
-        """Go on with what was begun, for a fraction of a millisecond; whether it is finished."""
+        """Continue the shapes for a fraction of a millisecond; return whether they are finished."""
         if self._making is None:
             return self.shapes is not None
         for _ in range(_SHAPES_AT_ONCE):
@@ -94,14 +94,14 @@ class SceneView:
         return False
 
     def begin_state(self, sensed: Sensed, situation: Situation, taken_s: float) -> None:
-        """Begin a SceneState of the newest tick, which found `sensed` in `situation` at `taken_s`."""
+        """Begin a SceneState of the newest tick at `taken_s`, with its `sensed` and `situation`."""
         links = _row_bytes(self._kinematics.body_poses(self._model.bodies))
         index = self._moved(situation.objects)
         poses = object_poses(situation.objects, index)
         self._begun = _Begun(sensed, situation, taken_s, self.version, links, index, _row_bytes(poses))
 
     def work_on_state(self, header: Callable[[], Header], ticks: TickFigures) -> SceneState | None:
-        """Go on with what was begun, for some 200 us: an explanation, or at last the message under a new header."""
+        """Continue the state for some 200 us: an explanation, or at last the message under a new header."""
         begun = self._begun
         if begun is None:
             return None
@@ -137,7 +137,7 @@ class SceneView:
         )
 
     def _moved(self, objects: PerceivedObjects) -> IntArray:
-        """The objects whose poses have to be said."""
+        """Return the indices of objects whose poses must be sent."""
         if len(objects.names) <= _FEW:
             return np.arange(len(objects.names))
         if self._base is None:
@@ -181,9 +181,9 @@ class SceneView:
 
 
 def object_poses(objects: PerceivedObjects, index: IntArray) -> FloatArray:
-    """Where the objects of `index` (n,) are perceived (n, 7): positions and quaternions, w first.
+    """Return the perceived poses (n, 7) of the objects `index` (n,): positions and quaternions, w first.
 
-    ValueError where nobody knows.
+    ValueError without known poses.
     """
     positions_m, rotations = _frames(objects)
     if index.size == 0:
@@ -199,7 +199,7 @@ def _frames(objects: PerceivedObjects) -> tuple[FloatArray, FloatArray]:
 
 
 def _boxed(shape: Shape) -> Shape:
-    """A box around a mesh that there is no room for."""
+    """Return a box around a mesh that is too large for the message."""
     vertices_m = np.frombuffer(shape.vertices_m, "<f4").reshape(-1, 3).astype(np.float64)
     low, high = vertices_m.min(axis=0), vertices_m.max(axis=0)
     x, y, z, *quaternion = shape.pose

@@ -1,4 +1,4 @@
-"""What a person may set about pictures."""
+"""Settings of pictures."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -13,19 +13,19 @@ _Pixels = Annotated[int, Meta(ge=16, le=4096)]
 
 @dataclass(frozen=True)
 class CamerasSettings:
-    """The two views, rendered while somebody looks at them, in a process of their own."""
+    """The two views, rendered in a separate process while somebody watches them."""
 
     on: Annotated[bool, tyro.conf.arg(name="cameras", prefix_name=False)] = True
-    """Render what somebody looks at; without it nobody sees pictures, and the arm is felt and driven all the same."""
+    """Render the watched views; without pictures the arm is felt and driven all the same."""
     width: _Pixels = 640
-    """Pixels of each picture."""
+    """Width of each picture, in pixels."""
     height: _Pixels = 480
     rate_hz: Annotated[float, Meta(ge=0.1, le=120.0)] = 30.0
-    """Pictures of each view in a second."""
+    """Pictures of each view a second."""
     quality: Annotated[int, Meta(ge=1, le=100)] = 75
-    """1 to 100: 75 is 20 kB for each picture as JPEG, more than 90 three times that; 1 to 2 kB as H.264."""
+    """Quality, 1 to 100: a picture of 75 takes 20 kB as JPEG (above 90 three times that), 1 to 2 kB as H.264."""
     codec: Literal["auto", "jpeg"] = "auto"
-    """auto: H.264 where PyAV is installed here and with all who look, and nothing is recorded here; else JPEG."""
+    """auto: H.264 if PyAV is installed here and by all viewers, and nothing is recorded here; else JPEG."""
 
     def __post_init__(self) -> None:
         check_limits(self)

@@ -1,4 +1,4 @@
-"""The shapes of a scene's links and objects for whoever draws them: what MuJoCo's geoms are."""
+"""Shapes of a scene's links and objects, for drawing, from MuJoCo's geoms."""
 
 from collections.abc import Iterator
 from typing import Any, Final
@@ -22,13 +22,13 @@ _KINDS: Final[dict[GeomKind, ShapeKind]] = {
     GeomKind.BOX: "box",
 }
 _SHOWN_GROUPS: Final = 3
-"""MuJoCo's viewers show geoms of these groups; collision shapes below visual ones are in later groups."""
+"""Count of geom groups that MuJoCo's viewers show; collision shapes below visual ones are in later groups."""
 _SIZES: Final = {"sphere": 1, "capsule": 2, "cylinder": 2, "plane": 2, "box": 3, "ellipsoid": 3}
-"""How many of a geom's three sizes mean something."""
+"""Count of a geom's three sizes that its kind uses"""
 
 
 class SceneModel:
-    """Which links and objects there are, and their shapes in frames of their own."""
+    """Links and objects of a scene, and their shapes in their frames."""
 
     def __init__(self, scene: Scene) -> None:
         model, robot = scene.model, scene.robot
@@ -36,32 +36,32 @@ class SceneModel:
         shown = of_robot[model.geom_group[of_robot] < _SHOWN_GROUPS]
         self._link_geoms = shown if shown.size else of_robot
         self.bodies: IntArray = np.unique(model.geom_bodyid[self._link_geoms]).astype(np.int64)
-        """(n,) of the links"""
+        """(n,) bodies of the links"""
         self.links = tuple(model.body(int(body)).name or f"body{body}" for body in self.bodies)
         self.objects = tuple(thing.name for thing in scene.objects)
         fixed = scene.fixed
         self.may_move: IntArray = np.array(
             [index for index, name in enumerate(self.objects) if name not in fixed], dtype=np.int64
         )
-        """Objects that a joint lets move"""
+        """Indices of the objects that a joint or mocap can move"""
         self._model = model
         self._geoms = [thing.geoms for thing in scene.objects]
         self._start = scene.data.geom_xpos.copy(), scene.data.geom_xmat.reshape(-1, 3, 3).copy()
 
     def follow(self, objects: PerceivedObjects) -> bool:
-        """Take note of a frame; whether there are other objects now: a scene's stay the same."""
+        """Return whether a frame has other objects: never, as a scene's stay the same."""
         del objects
         return False
 
     def link_shapes(self) -> Iterator[Shape]:
-        """Of the robot, in the frames of its bodies."""
+        """Yield the robot's shapes, in the frames of the bodies."""
         model, owners = self._model, {int(body): index for index, body in enumerate(self.bodies)}
         for geom in self._link_geoms:
             owner = owners[int(model.geom_bodyid[geom])]
             yield self._shape(int(geom), owner, True, model.geom_pos[geom], model.geom_quat[geom])
 
     def object_shapes(self, index: int) -> Iterator[Shape]:
-        """Of one object, in the frame of its first geom; whatever joints it has inside count as they stood at first."""
+        """Yield the shapes of one object, in the first geom's frame; inner joints keep their start positions."""
         positions_m, rotations = self._start
         first = self._geoms[index][0]
         yield self._shape(first, index, False, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
@@ -94,7 +94,7 @@ class SceneModel:
 
 
 def bytes_of(shape: Shape) -> int:
-    """How much a shape takes in a message, at most."""
+    """Return an upper bound of a shape's bytes in a message."""
     return len(shape.vertices_m) + len(shape.triangles) + 160
 
 

@@ -1,4 +1,4 @@
-"""From where the two views of §4.3 are seen: the model's own cameras, or places that any arm has."""
+"""Viewpoints of the two views of §4.3: the model's cameras, or poses that every arm has."""
 
 import numpy as np
 
@@ -9,16 +9,16 @@ from robot_side.viewing.exchange import Triple, Viewpoint
 
 _OVERVIEW = "overview"
 _DOWN_DEG, _ASIDE_DEG = 55.0, 20.0
-"""The overview looks down over the arm's shoulder, so that ahead is up and the arm hides little."""
+"""Angles of the overview, which looks down over the arm's shoulder: ahead is up and the arm hides little."""
 _SHORTEST_REACH_M = 0.3
 _LEAST_ALONG = 0.5
-"""Cosine: a camera that looks within 60° of the approach sees what is ahead."""
+"""Cosine of the largest angle, 60°, between the approach and a camera that shows it."""
 _CLEARANCE_M = 0.05
 _WIDE_DEG = 70.0
 
 
 def viewpoints(scene: Scene) -> dict[ViewName, Viewpoint]:
-    """Both, for a scene at its start."""
+    """Return both viewpoints, for a scene at its start."""
     return {"overview": _overview(scene), "first_person": _first_person(scene)}
 
 
@@ -43,7 +43,7 @@ def _overview(scene: Scene) -> Viewpoint:
 
 
 def _first_person(scene: Scene) -> Viewpoint:
-    """The gripper's own camera, else one behind the palm and beside it, where fingers that close do not hide it."""
+    """Return the gripper's camera, else a viewpoint behind and beside the palm that closing fingers do not hide."""
     model, data, robot = scene.model, scene.data, scene.robot
     tool_m, tool = data.site_xpos[robot.site], data.site_xmat[robot.site].reshape(3, 3)
     carriers = {int(model.site_bodyid[robot.site]), *model.geom_bodyid[robot.gripper_geoms].tolist()}
@@ -61,7 +61,7 @@ def _first_person(scene: Scene) -> Viewpoint:
     up[axis] = side
     length_m = max(float(-low_m[2]), 0.05)
     place_m = aside_m * up - np.array([0.0, 0.0, 1.6 * length_m])
-    # Towards a point that is as far ahead as the palm is behind, so that fingers and what is ahead are seen alike.
+    # Towards a point as far ahead as the palm is behind, so that fingers and objects ahead are both visible.
     forward = np.array([0.0, 0.0, length_m]) - place_m
     forward /= np.linalg.norm(forward)
     up -= (up @ forward) * forward
@@ -78,7 +78,7 @@ def _first_person(scene: Scene) -> Viewpoint:
 
 
 def _extent(scene: Scene, tool_m: FloatArray, tool: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The lowest and highest corner (3,) of a box around the gripper's geoms, in the tool's frame."""
+    """Return the lowest and highest corner (3,) of a box around the gripper's geoms, in the tool frame."""
     model, data, geoms = scene.model, scene.data, scene.robot.gripper_geoms
     if geoms.size == 0:
         return np.full(3, -0.05), np.full(3, 0.05)

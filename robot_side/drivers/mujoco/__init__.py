@@ -1,1 +1,1 @@
-"""The simulated world behind the arm's and the camera's ports; only here and in the cameras is MuJoCo known."""
+"""Simulated world behind the ports of arm and camera; only this package and the cameras use MuJoCo."""

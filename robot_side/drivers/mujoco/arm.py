@@ -1,4 +1,4 @@
-"""The simulated arm: physics on a clock of its own, commands that run out, and sensors."""
+"""Simulated arm: physics on its own clock, commands that expire, and sensors."""
 
 import math
 from typing import Final, NamedTuple
@@ -19,36 +19,36 @@ from robot_side.drivers.mujoco.scene import Scene
 
 _LONGEST_ADVANCE_S = 2.0
 LONGEST_TURN_S: Final = 0.02
-"""Physics that takes longer than real time gives way to messages, stops and leases this often."""
+"""Longest time, in seconds, for which slow physics may delay messages, stops and leases."""
 _LIMIT_MARGIN_RAD = 0.005
 # Bad positions, velocities and accelerations, which are neighbours among MuJoCo's warnings.
 _UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
 
 
 class Stand(NamedTuple):
-    """What is known of an arm that stands at its start with the gripper open."""
+    """Properties of the arm at its start, with the gripper open."""
 
     travel: GripperTravel | None
-    """None without a gripper"""
+    """Travel of the gripper; None without one"""
     ends_rad: tuple[FloatArray, FloatArray]
-    """Where the joints (n,) end, lowest and highest"""
+    """Lower and upper ends of the joints, (n,) each"""
 
 
 def stand(scene: Scene) -> Stand:
-    """Open the gripper where the scene starts; ConfigurationError where its inputs' range is not known."""
+    """Open the gripper at the scene's start; ConfigurationError if its inputs' range is not known."""
     robot, data, travel = scene.robot, scene.data, measure_gripper(scene)
     if travel is not None:
         data.qpos[robot.finger_positions] = travel.open_fingers
     start = data.qpos[robot.arm_positions]
-    # A servo that stops at full deceleration runs over a little; at the model's own limit it would hit a stop.
+    # A servo that stops at full deceleration overshoots; at the model's own limit it would hit the stop.
     lowest = np.minimum(robot.lower_rad + _LIMIT_MARGIN_RAD, start)
     return Stand(travel, (lowest, np.maximum(robot.upper_rad - _LIMIT_MARGIN_RAD, start)))
 
 
 class MujocoArm:
-    """An Arm in MuJoCo: it goes on, decelerates and stops by its own physics clock, ticked or not.
+    """Arm in MuJoCo: it moves, decelerates and stops by its own physics clock, with or without ticks.
 
-    It advances the scene's one live state, so that there is one arm to a scene.
+    It advances the scene's only live state, so a scene has one arm.
     """
 
     def __init__(
@@ -58,9 +58,9 @@ class MujocoArm:
         limits: MotionLimits | None = None,
         gripper_stroke_time_s: float = 0.6,
     ) -> None:
-        """Stand where the scene starts, with the gripper open.
+        """Stand at the scene's start, with the gripper open.
 
-        ConfigurationError for a gripper actuator whose range of inputs is not known.
+        ConfigurationError for a gripper actuator without a known range of inputs.
         """
         self._model, self._data, self._robot = scene.model, scene.data, scene.robot
         self._encoder = encoder
@@ -79,7 +79,7 @@ class MujocoArm:
         limits = limits or MotionLimits()
         self._reference = JointReference(start, *self.ends_rad, limits, robot.drives.windup_rad(limits.windup_rad))
         mujoco.mj_forward(model, data)
-        # MuJoCo's arrays stay where they are as long as the state lives: asking for one costs more than a step's use.
+        # MuJoCo's arrays keep their addresses; fetching one costs more than its use in a step.
         self._unstable = data.warning.number[_UNSTABLE]
         self._borne_nm = data.qfrc_constraint
         gripper = self._gripper
@@ -110,14 +110,14 @@ class MujocoArm:
 
     @property
     def joint_count(self) -> int:
-        """The number n of joints between the base and the tool."""
+        """Number n of joints between the base and the tool."""
         return len(self._robot.arm_joints)
 
     def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
         """Follow `joint_velocity_rad_s` (n,) until `valid_until_s`, then decelerate from the measured state.
 
-        Velocities are scaled as a whole to the arm's limit. ValueError for a wrong shape or a value that is not
-        finite: nothing of it is applied.
+        All velocities are scaled by one factor to the arm's limit. ValueError for a wrong shape or a value that is not
+        finite; then nothing is applied.
         """
         self._reference.command(joint_velocity_rad_s, valid_until_s)
 
@@ -130,21 +130,21 @@ class MujocoArm:
             self._gripper.command(closing, valid_until_s)
 
     def give_way(self, clock: Clock) -> None:
-        """From now on let no `state` last more than LONGEST_TURN_S, and a step, by `clock`, however much is due.
+        """Limit each `state` from now on to LONGEST_TURN_S and one step, by `clock`.
 
-        What there was no time for is skipped: the simulation falls behind real time.
+        Further due steps are skipped: the simulation falls behind real time.
         """
         self._clock = clock
 
     def state(self, now_s: float) -> ArmState:
-        """The measured state after the physics that `now_s` has made due; the first call sets the clocks together.
+        """Advance the physics to `now_s` and return the measured state; the first call synchronises the clocks.
 
         At most 2 s are simulated at once: after a longer gap the rest is skipped, as if the world had paused.
-        FeelaheadError when the simulation has become unstable, or MuJoCo gives up.
+        FeelaheadError if the simulation has become unstable or MuJoCo fails.
         """
         if self._origin_s is None:
             self._origin_s = now_s
-        # A little grace, so that a tick of the timestep's own period never misses its step by rounding.
+        # A tolerance, so that a tick of the timestep's period never misses its step by rounding.
         due = math.floor((now_s - self._time_s) / self._step_s + 1e-6)
         run = self._advance(min(due, round(_LONGEST_ADVANCE_S / self._step_s)))
         if run > 0:
@@ -157,21 +157,21 @@ class MujocoArm:
 
     @property
     def share_of_real_time(self) -> float:
-        """How much of the time since the first `state` has been simulated: 1 unless the physics is too slow."""
+        """Simulated share of the time since the first `state`: 1 unless the physics is too slow."""
         return _share(self._steps, self._skipped)
 
     def take_share_of_real_time(self) -> float:
-        """The same since this was last asked for."""
+        """Return the simulated share of the time since the last call."""
         (steps, skipped), self._taken = self._taken, (self._steps, self._skipped)
         return _share(self._steps - steps, self._skipped - skipped)
 
     @property
     def _time_s(self) -> float:
-        """The physics' present time on the caller's clock."""
+        """Present time of the physics on the caller's clock."""
         return (self._origin_s or 0.0) + self._steps * self._step_s
 
     def _advance(self, due: int) -> int:
-        """Simulate up to `due` steps, and at least one if any is due; how many there was time for."""
+        """Simulate up to `due` steps, and at least one if any is due; return their number."""
         clock, ends_s = self._clock, 0.0
         if clock is not None and due > 1:
             ends_s = clock.now() + LONGEST_TURN_S
@@ -207,7 +207,7 @@ class MujocoArm:
         )
 
     def _require_stable(self) -> None:
-        # MuJoCo resets an unstable simulation to its start, which must not pass for a motion of the arm.
+        # MuJoCo resets an unstable simulation to its start, which must not count as a motion of the arm.
         if np.count_nonzero(self._unstable):
             raise FeelaheadError(
                 f"the simulation became unstable at {self._data.time:.3f} s; a smaller timestep in the model may help"

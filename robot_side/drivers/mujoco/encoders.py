@@ -1,4 +1,4 @@
-"""Joint encoders: what the arm's sensors say of its true configuration (eq. 3)."""
+"""Joint encoders: noisy readings of the arm's true configuration (eq. 3)."""
 
 import math
 from typing import Any
@@ -10,43 +10,43 @@ from robot_side.compiled.kernel import NUMBER, compiled, inlined, input_array, o
 
 
 class Encoder:
-    """An absolute encoder on every joint: white noise, then rounding to whole steps.
+    """Absolute encoder on every joint: white noise, then rounding to whole steps.
 
     The defaults are assumptions, not one arm's specification: a 15-bit ring on the joint's output, a usual
-    class for collaborative arms, and 0.2 mrad for what calibration, eccentricity and gear flex leave over.
+    class for collaborative arms, and 0.2 mrad for remaining errors of calibration, eccentricity and gear flex.
     """
 
     def __init__(self, sigma_rad: float = 2e-4, resolution_rad: float = 2.0 * math.pi / 2**15, seed: int = 0) -> None:
-        """Seed the noise; a step of 0 is none."""
+        """Seed the noise; a resolution of 0 means no rounding."""
         self.sigma_rad = sigma_rad
         self.resolution_rad = resolution_rad
         self._noise = np.random.default_rng(seed)
 
     def read(self, true_positions: FloatArray) -> FloatArray:
-        """Readings (n,) of joints that stand at `true_positions` (n,), radians; metres for a prismatic joint."""
+        """Return readings (n,) of joints at `true_positions` (n,), in radians; metres for a prismatic joint."""
         readings = self.noise(true_positions.size)
         _read(readings, true_positions, self.sigma_rad, self.resolution_rad)
         return readings
 
     def noise(self, count: int) -> FloatArray:
-        """Draw what `reading` makes the next readings (n,) of: standard normal numbers."""
+        """Draw `count` standard normal numbers, the noise of the next readings in `reading`."""
         drawn: FloatArray = self._noise.standard_normal(count)
         return drawn
 
     def standard_deviation_rad(self) -> float:
-        """Standard deviation of one reading's error: noise and rounding, which are independent (eq. 3)."""
+        """Return the standard deviation of one reading's error: noise and rounding, which are independent (eq. 3)."""
         return float(np.hypot(self.sigma_rad, self.resolution_rad / math.sqrt(12.0)))
 
 
 @inlined
 def reading(noise: float, true_position: float, sigma: float, resolution: float) -> Any:
-    """One reading, of standard normal noise."""
+    """Return a reading from standard normal noise."""
     read = noise * sigma + true_position
     return np.rint(read / resolution) * resolution if resolution > 0.0 else read
 
 
 @compiled(output_array(1), input_array(1), NUMBER, NUMBER)
 def _read(readings: FloatArray, true_positions: FloatArray, sigma: float, resolution: float) -> None:
-    """Make readings of standard normal noise."""
+    """Replace the standard normal noise in `readings` with readings."""
     for i in range(readings.size):
         readings[i] = reading(readings[i], true_positions[i], sigma, resolution)

@@ -1,13 +1,13 @@
-"""Closed meshes for the geoms that no simpler primitive describes, prepared once when a scene is loaded.
+"""Closed meshes for the geoms that no simpler primitive describes, made once when a scene is loaded.
 
-Only a scene that needs them imports this module, and so compiles the mesh kernels.
+Only a scene that needs them imports this module, which compiles the mesh kernels.
 """
 
 import math
 from dataclasses import dataclass
 from typing import Any
 
-# A scene that has meshes is looked at by these kernels, too, and they must be there to be warmed up.
+# A scene with meshes also runs these kernels; imported here, they are warmed up.
 import robot_side.surroundings.placed_meshes  # noqa: F401
 from robot_side.drivers.mujoco.mesh_arrays import height_field_surface, mesh_triangles, mesh_vertices
 from robot_side.drivers.mujoco.model_enums import GeomKind
@@ -22,39 +22,39 @@ from robot_side.overlap.meshes.mesh_shapes import (
 )
 
 _LARGEST_VOLUME_ERROR = 0.01
-"""The share by which a mesh around a round shape is larger, at most."""
+"""Largest share by which a mesh around a round shape may be larger."""
 _STANDS_OUT_M = 5e-4
-"""And how far it stands out, at most, unless that takes more than the most of what follows."""
+"""Largest distance by which the mesh may stand out, unless the finest one of those below stands out more."""
 _SEGMENTS = range(8, 129, 4)
 _SUBDIVISIONS = range(4, 25)
 _BY_NUMBER = {GeomKind.MESH, GeomKind.HFIELD}
-"""What the model has a list of, so that geoms of the same number have the same shape."""
+"""Kinds whose shapes the model lists, so that geoms of the same number have the same shape."""
 
 
 @dataclass(frozen=True)
 class GeomMesh:
-    """A mesh in the frame of the geoms that have this shape."""
+    """Mesh in the frame of the geoms with this shape."""
 
     mesh: Mesh
     volume_error: float
-    """The share of the shape's volume by which the mesh's is greater; infinite where the shape encloses none."""
+    """Share of the shape's volume by which the mesh's is greater; infinite for a shape that encloses none"""
     stands_out_m: float
-    """How far the mesh reaches beyond the shape; infinite where the shape encloses nothing."""
+    """Distance by which the mesh extends beyond the shape; infinite for a shape that encloses nothing"""
 
 
 class GeomMeshes:
-    """The meshes of a model's geoms; geoms of the same shape share one."""
+    """Meshes of a model's geoms; geoms of the same shape share one."""
 
     def __init__(self, model: Any) -> None:
-        """For the geoms of a compiled MuJoCo model."""
+        """Start without meshes. model: a compiled MuJoCo model."""
         self._model = model
         self._shapes: dict[tuple[Any, ...], tuple[int, GeomMesh] | None] = {}
 
     def add(self, geom: int) -> tuple[int, GeomMesh] | None:
-        """The geom's mesh and its index into `mesh_library`; None where no mesh can be made.
+        """Return the index into `mesh_library` and the geom's mesh; None if no mesh can be made.
 
-        A round shape gets a mesh around it. A height field is itself. A mesh geom is itself where its surface is closed
-        and each part of it is oriented consistently, else its convex hull, as it is in the simulation's contacts.
+        A round shape gets a mesh around it. A height field is exact. A mesh geom is exact if its surface is closed and
+        each part is oriented consistently; otherwise it gets its convex hull, as in the simulation's contacts.
         """
         kind = GeomKind(self._model.geom_type[geom])
         size = tuple(self._model.geom_size[geom].tolist())
@@ -71,13 +71,13 @@ class GeomMeshes:
         return _mesh_geom(self._model, geom) if kind is GeomKind.MESH else _round_geom(kind, size)
 
     def mesh_library(self) -> MeshLibrary | None:
-        """All the meshes so far; None for none."""
+        """Return the library of all meshes so far; None without meshes."""
         meshes = [shape[1].mesh for shape in self._shapes.values() if shape is not None]
         return MeshLibrary(meshes) if meshes else None
 
 
 def _round_geom(kind: GeomKind, size: tuple[float, ...]) -> GeomMesh | None:
-    """The coarsest mesh around the shape that is larger by no more than it may be, or the finest that there is."""
+    """Return the coarsest mesh around the shape within the limits of size, or else the finest one."""
     finenesses = _SEGMENTS if kind is GeomKind.CYLINDER else _SUBDIVISIONS
     for fineness in finenesses:
         if (made := _around(kind, size, fineness)) is None:
@@ -87,7 +87,7 @@ def _round_geom(kind: GeomKind, size: tuple[float, ...]) -> GeomMesh | None:
             try:
                 return GeomMesh(Mesh(made.vertices, made.triangles), made.excess, made.stands_out_m)
             except ValueError:
-                # So thin that its vertices fall together.
+                # So thin that its vertices coincide.
                 return None
     return None
 

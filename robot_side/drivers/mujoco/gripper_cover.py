@@ -1,4 +1,4 @@
-"""The spheres that cover a simulated gripper: its geoms as they collide, in the frames of their links."""
+"""Spheres that cover a simulated gripper's colliding geoms, in the frames of their links."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,26 +19,26 @@ from robot_side.gripper.surface_cover import cover_surface
 
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _WITH_ROWS = (GeomKind.SPHERE, GeomKind.CAPSULE, GeomKind.BOX)
-"""Kinds whose cover is written down, with the fewest spheres; any other is searched for."""
+"""Kinds whose cover is computed directly, with the fewest spheres; other kinds need a search."""
 
 
 @dataclass(frozen=True)
 class GripperCover:
-    """Spheres that contain the surface of every geom, but for what lies within another geom of the same link."""
+    """Spheres that contain the surface of every geom, except parts within another geom of the same link."""
 
     centers_m: FloatArray
     """(m, 3) in the frame of the sphere's link"""
     radii_m: FloatArray
     """(m,)"""
     bodies: IntArray
-    """(m,) the link of each"""
+    """(m,) link of each sphere"""
     stand_out_m: float
-    """How far out of the geoms the spheres stand at most"""
+    """Largest distance by which the spheres stand out of the geoms"""
 
 
 @dataclass(frozen=True)
 class _Part:
-    """A geom in the frame of its link's first geom; hashable, so that links of the same shape share one cover."""
+    """Geom in the frame of the link's first geom; hashable, so that links of the same shape share one cover."""
 
     kind: int
     size: tuple[float, ...]
@@ -53,15 +53,15 @@ def cover_gripper(
 ) -> GripperCover:
     """Cover the colliding geoms `geoms` (k,) of a compiled MuJoCo model.
 
-    A mesh counts as its convex hull, which is what collides. No sphere stands out of its link's geoms by more than
-    `stand_out_m`, unless a geom would need more than 2000 spheres. Links of the same shape get the same spheres.
-    searching: called before each search, but not for what was found before.
+    A mesh counts as its convex hull, which is the colliding shape. No sphere stands out of the link's geoms by more
+    than `stand_out_m`, unless a geom would need more than 2000 spheres. Links of the same shape get the same spheres.
+    searching: called before each search, but not for a stored cover.
     """
     centers, radii, bodies, stand_outs = [], [], [], []
-    # Sorted, as a set has no order of its own.
+    # Sorted, as a set has no defined order.
     for body in sorted(set(model.geom_bodyid[geoms].tolist())):
         of_body = geoms[model.geom_bodyid[geoms] == body].tolist()
-        # In the first geom's frame, which is the same wherever the link's frame was put.
+        # In the first geom's frame, which does not depend on the choice of the link's frame.
         first = Rotation.from_quat(model.geom_quat[of_body[0]], scalar_first=True)
         origin = model.geom_pos[of_body[0]]
         parts = tuple(_part(model, geom, first, origin) for geom in of_body)
@@ -119,7 +119,7 @@ def _cover_link(
 
 
 def _solid(part: _Part) -> Solid | None:
-    """None for what encloses nothing."""
+    """Return the solid of a part; None if it encloses nothing."""
     match part.kind:
         case GeomKind.CYLINDER:
             return cylinder(part.size[0], part.size[1])
@@ -147,7 +147,7 @@ def _with_rows(part: _Part, stand_out_m: float) -> tuple[FloatArray, FloatArray,
 
 
 def link_solids(model: Any, geoms: Sequence[int]) -> list[Solid]:
-    """The true shapes of geoms of one link, in its frame, as polyhedra; what encloses nothing is left out."""
+    """Return the true shapes of one link's geoms, in its frame, as polyhedra; shapes without volume are left out."""
     identity, origin, solids = Rotation.identity(), np.zeros(3), []
     for geom in geoms:
         part = _part(model, geom, identity, origin)
@@ -158,7 +158,7 @@ def link_solids(model: Any, geoms: Sequence[int]) -> list[Solid]:
 
 
 def placed_corners(model: Any, data: Any, geoms: IntArray) -> FloatArray:
-    """The triangles (t, 3, 3) of the geoms' shapes in the world, as the simulation's state `data` has them."""
+    """Return the triangles (t, 3, 3) of the geoms' shapes in the world frame, in the simulation's state `data`."""
     placed = []
     for geom in geoms.tolist():
         body = int(model.geom_bodyid[geom])

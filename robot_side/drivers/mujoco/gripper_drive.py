@@ -1,4 +1,4 @@
-"""The gripper's drive: a reference that opens and closes at a bounded speed and force, and what it can feel."""
+"""Drive of the gripper: a reference that opens and closes at a bounded speed and force, and detects a grip."""
 
 import math
 from typing import Any, Final
@@ -9,14 +9,14 @@ from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block, inlined
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
 
-# Beyond this share of the stroke between where the drive would stand freely and where it stands, and below this
-# share of the stroke per second, for this long, something stops the fingers.
+# Something stops the fingers if the drive lags its free position by more than this share of the stroke, and moves
+# slower than this share of the stroke per second, for this time.
 _BLOCKED_LAG = 0.02
 _STANDING_SPEED_1_S = 0.05
 _STANDING_TIME_S = 0.05
-# Stiff fingers chatter on what they grip: the speed is averaged over this time.
+# Time constant of the measured speed: stiff fingers chatter on a gripped object.
 _SPEED_TIME_CONSTANT_S = 0.05
-# Fingers this near to each other have closed on nothing.
+# Opening below which the fingers have closed on nothing.
 _CLOSED_OPENING_M = 1e-3
 
 GRIPPER: Final = np.dtype(
@@ -34,17 +34,17 @@ GRIPPER: Final = np.dtype(
         ("lag_s", np.float64),
     ]
 )
-"""A gripper's drive. reference and closure: where it should be and is, from open, 0, to closed, 1; speed: of the
-closure, 1/s, averaged. standing_s: for how long something has stopped it. The others: see `GripperTravel`."""
+"""Drive of a gripper. reference, closure: commanded and measured position, from open, 0, to closed, 1. speed: averaged
+rate of the closure, 1/s. standing_s: time for which something has stopped it. The others: see `GripperTravel`."""
 GRIPPER_INPUT: Final = np.dtype([("place", np.int64), ("open", np.float64), ("closed", np.float64)])
-"""One actuator of the gripper: its place in ctrl, and its input at either end."""
+"""Actuator of the gripper: its index in ctrl, and its inputs at both ends."""
 
 
 class GripperDrive:
-    """A reference between open, 0, and closed, 1, and whether something is held."""
+    """Reference between open, 0, and closed, 1, with detection of a held object."""
 
     def __init__(self, travel: GripperTravel, stroke_time_s: float = 0.6) -> None:
-        """Start open. `stroke_time_s`: at full speed; 85 mm at 150 mm/s for a Robotiq 2F-85 (its manual)."""
+        """Start open. stroke_time_s: at full speed; 85 mm at 150 mm/s for a Robotiq 2F-85 (its manual)."""
         stroke = float(travel.lengths[-1] - travel.lengths[0])
         self.drive: np.ndarray = np.zeros(1, GRIPPER)
         """(1,) of GRIPPER"""
@@ -60,14 +60,14 @@ class GripperDrive:
         self.samples: FloatArray = np.column_stack(
             [(travel.lengths - travel.lengths[0]) / stroke, travel.references, travel.openings_m]
         )
-        """(k, 3) closures, references and openings of the travel"""
+        """(k, 3) closures, references and openings along the travel"""
         self._travel = travel
         self._opening_m, self._standing_s = self.drive["opening_m"], self.drive["standing_s"]
         self._command = 0.0
         self._valid_until_s = -math.inf
 
     def inputs(self, places: IntArray) -> np.ndarray:
-        """(g,) of GRIPPER_INPUT, of the actuators whose inputs are at `places` (g,) in ctrl."""
+        """Return (g,) of GRIPPER_INPUT for the actuators whose inputs are at `places` (g,) in ctrl."""
         inputs = np.zeros(places.shape, GRIPPER_INPUT)
         inputs["place"], inputs["open"], inputs["closed"] = (
             places,
@@ -79,7 +79,7 @@ class GripperDrive:
     def command(self, closing: float, valid_until_s: float) -> None:
         """Close (+1) or open (-1) at that share of the full speed until `valid_until_s`; 0 holds.
 
-        ValueError for a value outside [-1, 1] or a time that is not finite: nothing of it is applied.
+        ValueError for a value outside [-1, 1] or a time that is not finite; then nothing is applied.
         """
         if not -1.0 <= closing <= 1.0:
             raise ValueError(f"closing = {closing}; valid: from -1 (open) to +1 (close)")
@@ -89,23 +89,23 @@ class GripperDrive:
         self._valid_until_s = valid_until_s
 
     def moving(self, time_s: float) -> float:
-        """What it is told at `time_s`: close (+1), hold (0) or open (-1)."""
+        """Return the command at `time_s`: close (+1), hold (0) or open (-1), or a share of it."""
         return self._command if time_s < self._valid_until_s else 0.0
 
     @property
     def opening_m(self) -> float:
-        """The free gap between the fingers at the last measured length, metres."""
+        """Free gap between the fingers at the last measured length, in metres."""
         return float(self._opening_m[0])
 
     @property
     def holding(self) -> bool:
-        """Whether the fingers were told to close and something between them has stopped them."""
+        """Whether something between the fingers stopped them while they were commanded to close."""
         return bool(self._standing_s[0] >= _STANDING_TIME_S and self._opening_m[0] > _CLOSED_OPENING_M)
 
 
 @inlined
 def _at_closure(samples: Any, closure: float, column: int) -> Any:
-    """A column of the samples (k, 3) at `closure`, between the two nearest; the end's beyond an end."""
+    """Return a column of the samples (k, 3) at `closure`, linearly interpolated; constant beyond the ends."""
     if not closure > samples[0, 0]:
         return samples[0, column]
     for k in range(1, samples.shape[0]):
@@ -119,9 +119,9 @@ def _at_closure(samples: Any, closure: float, column: int) -> Any:
 def advance_gripper(
     gripper: Any, samples: FloatArray, moving: float, step_s: float, length: float, length_speed: float
 ) -> None:
-    """Move one gripper's reference on by `step_s`; the drive measures its own length and its change per second.
+    """Advance one gripper's reference by `step_s`, from the drive's measured length and its speed.
 
-    moving: see `GripperDrive.moving`.
+    moving: from `GripperDrive.moving`.
     """
     gripper.closure = (length - gripper.open_length) / gripper.stroke
     gripper.opening_m = _at_closure(samples, gripper.closure, 2)
@@ -130,8 +130,8 @@ def advance_gripper(
     if moving != 0.0:
         gripper.told_to_close = 1 if moving > 0.0 else 0
         moved = gripper.reference + moving * step_s / gripper.stroke_time_s
-        # The servo's damping holds a moving drive behind its reference without any force on the fingers. Only
-        # on the side that it is told to go to may the reference lead, so that a grip is let go at once.
+        # The servo's damping lets a moving drive lag its reference without any force on the fingers. The reference
+        # may lead only in the commanded direction, so that a grip is released at once.
         center = free + gripper.lag_s * gripper.speed
         lead = math.copysign(gripper.force_lead, moving)
         moved = min(max(moved, center + min(lead, 0.0)), center + max(lead, 0.0))

@@ -1,4 +1,4 @@
-"""Measure how far a simulated gripper opens, by driving it, and the gap that the spheres leave of that."""
+"""Measurement of a simulated gripper's travel, by driving it, and of the gap that its spheres leave."""
 
 import copy
 from dataclasses import dataclass
@@ -17,59 +17,59 @@ _GRIPPER_SAMPLES = 9
 _SHORTEST_SETTLING_S, _LONGEST_SETTLING_S = 0.05, 2.0
 _FARTHEST_GAP_M = 0.5
 _ALIKE_M = 1e-4
-# A servo without a force limit leads a blocked drive by this share of the stroke at most.
+# Largest lead of a reference over a blocked drive without a force limit, as a share of the stroke.
 _DEFAULT_FORCE_LEAD = 0.3
-# Surfaces that come within this of the nearest pair when the gripper is closed take part in the grasp.
+# Pairs of surfaces within this distance of the nearest pair, in the closed gripper, take part in the grasp.
 _GRASP_BAND_M = 2e-3
 _SMALLEST_STROKE_M = 1e-3
 
 
 @dataclass(frozen=True)
 class GripperSweep:
-    """A gripper's places of rest at k evenly spaced inputs, from one end to the other."""
+    """Rest positions of a gripper at k evenly spaced inputs, from one end to the other."""
 
     controls: FloatArray
-    """(k, g) the actuators' inputs"""
+    """(k, g) inputs of the actuators"""
     fingers: FloatArray
     """(k, f) positions of the fingers' joints"""
     lengths: FloatArray
-    """(k,) the first actuator's own position, in its transmission's unit"""
+    """(k,) position of the first actuator, in its transmission's unit"""
     gaps_m: FloatArray
     """(k, p) distances between pairs of the gripper's geoms, negative where they overlap"""
 
     @property
     def stroke_m(self) -> float:
-        """The change of the gap that changes most."""
+        """Largest change of any gap"""
         return float(np.ptp(self.gaps_m, axis=0).max(initial=0.0))
 
 
 @dataclass(frozen=True)
 class GripperTravel:
-    """The way from open to closed."""
+    """Travel of the gripper from open to closed."""
 
     open_control: FloatArray
-    """(g,) the actuators' inputs at which it is open"""
+    """(g,) inputs of the actuators when open"""
     closed_control: FloatArray
-    """(g,) and closed"""
+    """(g,) inputs of the actuators when closed"""
     open_fingers: FloatArray
-    """(f,) positions of the fingers' joints when it is open"""
+    """(f,) positions of the fingers' joints when open"""
     references: FloatArray
-    """(k,) shares of the way from the open to the closed input, increasing from 0"""
+    """(k,) inputs as shares from open, 0, to closed, increasing"""
     lengths: FloatArray
-    """(k,) where the first actuator stands then, increasing or decreasing"""
+    """(k,) positions of the first actuator there, increasing or decreasing"""
     openings_m: FloatArray
-    """(k,) and the free gap between the fingers"""
+    """(k,) free gaps between the fingers there"""
     force_lead: float
-    """The share of the stroke by which the reference leads a blocked drive at the largest allowed force."""
+    """Lead of the reference over a blocked drive at the largest allowed force, as a share of the stroke"""
     lag_s: float
-    """By how many shares of the stroke a moving drive lags behind its reference, for each share per second."""
+    """Lag of a moving drive behind its reference, in shares of the stroke per share per second"""
 
 
 def measure_gripper(scene: Scene) -> GripperTravel | None:
-    """Drive a copy of the gripper of `scene` to both ends in empty space: how it opens and closes.
+    """Measure the travel by driving a copy of the scene's gripper to both ends in empty space.
 
-    None without a gripper, or with one whose fingers' geoms do not come nearer to each other.
-    ConfigurationError for a gripper actuator whose range of inputs is not known.
+    None without a gripper, or if its fingers' geoms do not approach each other.
+    ConfigurationError for a gripper actuator without a known range of inputs.
     """
     robot, actuators = scene.robot, scene.robot.gripper_actuators
     if actuators.size == 0:
@@ -81,7 +81,7 @@ def measure_gripper(scene: Scene) -> GripperTravel | None:
             f"model: the gripper's actuator {model.actuator(int(unknown[0])).name!r} has no ctrlrange; valid: its open"
             " and its closed input"
         )
-    # The copy hangs in empty space, and its arm is left limp and put back after every step.
+    # The copy is in empty space; its arm is without drive and put back after every step.
     model.opt.gravity[:] = 0.0
     elsewhere = model.body_rootid[model.geom_bodyid] != robot.root_body
     model.geom_contype[elsewhere] = model.geom_conaffinity[elsewhere] = 0
@@ -125,9 +125,9 @@ def _sweep_gripper(model: Any, scene: Scene, first: FloatArray, last: FloatArray
 
 
 def candidate_ends(lower: FloatArray, upper: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-    """The pairs of inputs (g,) between which a gripper may open and close, from its actuators' ranges (g,).
+    """Return possible pairs of inputs (g,) at the travel's ends, from the actuators' ranges (g,).
 
-    Two actuators may run the same way or against each other; more than two are taken to run the same way.
+    Two actuators may run in the same or in opposite directions; more are assumed to run in the same.
     """
     count = lower.size
     choices = product((False, True), repeat=count - 1) if count <= 2 else [(False,) * (count - 1)]
@@ -136,9 +136,9 @@ def candidate_ends(lower: FloatArray, upper: FloatArray) -> list[tuple[FloatArra
 
 
 def jaw_pairs(geoms: IntArray, bodies: IntArray, on_finger: BoolArray) -> list[tuple[int, int]]:
-    """The pairs of a gripper's geoms between which something can be gripped; all arguments (k,).
+    """Return the pairs of a gripper's geoms that can grip an object; all arguments (k,).
 
-    At least one of the two is on a finger, and they are on different bodies.
+    At least one of the two geoms is on a finger, and they are on different bodies.
     """
     return [
         (int(geoms[a]), int(geoms[b]))
@@ -149,9 +149,9 @@ def jaw_pairs(geoms: IntArray, bodies: IntArray, on_finger: BoolArray) -> list[t
 
 
 def travel_from_sweep(sweep: GripperSweep, force_lead: float, lag_s: float) -> GripperTravel | None:
-    """The gripper's travel; None when no gap changes or the drive does not move.
+    """Return the gripper's travel; None if no gap changes or the drive does not move.
 
-    The free gap is between those surfaces that move far and are nearest to each other when it is closed.
+    The free gap is between the surfaces that move far and are nearest to each other in the closed gripper.
     """
     stroke_m, lengths = sweep.stroke_m, sweep.lengths
     if stroke_m < _SMALLEST_STROKE_M or lengths[0] == lengths[-1]:
@@ -163,7 +163,7 @@ def travel_from_sweep(sweep: GripperSweep, force_lead: float, lag_s: float) -> G
     jaws = jaws[:, jaws[-1] <= jaws[-1].min() + _GRASP_BAND_M]
     openings = np.maximum(jaws.min(axis=1), 0.0)
     closures = (lengths - lengths[0]) / (lengths[-1] - lengths[0])
-    # Fingers that press on each other stop the drive before its input ends.
+    # Fingers that press on each other stop the drive before the last input.
     highest_before = np.concatenate([[-np.inf], np.maximum.accumulate(closures)[:-1]])
     moving = closures > highest_before + 1e-3
     return GripperTravel(
@@ -179,7 +179,7 @@ def travel_from_sweep(sweep: GripperSweep, force_lead: float, lag_s: float) -> G
 
 
 def open_gap(scene: Scene, cover: GripperCover) -> tuple[float, float] | None:
-    """(m between the geoms that grip, the least m between their spheres), open; None without fingers."""
+    """Return the open gap between the gripping geoms and the least between their spheres, m; None without fingers."""
     travel, model, robot = measure_gripper(scene), scene.model, scene.robot
     if travel is None:
         return None
@@ -202,7 +202,7 @@ def open_gap(scene: Scene, cover: GripperCover) -> tuple[float, float] | None:
 
 
 def _spheres_of(scene: Scene, cover: GripperCover, data: Any, geom: int) -> tuple[FloatArray, FloatArray]:
-    """Centres (m, 3) in the world and radii (m,) of the spheres whose centres are in a geom."""
+    """Return centres (m, 3) in the world frame and radii (m,) of the spheres whose centres are in a geom."""
     link = int(scene.model.geom_bodyid[geom])
     own = np.flatnonzero(cover.bodies == link)
     for solid in link_solids(scene.model, [geom]):

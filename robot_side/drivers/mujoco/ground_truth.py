@@ -1,4 +1,4 @@
-"""What is true of the simulated world, for summaries and tests alone."""
+"""Ground truth of the simulated world, for summaries and tests alone."""
 
 import math
 from collections.abc import Iterator
@@ -18,10 +18,10 @@ _FEW: Final = 64
 
 
 class GroundTruth:
-    """Watches the simulation itself, for the summary and for tests."""
+    """True distances, contacts and target of a simulation."""
 
     def __init__(self, scene: Scene, farthest_m: float = 1.0) -> None:
-        """Look for objects up to `farthest_m` from the gripper."""
+        """farthest_m: largest distance from the gripper at which objects count."""
         self._scene = scene
         self._farthest_m = farthest_m
         model = scene.model
@@ -29,11 +29,11 @@ class GroundTruth:
         self._object_of = {geom: thing.name for thing in scene.objects for geom in thing.geoms}
         self._roles: list[Role] = []
         self._of_roles: dict[tuple[Role, ...], IntArray] = {}
-        # What points upwards at the start, in each body's own frame.
+        # Direction that points upwards at the start, in each body's frame.
         self._up: FloatArray = scene.data.xmat[:, 6:].copy()
 
     def observe(self) -> Truth:
-        """The distances and contacts at the simulation's present state."""
+        """Return the distances and contacts in the simulation's present state."""
         to_obstacles = self._distance(self._geoms(Role.OBSTACLE), self._farthest_m)
         to_any = min(to_obstacles, self._distance(self._geoms(Role.TARGET, Role.IGNORED), to_obstacles))
         return Truth(
@@ -44,7 +44,7 @@ class GroundTruth:
         )
 
     def target(self) -> TargetTruth | None:
-        """Where the target really is at the present state; None without one."""
+        """Return the target's true pose and motion in the present state; None without a target."""
         model, data, mine = self._scene.model, self._scene.data, self._geoms(Role.TARGET)
         if not mine.size:
             return None
@@ -61,10 +61,10 @@ class GroundTruth:
         )
 
     def _geoms(self, *wanted: Role) -> IntArray:
-        """Those of the objects with these roles, now."""
+        """Return the geoms of the objects that have these roles now."""
         roles = list(self._scene.roles.values())
         if roles != self._roles:
-            # Of many objects few change.
+            # Roles change rarely.
             self._roles, self._of_roles = roles, {}
         if wanted not in self._of_roles:
             geoms = [geom for geom, name in self._object_of.items() if self._scene.roles[name] in wanted]
@@ -72,7 +72,7 @@ class GroundTruth:
         return self._of_roles[wanted]
 
     def _distance(self, theirs: IntArray, farthest_m: float) -> float:
-        """The smallest signed distance between the gripper and some geoms, at most `farthest_m`."""
+        """Return the least signed distance between the gripper and geoms, at most `farthest_m`."""
         mine = np.array(list(self._gripper), dtype=np.int64)
         return least_distance(self._scene.model, self._scene.data, mine, theirs, farthest_m)
 
@@ -86,12 +86,12 @@ class GroundTruth:
 
 
 def least_distance(model: Any, data: Any, mine: IntArray, theirs: IntArray, farthest_m: float) -> float:
-    """The smallest signed distance from geoms `mine` to geoms `theirs`, metres; at most `farthest_m`."""
+    """Return the least signed distance from geoms `mine` to geoms `theirs`, in metres, at most `farthest_m`."""
     theirs = _within(model, data, mine, theirs, farthest_m)
     if mine.size == 0 or theirs.size == 0:
         return farthest_m
     apart = np.linalg.norm(data.geom_xpos[mine][:, None] - data.geom_xpos[theirs][None], axis=2)
-    # No pair is nearer than its bounding spheres; a plane has none and is always looked at.
+    # No pair is nearer than its bounding spheres; a plane has none and is always measured.
     bound = np.where(model.geom_rbound[theirs] > 0.0, apart - model.geom_rbound[theirs], -np.inf)
     bound -= model.geom_rbound[mine][:, None]
     nearest = farthest_m
@@ -105,7 +105,7 @@ def least_distance(model: Any, data: Any, mine: IntArray, theirs: IntArray, fart
 
 
 def _within(model: Any, data: Any, mine: IntArray, theirs: IntArray, farthest_m: float) -> IntArray:
-    """Those of `theirs` that bounds do not show to be farther off; all where they are few."""
+    """Return `theirs` without geoms that bounding spheres show to be farther off; all if they are few."""
     if mine.size == 0 or theirs.size <= _FEW:
         return theirs
     middle = data.geom_xpos[mine].mean(axis=0)
@@ -116,7 +116,7 @@ def _within(model: Any, data: Any, mine: IntArray, theirs: IntArray, farthest_m:
 
 
 def _rising(bounds: FloatArray, farthest_m: float) -> Iterator[int]:
-    """The places of those below `farthest_m`, the least first; of many, only as many are put in order as are asked."""
+    """Yield the indices of bounds below `farthest_m` in ascending order; sorts the first `_FEW` before the others."""
     places = np.flatnonzero(bounds < farthest_m)
     if places.size > _FEW:
         first = np.argpartition(bounds[places], _FEW)[:_FEW]
@@ -128,9 +128,9 @@ def _rising(bounds: FloatArray, farthest_m: float) -> Iterator[int]:
 def geom_distance(
     model: Any, data: Any, mine: int, other: int, farthest_m: float, ends: FloatArray | None = None
 ) -> float:
-    """The signed distance between two geoms, at most `farthest_m`; `ends` (6,) say nothing of a height field."""
+    """Return the signed distance of two geoms, at most `farthest_m`; `ends` (6,) are not valid for a height field."""
     found = mujoco.mj_geomDistance(model, data, mine, other, farthest_m, ends)
-    # Of a height field MuJoCo sees the first 50 prisms within that distance, which need not be the nearest.
+    # MuJoCo measures only the first 50 prisms of a height field within the distance, which need not be the nearest.
     while model.geom_type[other] == GeomKind.HFIELD and 0.0 < found < farthest_m:
         farthest_m, found = found, mujoco.mj_geomDistance(model, data, mine, other, found, ends)
     return float(found)

@@ -1,4 +1,4 @@
-"""From a joint reference to what each joint's actuator is told: position servo, velocity servo or motor."""
+"""Actuator inputs from joint references, for position servos, velocity servos and motors."""
 
 from dataclasses import dataclass
 from typing import Any, Final
@@ -20,10 +20,10 @@ DRIVE: Final = np.dtype(
         ("load", np.float64),
     ]
 )
-"""One joint's drive, see `JointDrives`. friction: the joint's own damping, N m s/rad. acceleration, rad/s²: what it is
-to have; load: the torque, N m, that this takes."""
+"""Drive of a joint, see `JointDrives`. friction: damping of the joint itself, N m s/rad. acceleration: commanded one,
+rad/s². load: torque that it needs, N m."""
 
-# The stiffness of what this controller closes itself; servos of the model bring their own.
+# Bandwidths of the loops that this controller closes; servos of the model have their own stiffness.
 _MOTOR_BANDWIDTH_RAD_S = 50.0
 _VELOCITY_SERVO_BANDWIDTH_RAD_S = 20.0
 _MOST_WINDUP_RAD = 0.02
@@ -31,10 +31,10 @@ _MOST_WINDUP_RAD = 0.02
 
 @dataclass(frozen=True)
 class JointDrives:
-    """One actuator on each arm joint, all (n,): torque = gear (gain u + offset - stiffness l - damping dl/dt).
+    """Actuators of the arm joints, all (n,): torque = gear (gain u + offset - stiffness l - damping dl/dt).
 
-    Here u is its input and l = gear q its length, which is MuJoCo's fixed gain with an affine bias. A position
-    servo has stiffness and damping, a velocity servo only damping, a motor neither.
+    Here u is the input and l = gear q the length: MuJoCo's fixed gain with an affine bias. A position servo has
+    stiffness and damping, a velocity servo only damping, a motor neither.
     """
 
     gear: FloatArray
@@ -43,12 +43,12 @@ class JointDrives:
     stiffness: FloatArray
     damping: FloatArray
     strongest: FloatArray
-    """The greatest torque, N m, or force, N, that it gives; infinite where the model does not say"""
+    """Greatest torque, N m, or force, N; infinite without a limit in the model"""
 
     def windup_rad(self, least_rad: float) -> FloatArray:
-        """How far a reference may lead each joint (n,): until a servo gives an eighth of what it can.
+        """Return the largest lead of a reference over each joint (n,): where a servo gives an eighth of `strongest`.
 
-        No less than least_rad, and at most 20 mrad, which every other drive has.
+        The lead is at least least_rad and at most 20 mrad; other drives have the 20 mrad.
         """
         stiffness = self.gear**2 * self.stiffness
         known = (stiffness > 0.0) & np.isfinite(self.strongest)
@@ -56,7 +56,7 @@ class JointDrives:
         return np.clip(pressing, least_rad, max(_MOST_WINDUP_RAD, least_rad))
 
     def table(self, friction: FloatArray) -> np.ndarray:
-        """(n,) of DRIVE. friction (n,): each joint's own damping, N m s/rad."""
+        """Return (n,) of DRIVE. friction (n,): damping of each joint itself, N m s/rad."""
         drives = np.zeros(self.gear.shape, DRIVE)
         for name in ("gear", "gain", "offset", "stiffness", "damping"):
             drives[name] = getattr(self, name)
@@ -66,9 +66,9 @@ class JointDrives:
 
 @inlined
 def motor_acceleration(drive: Any, position_error: float, velocity_error: float) -> float:
-    """The joint acceleration that a motor's critically damped loop adds to its reference's; 0 for servos.
+    """Return the joint acceleration that a motor's critically damped loop adds to its reference's; 0 for servos.
 
-    The errors are reference less measured. The caller multiplies by the arm's inertia.
+    The errors are reference minus measured. The caller multiplies by the arm's inertia.
     """
     if drive.stiffness != 0.0 or drive.damping != 0.0:
         return 0.0
@@ -77,11 +77,10 @@ def motor_acceleration(drive: Any, position_error: float, velocity_error: float)
 
 @inlined
 def control(drive: Any, position_error: float, position: float, velocity: float, load: float) -> float:
-    """The actuator's input u under which the joint follows its reference `position` and `velocity`.
+    """Return the actuator's input u by which the joint follows its reference `position` and `velocity`.
 
-    position_error: reference less measured. load: the torque, N m, that holds the joint against gravity, friction and
-    its own inertia; force in N for a prismatic joint. A servo is told its reference ahead by what its damping holds
-    back, so that it does not lag while it moves.
+    position_error: reference minus measured. load: torque, N m, against gravity, friction and inertia; force in N for a
+    prismatic joint. A feedforward term cancels a servo's damping, so that it does not lag while it moves.
     """
     if drive.stiffness == 0.0 and drive.damping != 0.0:
         velocity += _VELOCITY_SERVO_BANDWIDTH_RAD_S * position_error

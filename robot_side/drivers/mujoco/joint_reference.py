@@ -1,4 +1,4 @@
-"""Where the joints should be now: a commanded velocity turned into a reference that stops by itself."""
+"""Joint references from a commanded velocity; they stop by themselves."""
 
 import math
 from dataclasses import dataclass
@@ -28,25 +28,24 @@ REFERENCE: Final = np.dtype(
         ("change", np.float64),
     ]
 )
-"""One joint's reference, in rad and s. lower, upper: where it ends. to_lower, to_upper: the velocities from which it
-can still stop there. change: what its velocity is short of."""
+"""Reference of a joint, in rad and s. lower, upper: its ends. to_lower, to_upper: the velocities from which it can
+still stop there. change: target velocity minus present one."""
 
 _Limit = Annotated[float, Meta(gt=0.0)]
 
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """What the arm's own controller allows each joint, whatever it is told; metres for a prismatic joint."""
+    """Limits of each joint in the arm's own controller, for any command; metres for a prismatic joint."""
 
     velocity_rad_s: _Limit = 2.0
-    """Under the 3.14 rad/s of a UR5e and the 2.17 rad/s of a Franka arm's large joints (their data sheets)."""
+    """Below the 3.14 rad/s of a UR5e and the 2.17 rad/s of a Franka arm's large joints (their data sheets)."""
     acceleration_rad_s2: _Limit = 8.0
     deceleration_rad_s2: _Limit = 12.0
-    """How fast the reference stops when a command has run out."""
+    """Deceleration of the reference after a command has expired."""
     windup_rad: _Limit = 0.005
-    """How far the reference may run ahead of a joint that something holds back, unless the caller says more for weak
-    drives. The built-in arm's large joints press with 20 N m then, some 30 N at the tool, and hardly spring when that
-    gives way."""
+    """Largest lead of the reference over a blocked joint, unless the caller allows more for weak drives. The built-in
+    arm's large joints then press with 20 N m, some 30 N at the tool, and hardly spring when the obstacle gives way."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -54,13 +53,13 @@ class MotionLimits:
     def of_joints(
         self, count: int, lower_rad: FloatArray | None = None, upper_rad: FloatArray | None = None
     ) -> JointLimits:
-        """The same for each of `count` joints, which end at lower_rad and upper_rad (n,)."""
+        """Return these limits for `count` joints with the ends lower_rad and upper_rad (n,)."""
         velocity, acceleration = np.full(count, self.velocity_rad_s), np.full(count, self.acceleration_rad_s2)
         return JointLimits(velocity, acceleration, lower_rad, upper_rad)
 
 
 class JointReference:
-    """References (n,) for position, velocity and acceleration: they follow a command until it runs out, then stop."""
+    """References (n,) for position, velocity and acceleration: they follow a command until it expires, then stop."""
 
     def __init__(
         self,
@@ -70,9 +69,9 @@ class JointReference:
         limits: MotionLimits,
         windup_rad: FloatArray | None = None,
     ) -> None:
-        """Stand at `position_rad` (n,), between lower_rad and upper_rad (n,), which may be infinite.
+        """Start at `position_rad` (n,), between lower_rad and upper_rad (n,), which may be infinite.
 
-        windup_rad (n,): that of each joint, in place of the limits'.
+        windup_rad (n,): value for each joint, instead of the limits'.
         """
         self.joints: np.ndarray = np.zeros(position_rad.shape, REFERENCE)
         """(n,) of REFERENCE"""
@@ -88,9 +87,9 @@ class JointReference:
         self._following = False
 
     def command(self, velocity_rad_s: FloatArray, valid_until_s: float) -> None:
-        """Follow `velocity_rad_s` (n,), scaled as a whole to the limit, until `valid_until_s`.
+        """Follow `velocity_rad_s` (n,), scaled by one factor to the limit, until `valid_until_s`.
 
-        ValueError for a wrong shape or a value that is not finite: nothing of it is applied.
+        ValueError for a wrong shape or a value that is not finite; then nothing is applied.
         """
         if velocity_rad_s.shape != self.joints.shape:
             raise ValueError(f"joint_velocity_rad_s has the shape {velocity_rad_s.shape}; valid: {self.joints.shape}")
@@ -101,14 +100,14 @@ class JointReference:
         self._valid_until_s = valid_until_s
 
     def follows(self, time_s: float) -> tuple[bool, bool]:
-        """Whether there is a command to follow at `time_s`, and whether it has run out since the last call."""
+        """Return whether there is a command to follow at `time_s`, and whether it has expired since the last call."""
         before, self._following = self._following, time_s < self._valid_until_s
         return self._following, before and not self._following
 
 
 @compiled(record_array(REFERENCE), input_array(1), NUMBER, returns=TRUTH)
 def _command(joints: Any, velocity: FloatArray, fastest: float) -> bool:
-    """Take over a velocity, scaled as a whole to at most `fastest`; False, and nothing done, if it is not finite."""
+    """Store a velocity, scaled by one factor to at most `fastest`; False, and nothing stored, if it is not finite."""
     largest = 0.0
     for j in range(joints.size):
         if not math.isfinite(velocity[j]):
@@ -129,15 +128,15 @@ def advance_references(
     acceleration: float,
     deceleration: float,
 ) -> None:
-    """Move the references of all `joints` on by `step_s`, near what is measured; the largest change limits them all."""
+    """Advance the references of all `joints` by `step_s`, near the measured ones; the largest change limits all."""
     largest = 0.0
     for j in range(joints.size):
         joint = joints[j]
         if ended:
-            # Halting from a reference that ran ahead would first make the arm catch up with it.
+            # A stop from a reference that leads would first let the arm catch up with it.
             joint.position = joint.measured_position
             joint.velocity = min(max(joint.measured_velocity, -fastest), fastest)
-        # Near a limit only the speed from which the joint can still stop before it.
+        # Near an end, limit the speed so that the joint can still stop before it.
         joint.to_lower = -math.sqrt(2.0 * deceleration * max(joint.position - joint.lower, 0.0))
         joint.to_upper = math.sqrt(2.0 * deceleration * max(joint.upper - joint.position, 0.0))
         target = min(max(joint.command, joint.to_lower), joint.to_upper) if following else 0.0
@@ -152,7 +151,7 @@ def advance_references(
         joint.velocity = velocity
         way = velocity * step_s
         moved = min(max(joint.position + way, joint.lower), joint.upper)
-        # What a load has made of the lead stays: a reference that followed the joint back would let it sink.
+        # A lead caused by a load stays: a reference that followed the joint back would let it sink.
         lead = joint.windup + abs(way)
         most_behind = min(joint.position, joint.measured_position - lead)
         most_ahead = max(joint.position, joint.measured_position + lead)

@@ -1,4 +1,4 @@
-"""Where encoder readings put the gripper (eq. 4)."""
+"""Forward kinematics of the gripper from encoder readings (eq. 4)."""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,13 +20,13 @@ from robot_side.gripper.near_order import near_order
 
 
 class MujocoKinematics:
-    """GripperKinematics: the gripper where the encoders say it is, without the simulation and without its objects."""
+    """GripperKinematics of the scene's robot: the gripper by its encoders, without the simulation's truth."""
 
     def __init__(self, scene: Scene, stand_out_m: float = 0.003, searching: Callable[[], None] | None = None) -> None:
-        """Cover the gripper's geoms with spheres that stand out of them by `stand_out_m` at most.
+        """Cover the gripper's geoms with spheres that stand out by at most `stand_out_m`.
 
-        searching: called before each search for these, but not for what was found before.
-        ConfigurationError when the robot has nothing at the tool that could touch anything.
+        searching: called before each search for spheres, but not for a stored cover.
+        ConfigurationError if the robot has no colliding geoms at the tool.
         """
         model, robot = scene.model, scene.robot
         geoms = robot.gripper_geoms
@@ -35,16 +35,16 @@ class MujocoKinematics:
         data = mujoco.MjData(model)
         data.qpos[:] = scene.data.qpos
         mujoco.mj_kinematics(model, data)
-        # The gripper is covered in the frames of its links, in which its geoms do not move.
+        # Covered in the frames of the links, in which the geoms do not move.
         self.cover = cover_gripper(model, geoms, stand_out_m, searching)
-        # Spheres that are near each other follow each other: the search looks at several at once.
+        # Neighbouring spheres are consecutive: the search handles clusters of them.
         on_link = np.einsum("mij,mj->mi", data.xmat[self.cover.bodies].reshape(-1, 3, 3), self.cover.centers_m)
         order = near_order(data.xpos[self.cover.bodies] + on_link, CLUSTER)
         bodies = self.cover.bodies[order]
         self._radii_m = self.cover.radii_m[order]
         self._on_finger = np.isin(bodies, model.geom_bodyid[geoms[robot.geom_on_finger]])
         self.has_fingers = bool(self._on_finger.any())
-        # Every pose shares these two.
+        # All poses share these two arrays.
         self._radii_m.setflags(write=False)
         self._on_finger.setflags(write=False)
         own = np.flatnonzero(model.body_rootid == robot.root_body)
@@ -56,18 +56,18 @@ class MujocoKinematics:
         self._link_poses: FloatArray = np.zeros((1 + own.size, 7))
 
     def body_poses(self, bodies: IntArray) -> FloatArray:
-        """Where the newest `pose` put `bodies` (n,) of the robot: positions and quaternions (n, 7), w first."""
+        """Return positions and quaternions (n, 7), w first, of the robot's `bodies` (n,) in the newest `pose`."""
         poses: FloatArray = self._link_poses[self._link_of[bodies]]
         return poses
 
     def pose(self, state: ArmState) -> GripperPose:
-        """The gripper at the encoder readings of `state` (eq. 4); the fingers' own motion is not in its Jacobians."""
+        """Return the gripper's pose at the encoder readings of `state` (eq. 4); no Jacobian has the finger joints."""
         placed = place(self._tree, state.joint_positions_rad, state.finger_positions, self._link_poses)
         return GripperPose(*placed, self._radii_m, self._on_finger)
 
 
 def _link_tree(model: Any, data: Any, robot: RobotModel, link_of: IntArray, points: Records) -> LinkTree:
-    """The robot without what is around it. What no reading moves stays as `data` has it, whatever its joints are."""
+    """Return the robot's links alone. Links that no reading moves keep their poses in `data`."""
     arm, fingers = robot.arm_positions.tolist(), robot.finger_positions.tolist()
     links = np.zeros(int(link_of.max()) + 1, dtype=LINK)
     joints: list[tuple[Any, ...]] = []

@@ -1,4 +1,4 @@
-"""The surfaces of mesh geoms and height fields, out of the arrays in which a compiled MuJoCo model keeps them all."""
+"""Surfaces of mesh geoms and height fields, from the shared arrays of a compiled MuJoCo model."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from common.arrays import FloatArray, IntArray
 
 
 def mesh_vertices(model: Any, geom: int) -> FloatArray:
-    """Vertices (v, 3) in m, in the geom's frame."""
+    """Return vertices (v, 3) in m, in the geom's frame."""
     mesh = int(model.geom_dataid[geom])
     first = int(model.mesh_vertadr[mesh])
     vertices: FloatArray = model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])].astype(np.float64)
@@ -16,7 +16,7 @@ def mesh_vertices(model: Any, geom: int) -> FloatArray:
 
 
 def mesh_triangles(model: Any, geom: int) -> IntArray:
-    """Triangles (t, 3), indices of `mesh_vertices`."""
+    """Return triangles (t, 3), indices of `mesh_vertices`."""
     mesh = int(model.geom_dataid[geom])
     first = int(model.mesh_faceadr[mesh])
     triangles: IntArray = model.mesh_face[first : first + int(model.mesh_facenum[mesh])].astype(np.int64)
@@ -24,9 +24,9 @@ def mesh_triangles(model: Any, geom: int) -> IntArray:
 
 
 def height_field_surface(model: Any, geom: int) -> tuple[FloatArray, IntArray]:
-    """Vertices (v, 3) in m, in the geom's frame, and triangles (t, 3) of the solid between a height field and its base.
+    """Return vertices (v, 3) in m, in the geom's frame, and triangles (t, 3) of a height field's solid, with its base.
 
-    As MuJoCo collides it: each cell is two triangles, which share the diagonal from its least to its greatest x and y.
+    As in MuJoCo's collisions, two triangles of each cell share the diagonal from its least to its greatest x and y.
     """
     field = int(model.geom_dataid[geom])
     rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
@@ -38,7 +38,7 @@ def height_field_surface(model: Any, geom: int) -> tuple[FloatArray, IntArray]:
     numbers = np.arange(rows * columns).reshape(rows, columns)
     here, right = numbers[:-1, :-1].ravel(), numbers[:-1, 1:].ravel()
     beyond, across = numbers[1:, :-1].ravel(), numbers[1:, 1:].ravel()
-    # Around the field, anticlockwise as seen from above; below each of these a vertex of the base, and one amid it.
+    # Rim of the field, anticlockwise from above; the base has a vertex below each of these, and one in its middle.
     rim = np.concatenate([numbers[0, :-1], numbers[:-1, -1], numbers[-1, :0:-1], numbers[:0:-1, 0]])
     bottom = top[rim] * [1.0, 1.0, 0.0] - [0.0, 0.0, base]
     below = len(top) + np.arange(len(rim))

@@ -1,6 +1,6 @@
-"""MuJoCo's own numbers for the kinds of joints, geoms and actuators, in its order; a test compares them with it.
+"""MuJoCo's numbers for the kinds of joints, geoms and actuators, in its order; a test compares them with MuJoCo.
 
-They let a module read a model's arrays without importing the library.
+With them a module can read a model's arrays without importing the library.
 """
 
 from enum import IntEnum

@@ -1,4 +1,4 @@
-"""The primitives of a scene's objects: which geoms are spheres, boxes, tetrahedra, meshes, half-spaces; and where."""
+"""Primitives of a scene's objects: spheres, boxes, tetrahedra, meshes, half-spaces and ellipsoids of geoms, placed."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -29,7 +29,7 @@ _EXACT: Final[Mapping[GeomKind, str]] = {
     GeomKind.ELLIPSOID: "ellipsoid",
 }
 _MESHES = {GeomKind.CAPSULE, GeomKind.CYLINDER, GeomKind.MESH, GeomKind.HFIELD}
-"""What a mesh describes, unless it is a tetrahedron."""
+"""Kinds of geoms that a mesh describes, except a tetrahedron"""
 _SIZES: Final[Mapping[str, Callable[[Any, IntArray], tuple[FloatArray, ...]]]] = {
     "sphere": lambda model, geoms: (model.geom_size[geoms, 0],),
     "box": lambda model, geoms: (model.geom_aabb[geoms],),
@@ -39,23 +39,23 @@ _SIZES: Final[Mapping[str, Callable[[Any, IntArray], tuple[FloatArray, ...]]]] =
     "half_space": lambda _model, geoms: (np.empty((len(geoms), 0)),),
     "ellipsoid": lambda model, geoms: (model.geom_size[geoms],),
 }
-"""By kind but meshes the sizes of geoms (k,) in their own frames, as `Kind.placed` takes them."""
+"""Functions that read the sizes of geoms (k,) in their own frames, as `Kind.placed` takes them; by kind but mesh"""
 
 
 @dataclass(frozen=True)
 class SceneObject:
-    """A thing in the scene that is not the robot: one tree of bodies, or one geom that is fixed to the world."""
+    """Object of the scene, not of the robot: one tree of bodies, or one geom that is fixed to the world."""
 
     name: str
     geoms: tuple[int, ...]
-    """Those that can touch something."""
+    """Geoms that can touch something"""
 
 
 class ObjectPrimitives:
-    """The objects' shapes in their geoms' frames, ready to be placed in the world once for each frame.
+    """Shapes of the objects in their geoms' frames, to be placed in the world once for each frame.
 
-    A sphere, a box, a plane, an ellipsoid, a closed mesh and a height field are exact. A cylinder and a capsule stand
-    for meshes around them, a mesh that is not closed for its convex hull, and any other shape for its bounding box.
+    A sphere, a box, a plane, an ellipsoid, a closed mesh and a height field are exact. A cylinder and a capsule are
+    meshes around them, a mesh that is not closed is its convex hull, and any other shape its bounding box.
     """
 
     def __init__(self, model: Any, objects: Sequence[SceneObject]) -> None:
@@ -79,12 +79,12 @@ class ObjectPrimitives:
                 volume_errors[name] = max(share, volume_errors.get(name, 0.0))
                 stands_out_m[name] = max(distance_m, stands_out_m.get(name, 0.0))
         self.volume_errors: Mapping[str, float] = volume_errors
-        """Of each object that is seen larger than it is, the greatest share by which a part's volume is greater.
+        """Greatest share by which a part's volume is too large, for each object that is perceived larger than it is.
 
-        Infinite for what has no known volume of its own, and stands for its convex hull or bounding box.
+        Infinite for a part without a known volume, of which the convex hull or the bounding box is used.
         """
         self.stands_out_m: Mapping[str, float] = stands_out_m
-        """And how far what is seen of it reaches beyond it, at most."""
+        """Largest distance by which the perceived shape of each of these objects extends beyond it."""
 
         mesh_index = np.array([meshes[geom][0] for geom, _ in of_kind["mesh"]], dtype=np.int64)
         self._mesh_index: IntArray = mesh_index
@@ -99,16 +99,16 @@ class ObjectPrimitives:
         ]
         of_each = np.concatenate([rows(*columns, width=NUMBERS) for columns in sizes])
         self._primitives = _Primitives(kinds, own, owners, of_each)
-        """All of them, a kind after another"""
+        """Primitives of all objects, kind by kind"""
         self._first_geoms = np.array([thing.geoms[0] for thing in objects], dtype=np.int64)
 
     def _seen(self, roles: Mapping[str, Role]) -> BoolArray:
-        """Which primitives (n,) belong to objects that are not ignored."""
+        """Return whether each primitive (n,) belongs to an object that is not ignored."""
         seen = np.array([roles[name] is not Role.IGNORED for name in self._names], dtype=np.bool_)
         return seen[self._primitives.owners]
 
     def moving(self, things: IntArray, roles: Mapping[str, Role]) -> "MovingPrimitives":
-        """Those of some of the objects, things (m,), rising, in the order of `movers`; ignored ones have none."""
+        """Return the primitives of `things` (m,), ascending, in the order of `movers`; none of ignored objects."""
         owners = self._primitives.owners
         kept = np.flatnonzero(self._seen(roles) & np.isin(owners, things))
         kept = kept[np.argsort(owners[kept], kind="stable")]
@@ -122,9 +122,9 @@ class ObjectPrimitives:
         geom_positions_m: FloatArray,
         geom_rotations: FloatArray,
     ) -> PerceivedObjects:
-        """The objects in the world, each moved by its row of `offsets_m` (k, 3); ignored ones without primitives.
+        """Return the objects in the world, each moved by its row of `offsets_m` (k, 3); ignored ones lack primitives.
 
-        geom_positions_m (g, 3) and geom_rotations (g, 9) are the model's geoms in the world frame.
+        geom_positions_m (g, 3) and geom_rotations (g, 9) are those of the model's geoms in the world frame.
         """
         kept = np.flatnonzero(self._seen(roles))
         primitives = self._primitives.only(kept)
@@ -152,17 +152,17 @@ class _Primitives(NamedTuple):
     kinds: IntArray
     geoms: IntArray
     owners: IntArray
-    """Among all objects"""
+    """Indices among all objects"""
     sizes: FloatArray
     """(n, 20) as `Kind.placed` takes them"""
 
     def only(self, places: IntArray) -> "_Primitives":
-        """Those at these places."""
+        """Return the primitives at these indices."""
         return _Primitives(self.kinds[places], self.geoms[places], self.owners[places], self.sizes[places])
 
 
 class MovingPrimitives(NamedTuple):
-    """Primitives of some objects (m), ready to be put where MuJoCo has their geoms."""
+    """Primitives of some objects (m), to be placed at the poses of MuJoCo's geoms."""
 
     primitives: _Primitives
     things: IntArray
@@ -170,7 +170,7 @@ class MovingPrimitives(NamedTuple):
     """(m,)"""
 
     def numbers(self, offsets_m: FloatArray, geom_positions_m: FloatArray, geom_rotations: FloatArray) -> FloatArray:
-        """Their numbers (n + m, 20) as in `movers`, velocities 0; the arguments as for `place`."""
+        """Return the rows (n + m, 20) of `movers`, with velocities 0; the arguments are those of `place`."""
         primitives, things, first_geoms = self
         numbers: FloatArray = np.empty((len(primitives.kinds) + len(things), NUMBERS))
         _place(geom_positions_m, geom_rotations, offsets_m, *primitives, things, first_geoms, numbers)
@@ -209,7 +209,7 @@ def _place(
 def _primitive_kind(model: Any, geom: int) -> str | None:
     kind = int(model.geom_type[geom])
     if kind == GeomKind.MESH:
-        # An open surface of four vertices has no more inside than any other.
+        # Four vertices without four faces are an open surface.
         mesh = model.geom_dataid[geom]
         return "tetrahedron" if model.mesh_vertnum[mesh] == 4 and model.mesh_facenum[mesh] == 4 else None
     return _EXACT.get(GeomKind(kind)) if kind in set(GeomKind) else None
@@ -218,7 +218,7 @@ def _primitive_kind(model: Any, geom: int) -> str | None:
 def _meshes(
     model: Any, geoms: Sequence[int]
 ) -> tuple["MeshLibrary | None", dict[int, tuple[int, "GeomMesh"]], frozenset[int]]:
-    """The library, (mesh index, mesh) of each geom that has a mesh, and the geoms that have none."""
+    """Return the library, (mesh index, mesh) of each geom with a mesh, and the geoms without one."""
     candidates = [geom for geom in geoms if int(model.geom_type[geom]) in _MESHES]
     if not candidates:
         return None, {}, frozenset(geoms)

@@ -1,4 +1,4 @@
-"""What is worked out around a step of the physics, in one kernel before it and one after it."""
+"""Control and measurement around a step of the physics: one kernel before it, one after it."""
 
 from typing import Any, Final, NamedTuple
 
@@ -13,55 +13,55 @@ from robot_side.drivers.mujoco.joint_drives import DRIVE, control, motor_acceler
 from robot_side.drivers.mujoco.joint_reference import REFERENCE, advance_references
 
 INERTIA: Final = np.dtype([("place", np.int64), ("row", np.int64), ("column", np.int64)])
-"""One element of the arm's inertia matrix on or below its diagonal, by joints: its place in what MuJoCo keeps of it."""
+"""Element of the arm's inertia matrix on or below the diagonal, by joints, and its index in MuJoCo's sparse array"""
 LIMITS: Final = np.dtype([("velocity", np.float64), ("acceleration", np.float64), ("deceleration", np.float64)])
-"""What the arm's own controller allows each joint, rad and s."""
+"""Limits of each joint in the arm's own controller, rad and s"""
 
 
 class Plant(NamedTuple):
-    """What the kernels before and after a step read and write; MuJoCo's arrays stay where they are while it lives."""
+    """Data that the kernels before and after a step read and write; MuJoCo's arrays keep their addresses."""
 
     joints: np.ndarray
     """(n,) of REFERENCE"""
     drives: np.ndarray
     """(n,) of DRIVE"""
     inertia: np.ndarray
-    """(k,) of INERTIA: the arm's elements of `mass`"""
+    """(k,) of INERTIA: elements of `mass` of the arm"""
     grippers: np.ndarray
     """(g,) of GRIPPER: one or none"""
     samples: FloatArray
-    """(s, 3) of its travel"""
+    """(s, 3) samples of the gripper's travel"""
     inputs: np.ndarray
     """(i,) of GRIPPER_INPUT"""
     positions: IntArray
-    """(n,) the joints' places in qpos"""
+    """(n,) indices of the joints in qpos"""
     fingers: IntArray
-    """(f,) and those of the fingers'"""
+    """(f,) indices of the fingers' joints in qpos"""
     velocities: IntArray
-    """(n,) the joints' places in qvel"""
+    """(n,) indices of the joints in qvel"""
     controls: IntArray
-    """(n,) and in ctrl"""
+    """(n,) indices of the joints' actuators in ctrl"""
     qpos: FloatArray
     qvel: FloatArray
     mass: FloatArray
     """MuJoCo's inertia matrix"""
     bias: FloatArray
-    """(nv,) the forces of gravity and velocity"""
+    """(nv,) forces of gravity and velocity"""
     compensated: FloatArray
-    """(nv,) what compensates gravity"""
+    """(nv,) forces of gravity compensation"""
     sprung: FloatArray
-    """(nv,) the forces of springs"""
+    """(nv,) forces of springs"""
     gripper_length: FloatArray
-    """Of the gripper's first actuator, in front"""
+    """Lengths of the actuators from the gripper's first one on; gripper_speed: their speeds"""
     gripper_speed: FloatArray
     ctrl: FloatArray
-    """(nu,) the actuators' inputs"""
+    """(nu,) inputs of the actuators"""
     limits: np.ndarray
     """(1,) of LIMITS"""
 
 
 def inertia_table(model: Any, velocities: IntArray) -> np.ndarray:
-    """The elements (k,) of INERTIA that joints at `velocities` (n,) among the degrees of freedom share."""
+    """Return the elements (k,) of INERTIA between joints whose degrees of freedom are `velocities` (n,)."""
     joint_of = {int(velocity): joint for joint, velocity in enumerate(velocities)}
     found = [
         (place, joint, joint_of[int(model.M_colind[place])])
@@ -84,7 +84,7 @@ _plant_at = PLANT.at
 
 @compiled(BUNDLE, TRUTH, TRUTH, NUMBER, NUMBER)
 def drive(bundle: IntArray, following: bool, ended: bool, closing: float, step_s: float) -> None:
-    """Move the references on by `step_s` and turn them into the actuators' inputs."""
+    """Advance the references by `step_s` and compute the actuators' inputs from them."""
     plant = _plant_at(bundle)
     joints, drives, inertia, limits = plant.joints, plant.drives, plant.inertia, plant.limits[0]
     for j in range(joints.size):
@@ -125,7 +125,7 @@ def sense(
     velocities: FloatArray,
     fingers: FloatArray,
 ) -> None:
-    """Make readings of the noise in positions (n,) and fingers (f,), and fill velocities (n,)."""
+    """Replace the noise in positions (n,) and fingers (f,) with readings, and fill velocities (n,)."""
     plant = _plant_at(bundle)
     for j in range(positions.size):
         positions[j] = reading(positions[j], plant.qpos[plant.positions[j]], sigma, resolution)

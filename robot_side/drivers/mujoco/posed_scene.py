@@ -1,4 +1,4 @@
-"""The true gripper among the true objects, put where one likes: for experiments that look at a motion afterwards."""
+"""True gripper among true objects, in any pose: for experiments that analyse a motion afterwards."""
 
 import math
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from robot_side.surroundings.perceived import PerceivedObjects
 
 
 class ToolPath(NamedTuple):
-    """Poses of the tool, so near to each other that nothing is met between two of them alone."""
+    """Poses of the tool, so dense that no contact occurs only between two of them."""
 
     positions_m: FloatArray
     """(k, 3)"""
@@ -23,7 +23,7 @@ class ToolPath(NamedTuple):
 
 
 class PosedScene:
-    """A scene's geometry in poses that were recorded elsewhere; nobody simulates it."""
+    """Geometry of a scene in recorded poses, without simulation."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -36,40 +36,40 @@ class PosedScene:
         self._at_rest_m: FloatArray = np.zeros((self._gripper.size, 3))
 
     def put(self, arm_positions_rad: FloatArray, finger_positions: FloatArray, shift_m: FloatArray) -> None:
-        """Put the joints (n,) and (f,), and every object `shift_m` (3,) from where the scene has it."""
+        """Set the joints (n,) and (f,), and move every object by `shift_m` (3,) from its pose in the scene."""
         data, robot = self._data, self.scene.robot
         data.qpos[robot.arm_positions] = arm_positions_rad
         data.qpos[robot.finger_positions] = finger_positions
         mujoco.mj_kinematics(self.scene.model, data)
-        # Where things may sleep MuJoCo does not put what is fixed back to its place.
+        # With sleeping enabled, MuJoCo does not update the poses of fixed geoms.
         data.geom_xpos[self._fixed] = self.scene.data.geom_xpos[self._fixed]
         data.geom_xpos[self._objects] += shift_m
         self._at_rest_m = data.geom_xpos[self._gripper].copy()
 
     def approach_axis(self) -> FloatArray:
-        """The tool's approach axis (3,) in the present pose, unit, in the world frame."""
+        """Return the tool's approach axis (3,) in the present pose, unit, in the world frame."""
         axis: FloatArray = self._data.site_xmat[self.scene.robot.site].reshape(3, 3)[:, 2].copy()
         return axis
 
     def gap_m(self, farthest_m: float = 1.0) -> float:
-        """The least distance from the gripper to any object, at most `farthest_m`."""
+        """Return the least distance from the gripper to any object, at most `farthest_m`."""
         return least_distance(self.scene.model, self._data, self._gripper, self._objects, farthest_m)
 
     def way_m(self, farthest_m: float) -> float:
-        """How far the gripper could go along its approach axis until it touches, at most `farthest_m`."""
+        """Return the distance that the gripper can move along its approach axis until contact, at most `farthest_m`."""
         axis = self.approach_axis()
         way_m = free_way(self.scene.model, self._data, self._gripper, self._objects, axis, farthest_m)
         self._data.geom_xpos[self._gripper] = self._at_rest_m
         return way_m
 
     def stays_clear(self, path: ToolPath, margin_m: float) -> bool:
-        """Whether the gripper stays `margin_m` off everything on a path that begins at the present pose."""
+        """Return whether the gripper keeps `margin_m` to all objects on a path that begins at the present pose."""
         data, gripper = self._data, self._gripper
         turns = data.geom_xmat[gripper].reshape(-1, 3, 3).copy()
         turned = path.rotations @ path.rotations[0].T
         lever = self._at_rest_m - path.positions_m[0]
         reach_m = float((np.linalg.norm(lever, axis=1) + self.scene.model.geom_rbound[gripper]).max())
-        # No part of the gripper goes farther than this from one pose to the next: |ΔR x| <= ‖ΔR‖ |x| / √2.
+        # Bound of the motion of any part of the gripper from one pose to the next: |ΔR x| <= ‖ΔR‖ |x| / √2.
         steps_m = np.linalg.norm(np.diff(path.positions_m, axis=0), axis=1)
         steps_m += np.linalg.norm(np.diff(turned, axis=0), axis=(1, 2)) * (reach_m / math.sqrt(2.0))
         gone_m = np.concatenate([[0.0], np.cumsum(steps_m)])
@@ -84,11 +84,11 @@ class PosedScene:
         return clear
 
     def perceived(self, errors_m: FloatArray) -> PerceivedObjects:
-        """What a camera with these errors (k, 3) says of the objects in the present pose (eq. 1)."""
+        """Return the objects in the present pose as a camera with these errors (k, 3) perceives them (eq. 1)."""
         scene, data = self.scene, self._data
         return scene.primitives.place(0.0, scene.roles, errors_m, data.geom_xpos, data.geom_xmat)
 
 
 def let_through(scene: Scene) -> None:
-    """Nothing touches anything from now on: the gripper goes through what stands in the way."""
+    """Disable contacts: from now on the gripper passes through objects."""
     scene.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT

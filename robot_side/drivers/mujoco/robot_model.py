@@ -1,4 +1,4 @@
-"""Which parts of a compiled model are the arm, its gripper and their actuators, found from the tool's site alone."""
+"""Arm, gripper and their actuators in a compiled model, found from the tool's site alone."""
 
 import hashlib
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ _TURNING_OR_SLIDING = (JointKind.HINGE, JointKind.SLIDE)
 
 @dataclass(frozen=True)
 class RobotModel:
-    """Indices into a model's arrays. The robot is the whole tree of bodies that carries the tool's site."""
+    """Indices of the robot in a model's arrays. The robot is the whole tree of bodies with the tool's site."""
 
     site: int
     root_body: int
     arm_joints: IntArray
-    """(n,) the joints on the chain from the world to the site"""
+    """(n,) joints on the chain from the world to the site"""
     arm_positions: IntArray
     """(n,) into qpos"""
     arm_velocities: IntArray
@@ -37,13 +37,13 @@ class RobotModel:
     finger_velocities: IntArray
     """(f,) into qvel"""
     gripper_actuators: IntArray
-    """(g,) the actuators that move those joints"""
+    """(g,) actuators that move the finger joints"""
     gripper_controls: IntArray
     """(g,) into ctrl"""
     fingerprint: str
-    """Twelve digits that tell an arm by its joints, links and limits, wherever it stands"""
+    """Twelve digits that identify an arm by its joints, links and limits, not by its base's position"""
     gripper_geoms: IntArray
-    """(k,) the geoms that can touch something, beyond the last arm link, or on it where there are none beyond"""
+    """(k,) colliding geoms beyond the last arm link, or on that link if there are none beyond"""
     geom_on_finger: BoolArray
     """(k,) whether a finger joint moves the geom"""
 
@@ -107,7 +107,7 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
 
 
 def _strongest(model: Any, actuators: IntArray) -> FloatArray:
-    """The greatest torque or force at the joint (n,) that `actuators` (n,) give; infinite without a limit."""
+    """Return the greatest torque or force of `actuators` (n,) at their joints (n,); infinite without a limit."""
     most: FloatArray = np.abs(model.actuator_gear[actuators, 0]) * model.actuator_forcerange[actuators, 1]
     return np.where(model.actuator_forcelimited[actuators].astype(bool), most, np.inf)
 
@@ -129,7 +129,7 @@ def _fingerprint(model: Any, joints: IntArray, site: int) -> str:
 
 
 def can_touch(model: Any, geom: int) -> bool:
-    """Whether a geom takes part in collisions; one that does not is there to be looked at."""
+    """Return whether a geom takes part in collisions; other geoms are only visual."""
     return bool(model.geom_contype[geom]) or bool(model.geom_conaffinity[geom])
 
 
@@ -153,7 +153,7 @@ def _find_site(model: Any, site_name: str | None) -> int:
 
 
 def _chain(model: Any, body: int) -> list[int]:
-    """The bodies from the child of the world down to `body`."""
+    """Return the bodies from the child of the world down to `body`."""
     chain: list[int] = []
     while body != 0:
         chain.insert(0, body)
@@ -175,7 +175,7 @@ def _require_simple(model: Any, joints: IntArray) -> None:
 
 
 def _joint_name(model: Any, joint: int) -> str:
-    """Words by which a person finds the joint in the model."""
+    """Return a description by which a person finds the joint in the model."""
     if name := model.joint(joint).name:
         return f"joint {name!r}"
     body = int(model.jnt_bodyid[joint])
@@ -183,7 +183,7 @@ def _joint_name(model: Any, joint: int) -> str:
 
 
 def _why_no_actuator(model: Any, joint: int) -> str:
-    """What moves a joint that has no actuator of its own."""
+    """Return the reason why a joint has no own actuator."""
     if any(_moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu)):
         return "it is pulled by a tendon that it shares"
     if model.nmocap > 0:
@@ -192,12 +192,12 @@ def _why_no_actuator(model: Any, joint: int) -> str:
 
 
 def _actuator_of(model: Any, joint: int) -> int:
-    """The first actuator on `joint`, of a kind that can be driven."""
+    """Return the first actuator on `joint`; ConfigurationError for none, or for one of an unsupported kind."""
     for actuator in range(model.nu):
         on_joint = model.actuator_trntype[actuator] in (TransmissionKind.JOINT, TransmissionKind.JOINT_IN_PARENT)
         if not on_joint or model.actuator_trnid[actuator, 0] != joint:
             continue
-        # A state of its own between input and force, such as an integrator's, is not followed here.
+        # An actuator with an internal state between input and force, such as an integrator, is not supported.
         simple = (
             model.actuator_dyntype[actuator] == 0
             and model.actuator_gaintype[actuator] == GainKind.FIXED

@@ -1,4 +1,4 @@
-"""The simulated world: from MJCF to an arm among objects."""
+"""Simulated world, loaded from MJCF: an arm among objects."""
 
 import logging
 import math
@@ -24,16 +24,16 @@ from robot_side.surroundings.roles import assign_roles
 
 _LOG = logging.getLogger(__name__)
 _ASSETS = Path(__file__).parent / "assets"
-# MuJoCo wants a prefix for what is attached; objects are named without it.
+# MuJoCo requires a prefix for attached elements; objects are named without it.
 _TABLE_PREFIX = "table_scene/"
 _START_KEY = "feelahead_start"
-# With longer ones the arm's own servos swing; with shorter ones no machine keeps up with real time.
+# Longer steps make the arm's servos oscillate; shorter ones are too slow for real time on any machine.
 _SHORTEST_STEP_S, _LONGEST_STEP_S = 1e-5, 0.02
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A compiled model and its one live state, which the arm advances and everybody else only reads."""
+    """Compiled model and its only live state, which the arm advances and all others only read."""
 
     model: Any
     """mujoco.MjModel"""
@@ -42,29 +42,29 @@ class Scene:
     robot: RobotModel
     objects: tuple[SceneObject, ...]
     roles: dict[str, Role]
-    """Each object's present role; `MujocoCamera.set_role` changes it."""
+    """Present role of each object; `MujocoCamera.set_role` changes it."""
     primitives: ObjectPrimitives
     start_pose: str
-    """Where the arm starts, in words for people."""
+    """Start pose of the arm, in words."""
     shared_names: tuple[str, ...]
-    """Names of a body and of a geom of the world, or the like: each is one object."""
+    """Names that several elements share, such as a body and a geom of the world; each name is one object."""
     warnings: tuple[str, ...]
-    """What MuJoCo had to say about the model."""
+    """Warnings of MuJoCo about the model."""
 
     @property
     def fixed(self) -> frozenset[str]:
-        """Names of the objects that no joint lets move, and nobody else does."""
+        """Names of the objects that neither a joint nor mocap moves"""
         model = self.model
         movable = (model.body_weldid != 0) | (model.body_mocapid[model.body_rootid] >= 0)
         moves = movable[model.geom_bodyid]
         return frozenset(thing.name for thing in self.objects if not any(moves[geom] for geom in thing.geoms))
 
     def step(self) -> None:
-        """Advance the state by one step, whoever drives the arm."""
+        """Advance the state by one step, with the actuators' present inputs."""
         mujoco.mj_step(self.model, self.data)
 
     def show(self, measured: ArmState) -> None:
-        """Put the robot where an arm that is elsewhere says it is; nobody steps the state then."""
+        """Set the robot to the state measured by a driver's arm; the scene is then not simulated."""
         self.data.qpos[self.robot.arm_positions] = measured.joint_positions_rad
         self.data.qpos[self.robot.finger_positions] = measured.finger_positions
         mujoco.mj_kinematics(self.model, self.data)
@@ -79,9 +79,9 @@ def load_scene(
 ) -> Scene:
     """Load the built-in arm at its table, or the MJCF file `model_path` whose tool is the site `site`.
 
-    A file with nothing but a robot and planes gets the built-in scene `name`, as drawn from `seed`, in front of it.
-    The arm starts at the keyframe `home`, else the first keyframe, else the middle of its joints' ranges.
-    `roles` overrides what the objects' names tell. ConfigurationError, one line, for what cannot be used.
+    A file with only a robot and planes gets the built-in scene `name`, drawn from `seed`, in front of the robot.
+    The arm starts at the keyframe `home`, else the first keyframe, else the middle of the joints' ranges.
+    `roles` overrides the roles by name. ConfigurationError, one line, for an unusable file, model or site.
     """
     mujoco.set_mju_user_warning(_log_warning)
     with warnings.catch_warnings(record=True) as said:
@@ -94,7 +94,7 @@ def load_scene(
         robot = find_robot(model, site)
         start, start_pose = _start_configuration(model, robot)
         if all(model.geom_type[geom] == GeomKind.PLANE for thing in _objects(model, robot)[0] for geom in thing.geoms):
-            # Attaching extends the keyframes by what is attached, so that one carries the configuration over.
+            # Attaching extends the keyframes by the attached joints, so that a keyframe preserves the configuration.
             start_key = _START_KEY
             while any(model.key(key).name == start_key for key in range(model.nkey)):
                 start_key += "_"
@@ -164,7 +164,7 @@ def _unusable(error: Exception) -> ConfigurationError:
 
 
 def _start_key(model: Any) -> int | None:
-    """Which keyframe the arm starts from: `home`, else the first one; None where there is none."""
+    """Return the keyframe that the arm starts from: `home`, else the first one; None without keyframes."""
     keyframes = [model.key(key).name for key in range(model.nkey)]
     if not keyframes:
         return None
@@ -172,7 +172,7 @@ def _start_key(model: Any) -> int | None:
 
 
 def _start_configuration(model: Any, robot: RobotModel) -> tuple[FloatArray, str]:
-    """qpos (nq,) of the keyframe that the arm starts from, else the middle of the ranges; and which, in words."""
+    """Return qpos (nq,) of the start keyframe, else of the middle of the ranges; and its description."""
     start: FloatArray
     key = _start_key(model)
     if key is not None:
@@ -187,7 +187,7 @@ def _start_configuration(model: Any, robot: RobotModel) -> tuple[FloatArray, str
 
 
 def _start_velocities(model: Any, robot: RobotModel) -> FloatArray:
-    """qvel (nv,) of the keyframe that the arm starts from, for what is not the robot: that starts at rest."""
+    """Return qvel (nv,) of the start keyframe, with the robot at rest."""
     key = _start_key(model)
     if key is None:
         return np.zeros(model.nv)
@@ -197,7 +197,7 @@ def _start_velocities(model: Any, robot: RobotModel) -> FloatArray:
 
 
 def _finite(model: Any, key: int, part: str) -> FloatArray:
-    """A copy of a keyframe's `part`, qpos or qvel; ConfigurationError where it is not finite."""
+    """Return a copy of a keyframe's `part`, qpos or qvel; ConfigurationError if not finite."""
     values: FloatArray = getattr(model, f"key_{part}")[key].copy()
     if not np.isfinite(values).all():
         raise ConfigurationError(f"model: keyframe {model.key(key).name!r} holds NaN or infinity; valid: finite {part}")
@@ -205,14 +205,14 @@ def _finite(model: Any, key: int, part: str) -> FloatArray:
 
 
 def _objects(model: Any, robot: RobotModel) -> tuple[tuple[SceneObject, ...], tuple[str, ...]]:
-    """What is not the robot and can touch something, in the order of its first geom; and the names that are shared."""
+    """Return the colliding objects other than the robot, by their first geom, and the shared names."""
     geoms_of: dict[str, list[int]] = {}
     parts_of: dict[str, set[tuple[str, int]]] = {}
     for geom in range(model.ngeom):
         root = int(model.body_rootid[model.geom_bodyid[geom]])
         if root == robot.root_body or not can_touch(model, geom):
             continue
-        # What is fixed to the world is a thing of its own; a tree of bodies is one thing.
+        # Each geom of the world is an object, unless names are shared; a tree of bodies is one object.
         kind, index, named = ("geom", geom, model.geom(geom)) if root == 0 else ("body", root, model.body(root))
         name = named.name.removeprefix(_TABLE_PREFIX) or f"{kind}{index}"
         geoms_of.setdefault(name, []).append(geom)
@@ -222,13 +222,13 @@ def _objects(model: Any, robot: RobotModel) -> tuple[tuple[SceneObject, ...], tu
 
 
 def _attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatArray) -> None:
-    """Put the table scene under the tool's start, at the height of the robot's base and the way the tool is."""
+    """Attach the scene below the tool's start, at the base's height, turned towards the tool."""
     data = mujoco.MjData(model)
     data.qpos[:] = start
     mujoco.mj_kinematics(model, data)
     base, tool = data.xpos[robot.root_body], data.site_xpos[robot.site]
     ahead = tool[:2] - base[:2]
-    # A tool straight above the base has no side of its own.
+    # A tool right above the base has no direction.
     yaw = math.atan2(ahead[1], ahead[0]) if np.hypot(*ahead) > 0.05 else 0.0
     home_x, home_y, _ = table.site("tool_home").pos
     if model.geom_type[model.geom_type == GeomKind.PLANE].size:

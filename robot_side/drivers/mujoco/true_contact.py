@@ -1,6 +1,4 @@
-"""When the true gripper, with what it holds, first touches something, how fast, and how far it still is: for
-experiments alone.
-"""
+"""True contacts of the gripper and a held object: onset, closing speed and free gap; for experiments alone."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -20,21 +18,21 @@ _MOST_STEPS = 200
 
 @dataclass(frozen=True)
 class ContactOnset:
-    """The first touch after none."""
+    """Onset of a contact."""
 
     thing: str
-    """The object's name."""
+    """Name of the object"""
     gripper_part: str
-    """The gripper's geom, or the held object's."""
+    """Geom of the gripper or of the held object"""
     closing_speed_m_s: float
-    """How fast the two points came together along the contact's normal, just before the physics knew of it."""
+    """Closing speed of the two points along the contact's normal, before the physics step that detected the contact"""
 
 
 class TrueContact:
-    """Watches one scene's physics from turn to turn; it changes nothing."""
+    """Observer of a scene's contacts from turn to turn; it changes nothing."""
 
     def __init__(self, scene: Scene, *, supports: bool = True) -> None:
-        """`supports`: whether touching one of them counts."""
+        """supports: whether contacts with supports count."""
         self._scene = scene
         self._model, self._data = scene.model, scene.data
         self._object_of = {
@@ -45,7 +43,7 @@ class TrueContact:
         }
         self._gripper = frozenset(int(geom) for geom in scene.robot.gripper_geoms)
         self._ours: tuple[str | None, BoolArray] = None, self._geoms_of(None)
-        # Nobody simulates this one: it holds the state before the last step, or a gripper moved in thought.
+        # These two are not simulated: the state before the last step, and a copy for hypothetical motions.
         self._before = mujoco.MjData(self._model)
         self._thought = mujoco.MjData(self._model)
         self._held: str | None = None
@@ -53,14 +51,14 @@ class TrueContact:
         self._remember()
 
     def update(self, held: str | None) -> ContactOnset | None:
-        """The contact that the steps since the last call have found; of several the fastest. None for none.
+        """Return the fastest new contact of the steps since the last call; None without one.
 
-        held: the object that the gripper holds, which counts as a part of it.
+        held: object that the gripper holds, which counts as a part of it.
         """
         if self._data.time == self._seen_s:
             return None
         touching = self._touching(held)
-        # What touched at the last look has had its onset; so has what something touched before it was gripped.
+        # Known contacts are not new; neither are those of an object that was just gripped.
         names = frozenset(self._object_of[theirs] for _, _, theirs, _ in touching)
         known = self._touched if held == self._held else names
         new = [pair for pair in touching if self._object_of[pair[2]] not in known]
@@ -70,7 +68,7 @@ class TrueContact:
         return max(found, key=lambda onset: onset.closing_speed_m_s, default=None)
 
     def approach(self) -> tuple[FloatArray, float]:
-        """The tool's approach axis (3,), unit, in the world frame, and the tool's true speed along it in m/s."""
+        """Return the tool's approach axis (3,), unit, in the world frame, and its true speed along the axis in m/s."""
         site = self._scene.robot.site
         axis: FloatArray = self._data.site_xmat[site].reshape(3, 3)[:, 2].copy()
         twist: FloatArray = np.zeros(6)
@@ -79,19 +77,16 @@ class TrueContact:
 
     @property
     def touched(self) -> frozenset[str]:
-        """The objects that the gripper, or what it holds, touched at the last look."""
+        """Objects that the gripper, or the held object, touched at the last `update`"""
         return self._touched
 
     def gap_m(self, held: str | None, farthest_m: float = 1.0) -> float:
-        """The least distance from the gripper to anything that it does not hold, at most `farthest_m`."""
+        """Return the least distance from the gripper to any object that it does not hold, at most `farthest_m`."""
         mine, theirs = self._parts(held)
         return least_distance(self._model, self._data, mine, theirs, farthest_m)
 
     def way_left_m(self, direction: FloatArray, held: str | None, farthest_m: float = 1.0) -> float:
-        """How far the gripper could go along the unit vector `direction` (3,) until it touches; at most `farthest_m`.
-
-        See `free_way`.
-        """
+        """Return `free_way` of the gripper, with `held`, along the unit vector `direction` (3,)."""
         model, thought = self._model, self._thought
         thought.qpos[:] = self._data.qpos
         mujoco.mj_kinematics(model, thought)
@@ -104,7 +99,7 @@ class TrueContact:
         return np.array([*self._gripper, *carried], dtype=np.int64), np.array(others, dtype=np.int64)
 
     def _geoms_of(self, held: str | None) -> BoolArray:
-        """Which geoms are the gripper's or the held object's."""
+        """Return whether each geom is the gripper's or the held object's."""
         ours = np.zeros(self._model.ngeom, dtype=bool)
         ours[[*self._gripper, *(geom for geom, name in self._object_of.items() if name == held)]] = True
         return ours
@@ -113,12 +108,12 @@ class TrueContact:
         if self._ours[0] != held:
             self._ours = held, self._geoms_of(held)
         contacts = self._data.contact
-        # A look at each single contact takes as long as a step of the physics, and most are none of the gripper's.
+        # Checking each contact takes as long as a step of the physics, and most are not the gripper's.
         rows = np.flatnonzero(self._ours[1][contacts.geom].any(axis=1))
         return [pair for row in rows if (pair := self._pair(contacts[row], held)) is not None]
 
     def _pair(self, contact: Any, held: str | None) -> tuple[Any, int, int, float] | None:
-        """The contact, the gripper's and the other geom, and the sign by which the normal leads to the other."""
+        """Return contact, gripper's geom, other geom, and the sign that directs the normal to the other; or None."""
         first, second = (int(geom) for geom in contact.geom)
         for mine, theirs, sign in ((first, second, 1.0), (second, first, -1.0)):
             thing = self._object_of.get(theirs)
@@ -142,7 +137,7 @@ class TrueContact:
         return onsets
 
     def _velocity(self, geom: int, point_m: FloatArray) -> FloatArray:
-        """Of the geom's body at `point_m` (3,), before the last step, in the world frame (3,) in m/s."""
+        """Return the velocity (3,) of a geom's body at `point_m` (3,), before the last step, world frame, in m/s."""
         body = int(self._model.geom_bodyid[geom])
         twist: FloatArray = np.zeros(6)
         mujoco.mj_objectVelocity(self._model, self._before, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)
@@ -159,9 +154,9 @@ class TrueContact:
 def free_way(
     model: Any, data: Any, mine: IntArray, theirs: IntArray, direction: FloatArray, farthest_m: float
 ) -> float:
-    """How far geoms `mine` could be moved along `direction` (3,) until they touch `theirs`; at most `farthest_m`.
+    """Return the distance that geoms `mine` can move along `direction` (3,) until contact with `theirs`.
 
-    Moves `mine` in `data`, whose kinematics must be up to date: give a copy.
+    The distance is at most `farthest_m`. Moves `mine` in `data`, whose kinematics must be up to date: pass a copy.
     """
     start = data.geom_xpos[mine].copy()
     moved_m, ends = 0.0, np.zeros(6)
@@ -172,7 +167,7 @@ def free_way(
                 gap_m = geom_distance(model, data, int(first), int(second), farthest_m, ends)
                 if gap_m <= _TOUCHING_M:
                     return moved_m
-                # Convex geoms are apart by a slab of this width, through which they come at this part of the way.
+                # A slab of the gap's width separates convex geoms; this share of the motion goes across the slab.
                 convex = model.geom_type[second] != GeomKind.HFIELD
                 towards = float((ends[3:] - ends[:3]) @ direction) / gap_m if convex and gap_m < farthest_m else 1.0
                 if towards * step_m > gap_m:

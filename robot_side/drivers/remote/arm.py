@@ -1,4 +1,4 @@
-"""An arm whose driver is a process beside the robot side, in any language."""
+"""Arm whose driver is a separate process, in any language."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol
@@ -10,10 +10,10 @@ from robot_side.drivers.remote.driver_session import ArmShape, DriverSession
 
 
 class Wire(Protocol):
-    """A port that one program speaks to."""
+    """Port to a driver's program."""
 
     def receive(self) -> Sequence[tuple[bytes, bytes, float]]:
-        """(peer, payload, when it was taken from the socket) of what has arrived."""
+        """Return the arrived messages: (peer, payload, time of reading from the socket)."""
         ...
 
     def send(self, peer: bytes, payload: bytes) -> bool:
@@ -22,14 +22,14 @@ class Wire(Protocol):
 
 
 class RemoteArm(Arm):
-    """An Arm that asks and tells a driver. Its states are as old as they are: `time_s` says so, at the earliest."""
+    """Arm by a driver's states and commands. `time_s` of a state is the earliest possible time of measurement."""
 
     joint_count = 0
 
     def __init__(
         self, wire: Wire, shape: ArmShape, show: Callable[[ArmState], None], note: Callable[[str], None]
     ) -> None:
-        """show: told each new state. note: told in one line what is wrong with a driver."""
+        """show: called with each new state. note: called with one line for each fault of a driver."""
         self.session = DriverSession(shape)
         self.joint_count = len(shape.joint_names)
         self._wire, self._show, self._note = wire, show, note
@@ -39,7 +39,7 @@ class RemoteArm(Arm):
     def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
         """Follow `joint_velocity_rad_s` (n,) until `valid_until_s`; it leaves with the gripper's command.
 
-        ValueError for a wrong shape or a value that is not finite: nothing of it is applied.
+        ValueError for a wrong shape or a value that is not finite; then nothing is applied.
         """
         self.session.command(joint_velocity_rad_s, valid_until_s)
 
@@ -52,7 +52,7 @@ class RemoteArm(Arm):
         self._send()
 
     def exchange(self, now_s: float) -> bool:
-        """Take what the driver said by `now_s`; whether it has ever said where the arm is."""
+        """Take the driver's messages until `now_s`; return whether there has been a state."""
         session, self._now_s = self.session, now_s
         for message in self._wire.receive():
             session.receive(*message)
@@ -65,16 +65,16 @@ class RemoteArm(Arm):
         return session.state is not None
 
     def begin(self, now_s: float) -> bool:
-        """Exchange before the first tick: the arm is told to stand still; whether it has said where it is."""
+        """Exchange before the first tick, with the command to stand still; return whether there has been a state."""
         ready = self.exchange(now_s)
         self._send()
         return ready
 
     def state(self, now_s: float) -> ArmState:
-        """The newest state that has arrived by `now_s`, however old; FeelaheadError before the first."""
+        """Return the newest state that has arrived by `now_s`, of any age; FeelaheadError before the first."""
         self.exchange(now_s)
         if self.session.state is None:
-            raise FeelaheadError("the driver has not said yet where the arm is")
+            raise FeelaheadError("the driver has not sent a state yet")
         return self.session.state
 
     def _send(self) -> None:

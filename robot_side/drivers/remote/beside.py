@@ -1,4 +1,4 @@
-"""The ports that --arm and --objects open, and the wait for the first that comes over them."""
+"""Ports of --arm and --objects, and the wait for the first messages over them."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -19,7 +19,7 @@ _AWAITED: Final = {"--arm": "an arm's driver", "--objects": "a process that perc
 
 
 class Beside:
-    """What runs beside the robot side, as far as its settings name it: a driver, a process that perceives."""
+    """Connected programs by the settings: the arm's driver and the perception process."""
 
     def __init__(
         self,
@@ -30,7 +30,7 @@ class Beside:
         insecure: bool = False,
         keys: RobotKeys | None = None,
     ) -> None:
-        """Bind at once; ConfigurationError as for DriverPort. note: told what people should know."""
+        """Bind at once; ConfigurationError as for DriverPort. note: called with lines for a person."""
         self._note = note
         with ExitStack() as opened:
             ports = [
@@ -48,22 +48,22 @@ class Beside:
 
     @property
     def has_arm(self) -> bool:
-        """Whether there is --arm."""
+        """Whether --arm is given"""
         return "--arm" in self._ports
 
     def arm(self, shape: ArmShape, show: Callable[[ArmState], None]) -> RemoteArm:
-        """The arm behind --arm; arguments as RemoteArm's."""
+        """Return the arm of --arm; arguments as for RemoteArm."""
         self._arm = RemoteArm(self._ports["--arm"], shape, show, self._note)
         return self._arm
 
     def objects(self, roles: dict[str, Role], sd_m: float) -> RemoteObjects | None:
-        """The objects behind --objects; None without."""
+        """Return the objects of --objects; None without it."""
         if (port := self._ports.get("--objects")) is not None:
             self._objects = RemoteObjects(port, roles, sd_m, self._note)
         return self._objects
 
     def wait(self) -> None:
-        """Wait until the arm has said where it is, and objects have been seen; a signal has to end it."""
+        """Wait for the arm's first state and the first objects, without a limit: a signal ends the wait."""
         begin = {
             flag: part.begin if isinstance(part, RemoteArm) else part.exchange
             for flag, part in (("--arm", self._arm), ("--objects", self._objects))
@@ -75,13 +75,13 @@ class Beside:
                 if flag not in told:
                     told.add(flag)
                     self._note(f"waiting for {_AWAITED[flag]} at {self._ports[flag].endpoint}")
-                # Keys may be allowed meanwhile; nobody else looks at them yet.
+                # Keys may be allowed meanwhile; the turns that refresh them have not begun.
                 for text in self._ports[flag].refresh_keys():
                     self._note(text)
             self._ports[waiting[0]].wait(_TURN_S)
 
     def summary(self) -> dict[str, Any]:
-        """What came over each port and what of it was rejected; None for what is not asked for."""
+        """Return the counts of accepted and rejected messages by port; None for a port that is not used."""
         arm = None if self._arm is None else self._arm.session.summary()
         return {"arm": arm, "objects": None if self._objects is None else self._objects.summary()}
 

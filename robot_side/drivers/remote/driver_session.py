@@ -1,4 +1,4 @@
-"""Who drives the arm, and what it said last: states in, commands out, without I/O."""
+"""Session with the arm's driver: states in, commands out, without I/O."""
 
 import math
 from collections import Counter
@@ -25,10 +25,8 @@ _ROUNDING: Final = 1e-15
 
 
 class DriverClock:
-    """What the driver's clock may be ahead of ours, from stamps that no message can contradict.
-
-    What arrives was sent before, and what it echoes was sent before it was read. So a state is never taken to be
-    younger than it can be, and a time at which the arm must stop is never told later than it is.
+    """Bounds of the driver's clock minus ours, from stamps: a message is sent before it arrives, and read before its
+    echo is sent. So a state never counts as younger than it can be, and a time to stop is never sent too late.
     """
 
     def __init__(self) -> None:
@@ -36,9 +34,9 @@ class DriverClock:
         self._at_s = 0.0
 
     def take(self, sent_s: float, received_s: float, echoed: tuple[float, float] | None) -> bool:
-        """Take in a message; False for stamps that contradict all before: a clock has jumped, or they are invented.
+        """Take a message; False for stamps that contradict earlier ones: a clock has jumped, or they are false.
 
-        echoed: our stamp, and how long the driver had held that.
+        echoed: our stamp, and the time for which the driver held the stamp.
         """
         self._at_s, margin_s = max(self._at_s, received_s), _ROUNDING * (abs(sent_s) + abs(received_s))
         self._interval.advance(received_s)
@@ -50,60 +48,60 @@ class DriverClock:
 
     @property
     def known(self) -> bool:
-        """Whether both bounds are."""
+        """Whether both bounds are known"""
         least_s, greatest_s = self._interval.at(self._at_s)
         return greatest_s - least_s < float("inf")
 
     def ours_s(self, driver_s: float) -> float:
-        """When that was by our clock, at the earliest; minus infinity while nothing was echoed."""
+        """Return the earliest time of `driver_s` on our clock; minus infinity before the first echo."""
         return driver_s - self._interval.at(self._at_s)[1]
 
     def drivers_s(self, our_s: float) -> float:
-        """What the driver's clock shows then, at the earliest."""
+        """Return the earliest time of `our_s` on the driver's clock."""
         return our_s + self._interval.at(self._at_s)[0]
 
 
 SILENT_S: Final = 0.1
-"""A driver that was silent for so long is gone."""
+"""Silence after which a driver is lost, in seconds."""
 COMMAND_PERIOD_S: Final = 0.004
-"""As often as commands come at most; what stops the arm leaves at once."""
+"""Least period of commands, in seconds; a command that stops the arm leaves at once."""
 _REFUSAL_PERIOD_S: Final = 1.0
 _NEWS_PERIOD_S: Final = 1.0
-"""A driver that comes and goes is told no more often."""
+"""Least period of notes about a driver's connection, in seconds."""
 _DECODER: Final = msgspec.msgpack.Decoder(DriverState)
 
 _UNANSWERED: Final = 250
-"""A driver that has echoed none of so many commands, a second's, echoes none at all."""
+"""Commands without an echo, those of a second, after which the driver counts as not echoing."""
 
 Why = Literal["second", "version", "malformed", "joints", "order", "echo", "clock"]
 
 
 class ArmShape(NamedTuple):
-    """What every state must have, and what one that says nothing of the gripper stands for."""
+    """Joints of every state, and the gripper of states without one."""
 
     joint_names: tuple[str, ...]
     finger_names: tuple[str, ...]
     open_fingers: FloatArray
     """(f,) positions of an open gripper"""
     opening_m: float
-    """Its free gap; 0 without a gripper"""
+    """Free gap of the open gripper; 0 without a gripper"""
 
 
 class _Told(NamedTuple):
-    """What the arm was told last."""
+    """Last command of the arm."""
 
     velocities: tuple[float, ...]
     until_s: float
 
 
 class DriverSession:
-    """One driver at a time: the first that speaks, until it falls silent."""
+    """Session with one driver at a time: the first that sends, until it is silent."""
 
     def __init__(self, shape: ArmShape) -> None:
         self.state: ArmState | None = None
-        """The newest; None before the first whose age is known"""
+        """Newest state; None before the first of known age"""
         self.rejected: Counter[Why] = Counter()
-        """States that were rejected whole, by the reason"""
+        """Counts of rejected states by reason; a state is rejected as a whole"""
         self.accepted = 0
         self._shape = shape
         self._peer: bytes | None = None
@@ -124,11 +122,11 @@ class DriverSession:
 
     @property
     def present(self) -> bool:
-        """Whether there is a driver."""
+        """Whether there is a driver"""
         return self._peer is not None
 
     def receive(self, peer: bytes, payload: bytes, received_s: float) -> None:
-        """Take one message; what cannot be is rejected whole, counted and told."""
+        """Take one message; an invalid one is rejected as a whole, counted and reported."""
         if self._peer not in (None, peer):
             self._reject("second", "a second driver, while the first one goes on", peer, received_s)
             return
@@ -145,7 +143,7 @@ class DriverSession:
             self._take(peer, said, received_s)
 
     def expire(self, now_s: float) -> None:
-        """After all that came was received: forget a driver that has fallen silent, so that another one may speak."""
+        """Drop a silent driver, so that another may connect; to be called after `receive` of all arrived messages."""
         if self._peer is not None and now_s - self._heard_s > SILENT_S:
             self._peer = None
         if self.present is not self._told_present and now_s - self._told_s >= _NEWS_PERIOD_S:
@@ -154,7 +152,7 @@ class DriverSession:
             self._notes.append("driver: connected" if self.present else gone)
 
     def command(self, velocities_rad_s: FloatArray, until_s: float) -> None:
-        """What the arm is to do until then, by our clock; see `outgoing`. ValueError as for `Arm.command`."""
+        """Store the arm's command until `until_s`, on our clock, for `outgoing`. ValueError as for `Arm.command`."""
         velocities = tuple(velocities_rad_s.tolist())
         if velocities_rad_s.shape != (len(self._shape.joint_names),) or not all(map(math.isfinite, velocities)):
             raise ValueError(
@@ -165,13 +163,13 @@ class DriverSession:
         self._told = _Told(velocities, until_s)
 
     def command_gripper(self, closing: float, until_s: float) -> None:
-        """How fast to close until then. ValueError as for `Arm.command_gripper`."""
+        """Store the gripper's command until `until_s`. ValueError as for `Arm.command_gripper`."""
         if not (-1.0 <= closing <= 1.0 and math.isfinite(until_s)):
             raise ValueError(f"closing = {closing} until {until_s}; valid: -1 to 1, and a finite time")
         self._closing = closing, until_s
 
     def outgoing(self, now_s: float) -> list[tuple[bytes, bytes]]:
-        """Take what has to leave now: (peer, payload)."""
+        """Return the messages that must leave now: (peer, payload)."""
         leaving, self._outgoing = self._outgoing, []
         closing = self._closing[0] if self._closing[1] > now_s else 0.0
         moves = (any(self._told.velocities) and self._told.until_s > now_s) or closing != 0.0
@@ -186,16 +184,16 @@ class DriverSession:
         return leaving
 
     def take_notes(self) -> list[str]:
-        """News since the last call, a line each."""
+        """Return the notes since the last call, a line each."""
         notes, self._notes = self._notes, []
         return notes
 
     def summary(self) -> dict[str, int]:
-        """How many states were taken, and how many rejected, by reason."""
+        """Return the counts of accepted states, and of rejected ones by reason."""
         return {"accepted": self.accepted} | {str(why): count for why, count in self.rejected.items()}
 
     def _require_fitting(self, said: DriverState) -> None:
-        """ValueError for other joints than the model's, RemoteProtocolError for what was measured after it was sent."""
+        """Raise ValueError for other joints than the model's, RemoteProtocolError for a measurement after sending."""
         for name, values, names in (
             ("joint_positions", said.joint_positions, self._shape.joint_names),
             ("joint_velocities", said.joint_velocities, self._shape.joint_names),
@@ -209,7 +207,7 @@ class DriverSession:
 
     def _take(self, peer: bytes, said: DriverState, received_s: float) -> None:
         if self._peer is None:
-            # One that goes on after a silence keeps its clock, by which what it sent before is known to be old.
+            # A driver that returns after a silence keeps its clock, so that its earlier messages count as old.
             if self._last_peer != peer or said.sequence <= self._sequence:
                 self._begin(said.sequence)
             self._peer = self._last_peer = peer
@@ -229,7 +227,7 @@ class DriverSession:
                 why = "echo_s is none of our stamps; valid: sent_s of the newest command that was read"
                 self._reject("echo", why, peer, received_s)
             return
-        # One that comes late says so: the arm is lost by its age, until younger ones come.
+        # A late state has its true age: the arm is lost by that age until younger states come.
         measured_s = min(self._clock.ours_s(said.measured_s), received_s)
         self.accepted += 1
         self._measured_s = max(self._measured_s, measured_s)
@@ -245,7 +243,7 @@ class DriverSession:
         )
 
     def _begin(self, sequence: int) -> None:
-        """Know nothing of a new driver, whose first message has this number."""
+        """Begin with a new driver, whose first message has the number `sequence`."""
         self._clock, self._sequence, self._sent_before = DriverClock(), sequence - 1, self._sent
 
     def _reject(self, why: Why, text: str, peer: bytes, now_s: float) -> None:

@@ -1,4 +1,4 @@
-"""What a process that perceives objects tells the robot side (docs/drivers.md), and the frame that it makes."""
+"""Message of a perception process to the robot side (docs/drivers.md), and its conversion to a frame."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -19,7 +19,7 @@ FRAME_LIMIT_BYTES: Final = 1024 * 1024
 MOST_OBJECTS: Final = 512
 _MOST_TETRAHEDRA: Final = 1024
 _UNIT: Final = 0.01
-"""A quaternion's length may differ from 1 by so much."""
+"""Largest deviation of a quaternion's length from 1."""
 
 _Coordinate = Annotated[float, Meta(ge=-1e3, le=1e3)]
 _Size = Annotated[float, Meta(gt=0.0, le=1e3)]
@@ -32,14 +32,14 @@ SHAPES: Final = ("sphere", "box", "ellipsoid", "half_space", "tetrahedra")
 
 
 class SeenObject(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One object: a name, a pose, and exactly one shape."""
+    """Object: a name, a pose, and exactly one shape."""
 
     name: Annotated[str, Meta(min_length=1, max_length=100)]
     role: Role | None = None
-    """None: what the name's beginning tells"""
+    """Role; None: by the beginning of the name"""
     position_m: _Three = (0.0, 0.0, 0.0)
     quaternion: tuple[_Coordinate, _Coordinate, _Coordinate, _Coordinate] = (1.0, 0.0, 0.0, 0.0)
-    """Object to world, w first"""
+    """Orientation, object to world, w first"""
     velocity_m_s: _Three = (0.0, 0.0, 0.0)
     mean_m: _Three = (0.0, 0.0, 0.0)
     """Mean error of the position, true minus perceived"""
@@ -52,19 +52,19 @@ class SeenObject(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     ellipsoid: _Sizes | None = None
     """Half axes"""
     half_space: bool = False
-    """Solid where z <= 0 in its own frame"""
+    """Solid where z <= 0 in the object's frame"""
     tetrahedra: Annotated[tuple[_Tetrahedron, ...], Meta(min_length=1, max_length=_MOST_TETRAHEDRA)] | None = None
-    """Four corners each, in its own frame"""
+    """Four corners each, in the object's frame"""
 
 
 class ObjectFrame(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """All objects that are there; times are by the sender's clock."""
+    """All present objects; times are by the sender's clock."""
 
     version: int
     sequence: Annotated[int, Meta(ge=0, le=2**53)]
     sent_s: Finite
     taken_s: Finite
-    """When the camera took it: no later than `sent_s`"""
+    """Time of the camera's picture, no later than `sent_s`"""
     objects: Annotated[tuple[SeenObject, ...], Meta(max_length=MOST_OBJECTS)]
 
 
@@ -72,7 +72,7 @@ FRAME_DECODER: Final = msgspec.msgpack.Decoder(ObjectFrame)
 
 
 def require_possible(frame: ObjectFrame) -> None:
-    """ValueError for two objects of one name, no shape or several, a quaternion that is none, or a time to come."""
+    """Raise ValueError for a repeated name, no shape or several, an invalid quaternion, or `taken_s` after `sent_s`."""
     if frame.taken_s > frame.sent_s:
         raise ValueError(f"taken_s = {frame.taken_s} after sent_s = {frame.sent_s}; valid: before")
     names = [thing.name for thing in frame.objects]
@@ -87,10 +87,10 @@ def require_possible(frame: ObjectFrame) -> None:
 
 
 def perceived(things: Sequence[SeenObject], roles: Sequence[Role], time_s: float) -> PerceivedObjects:
-    """A frame of these objects, which are possible, in these roles."""
+    """Return a frame of these valid objects in these roles."""
     quaternions = np.array([thing.quaternion for thing in things]).reshape(-1, 4)
     turned = Rotation.from_quat(quaternions, scalar_first=True).as_matrix() if things else np.empty((0, 3, 3))
-    # An error that is known on average is none any more.
+    # The known mean error is corrected.
     positions = _rows(np.add(thing.position_m, thing.mean_m) for thing in things)
     arrays: dict[str, Any] = {name: [] for kind in KINDS for name in (*kind.parts, kind.owner)}
     for index, thing in enumerate(things):
@@ -115,7 +115,7 @@ def perceived(things: Sequence[SeenObject], roles: Sequence[Role], time_s: float
 
 
 def _primitives(thing: SeenObject, position: FloatArray, turned: FloatArray) -> tuple[str, list[dict[str, Any]]]:
-    """The kind of its shape, and the values of the arrays of each primitive."""
+    """Return the kind of the object's shape, and the array values of each primitive."""
     if thing.sphere is not None:
         return "sphere", [{"sphere_centers_m": position, "sphere_radii_m": thing.sphere}]
     if thing.tetrahedra is not None:

@@ -1,4 +1,4 @@
-"""What an arm's driver and the robot side tell each other (docs/drivers.md): maps in MessagePack."""
+"""Messages between an arm's driver and the robot side (docs/drivers.md): maps in MessagePack."""
 
 from typing import Annotated, Any, Final, TypeVar
 
@@ -16,20 +16,20 @@ MOST_JOINTS: Final = 64
 _Count = Annotated[int, Meta(ge=0, le=2**53)]
 _Duration = Annotated[float, Meta(ge=0.0, lt=1e6)]
 _Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
-"""s; beyond, a double no longer tells milliseconds apart"""
+"""Time in s; beyond the limits a double no longer resolves milliseconds"""
 _Opening = Annotated[float, Meta(ge=0.0, le=1.0)]
-"""m"""
+"""Free gap in m"""
 _Value = Annotated[float, Meta(ge=-1e6, le=1e6)]
 _Values = Annotated[tuple[_Value, ...], Meta(max_length=MOST_JOINTS)]
 Message = TypeVar("Message", bound=Struct)
 
 
 class DriverState(Struct, frozen=True, forbid_unknown_fields=True):
-    """What a driver says of its arm; times are by its own clock."""
+    """State of the arm by its driver; times are by the driver's clock."""
 
     version: int
     sequence: _Count
-    """Rises with every message of one connection"""
+    """Number that rises with every message of a connection"""
     sent_s: _Stamp
     measured_s: _Stamp
     """No later than `sent_s`"""
@@ -38,33 +38,33 @@ class DriverState(Struct, frozen=True, forbid_unknown_fields=True):
     joint_velocities: _Values
     """(n,) in rad/s or m/s"""
     echo_s: _Stamp | None = None
-    """`sent_s` of the newest command that it has read; None before the first"""
+    """`sent_s` of the newest command that the driver has read; None before the first"""
     held_s: _Duration = 0.0
-    """How long ago it read that, at `sent_s`"""
+    """Time between reading that command and `sent_s`"""
     finger_positions: _Values | None = None
     """(f,) of the joints beyond the tool's, in the model's order"""
     opening_m: _Opening | None = None
     holding: bool = False
     joint_loads: _Values | None = None
-    """(n,) N m, or N: what it carries"""
+    """(n,) N m, or N: torques or forces of the carried load"""
 
 
 class DriverCommand(Struct, frozen=True):
-    """What its arm is to do."""
+    """Command for the driver's arm."""
 
     version: int
     sequence: int
     sent_s: float
-    """By the robot side's clock, to be echoed"""
+    """Time on the robot side's clock, to be echoed"""
     joint_velocities: tuple[float, ...]
     closing: float
     """1 closes and -1 opens the gripper at full speed, 0 holds it"""
     valid_until_s: float
-    """By the driver's clock: it stops then, unless there is a newer one"""
+    """Time on the driver's clock at which the arm stops, unless there is a newer command"""
 
 
 class Refusal(Struct, frozen=True):
-    """Why nothing is taken from who sent the last message."""
+    """Reason for which the sender's last message was rejected."""
 
     version: int
     refused: str
@@ -81,9 +81,9 @@ def encode(message: DriverCommand | Refusal) -> bytes:
 
 
 def decoded(payload: bytes, decoder: "msgspec.msgpack.Decoder[Message]", version: int) -> Message:
-    """Unpack and validate a message; RemoteProtocolError says which field cannot be.
+    """Unpack and validate a message; RemoteProtocolError names an invalid field.
 
-    OtherVersionError, a kind of it, for a map of another version.
+    OtherVersionError, a subclass, for a map of another version.
     """
     try:
         message = decoder.decode(payload)
@@ -96,7 +96,7 @@ def decoded(payload: bytes, decoder: "msgspec.msgpack.Decoder[Message]", version
 
 
 def _require_version(payload: bytes, version: int) -> None:
-    """OtherVersionError for a map that names another one, whatever else it holds."""
+    """Raise OtherVersionError for a map of another version, with any other content."""
     try:
         said = _VERSION.decode(payload).get("version")
     except _BAD_BYTES:
@@ -106,5 +106,5 @@ def _require_version(payload: bytes, version: int) -> None:
 
 
 def floats(values: tuple[float, ...]) -> FloatArray:
-    """A tuple of numbers as an array."""
+    """Return a tuple of numbers as an array."""
     return np.array(values, dtype=np.float64)

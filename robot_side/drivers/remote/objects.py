@@ -1,4 +1,4 @@
-"""Perceived objects of a process beside the robot side, in any language."""
+"""Perceived objects of a separate process, in any language."""
 
 import math
 from collections import Counter
@@ -23,19 +23,19 @@ from robot_side.surroundings.roles import role_from_name
 from robot_side.surroundings.validity import require_valid
 
 OLD_S: Final = 0.5
-"""A newest frame that is older is told. What it says holds on: nobody feels less for it."""
+"""Age of the newest frame, in seconds, above which a note is made. The frame stays valid: nobody feels less for it."""
 _REFUSAL_PERIOD_S: Final = 1.0
 
 Why = Literal["second", "version", "malformed", "order"]
 
 
 class RemoteObjects:
-    """An ObjectSource: the newest whole frame that came, from one sender at a time."""
+    """ObjectSource of the newest valid frame, from one sender at a time."""
 
     def __init__(self, wire: Wire, roles: Mapping[str, Role], sd_m: float, note: Callable[[str], None]) -> None:
-        """roles: by name, before what frames say. sd_m: σ_c that the law reckons with. note: told what is wrong."""
+        """roles: by name, before those of frames. sd_m: σ_c that the law uses. note: called with each fault."""
         self.rejected: Counter[Why] = Counter()
-        """Frames that were rejected whole, by the reason"""
+        """Counts of rejected frames by reason; a frame is rejected as a whole"""
         self.accepted = 0
         self._wire, self._roles, self._sd_m, self._note = wire, dict(roles), sd_m, note
         self._peer: bytes | None = None
@@ -47,29 +47,29 @@ class RemoteObjects:
         self._is_old = False
 
     def perceive(self, now_s: float) -> PerceivedObjects:
-        """The newest frame at `now_s`; FeelaheadError before the first."""
+        """Return the newest frame at `now_s`; FeelaheadError before the first."""
         if not self.exchange(now_s) or self._frame is None:
             raise FeelaheadError("no objects have been perceived yet")
         return self._frame
 
     def set_role(self, name: str, role: Role) -> None:
-        """Change what the object `name` is to the task, from the next frame on."""
+        """Change the role of the object `name` from the next frame on."""
         self._roles[name] = role
 
     def exchange(self, now_s: float) -> bool:
-        """Take the frames that have come; whether there has ever been one."""
+        """Take the arrived frames; return whether there has been one."""
         newest = {peer: (payload, received_s) for peer, payload, received_s in self._wire.receive()}
         for peer, (payload, received_s) in newest.items():
             self._receive(peer, payload, received_s)
         old = self._frame is not None and now_s - self._taken_s > OLD_S
         if old is not self._is_old:
             self._is_old = old
-            age = f"the newest frame is {now_s - self._taken_s:.1f} s old; what it shows holds on"
+            age = f"the newest frame is {now_s - self._taken_s:.1f} s old; its objects stay valid"
             self._note(f"objects: {age if old else 'frames come again'}")
         return self._frame is not None
 
     def summary(self) -> dict[str, int]:
-        """How many frames were taken, and how many rejected, by reason."""
+        """Return the counts of accepted frames, and of rejected ones by reason."""
         return {"accepted": self.accepted} | {str(why): count for why, count in self.rejected.items()}
 
     def _receive(self, peer: bytes, payload: bytes, received_s: float) -> None:
@@ -92,9 +92,9 @@ class RemoteObjects:
             self._peer, self._sequence, self._heard_s = peer, frame.sequence, received_s
 
     def _take(self, frame: ObjectFrame, received_s: float) -> None:
-        """ValueError for what no frame can be."""
+        """Take a frame; ValueError for an invalid one."""
         require_possible(frame)
-        # An object keeps its place among the names, and one that is gone has no shape there: it may be held.
+        # An object keeps its index; a missing one has no shape but keeps its name, as it may be held.
         known = self._known | {thing.name: thing for thing in frame.objects}
         if len(known) > MOST_OBJECTS:
             raise ValueError(
@@ -108,7 +108,7 @@ class RemoteObjects:
         self._known, self._frame, self._taken_s = known, seen, taken_s
         widest = max(frame.objects, key=lambda thing: thing.sd_m, default=None)
         if widest is not None and widest.sd_m > self._sd_m:
-            told = f"sd_m = {widest.sd_m} of {widest.name!r} is more than the {self._sd_m} that is reckoned with"
+            told = f"sd_m = {widest.sd_m} of {widest.name!r} is more than the {self._sd_m} that the law uses"
             self._tell("sd", f"objects: {told}; to raise that: --camera.sd-m {widest.sd_m}")
 
     def _role(self, thing: SeenObject) -> Role:
