@@ -84,7 +84,7 @@ class Connection:
             if self.state is not ConnectionState.LOST:  # the loss has been reported
                 self._say_once(f"{found}; waiting for one")
         elif found is not None:
-            # The system grants permission after the controller appears: one failure is no trouble yet.
+            # The system grants permission a moment later: one failure is no trouble yet.
             if str(found) == self._refused:
                 self._say_once(f"{found}; trying again until it works")
             self._refused = str(found)
@@ -95,8 +95,8 @@ class Connection:
     def beat(self, now_s: float) -> None:
         """Beat for the watchdog while an effect is on; call it every turn, before a write.
 
-        After a long silence the watchdog may have released the triggers. Then the listener is notified of a controller, as
-        after a search. A write that does not return counts as silence.
+        After a long silence the watchdog may have released the triggers. Then the listener is notified of a
+        controller, as after a search. A write that does not return counts as silence.
         """
         if self._guard is None or self.controller is None or not self._held:
             return

@@ -1,1 +1,1 @@
-"""What the fingers get: what lies ahead becomes trigger effects."""
+"""From onset distances to trigger effects and rumble."""
