@@ -50,7 +50,7 @@ class Finder:
 
 
 def find_controller(backend: HidBackend, preferred: str | None = None, *, others: bool = True) -> OpenController:
-    """Open the controller of address `preferred`, else the first; NoDeviceError or DeviceError gives the reason for none.
+    """Open the controller of address `preferred`, else the first; NoDeviceError or DeviceError gives the reason.
 
     Of a controller on USB and on Bluetooth at once, USB is taken. With `preferred`, another one is taken only if
     `others` allows it and none refuses to be opened. The refusing one may be the preferred: the system grants
