@@ -52,8 +52,9 @@ class Gate:
     def headers(self, place: str) -> dict[str, str]:
         """Return the headers of an answer for `place`: no caching, no foreign frames, no foreign sources.
 
-        viser's page is one file that unpacks itself, and starts a worker of WebAssembly. Our page embeds it by the other of
-        our two names, as another site: the browser then isolates it in a separate process, without access to ours.
+        viser's page is one file that unpacks itself, and starts a worker of WebAssembly. Our page embeds it by the
+        other of our two names, as another site: the browser then isolates it in a separate process, without access to
+        ours.
         """
         sockets = " ".join(f"ws://{host}" for host in self._hosts)
         sites = " ".join(f"http://{host}" for host in self._hosts)
