@@ -48,9 +48,9 @@ class CoreSettings:
     """Whether left and right of the controller are swapped"""
     seed: int = 0
     asymmetry_s: float = 0.0
-    """As LinkEnd's"""
+    """Asymmetry of the link's delays, as LinkEnd's"""
     full_rate: bool = False
-    """As HeldCommand's"""
+    """Whether every command is sent, as HeldCommand's"""
 
 
 class OperatorSide:

@@ -23,7 +23,7 @@ DeviceName = Literal["hid", "evdev", "simulated", "browser"]
 class OperatorSettings(SideOptions):
     """The operator side: a DualSense whose triggers stiffen in the direction of danger.
 
-    It connects to a robot side, sends the hands' intent, and renders what is ahead to the fingers. L1 held: the arm
+    It connects to a robot side, sends the hands' intent, and lets the fingers feel what is ahead. L1 held: the arm
     may move. Options: arm it, with released triggers. R2 advances, L2 retreats, the left stick moves across, the
     right one turns. Cross closes and square opens the gripper, triangle changes the target, circle stops everything,
     and create hands the robot over to the observer that has waited longest.

@@ -29,8 +29,8 @@ HELPS: Final = {
     "hands": "another controller",
     "": "a page of the console fewer, or a faster machine,",
 }
-"""Stages of a turn, and what shortens each: sending and receiving; taking in messages; writing to the controller;
-reading it, and commands. "": all else, such as the display."""
+"""Remedies by stage of a turn. Stages: sending and receiving; taking in messages; writing to the controller; reading
+it, and commands. "": all else, such as the display."""
 _GUARD_PERIOD_S: Final = 0.5
 """Period of checks of the watchdog."""
 

@@ -25,10 +25,10 @@ class Listener(Protocol):
     """Receiver of a controller's arrival and loss, called at once."""
 
     def controller_found(self, now_s: float) -> None:
-        """Take note of a controller; the state of its triggers is unknown."""
+        """Note a controller; the state of its triggers is unknown."""
 
     def controller_lost(self, now_s: float) -> None:
-        """Take note of its loss."""
+        """Note the controller's loss."""
 
 
 class Guard(Protocol):

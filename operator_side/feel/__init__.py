@@ -1,1 +1,1 @@
-"""From onset distances to trigger effects and rumble."""
+"""Rendering of onset distances as trigger effects and rumble."""

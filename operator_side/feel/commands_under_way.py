@@ -93,11 +93,11 @@ class CommandsUnderWay:
 
     - Commands up to `echo` have had their effect. The arm follows the one of `echo`; its measured speed v is as near
       to that command as the arm could get. Older ones are discarded, as the newest wins. The report also has the
-      speed that the robot gives that command (`told`): zero if it came too late or the arm was stopped, less at a
-      joint's limit.
+      speed that the robot gives that command (`told`). It is zero if the command came too late or the arm was
+      stopped, and less at a joint's limit.
     - Commands after `echo` are under way. On a steady link these were sent after e, and one sent at t is followed
-      from T + (t - e) on. If one sent between `echo` and e is overdue, delays have grown: it arrives at T at the
-      earliest. So e is no later than the first command after `echo`.
+      from T + (t - e) on. A command between `echo` and e may be overdue, as delays have grown: it arrives at T at
+      the earliest. So e is no later than the first command after `echo`.
 
     A command sent now is followed from T + (now - e) on. Until then the arm goes from the speed v towards
     u(t) = x(t) v_max, x(t) the newest command sent at or before t, for t from e to now:

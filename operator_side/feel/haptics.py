@@ -1,4 +1,4 @@
-"""From the robot side's reports and our commands to the writes to a controller."""
+"""Haptics: from the robot side's reports and our commands to the writes to a controller."""
 
 import dataclasses
 import math

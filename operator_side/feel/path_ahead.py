@@ -57,7 +57,7 @@ def traced_zones(
 ) -> Zones:
     """Compute the zones: full where a zone's path meets something, and rising before that as `field` does.
 
-    The sticks stay as they are, or are released now: the stiffer result counts, as the future is unknown. travels: at
+    The sticks stay as they are, or are released now. The stiffer result counts, as the future is unknown. travels: at
     the middle of each zone. forth: the trigger advances.
     """
     where = field, travels, other_travel, horizon_s

@@ -1,4 +1,4 @@
-"""From the field to both triggers' strengths and the motors' drive.
+"""Rendering of the field: both triggers' strengths and the motors' drive.
 
 field ─▶ ten zones of each trigger ─▶ falls over 100 ms, rises at once ─▶ strengths
 """

@@ -16,7 +16,7 @@ class Hands:
     def __init__(self, calibration: TravelCalibration, *, swap_sides: bool) -> None:
         self.calibration = calibration
         self.intent: OperatorIntent | None = None
-        """None before the first state, and once the controller is lost"""
+        """Newest intent; None before the first state, and once the controller is lost"""
         self.lost_s: float | None = None
         """Time at which the controller was lost; None once the arm has stopped since"""
         self._swap_sides = swap_sides

@@ -90,7 +90,7 @@ class SimulatedOperator:
 
     @property
     def doing(self) -> Doing:
-        """Their phase; NO_TARGET instead of ADVANCING without a target."""
+        """Present phase; NO_TARGET instead of ADVANCING without a target."""
         aimless = self.phase is Doing.ADVANCING and self._view is not None and self._view.target_in_tool_m is None
         return Doing.NO_TARGET if aimless else self.phase
 

@@ -69,7 +69,7 @@ class PullingHands:
 
     @property
     def doing(self) -> Doing:
-        """Their phase."""
+        """Present phase."""
         return _DOING[self.phase]
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:

@@ -28,16 +28,16 @@ class PersonSettings(Limited):
     """Share of cues, stiff triggers and rumble, that they believe and slow down for; at 0 only the trigger's mechanics
     act."""
     phase_margin_rad: Annotated[float, Meta(ge=0.0, lt=math.pi / 2)] = math.radians(65)
-    """Caution in adapting to the delay that they experience: 45° is tracking, 69° (gain times lag 1/e) aims without
-    overshoot, and from 90° on they would not correct what they see."""
+    """Caution in adapting to the delay that they experience: 45° is tracking; 69° (gain times lag 1/e) aims without
+    overshoot. From 90° on they would not correct what they see."""
     adapts_to_delay: bool = True
     """Whether they adapt to the link's delay, or act as without one."""
     aiming: Literal["servo", "move-and-wait"] = "servo"
     """Approach to the target: servo corrects all the time; move-and-wait makes single moves and waits until the screen
     shows each outcome (Ferrell 1965)."""
     depth_error_sd_m: _Usual = 0.008
-    """Standard deviation of the error in judging the target's distance along the line of sight, and the height at which
-    a carried object will stand; drawn at each attempt."""
+    """Standard deviation of judged distances: to the target along the line of sight, and to the place where a carried
+    object will stand; drawn at each attempt."""
     depth_error_mean_m: Annotated[float, Meta(ge=-1.0, le=1.0)] = 0.0
     """Mean error in judging distance; above 0 objects seem farther away than they are."""
     attempts: Annotated[int, Meta(ge=1)] = 3
@@ -48,5 +48,5 @@ class PersonSettings(Limited):
     carry_m: _Usual = 0.06
     """Distance back, towards the robot, before they set it down."""
     pull_n: Annotated[float, Meta(ge=0.0, le=20.0)] | None = None
-    """Instead of all this: arm, then pull R2 with this force for good, whatever is felt or seen. 2 N is a light pull,
-    3.7 N a normal one."""
+    """Force on R2, in N: arm, then pull with it for good, instead of all other behaviour. 2 N is a light pull, 3.7 N a
+    normal one."""

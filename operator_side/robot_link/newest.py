@@ -15,7 +15,7 @@ class NewestStiffness:
 
     def __init__(self, seed: int = 0) -> None:
         self.update: StiffnessUpdate | None = None
-        """None before the first and once it has expired"""
+        """Newest stiffness; None before the first and once it has expired"""
         self.received_s = 0.0
         self.count = 0
         self.has_been_armed = False

@@ -22,7 +22,7 @@ class Standing:
 
     def __init__(self) -> None:
         self.lease: LeaseNotice | None = None
-        """None before the first notice and once it has expired."""
+        """Newest notice; None before the first and once it has expired."""
         self.history: list[str] = []
         """Our standings in turn, the latest ones."""
         self.other_version: str | None = None

@@ -36,7 +36,7 @@ class SceneFigures:
 
     def __init__(self) -> None:
         self.newest: SceneFacts | None = None
-        """None before the first"""
+        """Newest figures; None before the first"""
 
     def take(self, payload: bytes) -> None:
         """Take a payload of the topic `scene`; ignore shapes, which are large, and invalid ones."""

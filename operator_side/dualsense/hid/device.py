@@ -165,7 +165,7 @@ class HidDualSense:
 def _open(backend: HidBackend, path: bytes) -> tuple[HidHandle, HidHandle]:
     """Return the handles to read and to write by.
 
-    hidapi keeps the text of the last failure with each handle and frees it with every call, so one handle must not be
+    hidapi keeps the text of the last failure with each handle and frees it with every call. So one handle must not be
     read and written concurrently (background_writes.py). Both are opened now, while the path is this controller's.
     """
     handles: list[HidHandle] = []

@@ -41,9 +41,9 @@ _SET_LIGHTBAR, _CLASSIC_RUMBLE_V2 = 0x04, 0x04
 def build_output_report(feel: Feel, transport: Transport = Transport.USB, sequence: int = 0) -> bytes:
     """Make the report that sets what `feel` holds: 48 bytes on USB, 78 with the checksum on Bluetooth.
 
-    sequence: on Bluetooth, one more with each report; four bits of it are sent. Of the two framings of Bluetooth
-    reports in use, this is that of Linux hid-playstation, whose authors make the controller. ValueError if the packed
-    bytes hold a code other than the two of official.py.
+    sequence: on Bluetooth, one more with each report; four bits of it are sent. Bluetooth has two framings in use; this
+    is that of Linux hid-playstation, whose authors make the controller. ValueError if the packed bytes hold a code
+    other than the two of official.py.
     """
     framing = OUTPUT_FRAMING[transport]
     report = bytearray(framing.length)

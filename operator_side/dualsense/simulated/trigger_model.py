@@ -18,8 +18,8 @@ STRENGTH_STEP_N: Final = 0.25
 FINGER_TIME_CONSTANT_S: Final = 0.04
 """Time constant of a finger's approach to the equilibrium of forces (assumed)."""
 NORMAL_FINGER_FORCE_N: Final = 3.7
-"""Force of a normal pull (assumed). Against the bare spring it rests at 80 % of the travel, reported as full; against
-the strongest effect at 30 %, reported as 40 %: it overcomes any stiffness."""
+"""Force of a normal pull (assumed). Against the bare spring it rests at 80 % of the travel, reported as full. Against
+the strongest effect it rests at 30 %, reported as 40 %: it overcomes any stiffness."""
 
 
 def equilibrium_travel(

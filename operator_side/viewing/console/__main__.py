@@ -91,7 +91,7 @@ class _Process:
             return
         self._drawing = Drawing(server.viser)
         if (hole := prove(port, token)) is not None:
-            self._give_up(f"its gate is not tight: {hole}")
+            self._give_up(f"its gate failed a check: {hole}")
             return
         assert server.loop is not None  # noqa: S101  # Server guarantees it
         server.loop.call_soon_threadsafe(self._begin, server.loop, gate.address)

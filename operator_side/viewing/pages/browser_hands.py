@@ -43,7 +43,7 @@ class BrowserHands:
 
     @property
     def doing(self) -> Doing:
-        """Their present action."""
+        """Present action of the hands."""
         if self._pages.doing is not Doing.RUNNING or self._moves:
             return self._pages.doing
         return Doing.AT_REST_FIRST if self._was_armed else Doing.ARMING

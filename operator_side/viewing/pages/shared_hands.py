@@ -44,7 +44,7 @@ class SharedHands(BrowserHands):
 
     @property
     def doing(self) -> Doing:
-        """Their present action."""
+        """Present action of the hands."""
         return super().doing if self._person is None else self._person.doing
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:

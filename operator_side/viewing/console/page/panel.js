@@ -49,7 +49,7 @@ export class Panel {
       keys.replaceChildren(...KEYS.flatMap(([, codes, does]) => [
         make("dt", {}, ...codes.flatMap((code, k) => [k ? " or " : "", make("kbd", {}, word(code))])), make("dd", {}, does),
       ]), make("dt", {}, make("kbd", {}, "1"), " … ", make("kbd", {}, "9")), make("dd", {}, "travel of keys"),
-      make("dt", {}, make("kbd", {}, "Esc")), make("dd", {}, "emergency stop, whoever drives"));
+      make("dt", {}, make("kbd", {}, "Esc")), make("dd", {}, "emergency stop, for any driver"));
     });
   }
 
