@@ -48,7 +48,7 @@ class CoreSettings:
     """Whether left and right of the controller are swapped"""
     seed: int = 0
     asymmetry_s: float = 0.0
-    """Asymmetry of the link's delays, as LinkEnd's"""
+    """Least delay to the robot minus that to the operator, if known"""
     full_rate: bool = False
     """Whether every command is sent, as HeldCommand's"""
 
@@ -216,7 +216,7 @@ class OperatorSide:
         return messages
 
     def _meant(self, now_s: float) -> OperatorIntent | None:
-        """Return the intent to send; None without a lease, or without both a controller and a pressed stop."""
+        """Return the intent to send; None without ownership, or with neither a controller nor a pressed stop."""
         if self.lease is None or not self._standing.owns:
             return None
         state = None if self.stiffness is None else self.stiffness.state

@@ -32,7 +32,7 @@ class OperatorSettings(SideOptions):
     connect: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT")] = "tcp://127.0.0.1:5555"
     """Address of the robot side."""
     view_connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """Address of its view port; the port after the control port unless given."""
+    """Address of the robot side's view port; by default the port after the control port."""
     keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     """Authenticate with the operator's key in FOLDER, made by: feelahead keys make operator. The robot side admits it
     after: feelahead keys allow NAME KEY."""
@@ -58,9 +58,9 @@ class OperatorSettings(SideOptions):
     console: bool = False
     """Open the browser console on this machine, at an address that is shown: views, scene, what is felt and why."""
     console_port: Annotated[int, tyro.conf.arg(metavar="PORT"), Meta(ge=0, le=65535)] = 0
-    """Its port on 127.0.0.1; 0 for any free port."""
+    """Port of the console on 127.0.0.1; 0 for any free port."""
     tui: bool = False
-    """Show the same on the whole terminal, without pictures, for machines without a browser."""
+    """Show the console's facts on the whole terminal instead of a line, for machines without a browser."""
     person: PersonSettings = field(default_factory=PersonSettings)
     """Limits of the scripted person (simulated device only)."""
 

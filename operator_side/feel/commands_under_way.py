@@ -60,7 +60,7 @@ class Report(NamedTuple):
     full_speed_m_s: float
     """v_max, speed of full travel"""
     told_m_s: float | None = None
-    """Speed that the robot commands for it; None: as requested."""
+    """Speed that the robot gives that command; None: as the command asks."""
 
 
 class Course(NamedTuple):

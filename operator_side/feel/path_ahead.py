@@ -1,4 +1,4 @@
-"""Trace the gripper's path, trigger and sticks together, through the robot side's map of what is around it.
+"""Trace the gripper's path, trigger and sticks together, through the robot side's map of its surroundings.
 
 The robot side knows a stick a loop later than the hand. So it sends contact distances from probes around the gripper
 (`Around`). The path begins where that message was sent. It follows the commands under way, then one reaction, then
@@ -90,7 +90,7 @@ def _traced(
     free_m = np.hstack([under_way_m, then_m])
     known_m = np.broadcast_to(course.ways_m[some[1:]], (zones, count - 1))
     path_m = np.hstack([known_m, ahead_m])
-    # A point counts with those before and after it.
+    # Between two points the shorter contact distance counts.
     short_m = (path_m - np.minimum(free_m[:, :-1], free_m[:, 1:])).max(axis=1).tolist()
     found = [0] * first
     for of_slow, beyond_m in zip(slow[:, 0].tolist(), short_m, strict=True):

@@ -15,7 +15,7 @@ STOP_HELD_S: Final = 0.2
 HEARTBEAT_PERIOD_S: Final = 0.2
 """Period of Hellos while nothing else is sent: the first opens the session, later ones show that we are alive."""
 _NOTICED: Final = 0.01
-"""Change of a travel or a stick that is sent at once; the triggers' own noise is less."""
+"""Largest change of a travel or a stick that may wait; the triggers' own noise is less."""
 _LATEST_S: Final = LONGEST_HELD_S - MOTION_PERIOD_S / 2.0
 """Time after which a command is sent: in the turn nearest to `LONGEST_HELD_S`, early or late."""
 STOPPING: Final = OperatorIntent(emergency_stop=True)
@@ -77,7 +77,7 @@ class HeldCommand:
         self._sent_s = -math.inf
 
     def due(self, intent: OperatorIntent, token: int, now_s: float) -> ToRobot | None:
-        """Return the connections to send to, without a payload yet; None if the command may wait.
+        """Return the message, still without payload; None if the command may wait.
 
         Due at once: a button, another token, a travel or stick by more than 0.01, and rest, which is sent exactly.
         """

@@ -19,9 +19,9 @@ class Tuner:
 
     def __init__(self) -> None:
         self.refused = 0
-        """Number of wishes that were not sent."""
+        """Number of refused wishes."""
         self.why = ""
-        """Reason for the last of them, in one line."""
+        """Reason for the last refusal, in one line; empty once a wish is accepted."""
         self.link: str | None = None
         """Link of the last wish; None before the first."""
         self._number = 0

@@ -198,7 +198,7 @@ function look() {
     const [word, because] = byId("lost").children;
     word.textContent = open ? (everHeard ? "NOTHING HEARD" : "WAITING FOR THE OPERATOR SIDE") : "CONNECTION LOST";
     const old = everHeard ? `What you see is ${(silentMs / 1000).toFixed(1)} s old. ` : "";
-    because.textContent = old + (open ? "The operator side says nothing." : `The console: ${closedBecause || "not reached yet"}.`);
+    because.textContent = old + (open ? "The operator side is silent." : `The console: ${closedBecause || "not reached yet"}.`);
   }
   for (const view of views) view.look();
 }

@@ -61,7 +61,7 @@ export class Hands {
       if (document.visibilityState === "hidden") this.#release("The tab was hidden.");
     });
     document.addEventListener("focusin", ({ target }) => {
-      if (target.matches?.(EDITS)) this.#release("A field has the keys.");
+      if (target.matches?.(EDITS)) this.#release("A field has the focus.");
     });
     setInterval(() => this.#step(), PERIOD_MS);
   }
@@ -95,7 +95,7 @@ export class Hands {
     }
     if (event.target.matches?.(EDITS)) return;
     if (event.ctrlKey || event.altKey || event.metaKey) {
-      this.#release("A key for the browser was pressed."); // the browser may keep its release to itself
+      this.#release("A browser shortcut was pressed."); // the browser may keep its release to itself
       return;
     }
     // Also while watching: a key that is down already must come up first.

@@ -78,7 +78,7 @@ export class Panel {
 
   showGamepad({ name, unknown }, there) {
     if (unknown) this.#text("pad", `Gamepad not used, as its mapping is unknown: ${unknown}`);
-    else this.#text("pad", name ? `Gamepad: ${name}${there ? "" : " (not while the page has no focus)"}` : "");
+    else this.#text("pad", name ? `Gamepad: ${name}${there ? "" : " (unused: the page has no focus)"}` : "");
   }
 
   show({ state, why, restMs, moves, facts, hands, mine, level, stop }) {
