@@ -57,7 +57,7 @@ def load_calibration(address: str) -> TravelCalibration | None:
         pass  # reading reports the fault
     stored, calibration = read_calibration(path)
     if stored != address:
-        raise ConfigurationError(f"{path}: is of the controller {stored}; valid: {address}; {_MEND}")
+        raise ConfigurationError(f"{path}: belongs to the controller {stored}; valid: {address}; {_MEND}")
     return calibration
 
 

@@ -62,7 +62,7 @@ class StickRest:
         if not math.hypot(self.x, self.y) <= LARGEST_REST:  # false for NaN, too
             raise ValueError(f"x = {self.x}, y = {self.y}; valid: within {LARGEST_REST} of the centre")
         if not 0.0 <= self.dead_zone < 1.0 - math.hypot(self.x, self.y):
-            raise ValueError(f"dead_zone = {self.dead_zone}; valid: 0 to below 1, less how far off it rests")
+            raise ValueError(f"dead_zone = {self.dead_zone}; valid: 0 to below 1 minus the distance of its rest")
 
     def deflection(self, raw: Stick) -> Stick:
         """Return the deflection from rest without the dead zone: its radius ends at 1 in every direction."""

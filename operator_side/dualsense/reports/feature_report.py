@@ -63,7 +63,7 @@ class Firmware(NamedTuple):
     hardware_version: int
     firmware_version: int
     update_version: int
-    """Set of the firmware's features to expect."""
+    """Version by which to expect features of the firmware."""
 
     @classmethod
     def parse(cls, report: bytes, transport: Transport = Transport.USB) -> Self:

@@ -62,7 +62,7 @@ class UhidFile:
             os.write(self._open_descriptor(), event)
         except OSError as error:
             reason = os.strerror(error.errno or 0)
-            said = "the kernel has let the controller go" if error.errno == errno.EINVAL else "the kernel refused"
+            said = "the kernel has released the controller" if error.errno == errno.EINVAL else "the kernel refused"
             raise DeviceError(f"{said} ({reason}); its messages: sudo dmesg | grep playstation") from error
 
     def close(self) -> None:
