@@ -1,4 +1,4 @@
-"""Every --device by its name, and how it is opened. Another controller is a file of its own, and a line here."""
+"""Controllers by --device, and how each is opened. To add one, write its file and add a line here."""
 
 import dataclasses
 import functools
@@ -22,28 +22,28 @@ from operator_side.viewing.pages.shared_hands import SharedHands
 
 
 class Given(NamedTuple):
-    """What a controller may be opened with."""
+    """Parts that a controller may be opened with."""
 
     settings: OperatorSettings
     core: OperatorSide
     pages: DrivingPage
     backend: HidBackend | None = None
-    """hidapi, unless given"""
+    """hidapi if None"""
 
 
 class Opening(NamedTuple):
-    """How the controller is found, and what else it takes."""
+    """Search for the controller, and the parts that go with it."""
 
     search: BackgroundSearch
     guard: ReleaseGuard | None = None
-    """Releases it should we be killed; its context is still to be opened"""
+    """Releases it if this process is killed; its context is still to be entered"""
     hands: BrowserHands | None = None
-    """Those on it that have to be moved in every turn; None for a person's own"""
+    """Hands on it that must be moved in every turn; None for a person's own"""
 
 
 def _hid(given: Given) -> Opening:
     find = Finder(load_backend() if given.backend is None else given.backend)
-    # A reader leaves nothing behind.
+    # Without haptics nothing must be released.
     return Opening(
         BackgroundSearch(functools.partial(_with_background_writes, find)),
         ReleaseGuard() if given.settings.haptics else None,

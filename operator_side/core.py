@@ -1,4 +1,4 @@
-"""The operator side without I/O: bytes in, bytes out, and `now` with every call.
+"""The operator side without I/O: bytes in, bytes out, `now_s` with every call.
 
 control payloads ─▶ receive ─▶ newest stiffness ─▶ feel_now ─▶ controller
                                                   ▲ own commands under way
@@ -37,24 +37,24 @@ from operator_side.robot_link.tuner import Tuner
 
 @dataclass(frozen=True, kw_only=True)
 class CoreSettings:
-    """How an operator side feels and commands."""
+    """Settings of an operator side's rendering and commands."""
 
     haptics: bool = True
-    """Whether the triggers are stiffened at all"""
+    """Whether the triggers are stiffened"""
     calibration: TravelCalibration = field(default_factory=TravelCalibration)
     rendering: RenderingSettings = field(default_factory=RenderingSettings)
     compensation: Compensation = "operator"
     swap_sides: bool = False
-    """Left and right of the controller swapped"""
+    """Whether left and right of the controller are swapped"""
     seed: int = 0
     asymmetry_s: float = 0.0
-    """See LinkEnd"""
+    """Least delay to the robot minus that to the operator, if known"""
     full_rate: bool = False
-    """See HeldCommand"""
+    """Whether every command is sent, as HeldCommand's"""
 
 
 class OperatorSide:
-    """Turns stiffness into trigger effects and travel into motion commands, towards one robot."""
+    """From stiffness to trigger effects, and from travel to motion commands, towards one robot."""
 
     def __init__(
         self,
@@ -63,12 +63,12 @@ class OperatorSide:
         settings: CoreSettings | None = None,
         listeners: Sequence[Listener] = (),
     ) -> None:
-        """listeners: hear what happens."""
+        """listeners: notified of inputs and outputs."""
         self.settings = settings = settings or CoreSettings()
         self.link = LinkEnd("operator", epoch, clock_domain, settings.seed, settings.asymmetry_s)
         self.felt = NewestStiffness(settings.seed)
         self.screen: Telemetry | None = None
-        """The newest view of the robot; None before the first."""
+        """Newest telemetry of the robot; None before the first."""
         self.hands = Hands(settings.calibration, swap_sides=settings.swap_sides)
         self.haptics = Haptics(
             settings.rendering,
@@ -77,7 +77,7 @@ class OperatorSide:
             swap_sides=settings.swap_sides,
             compensation=settings.compensation,
         )
-        """What the fingers are told, and why."""
+        """Rendering, and the last write."""
         self.commands = Commands(self.link, settings.compensation, full_rate=settings.full_rate)
         self.tuner = Tuner()
         self.rejected = 0
@@ -87,12 +87,12 @@ class OperatorSide:
 
     @property
     def lease(self) -> LeaseNotice | None:
-        """Where we stand with the robot side; None before the first notice and once it has expired."""
+        """The newest notice of the lease; None before the first and once it has expired."""
         return self._standing.lease
 
     @property
     def intent(self) -> OperatorIntent | None:
-        """What the hands meant by the newest state of the controller; None before the first."""
+        """The newest intent; None before the first."""
         return self.hands.intent
 
     @property
@@ -114,7 +114,7 @@ class OperatorSide:
             return
         self._standing.other_version = None
         if isinstance(message, LinkReport):
-            # In a sequence of its own, which must not be taken for the order of what is felt.
+            # Its sequence is separate, and says nothing of the stiffness's order.
             if message.header.epoch == self.link.peer_epoch:
                 self._standing.note(message, now_s)
             return
@@ -132,7 +132,7 @@ class OperatorSide:
             self.felt.note(felt, arrival)
             self.haptics.take_map(felt)
         if arrival.fresh:
-            self._look(now_s)  # before it counts: a field that was lost meanwhile is back, and not unbroken
+            self._look(now_s)  # first: an expired field counts as lost before the new one arrives
             self._blindness.end()
             self.felt.apply(felt, arrival, now_s)
             self.hands.see(armed=felt.state == "armed", now_s=now_s)
@@ -163,29 +163,29 @@ class OperatorSide:
         self._blindness.see_hands(released=self.hands.read(state, now_s).triggers_released)
 
     def tune(self, probability: float | None, link: str | None, now_s: float) -> None:
-        """The person wants another P, another emulated link, or both; None leaves it."""
+        """Take the person's wish for another P, another emulated link, or both; None leaves it."""
         self._hear("tuned", {"probability": probability, "link": link}, now_s)
         self.tuner.ask(probability, link, self._standing, now_s)
 
     def calibrate(self, calibration: TravelCalibration) -> None:
-        """Read the triggers and sticks of the controller that has just been found through `calibration`."""
+        """Read the triggers and sticks of the newly found controller through `calibration`."""
         if calibration != self.hands.calibration:
             self._hear("calibrated", calibration, None)
             self.hands.calibration = calibration
             self.haptics.calibrate(calibration)
 
     def controller_found(self, now_s: float) -> None:
-        """A controller came, perhaps with what was written to it before: it is released first, then told anew."""
+        """Note a controller, perhaps with effects on: it is released first, then written again."""
         self._hear("found", b"", now_s)
         self.haptics.controller_found()
 
     def controller_lost(self, now_s: float) -> None:
-        """The controller went: what the hands did last counts no more, and not again before the arm has stopped."""
+        """Note the controller's loss: its intent is dropped, and none counts before the arm has stopped."""
         self._hear("lost", b"", now_s)
         self.hands.lose(now_s)
 
     def press_stop(self, now_s: float) -> None:
-        """Stop the arm: somebody pressed it away from the controller."""
+        """Stop the arm, as pressed away from the controller."""
         self._hear("stopped", b"", now_s)
         self.commands.stop_button.press(now_s)
 
@@ -194,7 +194,7 @@ class OperatorSide:
             one.on_input(what, content, now_s)
 
     def motion(self, now_s: float) -> list[ToRobot]:
-        """What to send to the robot side now: the owner's motion command, else a Hello every so often."""
+        """Return the messages to send now: the owner's motion command, else a Hello each period."""
         self._look(now_s)
         self._standing.expire(now_s)
         linked = self.felt.within(2 * HEARTBEAT_PERIOD_S, now_s)
@@ -216,23 +216,23 @@ class OperatorSide:
         return messages
 
     def _meant(self, now_s: float) -> OperatorIntent | None:
-        """What the hands do; None while there is no lease to send it under, or neither controller nor stop."""
+        """Return the intent to send; None without ownership, or with neither a controller nor a pressed stop."""
         if self.lease is None or not self._standing.owns:
             return None
         state = None if self.stiffness is None else self.stiffness.state
         intent = STOPPING if self.commands.stop_button.holds(now_s, state) else self.hands.present(now_s)
-        # The arm may still be armed from before the controller was lost: then silence disarms it.
+        # The arm may still be armed from before the loss: silence disarms it.
         if intent is None or (self.hands.lost_s is not None and not intent.emergency_stop):
             return None
         return intent.resting() if self._blindness.holds else intent
 
     def _look(self, now_s: float) -> None:
-        """Once the stiffness has expired there is none, and who drives is blind."""
+        """Expire an old stiffness; the owner is blind from then on."""
         if self.felt.expired(now_s) and self._standing.owns:
             self._blindness.lose(now_s)
 
     def feel_now(self, now_s: float) -> Feel | None:
-        """What the controller has to be told now; None while nothing changes, or while a change has to wait."""
+        """Return the change to write to the controller now; None without a change, or while a change must wait."""
         self._look(now_s)
         felt, intent = self.stiffness, self.hands.present(now_s)
         if felt is not None and felt.state != "armed":
@@ -244,7 +244,7 @@ class OperatorSide:
         return feel
 
     def status(self, now_s: float) -> OperatorStatus:
-        """What a person is shown; what the process knows beside it is not in it."""
+        """Return the status for a person, without what only the process knows."""
         mean_s, lease, screen, felt = self.link.delay.mean, self.lease, self.screen, self.stiffness
         intent, rendering = self.hands.present(now_s), self.haptics.rendering
         order, linked = -1 if self.settings.swap_sides else 1, self.felt.within(STIFFNESS_EXPIRES_S, now_s)
@@ -274,7 +274,7 @@ class OperatorSide:
         )
 
     def summary(self) -> dict[str, Any]:
-        """This side's part of the run's summary."""
+        """Return this side's part of the run's summary."""
         return {
             "messages": {
                 "stiffness_received": self.felt.count,

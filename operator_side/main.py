@@ -1,4 +1,4 @@
-"""The process `feelahead-operator`: settings, parts, and `run`."""
+"""Process `feelahead-operator`: settings, parts, and `run`."""
 
 import secrets
 from collections.abc import Sequence
@@ -25,10 +25,9 @@ from operator_side.viewing.viewing import view_topics
 
 
 def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
-    """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released on every way out.
+    """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released on every exit.
 
-    A real controller need not be there: it is waited for, and so is one that was unplugged. `backend`: hidapi
-    unless given.
+    A real controller may be absent or unplugged: the process waits for it. backend: hidapi if None.
     """
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
@@ -49,7 +48,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
 
 
 def _desk(settings: OperatorSettings, core: OperatorSide, process: Process, backend: HidBackend | None) -> Desk:
-    """Open the controller, and the console before the priority is raised, which it would inherit."""
+    """Open the controller, and the console before the priority is raised, which the console would inherit."""
     pages, stack = DrivingPage(), process.stack
     search, guard, person = DEVICES[settings.device](Given(settings, core, pages, backend))
     pages.may_drive = person is not None

@@ -1,4 +1,4 @@
-"""Note every call of the core and what it answered, so that a replay makes them again bit for bit."""
+"""Recording of every call of the core and its answer, for a replay bit for bit."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Final
@@ -33,14 +33,14 @@ _KINDS: Final[dict[Input, Kind]] = {
 
 
 class Recorder(Listener):
-    """Passes to `note` what happens."""
+    """Listener that passes inputs and outputs to `note`."""
 
     def __init__(self, note: Callable[[Any], None]) -> None:
         self._note = note
         self._now_s = 0.0
 
     def on_input(self, what: Input, content: object, now_s: float | None) -> None:
-        """Note it; what has no time happened after the last call that had one."""
+        """Note an input; one without a time gets that of the last output."""
         kept = content if isinstance(content, bytes | ControllerState) else msgspec.json.encode(content)
         self._note((_KINDS[what], self._now_s if now_s is None else now_s, kept))
 
@@ -49,19 +49,19 @@ class Recorder(Listener):
         self._note((Kind.MOTION, now_s, messages))
 
     def on_output(self, feel: Feel | None, now_s: float) -> None:
-        """Note what was told."""
+        """Note the write."""
         self._now_s = now_s
         self._note((Kind.OUTPUT, now_s, feel))
 
 
 class OperatorEncoder:
-    """Turns these notes into entries."""
+    """Encoder of these notes as entries."""
 
     def begin_anew(self) -> None:
-        """Each entry is whole."""
+        """Do nothing: each entry is complete."""
 
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
-        """When it happened, and its entries; view payloads go to `views`, too."""
+        """Return a note's time and its entries; pass view payloads to `views`, too."""
         kind, now_s, content = noted
         if kind == Kind.MOTION:
             sent = [entry(Kind.SENT, now_s, _HAPTICS, _NOBODY, message.payload) for message in content]
@@ -72,14 +72,14 @@ class OperatorEncoder:
             return now_s, asked + told
         if kind == Kind.SEEN:
             views(now_s, content)
-            if len(content) > MAXIMUM_BYTES:  # no message that the core heeds, but a picture
+            if len(content) > MAXIMUM_BYTES:  # a picture, which the core ignores
                 return now_s, b""
         sender = [_NOBODY] if kind == Kind.RECEIVED else []
         return now_s, entry(kind, now_s, *sender, msgspec.msgpack.encode(content) if kind == Kind.HANDS else content)
 
 
 def build_recorded(settings: OperatorSettings, epoch: int, recording: SideRecording | None) -> OperatorSide:
-    """Make the core of `settings`, whose calls go to `recording` where there is one."""
+    """Build the core of `settings`; record its calls if there is a `recording`."""
     if recording is None:
         return build_operator_side(settings, epoch, clock_domain())
     core = build_operator_side(settings, epoch, clock_domain(), [Recorder(recording.noted.append)])

@@ -1,4 +1,4 @@
-"""The travel calibration that is stored for a controller, taken on as soon as it is found."""
+"""Use of the travel calibration that is stored for a controller, as soon as it is found."""
 
 from collections.abc import Callable
 
@@ -10,7 +10,7 @@ from operator_side.hands.travel_calibration import TravelCalibration
 
 
 class StoredTravel:
-    """Looks once for each time that a controller is found, and says which calibration it goes by."""
+    """Loader of the stored calibration, once for each controller found, with a note of the one in use."""
 
     def __init__(self, connection: Connection, core: OperatorSide, note: Callable[[str], None]) -> None:
         self._connection, self._core, self._note = connection, core, note
@@ -18,10 +18,9 @@ class StoredTravel:
         self._told: set[str] = set()
 
     def follow(self) -> None:
-        """In every turn.
+        """Load the calibration of a newly found controller; call it every turn.
 
-        ConfigurationError when the run's first controller has a stored calibration that is broken; later it is only
-        said.
+        ConfigurationError if the stored calibration of the run's first controller is broken; a later one is only noted.
         """
         controller = self._connection.controller
         if controller is None or self._calibrated == self._connection.found:

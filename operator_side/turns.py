@@ -1,4 +1,4 @@
-"""The work of the operator side in the turns of its loop: sockets, controller and people around the core."""
+"""Work of the operator side in each turn of its loop: sockets, controller and people around the core."""
 
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
@@ -29,26 +29,26 @@ HELPS: Final = {
     "hands": "another controller",
     "": "a page of the console fewer, or a faster machine,",
 }
-"""The stages of a turn, and what makes each of them shorter: sending and receiving; taking in what arrived; what the
-controller is told; what is read from it, and commands. "": all else, such as what is shown."""
+"""Remedies by stage of a turn. Stages: sending and receiving; taking in messages; writing to the controller; reading
+it, and commands. "": all else, such as the display."""
 _GUARD_PERIOD_S: Final = 0.5
-"""From one look at the watchdog to the next."""
+"""Period of checks of the watchdog."""
 
 
 class Desk(NamedTuple):
-    """What stands before the operator: a controller, and who may hold it."""
+    """Devices before the operator: a controller, and who may hold it."""
 
     connection: Connection
     guard: ReleaseGuard | None
     """The watchdog of a real controller"""
     person: BrowserHands | None
-    """The hands that have to be moved in every turn; None for a person's own"""
+    """The hands that must be moved in every turn; None for a person's own"""
     pages: DrivingPage
     console: Console | None
 
 
 class OperatorTurns:
-    """Motion, messages and effects, and what is shown."""
+    """Motion, messages, effects and display of each turn."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class OperatorTurns:
         *,
         stored_travel: bool,
     ) -> None:
-        """stored_travel: take on the calibration that is stored for a controller."""
+        """stored_travel: use the calibration that is stored for a controller."""
         self._process, self._core, self._sockets = process, core, sockets
         self._connection, self._guard, self._person, self._pages, console = desk
         self._sending = Sending(settings.link_spec(), sockets)
@@ -78,26 +78,26 @@ class OperatorTurns:
 
     @property
     def resting(self) -> bool:
-        """The arm is not armed, as far as is known."""
+        """Whether the arm is not armed, as far as is known."""
         stiffness = self._core.stiffness
         return stiffness is None or stiffness.state != "armed"
 
     def receive(self) -> tuple[Sequence[bytes], Sequence[tuple[bytes, bytes]]]:
-        """Return what has arrived, of control and of view."""
+        """Return the control and view messages that have arrived."""
         return self._sockets.receive(), self._sockets.receive_view()
 
     def take(self, received: tuple[Sequence[bytes], Sequence[tuple[bytes, bytes]]], now_s: float) -> None:
-        """Take in what has arrived, and tell the controller what follows from it."""
+        """Take in the messages, and write the resulting effects."""
         self._take(*received, now_s)
         self._feel(now_s)
 
     def send(self) -> None:
-        """Let go of what is due."""
+        """Send the due messages."""
         if not self._sending.send(self._process.loop.clock.now()):
             self._core.commands.held.forget()
 
     def rest(self, now_s: float, turned_s: float) -> None:
-        """Record, look after the watchdog, and show."""
+        """Record, check the watchdog, and update the display."""
         del turned_s
         recording, status = self._process.recording, self._process.status
         if recording is not None:
@@ -117,11 +117,11 @@ class OperatorTurns:
                 self._viewing.tell(said, now_s)
 
     def close(self) -> None:
-        """Release the triggers, and let the controller go."""
+        """Release the triggers and close the controller."""
         self._connection.close()
 
     def summary(self) -> dict[str, Any]:
-        """Return the core's figures and the process's."""
+        """Return the figures of the core and of the process."""
         pages = self._pages
         figures = {
             "controller": {"found": self._connection.found, "state": str(self._connection.state)},
@@ -145,7 +145,7 @@ class OperatorTurns:
     def _move(self, now_s: float) -> None:
         core, connection = self._core, self._connection
         self._pages.follow(core, now_s)
-        # Before anything else is sent: the wish arrives after all that took the old way.
+        # First, so that the wish arrives after all messages of the old link.
         if (words := core.tuner.take_link()) is not None:
             self._sending.tune(words)
         if self._person is not None:
@@ -170,7 +170,7 @@ class OperatorTurns:
         return Surroundings(hands, self._sending.line.profile.words, page)
 
     def _status(self, now_s: float) -> OperatorStatus:
-        """The core's status with what the process knows."""
+        """Return the core's status with the process's fields."""
         controller, status = self._connection.controller, self._core.status(now_s)
         if (trouble := self._sockets.trouble) is not None and status.link is not LinkState.UP:
             link = LinkState.REFUSED if self._sockets.key_refused else status.link

@@ -1,1 +1,1 @@
-"""Measuring a controller's triggers, and keeping what was measured."""
+"""Measurement of a controller's triggers and sticks, and storage of the result."""

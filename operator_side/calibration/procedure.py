@@ -1,10 +1,9 @@
-"""Measures one controller's triggers and sticks, step by step, without I/O: reports in, what to do next out.
+"""Measure one controller's triggers and sticks step by step, without I/O.
 
     rest ─▶ pull L2 ─▶ pull R2 ─▶ sticks ─▶ rest again ─▶ done
 
-At rest, for a second, the noise gives the dead zones, and the sticks say where they stand. Three full pulls of each
-trigger give its saturation. Both are measured again at the end, after everything has been moved: a worn stick comes
-back to another place.
+A second of rest gives the noise, hence the dead zones, and the sticks' centres. Three full pulls of each trigger give
+its saturation. Rest is measured again at the end: a worn stick returns to another place.
 """
 
 import math
@@ -19,19 +18,19 @@ from operator_side.hands.travel_calibration import LARGEST_REST, StickRest, Trav
 REST_S: Final = 1.0
 _LEAST_REPORTS: Final = 20
 _STILL: Final = 0.06
-"""What changes by more than this within the second is being moved."""
+"""Largest change of a channel at rest, within the second; a larger one is a motion."""
 _CHANNELS: Final = ("L2", "R2", "the left stick", "the left stick", "the right stick", "the right stick")
 PULLS: Final = 3
 _PULLED, _RELEASED_ABOVE_REST = 0.4, 0.1
 _LEAST_PULL: Final = 0.5
 _LARGEST_SPREAD: Final = 0.08
-"""Pulls that differ by more were not all full ones: a full pull ends at the same stop."""
+"""Largest difference of full pulls, which all end at the same stop."""
 _ATTEMPTS: Final = 3
 _LONGEST_WAIT_S: Final = 60.0
 _REST_MARGIN: Final = 0.02
-"""Five of a report's 255 steps beyond the highest at rest."""
+"""Added to the highest travel at rest: five of a report's 255 steps."""
 _PULL_MARGIN: Final = 0.03
-"""Below the smallest of the full pulls, which noise has raised."""
+"""Subtracted from the smallest full pull, which noise has raised."""
 _STICK_MARGIN: Final = 0.03
 _LEAST_TRIGGER_DEAD_ZONE: Final = 0.03
 _LEAST_STICK_DEAD_ZONE: Final = 0.05
@@ -42,11 +41,11 @@ _ENOUGH_SECTORS: Final = 6
 
 
 class CalibrationError(FeelaheadError):
-    """The controller, or the hands on it, cannot be calibrated; the text says why."""
+    """Error of a controller, or of the hands on it, that cannot be calibrated; the text gives the reason."""
 
 
 class Step(Enum):
-    """What is measured; the values tell a person what to do."""
+    """Steps of the procedure; the values instruct the person."""
 
     REST = "Put the controller down and touch nothing."
     PULL_L2 = "Pull L2 all the way and let go, three times."
@@ -61,28 +60,28 @@ _ORDER: Final = tuple(Step)
 
 @dataclass(frozen=True)
 class Rest:
-    """What a second of rest has shown."""
+    """Result of a second of rest."""
 
     l2: float
-    """The highest raw travel."""
+    """Highest raw travel."""
     r2: float
     left: tuple[Stick, float]
-    """Where the stick stood in the mean, and how far from there it was at most."""
+    """The stick's mean position, and its largest distance from there."""
     right: tuple[Stick, float]
 
 
 class RestMeasurement:
-    """Waits for a second of rest; whatever moves begins it anew."""
+    """Measurement of a second of rest; any motion restarts it."""
 
     def __init__(self) -> None:
         self.result: Rest | None = None
         self.progress = 0.0
-        """How much of the second has passed, 0 to 1."""
+        """Share of the second that has passed, 0 to 1."""
         self._since_s = 0.0
         self._reports: list[tuple[float, ...]] = []
 
     def feed(self, state: ControllerState, now_s: float) -> str | None:
-        """Take one report; what is being moved, if anything is."""
+        """Take one report. Return the motion that restarted the second, or None."""
         values = (state.l2, state.r2, *state.left_stick, *state.right_stick)
         self._since_s = self._since_s if self._reports else now_s
         self._reports.append(values)
@@ -110,7 +109,7 @@ class CalibrationProcedure:
     def __init__(self) -> None:
         self.step = Step.REST
         self.complaint: str | None = None
-        """Why something did not count, until the next thing does."""
+        """Reason why the last attempt did not count, until the next one does."""
         self.result: TravelCalibration | None = None
         self._since_s: float | None = None
         self._rests: list[Rest] = []
@@ -122,7 +121,7 @@ class CalibrationProcedure:
 
     @property
     def progress(self) -> float:
-        """How much of the present step is done, 0 to 1."""
+        """Share of the present step that is done, 0 to 1."""
         if self.step in self._peaks:
             return len(self._peaks[self.step]) / PULLS
         if self.step is Step.STICKS:
@@ -130,7 +129,7 @@ class CalibrationProcedure:
         return 1.0 if self.step is Step.DONE else self._rest.progress
 
     def feed(self, state: ControllerState, now_s: float) -> None:
-        """Take one report. CalibrationError when it cannot succeed any more; nothing is done once it is done."""
+        """Take one report; after the last step, do nothing. Raises CalibrationError once it cannot succeed."""
         if self._since_s is None:
             self._since_s = now_s
         if self.step is Step.DONE:
@@ -167,7 +166,7 @@ class CalibrationProcedure:
         raw, other = (state.l2, state.r2) if left else (state.r2, state.l2)
         resting = self._rests[0].l2 if left else self._rests[0].r2
         if other > _PULLED:
-            self.complaint = f"that is {other_name}; let go of it and pull {name}"
+            self.complaint = f"that is {other_name}; release it and pull {name}"
         if self._pull is None:
             self._pull = raw if raw > max(_PULLED, resting + _RELEASED_ABOVE_REST) else None
         elif raw > resting + _RELEASED_ABOVE_REST:
@@ -209,7 +208,7 @@ class CalibrationProcedure:
         self._since_s = now_s
 
     def _calibration(self) -> TravelCalibration:
-        """What the measurements say; CalibrationError for what no controller that works says."""
+        """Compute the calibration; CalibrationError for values that no working controller gives."""
         before, after = self._rests
         return TravelCalibration(
             l2=_trigger("L2", max(before.l2, after.l2), self._peaks[Step.PULL_L2]),

@@ -1,8 +1,8 @@
-"""Each controller's travel calibration as a TOML file that people can read, in their configuration folder.
+"""Storage of each controller's travel calibration: a readable TOML file in the person's configuration folder.
 
     controllers/aa-bb-cc-dd-ee-ff.toml      by the controller's own address, the same on USB and Bluetooth
 
-The address is written with dashes in the file's name, because colons are not allowed there on Windows.
+The file's name has dashes because Windows allows no colons there.
 """
 
 import dataclasses
@@ -20,12 +20,12 @@ from operator_side.controller.port import checked_address
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 
 _LARGEST_BYTES: Final = 10_000
-_MEND: Final = "measure it anew with: feelahead calibrate; or delete the file for the defaults"
+_MEND: Final = "measure it again with: feelahead calibrate; or delete the file for the defaults"
 
 
 @dataclasses.dataclass(frozen=True)
 class _Stored:
-    """The content of a file."""
+    """Content of a file."""
 
     version: Literal[1]
     address: str
@@ -39,14 +39,14 @@ class _Stored:
 
 
 def calibration_path(address: str) -> Path:
-    """The file of the calibration of the controller `address` ("aa:bb:cc:dd:ee:ff"); ValueError for another form."""
+    """Return the file of the controller `address` ("aa:bb:cc:dd:ee:ff"); ValueError for another form."""
     return configuration_folder() / "controllers" / f"{checked_address(address).replace(':', '-')}.toml"
 
 
 def load_calibration(address: str) -> TravelCalibration | None:
-    """The stored calibration of the controller `address` ("aa:bb:cc:dd:ee:ff"); None when there is none.
+    """Load the calibration of the controller `address` ("aa:bb:cc:dd:ee:ff"); None without a file.
 
-    ConfigurationError, in one line with what mends it, for a file that is broken or another controller's.
+    ConfigurationError, in one line with the remedy, if the file is broken or another controller's.
     """
     path = calibration_path(address)
     try:
@@ -54,15 +54,15 @@ def load_calibration(address: str) -> TravelCalibration | None:
     except FileNotFoundError:
         return None
     except OSError:
-        pass  # reading says what is wrong
+        pass  # reading reports the fault
     stored, calibration = read_calibration(path)
     if stored != address:
-        raise ConfigurationError(f"{path}: is of the controller {stored}; valid: {address}; {_MEND}")
+        raise ConfigurationError(f"{path}: belongs to the controller {stored}; valid: {address}; {_MEND}")
     return calibration
 
 
 def read_calibration(path: Path) -> tuple[str, TravelCalibration]:
-    """Address and calibration in the file `path`; ConfigurationError, in one line, when it is broken."""
+    """Read address and calibration from the file `path`; ConfigurationError, in one line, if it is broken."""
     try:
         return _read(read_toml(path, _LARGEST_BYTES))
     except OSError as error:
@@ -72,7 +72,7 @@ def read_calibration(path: Path) -> tuple[str, TravelCalibration]:
 
 
 def write_calibration(path: Path, address: str, calibration: TravelCalibration) -> None:
-    """Write the file whole or not at all, and make our own folder for it; ConfigurationError as in `output_file`."""
+    """Write the file atomically, and make our own folder for it; ConfigurationError as in `output_file`."""
     if configuration_folder() in path.absolute().parents:
         path.parent.mkdir(parents=True, exist_ok=True)
     with output_file("calibration", path) as file:
@@ -91,7 +91,7 @@ def _text(address: str, calibration: TravelCalibration) -> str:
 
 
 def _read(content: dict[str, Any]) -> tuple[str, TravelCalibration]:
-    """ValueError names the key."""
+    """Convert the file's content; ValueError names the key."""
     try:
         stored = msgspec.convert(content, _Stored)
     except msgspec.ValidationError as error:

@@ -1,1 +1,1 @@
-"""The port of any controller: state in, feel out, as values; and the controller that comes and goes."""
+"""Port of any controller, state in and feel out as values; and the connection that finds and loses one."""

@@ -1,7 +1,7 @@
-"""A controller whose writes are made by a thread of their own, so that the loop waits for none of them.
+"""A controller whose writes run in their own thread, so that the loop does not wait for them.
 
-On USB a write takes until the controller fetches it, some milliseconds (its interrupt endpoint's interval), and longer
-on a bad cable. Only the newest of what waits goes out, part by part: latest wins here, too.
+On USB a write lasts until the controller fetches it: some milliseconds (its interrupt endpoint's interval), longer on
+a bad cable. Waiting writes are merged part by part: latest wins.
 """
 
 import threading
@@ -13,16 +13,16 @@ from operator_side.controller.port import Controller
 from operator_side.controller.state import ControllerState
 
 CLOSE_TIMEOUT_S: Final = 0.3
-"""A write that has not returned by then is left to itself; the watchdog releases the triggers."""
+"""Longest wait for the last write, in seconds; after it the watchdog releases the triggers."""
 STALL_S: Final = 0.05
-"""A write takes some milliseconds: one that has not returned by then hangs for now."""
+"""Time after which a write hangs, in seconds; a normal one takes some milliseconds."""
 
 
 class BackgroundWrites:
-    """The port around a device: reads go straight through, writes go by the thread."""
+    """Wrapper of a device: reads are direct, writes go through the thread."""
 
     def __init__(self, device: Controller) -> None:
-        """`device` is written to by the thread alone; its `read` and `write` must bear being called at once."""
+        """device: only the thread writes to it; its `read` and `write` must tolerate concurrent calls."""
         self._device = device
         self._changed = threading.Condition()
         self._waiting: Feel | None = None
@@ -37,23 +37,23 @@ class BackgroundWrites:
 
     @property
     def released(self) -> bool:
-        """Whether the device is released; False while anything waits, and when a write has not returned."""
+        """Whether the device is released; False while a write waits or has not returned."""
         with self._changed:
             under_way = self._stuck or self._waiting is not None or self._written_since_s is not None
         return not under_way and self._device.released
 
     def stalls(self, now_s: float) -> bool:
-        """Whether what is being written was asked for more than STALL_S ago."""
+        """Whether the write in progress was requested more than STALL_S ago."""
         with self._changed:
             return self._written_since_s is not None and now_s - self._written_since_s > STALL_S
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Read the device; DeviceError also when a write has failed since."""
+        """Read the device; DeviceError also if an earlier write has failed."""
         self._raise_failure()
         return self._device.read(now_s)
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Have it written soon; DeviceError when an earlier write has failed."""
+        """Queue `feel` for the thread; DeviceError if an earlier write has failed."""
         self._raise_failure()
         with self._changed:
             self._waiting = feel if self._waiting is None else feel.following(self._waiting)
@@ -61,7 +61,7 @@ class BackgroundWrites:
             self._changed.notify()
 
     def close(self) -> None:
-        """Drop what waits, and close the device, which releases the triggers."""
+        """Drop the waiting write and close the device, which releases the triggers."""
         with self._changed:
             self._ends, self._waiting = True, None
             self._changed.notify()
@@ -80,7 +80,7 @@ class BackgroundWrites:
                 self._written_since_s = now_s
             try:
                 self._device.write(feel, now_s)
-            except Exception as error:  # raised again where it can be answered
+            except Exception as error:  # raised again by the next `read` or `write`
                 self._failure = error
                 return
             finally:

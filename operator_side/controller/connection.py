@@ -1,4 +1,4 @@
-"""The controller as something that comes and goes: looks for one, loses it, finds it again.
+"""Connection to a controller: search for one, notice its loss, find it again.
 
 Without I/O: the search that opens a controller is an argument, and so is `now_s`.
 """
@@ -13,51 +13,51 @@ from operator_side.controller.search import BackgroundSearch
 from operator_side.controller.state import ControllerState
 
 BEAT_PERIOD_S: Final = 0.05
-"""From one sign of life for the watchdog to the next, while an effect is on."""
+"""Period of beats to the watchdog while an effect is on."""
 RETELL_AFTER_S: Final = 0.1
-"""Half the watchdog's patience: when it has released the triggers, one of two gaps in a row was longer than this,
-however long we were kept between looking at the clock and beating."""
+"""Silence after which effects are written again: half the watchdog's patience. If the watchdog has released the
+triggers, one of two consecutive gaps was longer, even if the process was suspended between clock and beat."""
 LOOK_PERIOD_S: Final = 1.0
-"""From one look to the next, and from a loss to the first look: by then the robot side has long stopped."""
+"""Period of searches, also from a loss to the first search: by then the robot side has long stopped."""
 
 
 class Listener(Protocol):
-    """The part that has to know at once that the hands came or went."""
+    """Receiver of a controller's arrival and loss, called at once."""
 
     def controller_found(self, now_s: float) -> None:
-        """There is one, and nothing is known of what its triggers do."""
+        """Note a controller; the state of its triggers is unknown."""
 
     def controller_lost(self, now_s: float) -> None:
-        """There is none any more."""
+        """Note the controller's loss."""
 
 
 class Guard(Protocol):
-    """The part that releases a controller when we are killed, or hang."""
+    """Watchdog that releases a controller when this process is killed or hangs."""
 
     def hold(self, path: bytes, release: bytes) -> None:
-        """From now on, should we die, `release` is to be written to the controller at `path`."""
+        """Have `release` written to the controller at `path` if this process dies from now on."""
 
     def let_go(self) -> None:
-        """There is nothing to release any more."""
+        """Cancel `hold`."""
 
     def beat(self) -> None:
-        """An effect is on, and we live: should no further beat follow in time, we hang."""
+        """Report that an effect is on and this process runs; without a further beat in time, it hangs."""
 
     def rest(self) -> None:
-        """No effect is on: there are no beats until the next one."""
+        """Report that no effect is on: no beat is due until the next one."""
 
 
 class Connection:
-    """One controller at a time. None of its methods waits, and none raises DeviceError but `update` (NoDriverError)."""
+    """Connection to one controller at a time. No method waits; only `update` raises, and only NoDriverError."""
 
     def __init__(self, search: BackgroundSearch, listener: Listener, guard: Guard | None = None) -> None:
         self.state = ConnectionState.ABSENT
         self.found = 0
         """Number of times that a controller was found."""
         self.released = True
-        """Whether the last controller that was let go had its triggers released; False for one that was unplugged."""
+        """Whether the last controller to be closed had its triggers released; False for one that was unplugged."""
         self.controller: OpenController | None = None
-        """The one that is connected."""
+        """The connected controller."""
         self._search = search
         self._listener = listener
         self._guard = guard
@@ -71,7 +71,7 @@ class Connection:
         self._closed = False
 
     def update(self, now_s: float) -> None:
-        """Look for a controller if there is none and it is time. NoDriverError where looking is of no use."""
+        """Search for a controller if none is connected and a search is due. NoDriverError if searching is useless."""
         if self.state is ConnectionState.CONNECTED or self._closed:
             return
         found = self._search.take()
@@ -81,10 +81,10 @@ class Connection:
         if isinstance(found, NoDriverError):
             raise found
         if isinstance(found, NoDeviceError):
-            if self.state is not ConnectionState.LOST:  # that it is gone has been said
+            if self.state is not ConnectionState.LOST:  # the loss has been reported
                 self._say_once(f"{found}; waiting for one")
         elif found is not None:
-            # The system gives permission a moment after the controller appears: once is no trouble yet.
+            # The system grants permission a moment later: one failure is no trouble yet.
             if str(found) == self._refused:
                 self._say_once(f"{found}; trying again until it works")
             self._refused = str(found)
@@ -93,10 +93,10 @@ class Connection:
             self._search.begin(self._address)
 
     def beat(self, now_s: float) -> None:
-        """While an effect is on, show the watchdog that we live; to be called at every turn, before what is written.
+        """Beat for the watchdog while an effect is on; call it every turn, before a write.
 
-        After a long silence the watchdog may have released the triggers. Then the listener hears of a controller that
-        has just been found. A write that does not return is a silence, too.
+        After a long silence the watchdog may have released the triggers. Then the listener is notified of a
+        controller, as after a search. A write that does not return counts as silence.
         """
         if self._guard is None or self.controller is None or not self._held:
             return
@@ -119,7 +119,7 @@ class Connection:
             self._listener.controller_found(now_s)
 
     def read(self, now_s: float) -> ControllerState | None:
-        """The newest state; None without a new one, or without a controller."""
+        """Return the newest state; None without a new one, or without a controller."""
         if self.controller is None:
             return None
         try:
@@ -129,7 +129,7 @@ class Connection:
             return None
 
     def write(self, feel: Feel, now_s: float) -> bool:
-        """Tell the controller, if there is one; whether it went out."""
+        """Write to the controller, if there is one; return whether the write succeeded."""
         if self.controller is None:
             return False
         if self._guard is not None and self._held and self._beat_s is None:
@@ -143,12 +143,12 @@ class Connection:
         return True
 
     def take_notes(self) -> list[str]:
-        """Notes for a person since the last call; each trouble appears once, however long it lasts."""
+        """Return the notes for a person since the last call; each trouble appears once, however long it lasts."""
         notes, self._notes = self._notes, []
         return notes
 
     def close(self) -> None:
-        """Release the triggers and let the controller go; nothing is looked for any more. Safe to call again."""
+        """Release the triggers, close the controller and end the search. Safe to call again."""
         if self._closed:
             return
         self._closed = True
@@ -158,7 +158,7 @@ class Connection:
             self._let_go()
 
     def _connect(self, controller: OpenController, now_s: float) -> None:
-        # Before anything is written to it.
+        # Before the first write.
         self._held, self._beat_s = False, None
         if self._guard is not None and controller.path is not None:
             self._held = True
@@ -177,7 +177,7 @@ class Connection:
         self._next_look_s = now_s + LOOK_PERIOD_S
         self._say_once(
             f"{error}; until it is back nothing is sent to move the robot, which stops: then release the triggers and"
-            " arm it anew"
+            " arm it again"
         )
         self._listener.controller_lost(now_s)
         self._let_go()
@@ -188,7 +188,7 @@ class Connection:
             return
         controller.device.close()
         self.released = controller.device.released
-        # A controller that could not be released stays with the watchdog, which will try once more when we end.
+        # The watchdog keeps a controller that could not be released, and tries once more when this process ends.
         if self.released and self._guard is not None:
             self._guard.let_go()
 
@@ -199,9 +199,9 @@ class Connection:
 
 
 def _introduction(controller: OpenController, known: str | None, *, first: bool) -> str:
-    """Name the controller, and say whether it is the one from before, whose address is `known`."""
+    """Name the controller, and say if it is the one before, of address `known`."""
     if first or known is None or controller.address is None:
-        return f"controller: {controller.name}"  # nobody can tell whether it is the same
+        return f"controller: {controller.name}"  # cannot be told apart
     if controller.address == known:
         return f"controller: {controller.name}, back again"
     return f"another controller: {controller.name}"

@@ -1,4 +1,4 @@
-"""The port: what feelahead asks of any controller, real or not."""
+"""Port that every controller implements, real or not."""
 
 import re
 import reprlib
@@ -13,20 +13,20 @@ _ADDRESS: Final = re.compile("[0-9a-f]{2}(:[0-9a-f]{2}){5}")
 
 
 class Controller(Protocol):
-    """A controller that is open. Any method may raise DeviceError; the text says what to do about it."""
+    """An open controller. Any method may raise DeviceError; the text gives the remedy."""
 
     @property
     def released(self) -> bool:
-        """Both triggers are free and the motors stand, as far as anybody can know."""
+        """Whether both triggers are free and the motors still, as far as is known."""
 
     def read(self, now_s: float) -> ControllerState | None:
-        """The newest state, older unread ones skipped, or None when there is no new one; never waits."""
+        """Return the newest state and skip older ones; None without a new one. Never waits."""
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Have the controller do what `feel` sets."""
+        """Set the parts that `feel` holds."""
 
     def close(self) -> None:
-        """Take resistance, rumble and a warning light off if any were written, and let the controller go.
+        """Switch off resistance, rumble and a warning light if any were written, and close the controller.
 
         Safe to call again; nothing else is called afterwards.
         """
@@ -34,7 +34,7 @@ class Controller(Protocol):
 
 @dataclass(frozen=True)
 class OpenController:
-    """A controller that a search has found and opened."""
+    """A controller that a search has opened."""
 
     device: Controller
     name: str
@@ -42,15 +42,15 @@ class OpenController:
     address: str | None = None
     """Address "aa:bb:cc:dd:ee:ff", the same on USB and Bluetooth; None when it did not answer."""
     path: bytes | None = None
-    """Device node, for the guard; None where nothing has to be released after our death."""
+    """Device node, for the guard; None if nothing must be released after this process dies."""
     release: bytes = b""
-    """What the guard writes to that node to take everything off."""
+    """Report that the guard writes to that node to switch everything off."""
     stalls: Callable[[float], bool] = lambda _: False
-    """Whether a write does not return, at `now_s`: then nothing can be said to the controller by `device`."""
+    """Whether at `now_s` a write hangs: then `device` cannot reach the controller."""
 
 
 def checked_address(address: object) -> str:
-    """Return `address` if it has the form "aa:bb:cc:dd:ee:ff"; ValueError for anything else."""
+    """Return `address`; ValueError unless it has the form "aa:bb:cc:dd:ee:ff"."""
     if not isinstance(address, str) or not _ADDRESS.fullmatch(address):
         raise ValueError(
             f"address = {reprlib.repr(address)}; valid: six pairs of hexadecimal digits like aa:bb:cc:dd:ee:ff"

@@ -1,4 +1,4 @@
-"""The search for a controller, which keeps nobody waiting: opening one takes a few reports and their time."""
+"""Search for a controller in the background: opening one takes a few reports' time."""
 
 import threading
 from collections.abc import Callable
@@ -10,11 +10,11 @@ from operator_side.controller.port import OpenController
 _CLOSE_TIMEOUT_S = 0.3
 
 Find = Callable[[str | None], OpenController]
-"""Find and open a controller, that of the given address first; DeviceError says why there is none."""
+"""Find and open a controller, preferably the one of the given address; DeviceError gives the reason for none."""
 
 
 class BackgroundSearch:
-    """One look at a time, in a thread of its own: a controller on Bluetooth may take its time to answer."""
+    """One search at a time, in its own thread: a controller on Bluetooth may answer late."""
 
     def __init__(self, find: Find) -> None:
         self._find = find
@@ -22,7 +22,7 @@ class BackgroundSearch:
         self._closed = False
 
     def begin(self, preferred: str | None) -> None:
-        """Start to look, for the controller of this address first, unless a look goes on."""
+        """Start a search unless one is running; prefer the controller of this address."""
         if self._look is None and not self._closed:
             self._look = Future()
             # A daemon: a controller that never answers must not keep the process from ending.
@@ -30,7 +30,7 @@ class BackgroundSearch:
             threading.Thread(target=_find_for, args=about, daemon=True, name="controller search").start()
 
     def take(self) -> OpenController | DeviceError | None:
-        """The controller, or why there is none; any other failure in the thread is raised here."""
+        """Return the controller, or the reason for none; None during a search. Raises the thread's other errors."""
         if self._look is None or not self._look.done():
             return None
         look, self._look = self._look, None
@@ -38,7 +38,7 @@ class BackgroundSearch:
         return error if isinstance(error, DeviceError) else look.result()
 
     def close(self) -> None:
-        """Give up; what is found from now on is let go."""
+        """End the search; a controller found later is closed."""
         look, self._look, self._closed = self._look, None, True
         if look is not None:
             wait([look], _CLOSE_TIMEOUT_S)
@@ -58,7 +58,7 @@ def _let_go(look: "Future[OpenController]") -> None:
 
 
 class Ready(BackgroundSearch):
-    """A search that finds what is there already: a simulated controller."""
+    """Search that returns a given controller: a simulated one."""
 
     def __init__(self, controller: OpenController) -> None:
         super().__init__(lambda _: controller)
@@ -66,4 +66,4 @@ class Ready(BackgroundSearch):
         self._look.set_result(controller)
 
     def begin(self, preferred: str | None) -> None:
-        """There is nothing to look for."""
+        """Do nothing: the controller is given."""

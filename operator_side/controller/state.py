@@ -1,4 +1,4 @@
-"""The state of a controller at one moment, in units that a program can use."""
+"""State of a controller at one moment, in a program's units."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -13,7 +13,7 @@ Stick = tuple[Axis, Axis]
 
 
 class Button(Enum):
-    """Everything that is pressed or not; the directional pad counts as four buttons, two on a diagonal."""
+    """Buttons; the directional pad counts as four, two of them on a diagonal."""
 
     UP = "up"
     RIGHT = "right"
@@ -63,7 +63,7 @@ class Battery(Limited):
     """Charge and charging state."""
 
     fraction: Share | None = 1.0
-    """0 to 1; None when the controller does not tell, or reports a fault instead."""
+    """Charge, 0 to 1; None if the controller reports none, or a fault instead."""
     state: BatteryState = BatteryState.FULL
 
 
@@ -71,10 +71,10 @@ CHARGED: Final = Battery()
 
 
 class ControllerState(Struct, frozen=True):
-    """What the hands do to a controller; the defaults are one that nobody touches, charged."""
+    """Sticks, triggers and buttons; the defaults are an untouched, charged controller."""
 
     left_stick: Stick = (0.0, 0.0)
-    """(x, y), -1 to 1 each: right and up are positive. No dead zone is taken off."""
+    """(x, y), -1 to 1 each, right and up positive, without a dead zone."""
     right_stick: Stick = (0.0, 0.0)
     l2: Share = 0.0
     """Raw travel as the controller measures it, 0 to 1."""

@@ -1,9 +1,9 @@
-"""A gamepad with rumble through Linux evdev: what a trigger cannot resist, the motors say.
+"""Gamepad with rumble through Linux evdev: its motors render a trigger's resistance.
 
-The strength that a finger would meet where its trigger is now drives a motor: L2 the strong one, R2 the weak one; with
-the rumble that is asked for, the greater counts. Layout of events and ioctls: linux/input.h. The kernel erases a
-file's effects when that is closed, so that a killed process leaves nothing behind; each effect ends by itself soon,
-so that a process that hangs does not either.
+The strength that a finger would meet at its trigger's travel drives a motor: L2 the strong one, R2 the weak one; the
+greater of it and the commanded rumble counts. Layout of events and ioctls: linux/input.h. The kernel erases a file's
+effects when the file is closed, so a killed process leaves nothing behind. Each effect also ends soon by itself,
+against a process that hangs.
 """
 
 import contextlib
@@ -21,10 +21,10 @@ from operator_side.controller.state import Battery, BatteryState, Button, Contro
 
 NODES: Final = Path("/dev/input")
 LENGTH_S: Final = 0.2
-"""An effect ends so long after it was last said, as the release watchdog's patience."""
+"""Duration of an effect after the last command, as the release watchdog's patience"""
 _AGAIN_S: Final = LENGTH_S / 2
 RELEASED_TRAVEL: Final = 0.05
-"""A trigger up to this is let go: nothing is felt of it."""
+"""Travel up to which a trigger is released: its strengths drive no motor"""
 _FULL: Final = 0xFFFF
 
 _SYN, _KEY, _ABS, _FF = 0x00, 0x01, 0x03, 0x15
@@ -57,7 +57,7 @@ _EVENT: Final = struct.Struct("@llHHi")
 _ABSINFO: Final = struct.Struct("=6i")
 _EFFECT: Final = struct.Struct("@HhHHHHH2xHH")
 _EFFECT_SIZE: Final = 16 + struct.calcsize("@HHhhH4HIP")
-"""The largest member of its union is a periodic effect."""
+"""Size of struct ff_effect, whose largest union member is a periodic effect"""
 _MOST_EVENTS: Final = 64
 _UNKNOWN_BATTERY: Final = Battery(None, BatteryState.UNKNOWN)
 
@@ -65,7 +65,7 @@ Ioctl = Callable[[int, int, Any], Any]
 
 
 def _request(direction: int, number: int, size: int) -> int:
-    """_IOC of linux/ioctl.h for type "E"; direction: 1 writes, 2 reads."""
+    """Return _IOC of linux/ioctl.h for type "E"; direction: 1 writes, 2 reads."""
     return direction << 30 | size << 16 | ord("E") << 8 | number
 
 
@@ -74,28 +74,28 @@ GET_NAME: Final = _request(2, 0x06, _NAME_BYTES)
 GET_UNIQUE: Final = _request(2, 0x08, _NAME_BYTES)
 GET_KEYS: Final = _request(2, 0x18, _KEY_BYTES)
 GET_BITS: Final = _request(2, 0x20, _BIT_BYTES)
-"""One more for each kind of event"""
+"""Plus the number of the kind of event"""
 GET_AXIS: Final = _request(2, 0x40, _ABSINFO.size)
-"""One more for each axis"""
+"""Plus the number of the axis"""
 SEND_EFFECT: Final = _request(1, 0x80, _EFFECT_SIZE)
 
 
 class Axis(NamedTuple):
-    """The range of one axis."""
+    """Range of one axis."""
 
     least: int
     most: int
 
     def share(self, value: int) -> float:
-        """Place in the range, 0 to 1."""
+        """Return the place of `value` in the range, 0 to 1."""
         return min(max((value - self.least) / max(self.most - self.least, 1), 0.0), 1.0)
 
 
 class EvdevPad:
-    """The port on an open node; one thread reads and writes. A state comes with each read, as the kernel keeps it."""
+    """Port on an open node; one thread reads and writes. Each read returns a state, as the kernel keeps it."""
 
     def __init__(self, descriptor: int, ioctl: Ioctl = fcntl.ioctl) -> None:
-        """`descriptor`: open without waiting, and closed with this. DeviceError when it goes away meanwhile."""
+        """descriptor: non-blocking, and closed by `close`. DeviceError if the gamepad goes away meanwhile."""
         self._descriptor: int | None = descriptor
         self._ioctl = ioctl
         self._changed = True
@@ -121,11 +121,11 @@ class EvdevPad:
 
     @property
     def released(self) -> bool:
-        """Nothing that was told holds or shakes."""
+        """Whether the last command neither resists nor rumbles."""
         return self._told.releases
 
     def read(self, now_s: float) -> ControllerState | None:
-        """The state after all events until now, and the motors by it."""
+        """Return the state after all events until now, and drive the motors by it."""
         descriptor = self._open_descriptor()
         with _going_wrong(), contextlib.suppress(BlockingIOError):
             while True:
@@ -140,17 +140,17 @@ class EvdevPad:
         return self._state
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Feel it as rumble from now on; a light is passed over."""
+        """Render `feel` as rumble from now on; a light is ignored."""
         self._open_descriptor()
         self._told = feel.following(self._told)
         self._shake(now_s)
 
     def close(self) -> None:
-        """Stop the motors and let the pad go."""
+        """Stop the motors and close the pad."""
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is None:
             return
-        with contextlib.suppress(OSError):  # it is gone: nothing more can be told to it
+        with contextlib.suppress(OSError):  # it is gone: nothing can be written
             if any(self._drives):
                 os.write(descriptor, _played(self._effect_id, 0))
             self._told = self._told.farewell
@@ -168,7 +168,7 @@ class EvdevPad:
         self._changed = True
 
     def _ask(self) -> None:
-        """Ask for what is held now."""
+        """Read the present axes and buttons."""
         for axis in (*_AXES, *self._hats):
             content = bytearray(_ABSINFO.size)
             self._ioctl(self._open_descriptor(), GET_AXIS + axis, content)
@@ -189,7 +189,7 @@ class EvdevPad:
         )
 
     def _shake(self, now_s: float) -> None:
-        """Drive the motors by what was told and by where the triggers are; again before it would end."""
+        """Drive the motors by the last command and the present travel; again before the effect ends."""
         told, state = self._told, self._state
         left, right = (0.0, 0.0) if told.rumble is None else (told.rumble.left, told.rumble.right)
         drives = (
@@ -201,7 +201,7 @@ class EvdevPad:
         self._drives, self._said_s = drives, now_s
         with _going_wrong():
             descriptor = self._open_descriptor()
-            # Stopped as it is: the kernel (ff-memless) lets the motors run on where an effect changes and then stops.
+            # Stop it unchanged: the kernel (ff-memless) lets the motors run on if an effect changes and then stops.
             if any(drives):
                 effect = bytearray(_EFFECT_SIZE)
                 _EFFECT.pack_into(effect, 0, _FF_RUMBLE, self._effect_id, 0, 0, 0, round(1e3 * LENGTH_S), 0, *drives)
@@ -222,12 +222,12 @@ class EvdevPad:
 
     def _open_descriptor(self) -> int:
         if self._descriptor is None:
-            raise DeviceError("the gamepad is closed; open it anew")
+            raise DeviceError("the gamepad is closed; open it again")
         return self._descriptor
 
 
 def find_pad(preferred: str | None) -> OpenController:
-    """Open the gamepad of the address `preferred`, else the first with rumble; NoDeviceError says why there is none."""
+    """Open the gamepad of address `preferred`, else the first with rumble; NoDeviceError gives the reason for none."""
     found: list[tuple[Path, EvdevPad]] = []
     denied: list[str] = []
     for path in sorted(NODES.glob("event*"), key=lambda path: (len(path.name), path.name)):
@@ -271,7 +271,7 @@ def _address(unique: str) -> str | None:
 
 @contextlib.contextmanager
 def _going_wrong() -> Iterator[None]:
-    """DeviceError for what the system says of a node; nothing to read is no trouble."""
+    """Turn the system's errors of a node into DeviceError; nothing to read is no error."""
     try:
         yield
     except BlockingIOError:

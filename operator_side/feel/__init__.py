@@ -1,1 +1,1 @@
-"""What the fingers get: what lies ahead becomes trigger effects."""
+"""Rendering of onset distances as trigger effects and rumble."""

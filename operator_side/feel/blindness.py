@@ -1,4 +1,4 @@
-"""What follows when the field stops coming: nobody knows what is ahead, so that hands move nothing, and are told.
+"""Blindness after the loss of the field: the hands move nothing until it is back and both triggers were released.
 
 seeing ─▶ blind ─▶ waiting ─▶ seeing
        │        │          └ both triggers were seen released
@@ -12,47 +12,47 @@ from common.status.codes import Sight
 from operator_side.controller.feel import USUAL_LIGHT, WARNING_LIGHT, Color, Rumble
 
 SIGNAL_S: Final = 3.0
-"""The motors say it for so long; the light until the field is back."""
+"""Duration of the motors' signal; the light stays until the field is back."""
 _PERIOD_S: Final = 1.0
 _PULSES_S: Final = ((0.0, 0.12), (0.24, 0.36))
-"""Two short pulses in each period, of both motors: nothing else moves both alike."""
+"""Two short pulses of both motors in each period: no other signal drives both equally."""
 _PULSE: Final = Rumble(left=0.7, right=0.7)
 
 
 class Blindness:
-    """Where we stand, by what happened last. A link that never was up is not blind: there is nothing to lose."""
+    """State of sight. A link that never was up is not blind: there is nothing to lose."""
 
     def __init__(self) -> None:
         self.sight = Sight.SEEING
         self.times = 0
-        """How often the field was lost."""
+        """Number of losses of the field."""
         self.light: Color | None = None
-        """What colour the controller has to show; None leaves its light alone, as long as it was never blind."""
+        """Colour for the controller; None, before the first loss, leaves its light alone."""
         self._since_s = 0.0
 
     @property
     def holds(self) -> bool:
-        """Whether the hands move nothing."""
+        """Whether the intent is held at zero."""
         return self.sight is not Sight.SEEING
 
     def lose(self, now_s: float) -> None:
-        """The field has expired while our hands drove."""
+        """Become blind: the field has expired while our hands drove."""
         if self.sight is not Sight.BLIND:
             self.sight, self._since_s, self.light = Sight.BLIND, now_s, WARNING_LIGHT
             self.times += 1
 
     def end(self) -> None:
-        """The field is back, or somebody else drives: our hands still rest first."""
+        """End blindness, as the field is back or another operator drives; the hands must still rest first."""
         if self.sight is Sight.BLIND:
             self.sight, self.light = Sight.WAITING, USUAL_LIGHT
 
     def see_hands(self, *, released: bool) -> None:
-        """What the controller's state says of both triggers."""
+        """Take in whether both triggers are released."""
         if released and self.sight is Sight.WAITING:
             self.sight = Sight.SEEING
 
     def rumble(self, now_s: float) -> Rumble:
-        """What the motors do at `now_s` to say it."""
+        """Return the motors' signal at `now_s`."""
         since_s = now_s - self._since_s
         if self.sight is not Sight.BLIND or since_s >= SIGNAL_S:
             return Rumble()

@@ -1,8 +1,7 @@
-"""Where the gripper will be once the command sent now takes effect: what the operator side knows and the robot cannot.
+"""Displacement of the gripper by the commands under way, which the operator side knows and the robot side cannot.
 
-A report of the robot is old, and the arm follows commands that had not reached it then. The operator side has sent
-them: from the speed in the report it reckons on. That takes the place of ΔT = v t_d (eq. 8), which assumes that the
-speed stays as it was.
+A report is old: the arm follows commands that had not reached it then. The operator side integrates these commands
+from the speed in the report. The result replaces ΔT = v t_d (eq. 8), which assumes a constant speed.
 """
 
 import math
@@ -17,23 +16,23 @@ from common.following import follow, follow_together
 from common.protocol.around import PERIOD_S
 
 MAX_DELAY_S: Final = 2.0
-"""Beyond this loop age the robot side is disarmed, so that no older command matters."""
+"""Loop age beyond which the robot side is disarmed, so that older commands do not matter."""
 _MOST_COMMANDS: Final = 4096
-"""Kept at most: eight times what 250 commands a second leave in the window."""
+"""Capacity of the history: eight times 250 commands a second over the window."""
 _STEP_S: Final = 0.01
-"""One step of a course, in which trigger and sticks go towards the mean of what was commanded."""
+"""Step of a course, in seconds; trigger and sticks approach their mean command over the step."""
 _LEAST_S: Final = 1e-9
 _CLOCK_RATES_S: Final = 0.001
-"""By so much two clocks that run at slightly different rates may make `held` too long."""
+"""Largest excess of `held` by the two clocks' different rates."""
 
 
 class Displacement(NamedTuple):
-    """What the commands under way will have done, along the direction in which R2 advances."""
+    """Effect of the commands under way, along the direction in which R2 advances."""
 
     way_m: float
-    """δ, signed: from where the gripper was in the report to where it is when a command sent now is followed."""
+    """δ, signed: from the gripper's place in the report to its place when a command sent now is followed."""
     speed_m_s: float
-    """w, signed: its speed then."""
+    """w, signed: its speed at that time."""
 
 
 Sticks = tuple[float, float, float, float]
@@ -42,7 +41,7 @@ AT_REST: Final[Sticks] = (0.0, 0.0, 0.0, 0.0)
 
 
 class Command(NamedTuple):
-    """What was sent, and when."""
+    """A command and the time of its stamp."""
 
     sent_s: float
     travel: float
@@ -50,104 +49,103 @@ class Command(NamedTuple):
 
 
 class Report(NamedTuple):
-    """What a message of the robot side says of the arm and of our commands."""
+    """Content of a robot side's message about the arm and our commands."""
 
     echo_sent_s: float | None
-    """From the header: the stamp of the newest command that the robot side had"""
+    """From the header: the stamp of the newest command that the robot side had received."""
     echo_held_s: float | None
-    """and how long that had lain there."""
+    """From the header: the time for which the robot side had held that command."""
     speed_m_s: float
     """v along the direction in which R2 advances"""
     full_speed_m_s: float
-    """v_max, of full travel"""
+    """v_max, speed of full travel"""
     told_m_s: float | None = None
-    """The speed that the robot gives that command; None: what the command asked for."""
+    """Speed that the robot gives that command; None: as the command asks."""
 
 
 class Course(NamedTuple):
-    """The gripper's way by the commands under way, point by point."""
+    """Sampled course of the gripper by the commands under way."""
 
     ways_m: FloatArray
-    """(k,) signed, along the direction in which R2 advances, from where the gripper was in the report"""
+    """(k,) displacement since the report, signed along the direction in which R2 advances"""
     speed_m_s: float
-    """w: the speed at the end, so signed"""
+    """w: speed at the end, with the same sign"""
     aside_s: FloatArray
-    """(k, 4) how long each stick, fully deflected, would take to where it has led by then"""
+    """(k, 4) time that each stick, fully deflected, would take to the displacement that it has caused by then"""
     followed: FloatArray
     """(4,) deflections that the arm follows at the end"""
     changes_s: FloatArray
-    """(n, 5) K: how long each joint takes to full travel of R2, and to each fully deflected stick"""
+    """(n, 5) K: time of each joint to full travel of R2, and to each fully deflected stick"""
 
     def turned_back(self) -> "Course":
-        """The same along the direction in which L2 retreats."""
+        """Return the course along the direction in which L2 retreats."""
         changes_s = self.changes_s * [-1.0, 1.0, 1.0, 1.0, 1.0]
         return self._replace(ways_m=-self.ways_m, speed_m_s=-self.speed_m_s, changes_s=changes_s)
 
 
 class CommandsUnderWay:
-    """The operator side's own commands of the last seconds, followed as the robot will follow them.
+    """History of our commands, integrated as the robot will follow them.
 
-    Which are still under way? The robot made its report at its time T. The newest message that it had by then was
-    stamped `echo` by us and had lain there for `held`, so it arrived at T - held. If a message takes d to the robot,
-    echo + d = T - held: **T is when a message arrives that we sent at e = echo + held.** No clocks are compared: e is
-    a stamp of ours and a duration. At T:
+    Which commands are under way? The robot made its report at its time T. Its newest message from us bore our stamp
+    `echo` and had been held for `held`, so it arrived at T - held. With the one-way delay d, echo + d = T - held:
+    **a message that we sent at e = echo + held arrives at T.** No clocks are compared: e is our stamp and a duration.
+    At T:
 
-    - Commands sent until `echo` have had their effect: the arm follows that of `echo`, and its speed v, measured at T,
-      is as far on the way to it as the arm could get. Older ones cannot arrive any more, as the newest wins. What the
-      arm makes of it the report says, too (`told`): nothing if it came too late or the arm was stopped, less where a
-      joint is at its limit.
-    - All that were sent after `echo` are under way. On a steady link these are the commands sent after e, and one sent
-      at t is followed from T + (t - e) on. Where one sent between `echo` and e should have arrived and has not,
-      messages take longer than that of `echo` did, and the first of these arrives at T at the earliest. So e is no
-      later than the first command after `echo`.
+    - Commands up to `echo` have had their effect. The arm follows the one of `echo`; its measured speed v is as near
+      to that command as the arm could get. Older ones are discarded, as the newest wins. The report also has the
+      speed that the robot gives that command (`told`). It is zero if the command came too late or the arm was
+      stopped, and less at a joint's limit.
+    - Commands after `echo` are under way. On a steady link these were sent after e, and one sent at t is followed
+      from T + (t - e) on. A command between `echo` and e may be overdue, as delays have grown: it arrives at T at
+      the earliest. So e is no later than the first command after `echo`.
 
     A command sent now is followed from T + (now - e) on. Until then the arm goes from the speed v towards
     u(t) = x(t) v_max, x(t) the newest command sent at or before t, for t from e to now:
 
         δ = ∫ v dt,  w = v(now),  |dv/dt| <= a
 
-    exactly, as u is constant between commands. What differs in truth: d changes from message to message, and an
-    arm at the edge of its reach does not do what it is told. That joints share out their acceleration `course` knows.
-    `feelahead bench error` measures the sum of it.
+    exactly, as u is constant between commands. Two errors remain: d varies from message to message, and an arm at the
+    edge of its reach does not follow. `course` includes that joints share their acceleration. `feelahead bench error`
+    measures the total.
     """
 
     def __init__(self, window_s: float = MAX_DELAY_S) -> None:
-        """Remember what was sent in the last `window_s`; ValueError unless that is finite and above 0."""
+        """Keep the commands of the last `window_s`; ValueError unless finite and above 0."""
         if not (math.isfinite(window_s) and window_s > 0.0):
             raise ValueError(f"window_s = {window_s}; valid: a finite time above 0 s")
         self._window_s = window_s
         self._sent: deque[Command] = deque(maxlen=_MOST_COMMANDS)
 
     def __len__(self) -> int:
-        """How many commands are remembered."""
+        """Return the number of commands in the history."""
         return len(self._sent)
 
     def sent(self, now_s: float, travel: float, sticks: Sticks = AT_REST) -> None:
-        """A command left at `now_s`, the stamp in its header: calibrated travel of R2 less that of L2, -1 to 1.
+        """Add a command sent at `now_s`, the stamp in its header: calibrated travel of R2 less that of L2, -1 to 1.
 
-        It counts until the next one; who stops commanding says so by a travel of 0. ValueError for a travel out of
-        range, or a time that is not finite or lies before the last one.
+        It holds until the next one; add a travel of 0 when commands end. ValueError for a travel out of range, or a
+        time that is not finite or before the last one.
         """
         if not -1.0 <= travel <= 1.0:
             raise ValueError(f"travel = {travel}; valid: -1 to 1")
         last_s = self._sent[-1].sent_s if self._sent else -math.inf
         if not (math.isfinite(now_s) and now_s >= last_s):
             raise ValueError(f"now_s = {now_s}; valid: a finite time, not before the last command's, {last_s}")
-        # The newest one from before the window stays: it is what counted as the window began.
+        # The newest one before the window stays: it held when the window began.
         while len(self._sent) > 1 and self._sent[1].sent_s <= now_s - self._window_s:
             self._sent.popleft()
         self._sent.append(Command(now_s, travel, sticks))
 
     def sticks_at(self, now_s: float) -> Sticks:
-        """Find how they were commanded last at `now_s`."""
+        """Return the deflections last commanded at `now_s`."""
         return next((one.sticks for one in reversed(self._sent) if one.sent_s <= now_s), AT_REST)
 
     def displacement(self, now_s: float, report: Report, acceleration_m_s2: float) -> Displacement | None:
-        """δ and w by the time that a command sent at `now_s` is followed.
+        """Compute δ and w at the time when a command sent at `now_s` is followed.
 
-        acceleration_m_s2: a; infinite for an arm that follows at once. None where the commands since the echo are not
-        known: without an echo, or with one that is older than the window or the first command, or that says what cannot
-        be. ValueError for a speed or an acceleration that is none.
+        acceleration_m_s2: a; infinite for an arm that follows at once. None if the commands since the echo are
+        unknown: the echo is missing, impossible, or older than the window or the first command. ValueError for a
+        speed or an acceleration out of range.
         """
         if not acceleration_m_s2 > 0.0:
             raise ValueError(f"acceleration_m_s2 = {acceleration_m_s2}; valid: above 0")
@@ -163,8 +161,8 @@ class CommandsUnderWay:
     def course(self, now_s: float, report: Report, changes_s: FloatArray) -> Course | None:
         """Follow trigger and sticks to the time at which a command sent at `now_s` is followed; see `displacement`.
 
-        changes_s: K (n, 5). A change Δ of travel and deflections takes max |K Δ|, and all change in proportion. None
-        where the sticks rest all the time, too.
+        changes_s: K (n, 5). A change Δ of travel and deflections takes max |K Δ|, all in proportion. None also if the
+        sticks rest throughout.
         """
         counting = self._counting(now_s, report)
         if counting is None or all(one.sticks == AT_REST for one in counting[:-1]):
@@ -185,7 +183,7 @@ class CommandsUnderWay:
         return Course(ways_m, full_speed_m_s * float(followed[0]), points[:, 1:], followed[1:], changes_s)
 
     def _counting(self, now_s: float, report: Report) -> list[Command] | None:
-        """List the commands that count from e to now, the oldest first, and the end; None where they are not known."""
+        """List the commands in force from e to now, oldest first, and the end; None if they are unknown."""
         echo_sent_s, held_s, speed_m_s, full_speed_m_s, told_m_s = report
         if not math.isfinite(speed_m_s):
             raise ValueError(f"speed_m_s = {speed_m_s}; valid: finite")
@@ -203,7 +201,7 @@ class CommandsUnderWay:
         return [followed._replace(sent_s=since_s, travel=travel), *under_way, Command(now_s, 0.0)]
 
     def _from(self, since_s: float, until_s: float) -> list[Command]:
-        """List the commands from the one that counts at `since_s` on, the oldest first."""
+        """List the commands from the one in force at `since_s` to `until_s`, oldest first."""
         newest_first = []
         for one in reversed(self._sent):
             if one.sent_s <= until_s:
@@ -214,7 +212,7 @@ class CommandsUnderWay:
 
 
 def _edges_s(since_s: float, now_s: float) -> tuple[FloatArray, int]:
-    """Lay out times from when the map was looked at to `since_s` and on to `now_s`, and count those before that."""
+    """Sample the times from the map's look over `since_s` to `now_s`; also count the steps to `since_s`."""
     age_s = 0.5 * PERIOD_S
     before, after = math.ceil(age_s / _STEP_S), max(math.ceil((now_s - since_s) / _STEP_S), 1)
     looked, known = (
@@ -224,7 +222,7 @@ def _edges_s(since_s: float, now_s: float) -> tuple[FloatArray, int]:
 
 
 def _means(commands: list[Command], edges_s: FloatArray) -> FloatArray:
-    """Average travel and sticks (k - 1, 5), as commanded, between edges (k,)."""
+    """Return the mean commanded travel and sticks (k - 1, 5) between edges (k,)."""
     sent_s = np.array([one.sent_s for one in commands])
     asked = np.array([(one.travel, *one.sticks) for one in commands])
     sums = np.concatenate([np.zeros((1, 5)), np.cumsum(np.diff(sent_s)[:, None] * asked[:-1], axis=0)])

@@ -1,4 +1,4 @@
-"""From what the robot side reports and what our hands commanded to what is written to the controller."""
+"""Haptics: from the robot side's reports and our commands to the writes to a controller."""
 
 import dataclasses
 import math
@@ -16,11 +16,11 @@ from operator_side.feel.zones import moving_along, needed_m
 from operator_side.hands.travel_calibration import TravelCalibration
 
 MAP_EXPIRES_S: Final = 1.0
-"""A map that is this much older than the newest field says nothing any more: it is repeated twice in that time."""
+"""Age, against the newest field, at which a map expires; maps come twice in that time."""
 
 
 class Haptics:
-    """Renders fields with our own commands under way, and remembers what the controller was told."""
+    """Rendering of fields with our commands under way, and memory of the last write."""
 
     def __init__(
         self,
@@ -32,9 +32,9 @@ class Haptics:
         compensation: Compensation,
     ) -> None:
         self.writes = 0
-        """What was told, one count for each write."""
+        """Number of writes."""
         self.without_history = 0
-        """Renderings that took the robot side's displacement, as our own was asked for and is not known."""
+        """Number of renderings with the robot side's displacement because ours was unknown."""
         self._settings = settings
         self._enabled = enabled
         self._swap_sides = swap_sides
@@ -49,27 +49,27 @@ class Haptics:
         self.calibrate(calibration)
 
     def calibrate(self, calibration: TravelCalibration) -> None:
-        """Render for a controller whose triggers travel so."""
+        """Render for a controller with this calibration."""
         self.rendering = TriggerRendering(self._settings, calibration, swap_sides=self._swap_sides)
 
     def controller_found(self) -> None:
-        """Nobody knows what this controller was told: it is released first, then told anew."""
+        """Forget the last write, as the controller's state is unknown: release first, then write again."""
         self._written = None if self._enabled else RELEASED
 
     def commanded(self, command: MotionCommand) -> None:
-        """Remember what was sent: it counts until the next one.
+        """Add a command to the history: it holds until the next one.
 
-        Without the run button nothing moves. Whether the arm is armed does not matter: what is felt begins with a
-        report that says so, and all that was under way then is followed.
+        Without the run button nothing moves. Whether the arm is armed does not matter here: rendering begins with an
+        armed report, and all commands under way then are followed.
         """
         travel, sticks = command.r2 - command.l2, (*command.lateral, *command.turning)
         self._commands.sent(command.header.sent_s, *((travel, sticks) if command.run else (0.0,)))
         self._commanding = True
 
     def silent(self, now_s: float, *, owns: bool) -> None:
-        """Nothing is sent any more: the arm stops if it had been told to move.
+        """Note that commands have ended: the arm stops if it was moving.
 
-        Where we do not own it somebody else may drive, and our commands say nothing any more of what it does.
+        Without the lease the history is dropped: another operator may drive the arm.
         """
         if not owns and len(self._commands) > 0:
             self._commands = CommandsUnderWay()
@@ -80,9 +80,9 @@ class Haptics:
     def due(
         self, felt: StiffnessUpdate | None, pulled: tuple[float, float], blindness: Blindness, now_s: float
     ) -> Feel | None:
-        """What the controller has to be told now; None while nothing changes, or while a change has to wait.
+        """Return the change to write now; None without a change, or while a change must wait.
 
-        felt: the newest field, None while there is none or the arm is not armed. pulled: as TriggerRendering's.
+        felt: the newest field; None without one or while the arm is not armed. pulled: as TriggerRendering's.
         """
         if not self._enabled:
             return None
@@ -102,22 +102,22 @@ class Haptics:
         return shown if before is None else shown.change_from(before)
 
     def _displacement(self, felt: StiffnessUpdate, now_s: float) -> Displacement | None:
-        """δ and w by our own commands under way, from where the gripper was when `felt` was sent."""
+        """Compute δ and w by our commands under way, from the gripper's place when `felt` was sent."""
         if self._compensation == "robot":
             return None
         return self._commands.displacement(now_s, _report(felt), felt.r2.acceleration_m_s2)
 
     def take_map(self, felt: StiffnessUpdate) -> None:
-        """Keep the newest message that has a map, even where another has overtaken it: few have one."""
+        """Keep the newest message with a map, even an overtaken one: few have a map."""
         known = self._mapped
         newer = known is None or known.header.epoch != felt.header.epoch or known.header.sent_s < felt.header.sent_s
         if felt.around is not None and newer:
             self._mapped, self._traced_s = felt, -math.inf
 
     def _aside(self, felt: StiffnessUpdate, now_s: float) -> Aside | None:
-        """Where our sticks lead, among what the newest map knows; None while they rest, or without a map.
+        """Return our sticks' course on the newest map; None while they rest, or without a map.
 
-        The same one for the time between two writes to a controller: a path is traced once for each write.
+        Cached between two writes to a controller: a path is traced once for each write.
         """
         if not 0.0 <= now_s - self._traced_s < WRITE_S:
             self._traced, self._traced_s = self._newest_aside(felt, now_s), now_s
@@ -137,7 +137,7 @@ class Haptics:
         return Aside(mapped.around, mapped.horizon_m, course, self._commands.sticks_at(now_s))
 
     def needed_m(self, felt: StiffnessUpdate, pulled: tuple[float, float], now_s: float) -> tuple[float, float]:
-        """D at the present travel, in metres: of the trigger that retreats and of the one that advances.
+        """Compute D at the present travel, in metres: of the trigger that retreats and of the one that advances.
 
         pulled: as TriggerRendering's.
         """
@@ -150,11 +150,11 @@ class Haptics:
 
     @property
     def written(self) -> Feel:
-        """What the controller was told last; nothing while it has not been told anything yet."""
+        """The last write; RELEASED before the first."""
         return self._written or RELEASED
 
     def summary(self) -> dict[str, Any]:
-        """What is to be known of the run."""
+        """Return the run's figures."""
         return self.rendering.summary() | {"writes": self.writes, "without_history": self.without_history}
 
 

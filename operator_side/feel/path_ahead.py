@@ -1,9 +1,9 @@
-"""Trace the gripper's path, trigger and sticks together, through the robot side's map of what is around it.
+"""Trace the gripper's path, trigger and sticks together, through the robot side's map of its surroundings.
 
-The robot side knows a stick a loop after the hand does. So it sends ways from probes around the gripper (`Around`).
-The path begins where that message was sent. It follows the commands under way. Then it goes on for one reaction and
-until the arm stands: with the sticks as they are, and with the sticks let go. A zone is full where either path is
-longer, at some point, than the way that is free there.
+The robot side knows a stick a loop later than the hand. So it sends contact distances from probes around the gripper
+(`Around`). The path begins where that message was sent. It follows the commands under way, then one reaction, then
+braking: once with the sticks as they are, once with them released. A zone is full where either path exceeds the
+contact distance at some point.
 """
 
 from bisect import bisect_right
@@ -21,44 +21,44 @@ from operator_side.feel.commands_under_way import AT_REST, Course, Sticks
 from operator_side.feel.zones import FREE, Zones
 
 _UNDER_WAY: Final = 9
-"""The most points of a path by the commands under way,"""
+"""Number of points at most of a path by the commands under way"""
 _AHEAD: Final = 8
-"""and the points beyond."""
+"""Number of points beyond them"""
 _LEAST_S: Final = 1e-9
 _ALIKE: Final = 0.1
-"""Share of the distance between two probes: both count within it of the middle."""
+"""Half width, as a share of the probes' distance, of the middle band in which both probes count."""
 _ALONE: Final = 0.15
-"""Share of a deflection that does not count beside the other direction's"""
+"""Share of a deflection below which only the other direction counts"""
 _RISES_M: Final = 0.01
-"""Before full strength; what is weaker farther ahead of it is another thing."""
+"""Distance before full strength in which strength rises; a weaker one farther ahead is of another object."""
 _LEFT_OUT: Final = 0.02
-"""Share of T that does not count as moved across, or turned"""
+"""Share of T up to which a move across or a turn is ignored"""
 _ACROSS, _TURNED = slice(0, 2), slice(2, 4)
 
 
 class Aside(NamedTuple):
-    """A map, and the gripper's course in it."""
+    """Map and the gripper's course on it."""
 
     around: Around
     horizon_m: float
-    """Horizon of the message that brought the map"""
+    """Horizon of the map's message"""
     course: Course
     """Along the direction in which R2 advances, from the message with `around` to now"""
     sticks: Sticks
     """Deflections, as commanded now"""
 
     def ways_m(self, *, advancing: bool) -> FloatArray:
-        """Take the ways (2, PROBES) of one trigger, fast and slow."""
+        """Return the contact distances (2, PROBES) of one trigger, fast and slow."""
         return self.around.ways_m(self.horizon_m)[slice(0, 2) if advancing else slice(2, 4)]
 
 
 def traced_zones(
     aside: Aside, field: TriggerField, travels: Sequence[float], other_travel: float, horizon_s: float, *, forth: bool
 ) -> Zones:
-    """Find how stiff each zone is: full where its path meets something, and as much less before as `field` says.
+    """Compute the zones: full where a zone's path meets something, and rising before that as `field` does.
 
-    The sticks stay as they are, or are let go now: the stiffer of both counts, as nobody knows which. travels: at the
-    middle of each zone. forth: the trigger advances.
+    The sticks stay as they are, or are released now. The stiffer result counts, as the future is unknown. travels: at
+    the middle of each zone. forth: the trigger advances.
     """
     where = field, travels, other_travel, horizon_s
     goes_on = _traced(aside, *where, forth=forth)
@@ -81,7 +81,7 @@ def _traced(
     ahead_m, ahead_s = _ahead(course, speeds_m_s, aside.sticks, full_m_s, horizon_s)
     points = np.concatenate([here_s, ahead_s.reshape(-1, 4)]) / aside.around.full_s
     free_m = free_ways_m(aside.ways_m(advancing=forth), points)
-    # From here on a row for each zone: the way along its path, and the ways that are free there.
+    # From here on one row for each zone: displacement along its path, and the contact distances there.
     slow = speeds_m_s < touch_speed_m_s(full_m_s)
     slow[0] = True
     count, zones = len(some), len(speeds_m_s)
@@ -90,7 +90,7 @@ def _traced(
     free_m = np.hstack([under_way_m, then_m])
     known_m = np.broadcast_to(course.ways_m[some[1:]], (zones, count - 1))
     path_m = np.hstack([known_m, ahead_m])
-    # A point counts with those before and after it.
+    # Between two points the shorter contact distance counts.
     short_m = (path_m - np.minimum(free_m[:, :-1], free_m[:, 1:])).max(axis=1).tolist()
     found = [0] * first
     for of_slow, beyond_m in zip(slow[:, 0].tolist(), short_m, strict=True):
@@ -104,9 +104,9 @@ def _traced(
 def _ahead(
     course: Course, speeds_m_s: FloatArray, sticks: Sticks, full_m_s: float, horizon_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Go on from the course's end at each zone's speed (z, 1) for one reaction, and brake then; sticks: all the time.
+    """Continue from the course's end at each zone's speed (z, 1) for one reaction, then brake; the sticks stay.
 
-    Returns the ways (z, k) and how long each stick would take (z, k, 4), at _AHEAD times until the arm stands. As
+    Returns displacements (z, k) and each stick's time (z, k, 4), at _AHEAD times until standstill. Equivalent to
     `common.following.follow_together` twice.
     """
     followed = np.array([course.speed_m_s / full_m_s, *course.followed])
@@ -124,16 +124,16 @@ def _ahead(
 
 
 def _counts_s(after_s: FloatArray, changing_s: FloatArray) -> FloatArray:
-    """Integrate a change's share, which grows evenly for `changing_s` to 1, until `after_s`."""
+    """Integrate until `after_s` a share that grows linearly to 1 within `changing_s`."""
     growing_s = np.minimum(after_s, changing_s)
     return after_s - growing_s + 0.5 * growing_s**2 / np.maximum(changing_s, _LEAST_S)
 
 
 def free_ways_m(ways_m: FloatArray, aside: FloatArray) -> FloatArray:
-    """Interpolate ways (n, PROBES) at points (k, 4), of a fully deflected stick's course: right, up, and turned so.
+    """Interpolate contact distances (n, PROBES) at points (k, 4): times of fully deflected sticks over T.
 
-    The shorter of those across and turned. Across, a thing begins at once: the nearest probe counts. In a turn a wall
-    comes nearer steadily: linear in the angle. Beyond the farthest probe its way holds.
+    Points: across, right and up, and turned, right and up. The shorter of across and turned counts. Across, objects
+    begin abruptly: the nearest probe. Turned, walls approach steadily: linear. Beyond the last probe: constant.
     """
     sides_m = ways_m[:, 1:].reshape(-1, DIRECTIONS, ACROSS + TURNED)
     here_m = np.broadcast_to(ways_m[:, :1, None], (len(ways_m), DIRECTIONS, 1))
@@ -145,9 +145,9 @@ def free_ways_m(ways_m: FloatArray, aside: FloatArray) -> FloatArray:
 
 
 def _between(ways_m: FloatArray, aside: FloatArray, *, linear: bool) -> FloatArray:
-    """Interpolate ways (n, DIRECTIONS, r + 1), evenly from 0 to 1, at points (k, 2): outwards, then between two sides.
+    """Interpolate contact distances (n, DIRECTIONS, r + 1), at points (k, 2): by radius 0 to 1, then by angle.
 
-    linear: outwards and between sides; else the nearest way, and the shorter of two about as near.
+    linear: linear in both; else the nearest distance, and the shorter of two about equally near.
     """
     size = np.abs(aside).sum(axis=1)
     share = np.abs(aside[:, 0]) / np.where(size > 0.0, size, 1.0)

@@ -1,4 +1,4 @@
-"""From the field ahead to what both triggers and the motors do.
+"""Rendering of the field: both triggers' strengths and the motors' drive.
 
 field ─▶ ten zones of each trigger ─▶ falls over 100 ms, rises at once ─▶ strengths
 """
@@ -28,32 +28,32 @@ from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_tr
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 
 FALL_S: Final = 0.1
-"""From full strength to none, unless the trigger is released."""
+"""Fall from full strength to none, in seconds, unless the trigger is released."""
 PULSE_S: Final = 0.08
 _PULSE: Final = 0.7
-"""Drive of the right motor alone: the left one says danger, and both say that the field is lost."""
+"""Drive of the right motor alone: the left one signals danger, and both signal a lost field."""
 _ROUNDING: Final = 1e-9
 _TOUCHED: Final = MAX_STRENGTH // 2
-"""The most that is felt, in slow zones, of what is to be touched"""
+"""Largest strength, in slow zones, of an object that is to be touched"""
 
 
 @dataclass(frozen=True)
 class RenderingSettings(Limited):
-    """How what lies ahead becomes what a finger feels."""
+    """Settings of the rendering from field to strengths."""
 
     horizon_s: Annotated[float, Meta(ge=0.0, le=2.0)] = HORIZON_S
-    """h: so long a speed goes on before anything felt can change it (reaction, the finger's way, a write)."""
+    """h: time for which a speed continues before anything felt can change it (reaction, finger's travel, write)."""
 
 
 class RenderedTrigger:
-    """One trigger's zones, and what they have to remember."""
+    """Zones of one trigger, with their state over time."""
 
     def __init__(self, settings: RenderingSettings, travel: TriggerTravel) -> None:
         self.first_stiff: int | None = None
-        """The lowest zone that ever was stiff."""
+        """Lowest zone that ever was stiff."""
         self.max_strength = 0
         self.beyond_horizon = 0
-        """How many zones, over all renderings, were full because nobody knew what lay so far ahead."""
+        """Number of zones, over all renderings, that were full because D exceeded the horizon."""
         self._settings = settings
         self._travel = travel
         self._travels = zone_travels(travel)
@@ -74,14 +74,14 @@ class RenderedTrigger:
         *,
         forth: bool = True,
     ) -> Strengths:
-        """The strengths at `now_s`; the others: of `zone_strengths`, or of `traced_zones` while sticks lead aside."""
+        """Render at `now_s`; for the others see `zone_strengths`, or `traced_zones` while the sticks are deflected."""
         horizon_s = self._settings.horizon_s
         zones = zone_strengths(field, horizon_m, self._travels, other_travel, moving, horizon_s)
         if aside is not None:
             if aside is not self._traced:
                 self._traced = aside
                 self._zones = traced_zones(aside, field, self._travels, other_travel, horizon_s, forth=forth)
-            # A map has ways of full strength alone: what is to be touched is felt straight ahead.
+            # A map has only the onset of full strength: objects to be touched are felt straight ahead.
             touched = field.slow_m[-1] > field.fast_m[-1]
             zones = self._zones.at_least(zones, _TOUCHED) if touched else self._zones
         self.beyond_horizon += zones.beyond_horizon
@@ -97,7 +97,7 @@ class RenderedTrigger:
         return self._strengths
 
     def release(self) -> None:
-        """Let go at once."""
+        """Drop all strengths at once."""
         self._levels = [0.0] * ZONE_COUNT
         self._show(FREE_TRIGGER)
 
@@ -112,17 +112,17 @@ class RenderedTrigger:
 
     @property
     def free_travel(self) -> float:
-        """How far it is pulled, in calibrated travel, 0 to 1, by what the controller reports, before it stiffens."""
+        """Calibrated travel, 0 to 1, at which it stiffens, as the controller reports travel."""
         return self._travel.travel(min(self._strengths.count(0) / ZONE_COUNT / SENSED_TRAVEL, 1.0))
 
 
 class TriggerRendering:
-    """Both triggers, and the motors for danger where the stick leads, and for what has come to stand."""
+    """Rendering of both triggers, and of the motors for danger where the stick leads and for an object set down."""
 
     def __init__(
         self, settings: RenderingSettings, calibration: TravelCalibration, *, swap_sides: bool = False
     ) -> None:
-        """`swap_sides`: what the robot side says of L2 is for R2, and the other way round."""
+        """swap_sides: the robot side's L2 is rendered on R2, and its R2 on L2."""
         self.l2 = RenderedTrigger(settings, calibration.l2)
         self.r2 = RenderedTrigger(settings, calibration.r2)
         self._swap_sides = swap_sides
@@ -137,11 +137,11 @@ class TriggerRendering:
         now_s: float,
         aside: Aside | None = None,
     ) -> Feel:
-        """What both triggers and the motors have to do at `now_s`; all off, at once, for None.
+        """Render both triggers and the motors at `now_s`; RELEASED at once for None.
 
         pulled: present calibrated travel of the trigger that retreats and of the one that advances. known: δ and w by
-        our own commands under way; None where the robot side's are to be taken. aside: where our sticks lead, which is
-        felt in their stead.
+        our commands under way; None for the robot side's. aside: the sticks' course, rendered instead of the zones
+        straight ahead.
         """
         if felt is None:
             self.l2.release()
@@ -160,10 +160,10 @@ class TriggerRendering:
         return Feel(l2=l2, r2=r2, rumble=Rumble(felt.rumble, _PULSE if now_s < self._pulse_ends_s else 0.0))
 
     def zones(self) -> dict[str, Any]:
-        """The run's figures of the controller's own triggers."""
+        """Return the run's figures of the controller's own triggers."""
         both = {"l2": self.l2, "r2": self.r2}
         return {name: {"first_stiff": one.first_stiff, "max": one.max_strength} for name, one in both.items()}
 
     def summary(self) -> dict[str, Any]:
-        """What else is to be known of the run."""
+        """Return the other figures of the run."""
         return {"l2": {"beyond_horizon": self.l2.beyond_horizon}, "r2": {"beyond_horizon": self.r2.beyond_horizon}}

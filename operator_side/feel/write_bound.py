@@ -1,8 +1,8 @@
-"""How often a controller is written to: at most 100 times in any second, the newest winning, releases at once.
+"""Token bucket for writes to a controller: at most 100 in any second, latest wins, releases at once.
 
-Each write costs one of what the bound has left, and setting a part that was off costs one more, ahead, for the write
-that will release it. So a release is always paid for, and never waits; nothing else can be owed, so that nothing that
-was written before keeps a change back for longer than four writes take to be earned (a twentieth of a second).
+A write costs one token. Setting a part that was off costs one more, in advance, for its release: so a release never
+waits. Earlier writes delay a change by at most the refill of four tokens (a twentieth of a
+second).
 """
 
 import dataclasses
@@ -13,24 +13,23 @@ from operator_side.controller.feel import RELEASED, Feel
 MOST_WRITES_PER_S: Final = 100
 _PARTS: Final = ("l2", "r2", "rumble")
 _BURST: Final = 10.0
-"""What may be left after a rest, so that a change is then felt without delay."""
+"""Capacity in tokens: after a rest a change is felt without delay."""
 _REFILL_PER_S: Final = MOST_WRITES_PER_S - _BURST - len(_PARTS)
-"""A second may begin with all of the burst left, and with a release paid for each part."""
+"""Refill rate: a second may begin with a full bucket, and with a paid release for each part."""
 
 
 class WriteBound:
-    """What of the newest wish to write now; a part that goes off is never among what has to wait."""
+    """Choice of the parts to write now; a part that goes off never waits."""
 
     def __init__(self) -> None:
         self._left = _BURST
         self._last_s: float | None = None
 
     def next(self, written: Feel | None, wanted: Feel, now_s: float) -> Feel | None:
-        """What the triggers and motors are to do after a write now; None for no write, now or at all.
+        """Return the state after a write now; None for no write.
 
-        `written`: what they do by the last write, None where nobody knows: they are released then, whatever is left.
-        `wanted`: what they should do. When there is not enough left for all of it, only the parts that go off are
-        written; ask again with what is newest then.
+        written: state by the last write; None if unknown: then RELEASED is written regardless of tokens. wanted:
+        desired state. Without enough tokens only the parts that go off are written; call again with the newest.
         """
         if self._last_s is not None:
             self._left = min(self._left + max(now_s - self._last_s, 0.0) * _REFILL_PER_S, _BURST)

@@ -1,12 +1,12 @@
-"""How stiff each of a trigger's ten zones is: by what lies ahead at the speed that the zone commands (§4.2).
+"""Strength of each of a trigger's ten zones, from the distances ahead at the speed that the zone commands (§4.2).
 
-A trigger that is let go is free. Its first stiff zone says how far it may be pulled before a person who feels it and
-lets go, one reaction later, comes too near:
+A released trigger is free. Its first stiff zone shows how far it may be pulled before a person who feels it, and
+releases it one reaction later, comes too near:
 
     u = (x_z - x_other) v_max                                  x_z: the calibrated travel at the zone's middle
     D_z = δ + u h + u²/2a + max(0, w - u)²/2a                  δ, w along the trigger: Displacement
 
-and a zone's strength is how many of the field's ways D_z has passed, never less than that of the zone before.
+A zone's strength is the number of the field's onset distances up to D_z, never less than that of the zone before.
 """
 
 from bisect import bisect_right
@@ -22,15 +22,15 @@ from operator_side.hands.travel_calibration import TriggerTravel
 
 
 class Zones(NamedTuple):
-    """One trigger's ten zones."""
+    """Strengths of one trigger's ten zones."""
 
     strengths: Strengths
-    """Never falling with travel."""
+    """Never falling with travel"""
     beyond_horizon: int
-    """How many are full because nobody knows what lies so far ahead."""
+    """Number of zones that are full because D exceeds the horizon."""
 
     def at_least(self, others: "Zones", most: int) -> "Zones":
-        """Make each as stiff as in `others`, but by these to `most` at most."""
+        """Raise each zone to its strength in `others`, or to `most` if that is lower."""
         strengths = (max(mine, min(other, most)) for mine, other in zip(self.strengths, others.strengths, strict=True))
         return Zones(tuple(strengths), max(self.beyond_horizon, others.beyond_horizon))
 
@@ -39,13 +39,13 @@ FREE: Final = Zones(FREE_TRIGGER, 0)
 
 
 def zone_travels(travel: TriggerTravel) -> tuple[float, ...]:
-    """The calibrated travel at the middle of each zone of the mechanical travel: 1 beyond a full pull."""
+    """Return the calibrated travel at the middle of each mechanical zone; 1 beyond a full pull."""
     middles = ((zone + 0.5) / ZONE_COUNT for zone in range(ZONE_COUNT))
     return tuple(travel.travel(min(middle / SENSED_TRAVEL, 1.0)) for middle in middles)
 
 
 def moving_along(update: StiffnessUpdate, known: Displacement | None) -> tuple[Displacement, Displacement]:
-    """δ and w along L2 and along R2: as `known` along R2 from our own commands, or as the robot side reckons them."""
+    """Return δ and w along L2 and along R2: from `known`, along R2 by our commands, else the robot side's."""
     if known is None:
         speed_m_s = update.speed_m_s
         return Displacement(update.l2.displacement_m, -speed_m_s), Displacement(update.r2.displacement_m, speed_m_s)
@@ -53,7 +53,7 @@ def moving_along(update: StiffnessUpdate, known: Displacement | None) -> tuple[D
 
 
 def needed_m(field: TriggerField, speed_m_s: float, moving: Displacement, horizon_s: float = HORIZON_S) -> float:
-    """D: how far ahead the gripper has to be felt where the trigger commands `speed_m_s`, 0 or more, along it."""
+    """Compute D, the distance to feel ahead, if the trigger commands `speed_m_s`, 0 or more."""
     excess_m_s = max(0.0, moving.speed_m_s - speed_m_s)
     stopping_m = (speed_m_s**2 + excess_m_s**2) / (2.0 * field.acceleration_m_s2)
     return moving.way_m + speed_m_s * horizon_s + stopping_m
@@ -67,10 +67,10 @@ def zone_strengths(
     moving: Displacement,
     horizon_s: float = HORIZON_S,
 ) -> Zones:
-    """The zones of a trigger whose middles lie at `travels`, with the other trigger at `other_travel`.
+    """Compute the zones with middles at `travels`, with the other trigger at `other_travel`.
 
-    horizon_m: how far `field` knows what lies ahead; what goes beyond is full. horizon_s: h, from feeling to what the
-    arm is told. A zone that does not advance along the trigger, as the other one is pulled farther, has none.
+    horizon_m: horizon of `field`; a zone whose D exceeds it is full. horizon_s: h, from feeling to the arm's command.
+    A zone that commands no motion along the trigger, as the other one is pulled farther, is free.
     """
     full_m_s = field.full_speed_m_s
     fastest_m_s = max(0.0, (travels[-1] - other_travel) * full_m_s)

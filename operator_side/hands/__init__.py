@@ -1,1 +1,1 @@
-"""What the person wants: travel, sticks and buttons become an intent."""
+"""From the controller's state to an intent: travels, sticks, buttons."""

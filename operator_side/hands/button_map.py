@@ -1,4 +1,4 @@
-"""The purpose of each button: the one table that reading, help and docs/controls.md follow."""
+"""Purpose of each button: the one table for reading, help and docs/controls.md."""
 
 from collections.abc import Mapping
 from enum import Enum
@@ -9,7 +9,7 @@ from operator_side.controller.state import Button
 
 
 class Action(Enum):
-    """The purpose of a button."""
+    """Purpose of a button."""
 
     RUN = "hold to run"
     ARM = "arm"
@@ -31,10 +31,10 @@ BUTTON_OF: Final[Mapping[Action, Button]] = MappingProxyType(
         Action.HAND_OVER: Button.CREATE,
     }
 )
-"""The whole button map."""
+"""The button map."""
 _SWAPPED_BUTTON_OF: Final[Mapping[Action, Button]] = MappingProxyType({**BUTTON_OF, Action.RUN: Button.R1})
 
 
 def button_of(*, swap_sides: bool) -> Mapping[Action, Button]:
-    """`BUTTON_OF`, or, with left and right swapped, the same with R1 for L1."""
+    """Return `BUTTON_OF`; with left and right swapped, R1 takes L1's place."""
     return _SWAPPED_BUTTON_OF if swap_sides else BUTTON_OF

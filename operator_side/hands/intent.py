@@ -1,4 +1,4 @@
-"""The controller's state to what the operator means: calibrated travel, sticks without drift, named buttons."""
+"""From the controller's state to the operator's intent: calibrated travel, sticks without drift, named buttons."""
 
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
@@ -12,34 +12,34 @@ _DEFAULT_CALIBRATION: Final = TravelCalibration()
 
 @dataclass(frozen=True)
 class OperatorIntent:
-    """What the operator's hands mean at one moment. Buttons are levels: they are true as long as they are held."""
+    """Intent of the operator's hands at one moment. Buttons are levels: true while held."""
 
     l2: float = 0.0
     """Calibrated travel, 0 to 1, of the trigger that retreats: L2, unless the sides are swapped."""
     r2: float = 0.0
     """Calibrated travel, 0 to 1, of the trigger that advances."""
     lateral: Stick = (0.0, 0.0)
-    """Of the stick that moves across, the left one: right and up positive, within the unit circle."""
+    """Deflection of the stick that moves across, the left one: right and up positive, within the unit circle."""
     turning: Stick = (0.0, 0.0)
-    """Of the stick that turns, the right one."""
+    """Deflection of the stick that turns, the right one."""
     run: bool = False
     arm: bool = False
     emergency_stop: bool = False
     next_target: bool = False
-    """One press is one step: whoever counts looks for the change from false to true."""
+    """Level; a step is its change from false to true."""
     hand_over: bool = False
     gripper: Literal[-1, 0, 1] = 0
     """-1 opens, 1 closes, 0 holds; both buttons at once hold."""
     raw: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
-    """What the controller itself reports of its own L2 and R2, 0 to 1 each, uncalibrated and never swapped."""
+    """Raw travel of the controller's own L2 and R2, 0 to 1 each, uncalibrated and never swapped."""
 
     @property
     def triggers_released(self) -> bool:
-        """Both triggers are within their dead zones, as arming needs them."""
+        """Whether both triggers are within their dead zones, which arming requires."""
         return self.l2 == 0.0 and self.r2 == 0.0
 
     def resting(self) -> "OperatorIntent":
-        """The same hands moving nothing and arming nothing; the other buttons as they are held."""
+        """Return the same intent without motion and arming; the other buttons stay."""
         rest = (0.0, 0.0)
         return replace(self, l2=0.0, r2=0.0, lateral=rest, turning=rest, gripper=0, arm=False)
 
@@ -47,7 +47,7 @@ class OperatorIntent:
 def operator_intent(
     state: ControllerState, calibration: TravelCalibration = _DEFAULT_CALIBRATION, *, swap_sides: bool = False
 ) -> OperatorIntent:
-    """Read `state` through the calibration and the button map, with left and right swapped if so asked.
+    """Apply the calibration and the button map to `state`; swap_sides swaps left and right.
 
     While the emergency stop is held, every other button counts as not pressed.
     """

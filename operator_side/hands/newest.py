@@ -1,4 +1,4 @@
-"""What the hands mean by the newest state of the controller."""
+"""The newest intent of the hands, until it expires."""
 
 from typing import Final
 
@@ -7,33 +7,33 @@ from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import TravelCalibration
 
 INTENT_EXPIRES_S: Final = 0.1
-"""Without a state of the controller for this long nothing is sent, so that the robot stops."""
+"""Age of the newest state after which nothing is sent, so that the robot stops, in seconds."""
 
 
 class Hands:
-    """What the hands mean by the newest state of the controller."""
+    """The newest intent of the hands."""
 
     def __init__(self, calibration: TravelCalibration, *, swap_sides: bool) -> None:
         self.calibration = calibration
         self.intent: OperatorIntent | None = None
-        """None before the first state, and once the controller is lost"""
+        """Newest intent; None before the first state, and once the controller is lost"""
         self.lost_s: float | None = None
-        """When the controller went; None once the arm has stopped since"""
+        """Time at which the controller was lost; None once the arm has stopped since"""
         self._swap_sides = swap_sides
         self._read_s = 0.0
 
     def read(self, state: ControllerState, now_s: float) -> OperatorIntent:
-        """Take one state; what the hands mean by it."""
+        """Take one state and return its intent."""
         self.intent = intent = operator_intent(state, self.calibration, swap_sides=self._swap_sides)
         self._read_s = now_s
         return intent
 
     def lose(self, now_s: float) -> None:
-        """Forget what the hands did last: the controller went."""
+        """Forget the intent: the controller was lost."""
         self.intent, self.lost_s = None, now_s
 
     def see(self, *, armed: bool, now_s: float) -> None:
-        """Notice that the arm has stopped since the controller went."""
+        """Note whether the arm has stopped since the controller was lost."""
         if not armed and self.lost_s is not None and now_s > self.lost_s:
             self.lost_s = None
 

@@ -1,4 +1,4 @@
-"""Where one controller's triggers and sticks begin and end: raw travel to calibrated travel."""
+"""Calibration of one controller's triggers and sticks: raw travel to calibrated travel."""
 
 import math
 from dataclasses import dataclass, field
@@ -8,25 +8,25 @@ from operator_side.controller.feel import SENSED_TRAVEL, ZONE_COUNT
 from operator_side.controller.state import Stick
 
 LARGEST_REST: Final = 0.3
-"""A stick that rests farther from its centre is broken, or held."""
+"""Largest distance of a stick's rest from its centre; beyond it the stick is broken, or held."""
 LEAST_SPAN: Final = 0.2
-"""Of a trigger's raw travel between released and fully pulled: with less, a few counts would be full speed."""
+"""Least raw travel between released and fully pulled: with less, a few counts would be full speed."""
 _ROUNDING: Final = 1e-9
 _LEAST_MEANT: Final = 1e-3
-"""A stick that is meant to be deflected by less is let go."""
+"""Least intended deflection of a stick; a smaller one is rest."""
 
 
 @dataclass(frozen=True)
 class TriggerTravel:
-    """Which part of one trigger's raw travel counts."""
+    """Used part of one trigger's raw travel."""
 
     dead_zone: float = 0.05
-    """A trigger up to this is released."""
+    """Raw travel up to which a trigger is released."""
     saturation: float = 0.98
-    """A trigger from this on is fully pulled."""
+    """Raw travel from which a trigger is fully pulled."""
 
     def __post_init__(self) -> None:
-        # The second part is false for NaN, too.
+        # The second comparison is false for NaN, too.
         if not (self.dead_zone >= 0.0 and self.dead_zone + LEAST_SPAN <= self.saturation <= 1.0):
             raise ValueError(
                 f"dead_zone = {self.dead_zone}, saturation = {self.saturation}; valid: 0 <= dead_zone, at least"
@@ -34,50 +34,50 @@ class TriggerTravel:
             )
 
     def travel(self, raw: float) -> float:
-        """Calibrated travel, 0 to 1, from the raw one; exactly 0 within the dead zone."""
+        """Return the calibrated travel, 0 to 1; exactly 0 within the dead zone."""
         return min(max((raw - self.dead_zone) / (self.saturation - self.dead_zone), 0.0), 1.0)
 
     def raw(self, travel: float) -> float:
-        """The raw travel of a calibrated one, 0 to 1; the end of the dead zone for 0."""
+        """Return the raw travel of a calibrated one, 0 to 1; for 0 the end of the dead zone."""
         return min(self.dead_zone + travel * (self.saturation - self.dead_zone), self.saturation)
 
     @property
     def reachable_zones(self) -> int:
-        """How many of the effects' ten zones a full pull enters: what lies beyond is not felt."""
+        """Number of the effects' ten zones that a full pull enters; those beyond are not felt."""
         return max(1, math.ceil(ZONE_COUNT * SENSED_TRAVEL * self.saturation - _ROUNDING))
 
 
 @dataclass(frozen=True)
 class StickRest:
-    """Where one stick rests."""
+    """Rest position and dead zone of one stick."""
 
     x: float = 0.0
-    """Where it rests, right positive: worn sticks do not come back to the centre."""
+    """Rest position, right positive: worn sticks do not return to the centre."""
     y: float = 0.0
-    """And up positive."""
+    """Rest position, up positive."""
     dead_zone: float = 0.1
-    """A stick within this radius of its rest is at rest."""
+    """Radius around the rest position within which the stick is at rest."""
 
     def __post_init__(self) -> None:
         if not math.hypot(self.x, self.y) <= LARGEST_REST:  # false for NaN, too
             raise ValueError(f"x = {self.x}, y = {self.y}; valid: within {LARGEST_REST} of the centre")
         if not 0.0 <= self.dead_zone < 1.0 - math.hypot(self.x, self.y):
-            raise ValueError(f"dead_zone = {self.dead_zone}; valid: 0 to below 1, less how far off it rests")
+            raise ValueError(f"dead_zone = {self.dead_zone}; valid: 0 to below 1 minus the distance of its rest")
 
     def deflection(self, raw: Stick) -> Stick:
-        """The deflection from the rest without the dead zone: its radius ends at 1 in every direction."""
+        """Return the deflection from rest without the dead zone: its radius ends at 1 in every direction."""
         x, y = raw[0] - self.x, raw[1] - self.y
         radius = math.hypot(x, y)
         if radius <= self.dead_zone:
             return 0.0, 0.0
-        # So much is left towards the side to which it rests; on the other one it ends early.
+        # The shortest span, on the side to which the stick rests; on the other side it saturates early.
         span = 1.0 - math.hypot(self.x, self.y) - self.dead_zone
         scale = min((radius - self.dead_zone) / span, 1.0) / radius
         # Rounding must not leave the range.
         return min(max(x * scale, -1.0), 1.0), min(max(y * scale, -1.0), 1.0)
 
     def raw(self, deflection: Stick) -> Stick:
-        """Where a stick that rests at its centre has to be for this to count, within the unit circle."""
+        """Return the raw position, within the unit circle, of a stick centred at 0 that gives this deflection."""
         radius = math.hypot(*deflection)
         if radius < _LEAST_MEANT:
             return 0.0, 0.0
@@ -87,7 +87,7 @@ class StickRest:
 
 @dataclass(frozen=True)
 class TravelCalibration:
-    """One controller's triggers and sticks, as they are on it, whatever each is used for."""
+    """Calibration of one controller's own triggers and sticks, whatever each is used for."""
 
     l2: TriggerTravel = field(default_factory=TriggerTravel)
     r2: TriggerTravel = field(default_factory=TriggerTravel)
@@ -98,4 +98,4 @@ class TravelCalibration:
 AS_GIVEN: Final = TravelCalibration(
     TriggerTravel(0.0, 1.0), TriggerTravel(0.0, 1.0), StickRest(dead_zone=0.0), StickRest(dead_zone=0.0)
 )
-"""Of a controller that has neither play nor noise: what it says is what is meant."""
+"""Calibration of a controller without play or noise: raw travel is calibrated travel."""

@@ -1,1 +1,1 @@
-"""A scripted person who pulls, feels and looks."""
+"""Scripted person who pulls, feels and looks."""

@@ -1,4 +1,4 @@
-"""Hands that do what the calibration asks for, on a simulated controller."""
+"""Hands for a calibration, on a simulated controller."""
 
 import math
 from typing import Final
@@ -12,7 +12,7 @@ _TURN_S: Final = 1.5
 
 
 class CalibratingHands:
-    """Pulls, lets go, and moves the sticks, as each step wants it."""
+    """Hands that follow each step: pull, release, move the sticks."""
 
     def __init__(self, device: SimulatedDualSense) -> None:
         self._device = device
@@ -20,11 +20,11 @@ class CalibratingHands:
         self._since_s = 0.0
 
     def act(self, step: Step, now_s: float) -> None:
-        """Do at `now_s` what `step` asks for."""
+        """Act at `now_s` as `step` asks."""
         if step is not self._step:
             self._step, self._since_s = step, now_s
         elapsed_s = now_s - self._since_s
-        # Half the time pulled, half let go, the first thing a moment of thought.
+        # Released in the first half of each period: the first pull follows a moment of thought.
         pulling = elapsed_s % _PULL_S > 0.5 * _PULL_S
         force_n = NORMAL_FINGER_FORCE_N if pulling else 0.0
         self._device.set_finger_force(force_n * (step is Step.PULL_L2), force_n * (step is Step.PULL_R2))

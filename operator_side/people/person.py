@@ -1,10 +1,10 @@
-"""A scripted person who sees late, steers with a person's limits, and feels the triggers with their fingers.
+"""Scripted person who sees late, steers with a person's limits, and feels the triggers with their fingers.
 
-They see only what the screen shows, `visual_reaction_s` after it was shown, and the controller's warning light, and
-act only through the controller: a finger pushes with a force, and how far the trigger yields is up to its spring and
-its effect. So haptics act on this person mechanically and at once: where the trigger stiffens, the same force travels
-less, and they never push harder for it. What they feel, a trigger that yields less than usual and rumble, they may
-also believe, and go on gently from a reaction later; or let go, where a pulse says that what they hold stands.
+They see only the screen, `visual_reaction_s` late, and the controller's warning light. They act only through the
+controller: a finger applies a force, and spring and effect decide how far the trigger yields. So haptics act on this
+person mechanically and at once: a stiff trigger travels less under the same force, and they never push harder.
+They may also believe cues, a trigger that yields less than usual and rumble. Then they go gently from a reaction
+later, or release the object where a pulse signals that it stands.
 Figures: the operator's table of facts (McRuer's crossover model; reaction times).
 
     rest ─▶ arm ─▶ advance ─▶ grasp ─▶ lift ─▶ carry ─▶ lower ─▶ let go ─▶ draw back ─▶ done
@@ -30,31 +30,31 @@ from operator_side.people.settings import PersonSettings
 from operator_side.people.submove import MoveAndWait
 
 FULL_TRIGGER_M_S = 0.25
-"""What a person has learnt a fully pulled trigger to do."""
+"""Speed of a fully pulled trigger, as the person has learnt it."""
 FULL_STICK_M_S = 0.1
-"""And a fully deflected stick."""
+"""Speed of a fully deflected stick, as the person has learnt it."""
 GENTLY_M_S: Final = 0.025
-"""How fast they go on once they have felt something, and set things down."""
+"""Speed after a cue, and when setting things down."""
 _CARRY_M_S: Final = 0.05
-"""A person carries with care."""
+"""Speed of carrying, with care."""
 _PEAK_M_S: Final = 0.2
 _PEAK_ACROSS_M_S: Final = 0.08
-"""The greatest speeds of single moves."""
+"""The greatest speeds of single moves: along the tool axis and across it."""
 _DROPPED_S = 0.5
-"""After so long without the target in the fingers they believe it."""
+"""Time without the target in the fingers after which they believe it, in seconds."""
 _CALM_S = 0.5
-"""So long after the controller's warning light they let their hands rest."""
+"""Time for which the hands rest after the controller's warning light, in seconds."""
 _CLEAR_M: Final = 0.01
 _CLEARS_S: Final = 3.0
-"""So far they rise before they draw back, or try to for so long."""
+"""Rise before they draw back, and the longest time that they try."""
 _BACK_M: Final = 0.1
-"""So far they draw back from what they have set down."""
+"""Distance that they draw back from an object set down."""
 
 _REST: Final[Vector2] = (0.0, 0.0)
 
 
 class SimulatedOperator:
-    """Drives a `SimulatedDualSense` towards the target, grasps it, lifts it and sets it down."""
+    """Person who drives a `SimulatedDualSense` to the target, grasps it, lifts it and sets it down."""
 
     _ALIGNED_M = 0.006
     _REACHED_M = 0.008
@@ -90,12 +90,12 @@ class SimulatedOperator:
 
     @property
     def doing(self) -> Doing:
-        """Their phase; without a target they do not seem to advance."""
+        """Present phase; NO_TARGET instead of ADVANCING without a target."""
         aimless = self.phase is Doing.ADVANCING and self._view is not None and self._view.target_in_tool_m is None
         return Doing.NO_TARGET if aimless else self.phase
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Look at the screen and move the hands; `delay_s` is the round trip that the person has got used to."""
+        """Look at the screen and move the hands. delay_s: round trip that the person is used to."""
         if self._since_s is None:
             self._since_s = now_s
         if screen is not None and (not self._seen or self._seen[-1][1] is not screen):
@@ -116,7 +116,7 @@ class SimulatedOperator:
         getattr(self, f"_{self.phase}")(Glance(now_s, self._view, gain, lag_s))
 
     def _feel(self, now_s: float) -> None:
-        """Go on gently, until the next phase, from a reaction after a cue: with the trigger, or with the stick."""
+        """Go gently until the next phase, from a reaction after a cue: along by stiffness, across by rumble."""
         self._fingers.let_pass(now_s)
         stiff = self._stiff.acted_on(now_s, self._fingers.resisted_share() > self._settings.noticeable_force)
         rumbles = self._rumble.acted_on(now_s, self._device.rumble.left > 0.0)
@@ -138,7 +138,7 @@ class SimulatedOperator:
         return look.now_s - (look.now_s if self._since_s is None else self._since_s)
 
     def _resting(self, look: Glance) -> None:
-        """Rest the hands for the healthy second that arming asks for."""
+        """Rest the hands for the second of health that arming requires."""
         self._fingers.do(0.0, _REST)
         if self._elapsed_s(look) > 1.2 + self._settings.visual_reaction_s:
             self._enter(Doing.ARMING, look.now_s)
@@ -160,7 +160,7 @@ class SimulatedOperator:
         self._depth_error_m = float(self._generator.normal(settings.depth_error_mean_m, settings.depth_error_sd_m))
 
     def _advancing(self, look: Glance) -> None:
-        """Centre the target with the stick, then pull R2 until it seems to lie between the fingers."""
+        """Centre the target with the stick, then pull R2 until it seems to be between the fingers."""
         if look.view.target_in_tool_m is None:
             self._fingers.do(0.0, _REST)
             return
@@ -172,7 +172,7 @@ class SimulatedOperator:
         if settled and aligned and (abs(depth_m) < self._REACHED_M or self._nearing.see(depth_m, look)):
             self._enter(Doing.GRASPING, look.now_s)
             return
-        # Off the line a person slows down; far off, they centre first.
+        # The farther off the line, the slower; far off, they centre first.
         eagerness = max(0.0, 1.0 - off_m / (3 * self._ALIGNED_M))
         if self._settings.aiming == "move-and-wait":
             if self._moves.free(look.now_s, look.lag_s):
@@ -201,7 +201,7 @@ class SimulatedOperator:
             self._aim(look.now_s)
 
     def _dropped(self, look: Glance) -> bool:
-        """Whether they have given up what they held, as it is not between the fingers any more."""
+        """Return whether they have given up the object, as it is no longer between the fingers."""
         if look.view.holding:
             self._holding_s = look.now_s
         if look.now_s - self._holding_s <= _DROPPED_S:
@@ -210,16 +210,16 @@ class SimulatedOperator:
         return True
 
     def _lifting(self, look: Glance) -> None:
-        """Move against gravity, whichever way the tool points."""
+        """Move against gravity, for any direction of the tool."""
         up = look.view.up_in_tool
         if not self._dropped(look) and math.dist(look.view.tool_position_m, self._from) > self._settings.lift_m:
             self._from = look.view.tool_position_m
             self._enter(Doing.CARRYING, look.now_s)
-        # Half speed: a person carries with care.
+        # Half speed, with care.
         self._fingers.do(0.5 * up[2], (0.5 * up[0], -0.5 * up[1]), {Button.CROSS})
 
     def _carrying(self, look: Glance) -> None:
-        """Back towards the robot, level; a tool that points straight up or down has no back."""
+        """Move back towards the robot, level; a tool that points straight up or down has no back."""
         if self._dropped(look):
             return
         up = look.view.up_in_tool
@@ -235,7 +235,7 @@ class SimulatedOperator:
         self._go((speed * back[0], speed * back[1], speed * back[2]), {Button.CROSS})
 
     def _lowering(self, look: Glance) -> None:
-        """Down to where it should stand, gently near there and once that is felt, until it is felt or seen to stand."""
+        """Lower to the expected height, gently near it and after a cue, until the object is felt or seen to stand."""
         if self._dropped(look):
             return
         height_m = look.view.tool_position_m[2]
@@ -247,7 +247,7 @@ class SimulatedOperator:
         self._go((x, y, z), {Button.CROSS})
 
     def _letting_go(self, look: Glance) -> None:
-        """Open, and rise a little out of where they have pressed it down; what stands stays."""
+        """Open, and rise a little, as they have pressed it down."""
         risen_m = look.view.tool_position_m[2] - self._from[2]
         if not look.view.holding and (risen_m > _CLEAR_M or self._elapsed_s(look) > _CLEARS_S + look.lag_s):
             self._from = look.view.tool_position_m
@@ -266,9 +266,7 @@ class SimulatedOperator:
         self._fingers.do(0.0, _REST, {Button.CROSS} if look.view.holding else set())
 
     def _go(self, velocity_m_s: Vector3, buttons: set[Button] | None = None) -> None:
-        """Pull and push what gives the tool this velocity in its own frame, or less where they go gently; its y axis
-        points down the screen.
-        """
+        """Move the tool at this velocity in its own frame (y down the screen), or slower where they go gently."""
         across, along = (GENTLY_M_S if gently else math.inf for gently in (self._gently_across, self._gently_along))
         x, y, z = (min(max(v, -most), most) for v, most in zip(velocity_m_s, (across, across, along), strict=True))
         stick = within_unit_circle(x / FULL_STICK_M_S, -y / FULL_STICK_M_S)

@@ -1,4 +1,4 @@
-"""A person who arms the robot and then pulls as told: no eyes for the scene, no will of their own."""
+"""Hands that arm the robot and then pull as specified, without regard to the scene."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from operator_side.hands.button_map import BUTTON_OF, Action
 from operator_side.hands.travel_calibration import StickRest
 
 _REST_S = 1.2
-"""The triggers rest for longer than the healthy second that arming asks for."""
+"""Rest of the triggers, longer than the second of health that arming requires."""
 _PRESS_S = 0.2
 _PATIENCE_S = 3.0
-"""After so long in vain they press again."""
+"""Time without arming after which they press again, in seconds."""
 _GRIP_S = 0.3
-"""What is gripped is held for so long before the pull begins."""
+"""Time for which an object is held before the pull, in seconds."""
 _ASIDE_S: Final = 1.5
-"""150 mm across, or 43°, at full deflection."""
+"""Duration of the deflection, in seconds: 150 mm across, or 43°, at full deflection."""
 _STICK: Final = StickRest()
 
 Phase = Literal["rest", "arm", "grip", "pull"]
@@ -32,7 +32,7 @@ _DOING: Final[dict[Phase, Doing]] = {
 
 @dataclass(frozen=True)
 class Hands:
-    """What both hands do at one moment; sticks as the controller has them, -1 to 1."""
+    """Forces and sticks of both hands at one moment; sticks raw, -1 to 1."""
 
     r2_n: float = 0.0
     l2_n: float = 0.0
@@ -41,13 +41,13 @@ class Hands:
 
 
 Pull = Callable[[float], Hands]
-"""The hands, so many seconds after the pull began."""
+"""Function from the seconds since the pull began to the hands"""
 
 
 def constant_force(force_n: float, across: Vector2 = (0.0, 0.0), turning: Vector2 = (0.0, 0.0)) -> Pull:
-    """R2 pressed with `force_n` for good; at first the sticks are deflected, too, each by 0 to 1.
+    """Make a pull of R2 with `force_n` for good; at first the sticks are deflected, too, each by 0 to 1.
 
-    They rest after 1.5 s: a tool that turns on and on ends where its arm cannot follow.
+    The sticks rest after 1.5 s: a tool that turned for longer would leave its arm's reach.
     """
     straight = Hands(r2_n=force_n)
     aside = Hands(r2_n=force_n, left_stick=_STICK.raw(across), right_stick=_STICK.raw(turning))
@@ -55,10 +55,10 @@ def constant_force(force_n: float, across: Vector2 = (0.0, 0.0), turning: Vector
 
 
 class PullingHands:
-    """rest ─▶ arm ─▶ (grip ─▶) pull, on a simulated controller."""
+    """Hands on a simulated controller: rest ─▶ arm ─▶ (grip ─▶) pull."""
 
     def __init__(self, device: SimulatedDualSense, pull: Pull, *, grip: bool = False) -> None:
-        """`grip`: close the gripper first, and pull once it holds something."""
+        """grip: close the gripper first, and pull once it holds something."""
         self.phase: Phase = "rest"
         self.pull_began_s: float | None = None
         self._device = device
@@ -69,11 +69,11 @@ class PullingHands:
 
     @property
     def doing(self) -> Doing:
-        """Their phase."""
+        """Present phase."""
         return _DOING[self.phase]
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Act at `now_s` on what the screen says of arming and gripping; nothing else of it counts."""
+        """Act at `now_s` on the screen's state of arming and gripping alone."""
         del delay_s
         if self._since_s is None or screen is None:
             self._since_s = now_s

@@ -1,1 +1,1 @@
-"""Towards the robot side: commands, lease, wishes, and the way out."""
+"""Messages to the robot side: commands, lease, tuning wishes, and their sending."""

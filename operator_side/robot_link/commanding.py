@@ -1,4 +1,4 @@
-"""What leaves for the robot side: what the hands mean, or a stop that was pressed elsewhere, as commands."""
+"""Messages to the robot side: the hands' intent, or a stop pressed elsewhere, as commands."""
 
 import math
 from operator import attrgetter
@@ -11,15 +11,15 @@ from common.silence import LONGEST_HELD_S, MOTION_PERIOD_S
 from operator_side.hands.intent import OperatorIntent
 
 STOP_HELD_S: Final = 0.2
-"""A stop that was pressed away from the controller is held for so long at least."""
+"""Least duration of a stop that was pressed away from the controller, in seconds."""
 HEARTBEAT_PERIOD_S: Final = 0.2
-"""A Hello this often while nothing else is sent: it opens the session, and then shows that we are alive."""
+"""Period of Hellos while nothing else is sent: the first opens the session, later ones show that we are alive."""
 _NOTICED: Final = 0.01
-"""Of a travel or a stick: the triggers' own noise is less."""
+"""Largest change of a travel or a stick that may wait; the triggers' own noise is less."""
 _LATEST_S: Final = LONGEST_HELD_S - MOTION_PERIOD_S / 2.0
-"""A command leaves in the turn that is nearest to `LONGEST_HELD_S`, however early or late that turn comes."""
+"""Time after which a command is sent: in the turn nearest to `LONGEST_HELD_S`, early or late."""
 STOPPING: Final = OperatorIntent(emergency_stop=True)
-"""What the hands mean while it is held, whatever they do."""
+"""Intent while the stop is held, whatever the hands do."""
 
 _BUTTONS: Final = ("run", "arm", "emergency_stop", "next_target", "hand_over")
 _NAMES: Final = ("l2", "r2", "lateral", "turning", *_BUTTONS)
@@ -32,11 +32,11 @@ class ToRobot(NamedTuple):
 
     payload: bytes
     everywhere: bool = False
-    """Over every connection, as something that must arrive soon; else over the next in turn."""
+    """Send over every connection, as it must arrive soon; else over the next in turn."""
 
 
 class StopButton:
-    """An emergency stop besides the controller's: held for a while, and until the robot side says that it stands."""
+    """Emergency stop besides the controller's: held for a while, and until the robot side reports `stopped`."""
 
     def __init__(self) -> None:
         self.presses = 0
@@ -44,42 +44,42 @@ class StopButton:
         self._holds = False
 
     def press(self, now_s: float) -> None:
-        """It is pressed, or still is."""
+        """Note that it is pressed, or still is."""
         self.presses += not self._holds
         self._pressed_s, self._holds = now_s, True
 
     def holds(self, now_s: float, state: MotionState | None) -> bool:
-        """Whether it counts as held at `now_s`; `state`: the robot's as last heard, None for unknown."""
+        """Return whether it counts as held at `now_s`. state: the robot's newest known one, None for unknown."""
         if self._holds and now_s - self._pressed_s >= STOP_HELD_S and state == "stopped":
             self._holds = False
         return self._holds
 
     def forget(self) -> None:
-        """Another operator owns the robot: it stops it, not we."""
+        """Release it: another operator owns the robot, and the stop is theirs."""
         self._holds = False
 
 
 class HeldCommand:
-    """The command that the robot side holds until the next one (zero-order hold), and when that has to leave.
+    """Command that the robot side holds until the next one (zero-order hold), and the time at which that is due.
 
-    A change of travel that no finger does on purpose may wait for the next one, for 16 ms at most.
+    A change of travel that no finger makes on purpose may wait for the next command, 16 ms at most.
     """
 
     def __init__(self, *, full_rate: bool = False) -> None:
-        """full_rate: every command leaves."""
+        """full_rate: send every command."""
         self._full_rate = full_rate
         self.forget()
 
     def forget(self) -> None:
-        """The robot side holds none of ours: the next one leaves at once."""
+        """Note that the robot side holds no command of ours: send the next one at once."""
         self._pressed: tuple[float, ...] = ()
         self._moved: tuple[float, ...] = ()
         self._sent_s = -math.inf
 
     def due(self, intent: OperatorIntent, token: int, now_s: float) -> ToRobot | None:
-        """None for what may wait; else where to send it, still without a payload.
+        """Return the message, still without payload; None if the command may wait.
 
-        At once: a button, another token, a travel or stick by more than 0.01, and rest, which is never approximated.
+        Due at once: a button, another token, a travel or stick by more than 0.01, and rest, which is sent exactly.
         """
         pressed = (*_PRESSED(intent), intent.gripper, token)
         moved = (intent.l2, intent.r2, *intent.lateral, *intent.turning)
@@ -92,10 +92,10 @@ class HeldCommand:
 
 
 class Commands:
-    """Makes commands of what the hands mean, else a Hello every so often."""
+    """Source of commands from the intent, else of a Hello each period."""
 
     def __init__(self, link: LinkEnd, compensation: Compensation, *, full_rate: bool) -> None:
-        """full_rate: see HeldCommand."""
+        """full_rate: as HeldCommand's."""
         self.sent = 0
         self.stop_button = StopButton()
         self.held = HeldCommand(full_rate=full_rate)
@@ -103,7 +103,7 @@ class Commands:
         self._hello_s = -math.inf
 
     def due(self, intent: OperatorIntent, token: int, now_s: float) -> tuple[ToRobot, MotionCommand] | None:
-        """Return the message that has to leave now, and its command; None for what may wait."""
+        """Return the message to send now, and its command; None if it may wait."""
         if (leaving := self.held.due(intent, token, now_s)) is None:
             return None
         meant = dict(zip(_NAMES, _MEANT(intent), strict=True)) | {"gripper": float(intent.gripper), "token": token}

@@ -1,4 +1,4 @@
-"""The newest stiffness that came from the robot side, and what is newer."""
+"""The newest stiffness from the robot side, and the order of messages."""
 
 from typing import Final
 
@@ -7,7 +7,7 @@ from common.protocol.messages import Header, StiffnessUpdate
 from common.statistics import RunningStatistics
 
 STIFFNESS_EXPIRES_S: Final = 0.2
-"""Triggers are released, and the hands move nothing, this long after the last stiffness that was received."""
+"""Age of the newest stiffness at which triggers are released and the hands move nothing, in seconds."""
 
 
 class NewestStiffness:
@@ -15,29 +15,29 @@ class NewestStiffness:
 
     def __init__(self, seed: int = 0) -> None:
         self.update: StiffnessUpdate | None = None
-        """None before the first and once it has expired"""
+        """Newest stiffness; None before the first and once it has expired"""
         self.received_s = 0.0
         self.count = 0
         self.has_been_armed = False
         self.driving_delay = RunningStatistics(seed)
-        """One-way delay in seconds of what an armed robot side sent: a link's first moments are not in it."""
+        """One-way delay, in seconds, of an armed robot side's messages, without a link's first moments."""
         self.applied_age = RunningStatistics(seed)
 
     def note(self, update: StiffnessUpdate, arrival: Arrival) -> None:
-        """Count a message that is no copy of another."""
+        """Count a message that is not a copy of another."""
         self.count += 1
         if update.state == "armed" and arrival.one_way_s is not None:
             self.driving_delay.add(arrival.one_way_s)
 
     def apply(self, update: StiffnessUpdate, arrival: Arrival, now_s: float) -> None:
-        """Take a fresh one."""
+        """Keep `update` as the newest."""
         self.update, self.received_s = update, now_s
         self.has_been_armed |= update.state == "armed"
         if arrival.one_way_s is not None:
             self.applied_age.add(arrival.one_way_s)
 
     def expired(self, now_s: float) -> bool:
-        """Forget a stiffness that is too old; tell whether it just was."""
+        """Forget a stiffness that is too old; return whether it expired now."""
         if self.update is None or now_s - self.received_s <= STIFFNESS_EXPIRES_S:
             return False
         self.update = None
@@ -45,14 +45,14 @@ class NewestStiffness:
 
     @property
     def stopped(self) -> bool:
-        """Whether the arm was armed and is so no more, as far as is known."""
+        """Whether the arm was armed and is not any more, as far as is known."""
         return self.has_been_armed and (self.update is None or self.update.state != "armed")
 
     def within(self, age_s: float, now_s: float) -> bool:
-        """Tell whether there is one that is not older."""
+        """Return whether there is one, at most `age_s` old."""
         return self.update is not None and now_s - self.received_s <= age_s
 
 
 def overtakes(header: Header, known: Header | None) -> bool:
-    """Tell whether the message with `header` is newer than the one with `known`, or of another run."""
+    """Return whether the message with `header` is newer than the one with `known`, or of another epoch."""
     return known is None or header.epoch != known.epoch or header.sequence > known.sequence

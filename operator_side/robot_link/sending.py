@@ -1,4 +1,4 @@
-"""The way out of the operator side: through the emulated link to the sockets. The queue in front of it is measured."""
+"""Sending of messages: through the emulated link to the sockets, with a measure of the queue before it."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -13,7 +13,7 @@ from operator_side.robot_link.commanding import ToRobot
 
 
 class Sending:
-    """Everything leaves at once: commands are few, and nothing here can give way to them."""
+    """Sender without rate control: commands are few, and nothing here can yield to them."""
 
     def __init__(self, link: LinkSpec, sockets: OperatorSockets) -> None:
         self._link = link
@@ -24,32 +24,32 @@ class Sending:
         self._budget: Budget[str] = Budget()
 
     def push(self, messages: Iterable[ToRobot], now_s: float) -> None:
-        """Take in what the core and the console made."""
+        """Queue the messages of the core and of the console."""
         for message in messages:
             self._budget.spend("haptics", len(message.payload), now_s)
             self.line.push(now_s, message, len(message.payload))
 
     def measure(self, queue: OutgoingQueue, now_s: float) -> None:
-        """Take in the echoes that have arrived. queue: in front of our messages."""
+        """Take in the echoes that have arrived. queue: the one before our messages."""
         self._budget.hear(queue, now_s)
         self._budget.take(now_s)
 
     def send(self, now_s: float) -> bool:
-        """Let go of what is due; False where some of it found no connection that takes it."""
+        """Send the due messages; False if no connection took one of them."""
         taken = [self._sockets.send(one.payload, everywhere=one.everywhere) for one in self.line.pop(now_s)]
         return all(taken)
 
     def tune(self, words: str) -> None:
-        """From now on do to messages what `words` say."""
+        """Emulate the link of `words` from now on."""
         self._link = tuned_link(self._link, words)
         self.line.change(self._link.profile("to_robot"))
 
     @property
     def queue_ms(self) -> float:
-        """The queue in front of our messages now."""
+        """Queueing delay of our messages now, in milliseconds."""
         return self._budget.status()["queue_ms"]
 
     def summary(self) -> dict[str, Any]:
-        """`link`, as it was emulated, and `rate`."""
+        """Return `link`, as it was emulated, and `rate`."""
         link = link_summary("to_robot", {"haptics": self.line})
         return {"link": link, "rate": {"operator": self._budget.summary()}}

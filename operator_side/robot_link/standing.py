@@ -1,4 +1,4 @@
-"""Where we stand with the robot side: the notice that came last, and whether it still counts."""
+"""Lease and link as the robot side last reported them, until they expire."""
 
 import math
 from typing import Any, Final
@@ -9,35 +9,35 @@ from common.status.codes import LinkState
 from operator_side.robot_link.newest import overtakes
 
 NOTICE_EXPIRES_S: Final = 0.5
-"""Without a notice for this long nobody knows whose lease it is."""
+"""Age at which a notice of the lease expires, in seconds."""
 REPORT_EXPIRES_S: Final = 2.0
-"""A report of the link is shown for so long."""
+"""Age at which a report of the link expires, in seconds."""
 _ANEW_PERIOD_S: Final = 5.0
-"""What is said of an ended epoch for so long after another began may still be about the one before."""
+"""Time after a new epoch in which a notice of an end may still be about the epoch before, in seconds."""
 _REMEMBERED: Final = 100
 
 
 class Standing:
-    """Whose lease it is, as last heard."""
+    """Lease and link as last heard."""
 
     def __init__(self) -> None:
         self.lease: LeaseNotice | None = None
-        """None before the first notice and once it has expired."""
+        """Newest notice; None before the first and once it has expired."""
         self.history: list[str] = []
-        """Each standing that we had in turn, the latest ones."""
+        """Our standings in turn, the latest ones."""
         self.other_version: str | None = None
-        """What the robot side's messages said when they were of another version; None once they are not"""
+        """Error of the robot side's messages while they are of another version; else None"""
         self._heard_s = self._reported_s = 0.0
         self._report: LinkReport | None = None
         self._anew_s = -math.inf
 
     @property
     def owns(self) -> bool:
-        """Whether our commands are the ones that count."""
+        """Whether our commands count."""
         return self.lease is not None and self.lease.session in OWNING
 
     def follow(self, notice: LeaseNotice, now_s: float) -> bool:
-        """Another notice arrived; whether it asks us to start anew, because the robot side forgot us."""
+        """Take a notice; return whether we must start a new epoch, because the robot side forgot us."""
         anew = now_s - self._anew_s < _ANEW_PERIOD_S
         known = None if self.lease is None else self.lease.session
         if anew and notice.session is SessionState.ENDED and known not in (None, SessionState.ENDED):
@@ -52,12 +52,12 @@ class Standing:
         return True
 
     def note(self, report: LinkReport, now_s: float) -> None:
-        """A report of the link arrived; one that was overtaken counts no more."""
+        """Take a report of the link; one that was overtaken is dropped."""
         if overtakes(report.header, None if self._report is None else self._report.header):
             self._report, self._reported_s = report, now_s
 
     def status_fields(self, now_s: float, *, linked: bool, heard: bool) -> dict[str, Any]:
-        """The fields of a status that tell of the link. linked: stiffness comes; heard: some came once."""
+        """Return a status's fields about the link. linked: stiffness arrives; heard: some has arrived before."""
         link, reason = self._link(linked=linked, heard=heard)
         fields: dict[str, Any] = {"link": link, "link_reason": reason}
         if self.lease is not None:
@@ -80,10 +80,10 @@ class Standing:
         return LinkState.LOST if heard else LinkState.WAITING, None
 
     def expire(self, now_s: float) -> None:
-        """Nothing is known any more once the last notice is too old."""
+        """Forget the lease once the last notice is too old."""
         if now_s - self._heard_s > NOTICE_EXPIRES_S:
             self.lease = None
 
     def forget(self) -> None:
-        """The lease was another robot side's."""
+        """Forget the lease, as it was another robot side's."""
         self.lease = None

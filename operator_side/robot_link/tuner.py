@@ -1,4 +1,4 @@
-"""What the person at this side wants to be different in the run: asked for until the robot side has heard it."""
+"""Tuning wishes of the person at this side, repeated until the robot side has received them."""
 
 import math
 from collections import deque
@@ -15,15 +15,15 @@ _REMEMBERED: Final = 1000
 
 
 class Tuner:
-    """Keeps the newest wish; a wish for P and one for the link are kept together."""
+    """The newest wish; one for P and one for the link are merged."""
 
     def __init__(self) -> None:
         self.refused = 0
-        """Wishes that were no use to send."""
+        """Number of refused wishes."""
         self.why = ""
-        """Of the last one of them, in one line."""
+        """Reason for the last refusal, in one line; empty once a wish is accepted."""
         self.link: str | None = None
-        """The link that was asked for last; None while nothing was."""
+        """Link of the last wish; None before the first."""
         self._number = 0
         self._probability: float | None = None
         self._words: str | None = None
@@ -32,7 +32,7 @@ class Tuner:
         self._asked: deque[dict[str, Any]] = deque(maxlen=_REMEMBERED)
 
     def ask(self, probability: float | None, link: str | None, standing: Standing, now_s: float) -> None:
-        """A wish; one that the run does not permit, or that no link or P can be, is refused whole."""
+        """Take a wish. Refuse it whole if the run does not permit it, or if P or link is invalid."""
         lease = standing.lease
         try:
             if lease is None or not standing.owns or not lease.may_tune:
@@ -57,17 +57,17 @@ class Tuner:
         self._asked.append({"at_s": now_s, "probability": probability, "link": link})
 
     def due(self, lease: LeaseNotice | None, link_end: LinkEnd, now_s: float) -> Tune | None:
-        """What to send now; None while there is nothing to ask for, or the robot side has heard it."""
+        """Return the message to send now; None without a wish, or once the robot side has received it."""
         if lease is None or not lease.may_tune or self._number <= lease.tuned or now_s - self._sent_s < _REPEATED_S:
             return None
         self._sent_s = now_s
         return Tune(link_end.stamp(now_s), self._number, self._probability, self._words)
 
     def take_link(self) -> str | None:
-        """The link that was asked for since the last call, for this side's own line; None for none."""
+        """Return the link wished for since the last call, for this side's own line; None for none."""
         words, self._own = self._own, None
         return words
 
     def summary(self) -> dict[str, Any]:
-        """What was asked for when, on this machine's clock, and how often that was refused."""
+        """Return the wishes, with their times on this machine's clock, and the number refused."""
         return {"asked": list(self._asked), "refused": self.refused}

@@ -1,1 +1,1 @@
-"""What a person sees of this side: facts of the core, the terminal, the console and its pages."""
+"""Views of this side for a person: facts of the core, the terminal, the console and its pages."""

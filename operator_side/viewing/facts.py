@@ -1,6 +1,6 @@
-"""All that a person may want to see of a run at one moment, as the operator side knows it.
+"""Facts of a run at one moment, as the operator side knows them.
 
-The console, the terminal view and the recording are all made of it.
+Source of the console, the terminal view and the recording.
 """
 
 from enum import StrEnum
@@ -16,108 +16,108 @@ Ten = tuple[int, int, int, int, int, int, int, int, int, int]
 
 
 class TriggerFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One of the controller's own triggers."""
+    """Facts of one of the controller's own triggers."""
 
     travel: float | None
-    """Calibrated, 0 to 1; None without a controller"""
+    """Calibrated travel, 0 to 1; None without a controller"""
     raw: float | None
-    """As the controller reports it, 0 to 1: the zones lie along this one"""
+    """Raw travel as the controller reports it, 0 to 1: the zones divide it"""
     zones: Ten
     """Strength of each tenth of the travel as last written, 0 to 8"""
     meets: int
-    """The strength that the finger meets where it is now, 0 to 8"""
+    """Strength at the finger's present travel, 0 to 8"""
     free: float
-    """Calibrated travel from which on it stiffens, 0 to 1"""
+    """Calibrated travel at which it stiffens, 0 to 1"""
     stiffness: float | None
     """s(δ) by the robot side, 0 to 1; None without a field"""
     needed_m: float | None
-    """D at the present travel: by so much the gripper is moved ahead to be felt; None without a field"""
+    """D at the present travel, the distance to feel ahead; None without a field"""
     fast_m: tuple[float, ...]
-    """The ways at which the eight strengths begin; empty without a field"""
+    """Onset distances of the eight strengths; empty without a field"""
     slow_m: tuple[float, ...]
 
 
 class DelayFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One direction of the link, over the last second."""
+    """Delay in one direction of the link, over the last second."""
 
     asked: str
-    """The emulated profile in the grammar's words; empty for none, or where the other side emulates it"""
+    """Emulated profile in the grammar's words; empty for none, or if the other side emulates it"""
     mean_ms: float | None
     p99_ms: float | None
     newest_ms: float | None
 
 
 class HandsFacts(msgspec.Struct, frozen=True):
-    """What a page has to know to drive, or to say why it cannot"""
+    """Facts for a page that drives, or that must say why it cannot."""
 
     may_drive: bool
-    """Whether a page can drive at all: not where a real controller does"""
+    """Whether a page may drive: not while a real controller does"""
     driver: str | None
-    """The word by which the page that drives calls itself; None while none does"""
+    """Word that identifies the page that drives; None for none"""
     person: bool
-    """Whether there is a scripted person who could go on"""
+    """Whether there is a scripted person to continue"""
     tuning_refused: str
-    """Why the last wish to tune was refused; empty where it was not"""
+    """Reason why the last tuning wish was refused; empty if it was not"""
     link_asked: str | None
-    """The link that was asked for last from here, in netem's words; None while nothing was"""
+    """Link of this side's last tuning wish, in netem's words; None before the first"""
 
 
 class SceneFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Figures of the robot side's scene."""
+    """Overlap and tick times of the robot side's scene."""
 
     overlap_mm3: float
-    """Of the trigger that has more ahead"""
+    """Overlap of the trigger that has more ahead"""
     tick_us: float
     tick_p99_us: float
     overruns: int
 
 
 class OperatorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One moment of the operator side."""
+    """Facts of the operator side at one moment."""
 
     now_s: float
-    """On this machine's monotonic clock, which is the console's, too"""
+    """Time on this machine's monotonic clock, which is the console's, too"""
     offset_s: float | None
-    """What the robot side's clock is ahead of ours: a stamp of its less this is on our clock; None while unknown"""
+    """Robot side's clock minus ours: a stamp of the robot side minus this is our time; None while unknown"""
     status: OperatorStatus
     screen: Telemetry | None
-    """The robot side's newest telemetry"""
+    """Newest telemetry of the robot side"""
     l2: TriggerFacts
     r2: TriggerFacts
     rumble: float
-    """As written to the motors, 0 to 1"""
+    """Stronger motor's drive as last written, 0 to 1"""
     advancing: Literal["L2", "R2"]
-    """Which of the two advances"""
+    """Trigger that advances"""
     to_operator: DelayFacts
     to_robot: DelayFacts
-    """As far as this side knows: half of what the round trip leaves, where it cannot be told"""
+    """Estimate: the round trip less the delay to here, or half the round trip if that is unknown"""
     round_trip_ms: float | None
     field_age_ms: float | None
-    """Since the newest stiffness arrived; None before the first"""
+    """Time since the newest stiffness arrived; None before the first"""
     hands: Hands
     may_tune: bool
-    """Whether the robot side lets this operator change P and the emulated link"""
+    """Whether this operator may change P and the emulated link"""
     probability: float | None
-    """P as the robot side has it; None while it has not said"""
+    """P of the robot side; None while unknown"""
     page: HandsFacts | None = None
-    """None where there is nothing for pages to drive or to stop"""
+    """None if pages can neither drive nor stop"""
     scene: SceneFacts | None = None
     robot: RobotStatus | None = None
-    """Where both sides' statuses are at hand: in the demo, and in a recording of both"""
+    """Given where both sides' statuses are known: in the demo, and in a recording of both"""
 
 
 class ShownKind(StrEnum):
-    """What a message to a page is."""
+    """Kinds of messages to a page."""
 
     RUN = "run"
-    """What does not change in a run"""
+    """Constants of a run"""
     FACTS = "facts"
     SCENE = "scene"
     NOTE = "note"
     PLAYER = "player"
-    """Where in a recording we are"""
+    """Position in a recording"""
     END = "end"
-    """No message follows before the page has said that it took all up to here"""
+    """End of a round: the next message follows once the page has taken all up to here"""
 
 
 FACTS_PERIOD_S = 1.0 / 30.0

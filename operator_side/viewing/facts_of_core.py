@@ -1,4 +1,4 @@
-"""What a person may want to see, put together from the core: made only while somebody looks."""
+"""Facts from the core: computed only while somebody watches."""
 
 import math
 from collections.abc import Iterable
@@ -17,18 +17,18 @@ _TAIL: Final = 0.99
 
 
 class Surroundings(msgspec.Struct, frozen=True):
-    """What the core itself does not know."""
+    """Facts that the core does not know."""
 
     hands: Hands
     asked_to_robot: str = ""
-    """The profile that this side emulates, in the grammar's words"""
+    """Profile that this side emulates, in the grammar's words"""
     page: HandsFacts | None = None
 
 
 def operator_facts(
     core: OperatorSide, status: OperatorStatus, around: Surroundings, now_s: float, scene: SceneFacts | None = None
 ) -> OperatorFacts:
-    """The facts of `now_s`; `status`: `core.status(now_s)`, with what the process knows."""
+    """Compute the facts of `now_s`. status: `core.status(now_s)`, with the process's fields."""
     felt, written, lease = core.stiffness, core.haptics.written, core.lease
     pulled = [status.l2_pulled, status.r2_pulled]
     order = -1 if core.settings.swap_sides else 1
@@ -80,7 +80,7 @@ def operator_facts(
 
 
 def _back(there_s: float | None, both_s: float | None) -> float | None:
-    """The way to the robot: what the round trip leaves, or half of it while the way from there cannot be told."""
+    """Estimate the delay to the robot: the round trip less the delay to here, or half of it if that is unknown."""
     if both_s is None:
         return None
     return both_s / 2.0 if there_s is None else max(0.0, both_s - there_s)

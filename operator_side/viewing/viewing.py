@@ -1,4 +1,4 @@
-"""Whoever looks at a run from this side: the console, and what the robot side is asked to render for it."""
+"""Viewers of a run at this side: the console, and the requests to the robot side to render for it."""
 
 import contextlib
 import math
@@ -26,20 +26,20 @@ _TELEMETRY_TOPIC: Final = b"telemetry"
 
 
 def view_topics(settings: OperatorSettings) -> tuple[bytes, ...]:
-    """What to subscribe to: pictures only where they could be shown."""
+    """Return the topics to subscribe to: pictures only with a console."""
     scene = (SCENE_TOPIC,) if settings.console or settings.tells_facts else ()
     return (_TELEMETRY_TOPIC, *scene, *((VIDEO_TOPIC,) if settings.console else ()))
 
 
 class SceneFigures:
-    """Overlaps and ticks of the robot side's scene."""
+    """Overlap and tick times of the robot side's scene."""
 
     def __init__(self) -> None:
         self.newest: SceneFacts | None = None
-        """None before the first"""
+        """Newest figures; None before the first"""
 
     def take(self, payload: bytes) -> None:
-        """One payload of the topic `scene`; shapes, which are large, and what is broken are passed over."""
+        """Take a payload of the topic `scene`; ignore shapes, which are large, and invalid ones."""
         with contextlib.suppress(RemoteProtocolError):
             if claims_to_be("scene", payload) and isinstance(state := decode_view(payload), SceneState):
                 by_trigger = zip(*((l2, r2) for _, l2, r2 in state.overlaps), strict=True)
@@ -48,7 +48,7 @@ class SceneFigures:
 
 
 class Viewing:
-    """Feeds who looks; asks for nothing while nobody does."""
+    """Feed of the viewers; without one it requests nothing."""
 
     def __init__(
         self,
@@ -59,7 +59,7 @@ class Viewing:
         console: Console | None,
         recording: SideRecording | None = None,
     ) -> None:
-        """`surroundings`: those of a moment. `pages`: are told what the console's say."""
+        """surroundings: those of a time. pages: receives the messages of the console's pages."""
         self.console = console
         self._pages = pages
         self._recording = recording
@@ -70,17 +70,17 @@ class Viewing:
         self._joining = {topic: Joining(VIEW_MAXIMUM_BYTES) for topic in (VIDEO_TOPIC, SCENE_TOPIC)}
         self._told: str | None = None
         self._asked = False
-        """Whether the newest Watch asks for a whole picture"""
+        """Whether the newest Watch requests a whole picture"""
         self._watch_s = self._facts_s = -math.inf
 
     def note(self, text: str) -> None:
-        """Say it to everybody: a line that stays."""
+        """Show a lasting line on the status and on the console."""
         self._status.note(text)
         if self.console is not None:
             self.console.note(text)
 
     def take(self, topic: bytes, payload: bytes) -> bool:
-        """Whether a view payload is for those who look, and not for the core; pieces are put together first."""
+        """Take a view payload for viewers, once its pieces are joined; False for one of the core."""
         of, is_piece, _ = topic.partition(PIECE)
         if of not in self._joining:
             return False
@@ -94,7 +94,7 @@ class Viewing:
         return True
 
     def requests(self, now_s: float) -> list[bytes]:
-        """What to send to the robot side now: what is looked at, while anything is."""
+        """Return the messages to send now: the views that are watched, while any is."""
         if self.console is not None:
             self._hear(self.console, now_s)
         pages = self.console is not None and self.console.pages > 0
@@ -118,7 +118,7 @@ class Viewing:
                 self._pages.receive(page, said, now_s)
 
     def facts_due(self, now_s: float) -> bool:
-        """Whether to call `show`."""
+        """Return whether to call `show`."""
         shown = self.console is not None and self._looks_at_console(self.console)
         return (shown or self._recording is not None) and now_s - self._facts_s >= FACTS_PERIOD_S
 
@@ -132,7 +132,7 @@ class Viewing:
         return console.pages > 0
 
     def show(self, status: OperatorStatus, now_s: float) -> None:
-        """Show and record the facts of `now_s`; `status`: with what the process knows."""
+        """Show and record the facts of `now_s`. status: with the process's fields."""
         self._facts_s = now_s if now_s - self._facts_s > 2 * FACTS_PERIOD_S else self._facts_s + FACTS_PERIOD_S
         facts = operator_facts(self._core, status, self._surroundings(now_s), now_s)
         if self.console is not None:
@@ -141,7 +141,7 @@ class Viewing:
             self._recording.facts(now_s, facts)
 
     def tell(self, status: OperatorStatus, now_s: float) -> None:
-        """Tell the status of `now_s`, and the facts where somebody wants them."""
+        """Print the status of `now_s`, and the facts if the status wants them."""
         self._status.show(now_s, operator=status)
         if self._status.wants_facts:
             around, scene = self._surroundings(now_s), self._figures.newest

@@ -50,7 +50,7 @@ class FakeKernel(UhidFile):
 
     def write(self, event: bytes) -> None:
         if self.clock.now() >= self.refuses_from_s:
-            raise DeviceError("the kernel has let the controller go")
+            raise DeviceError("the kernel has released the controller")
         self.heard.append((self.clock.now(), event))
 
     def heard_of(self, kind: int) -> list[tuple[float, bytes]]:

@@ -31,6 +31,6 @@ def test_a_run_outlives_its_console() -> None:
             os.kill(console, signal.SIGKILL)
             while "console has ended" not in str((note := operator.wait_for("note", 60.0))["text"]):
                 pass
-            assert note["text"] == "the console has ended; the run goes on without it"
+            assert note["text"] == "the console has ended; the run continues without it"
             operator.wait_for("status", 60.0)
             assert operator.stop() == 0

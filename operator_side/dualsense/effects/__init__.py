@@ -1,1 +1,1 @@
-"""What a trigger can be told to do, and the bytes that say so."""
+"""Trigger effects, and their bytes."""

@@ -1,6 +1,6 @@
-"""The trigger effects that feelahead commands: strengths of ten zones, and the exact eleven bytes that say so.
+"""Trigger effects that feelahead commands: strengths of ten zones, encoded exactly in eleven bytes.
 
-Strengths encode as one of two official codes, so that none can make a debug code. Sources: Nielk1's notes on trigger
+Strengths encode as one of two official codes, never as a debug code. Sources: Nielk1's notes on trigger
 effects, revision 6; dualsensectl has the same.
 """
 
@@ -9,17 +9,17 @@ from typing import Final
 from operator_side.controller.feel import FREE_TRIGGER, ZONE_COUNT, Strengths
 
 EFFECT_LENGTH: Final = 11
-"""Bytes of one encoded effect: the code and ten parameters."""
+"""Length of an encoded effect, in bytes: the code and ten parameters."""
 DEBUG_CODES: Final = frozenset({0xFC, 0xFD, 0xFE})
-"""Never to reach a controller: they corrupt a trigger until it is reset."""
+"""Codes that must never reach a controller: they corrupt a trigger until it is reset."""
 _OFF_CODE: Final = 0x05
 _FEEDBACK_CODE: Final = 0x21
 COMMANDED_CODES: Final = frozenset({_OFF_CODE, _FEEDBACK_CODE})
-"""The codes that a report to a controller may hold."""
+"""Codes that a report to a controller may hold."""
 
 
 def encode_effect(strengths: Strengths) -> bytes:
-    """The code, a mask of the zones with a strength, and in three bits a zone the strength less one; off for none."""
+    """Encode as the code, a mask of the stiff zones, and three bits a zone for the strength less one; off for none."""
     mask = fields = 0
     for zone, strength in enumerate(strengths):
         if strength:
@@ -30,7 +30,7 @@ def encode_effect(strengths: Strengths) -> bytes:
 
 
 def decode_effect(encoded: bytes) -> Strengths | None:
-    """Read the eleven bytes of an effect; None for what no strengths encode to: another program's."""
+    """Decode the eleven bytes of an effect; None for another program's, which no strengths encode to."""
     strengths = FREE_TRIGGER
     if encoded[0] == _FEEDBACK_CODE:
         mask, fields = int.from_bytes(encoded[1:3], "little"), int.from_bytes(encoded[3:7], "little")

@@ -1,1 +1,1 @@
-"""Real controllers: finding, opening, reading, writing, and letting go of them on every way out."""
+"""Real controllers: finding, opening, reading, writing, and releasing them on every exit."""

@@ -1,4 +1,4 @@
-"""A real DualSense over HID: the only file that imports hidapi, and only when a controller is looked for."""
+"""Real DualSense over HID: the only file that imports hidapi, and only during a search for a controller."""
 
 import contextlib
 import os
@@ -22,30 +22,29 @@ from operator_side.dualsense.reports.transport import Transport, is_simple_repor
 
 Read = TypeVar("Read")
 HidHandle = Any
-"""One of hidapi's `device` objects, which has no types."""
+"""A `device` object of hidapi, which has no types"""
 HidBackend = Any
-"""One of hidapi's modules, `hidraw` or `hid`."""
+"""A module of hidapi, `hidraw` or `hid`"""
 
 _INSTALL: Final = "pip install --force-reinstall hidapi"
-"""Over another package's module, too; by its own name, for feelahead may come from a folder."""
+"""Forced, to replace another package's module; by its own name, as feelahead may run from a folder."""
 
-_READ_LENGTH: Final = 128  # longer than any report, so that each is seen as long as it is
-_MAX_DRAINED: Final = 64  # what the kernel's hidraw queue holds; more than that is left for the next read
+_READ_LENGTH: Final = 128  # longer than any report, so that none is cut
+_MAX_DRAINED: Final = 64  # size of the kernel's hidraw queue; more is left for the next read
 _FIRST_REPORT_MS: Final = 100
 _FIRST_REPORT_ATTEMPTS: Final = 5
 _FEATURE_ATTEMPTS: Final = 3
-"""A feature that came over the air may be garbled (Linux hid-playstation asks again, too)."""
+"""Attempts to read a feature, which may be garbled by radio (Linux hid-playstation repeats, too)."""
 
 
 def load_backend() -> HidBackend:
-    """Import hidapi; NoDriverError when it is missing, broken or shadowed by the other package called `hid`.
+    """Import hidapi; NoDriverError if it is missing, broken or shadowed by the other package called `hid`.
 
-    hidapi's wheel has two modules: `hidraw`, which sees the kernel's hidraw devices, and `hid`, which goes through
-    libusb and does not.
+    hidapi's wheel has two modules: `hidraw` for the kernel's hidraw devices, and `hid`, which uses libusb instead.
     """
     try:
         import hidraw as module  # noqa: PLC0415
-    except Exception as error:  # another package's module may fail as it likes
+    except Exception as error:  # another package's module may raise anything
         raise NoDriverError(
             f"hidapi cannot be imported ({type(error).__name__}: {error}): {_INSTALL}, after pip uninstall hid if that"
             " other package is there; or run without a controller: --device simulated"
@@ -61,23 +60,23 @@ def load_backend() -> HidBackend:
 
 @dataclass(frozen=True)
 class Identity:
-    """The facts that a controller tells of itself; None for those that are missing."""
+    """Facts that a controller reports about itself; None for missing ones."""
 
     transport: Transport
     address: str | None
-    """The Bluetooth address, "aa:bb:cc:dd:ee:ff", the same on USB."""
+    """Bluetooth address, "aa:bb:cc:dd:ee:ff", the same on USB."""
     firmware: Firmware | None
     first_report: bytes
-    """The input report that shows the transport."""
+    """Input report that reveals the transport."""
 
 
 class HidDualSense:
-    """The port on a controller that is open, on USB or Bluetooth: one thread may read, another one write."""
+    """Port on an open controller, on USB or Bluetooth: one thread may read, another one write."""
 
     def __init__(self, backend: HidBackend, path: bytes) -> None:
-        """Open it and ask for its facts, which takes a few reports' time; DeviceError names the fault.
+        """Open it and read its facts, which takes a few reports' time; DeviceError names the fault.
 
-        On Bluetooth, asking is also what switches it to full reports.
+        On Bluetooth, this also switches it to full reports.
         """
         self._reading, self._writing = _open(backend, path)
         try:
@@ -97,15 +96,15 @@ class HidDualSense:
 
     @property
     def released(self) -> bool:
-        """Nothing that was written holds or shakes, as far as it went out."""
+        """Whether the effects written neither hold nor rumble; False after a write that failed."""
         return self._released
 
     def read(self, now_s: float) -> ControllerState | None:
-        """The newest report's state, or None when there is no new one; never waits. DeviceError when it is gone.
+        """Return the newest report's state, or None without a new one; never waits. DeviceError if it is gone.
 
-        A bad report is passed over.
+        A bad report is ignored.
         """
-        del now_s  # a real controller has a clock of its own
+        del now_s  # a real controller has its own clock
         self._require_open()
         drained: list[list[int]] = []
         try:
@@ -117,15 +116,15 @@ class HidDualSense:
         except OSError as error:
             raise _gone(str(error)) from error
         for report in map(bytes, reversed(drained)):
-            # Bluetooth may have begun with simple reports before it was asked for more.
+            # Bluetooth may have sent simple reports before full ones were requested.
             with contextlib.suppress(RemoteProtocolError):
                 return parse_input_report(report)
         return None
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Send an output report in this controller's framing; DeviceError when the controller is gone.
+        """Send an output report in this controller's framing; DeviceError if the controller is gone.
 
-        ValueError, and nothing sent, where build_output_report refuses: no debug effect code passes it.
+        ValueError, and nothing sent, if build_output_report refuses: no debug effect code passes.
         """
         del now_s
         self._require_open()
@@ -136,7 +135,7 @@ class HidDualSense:
         self._released = self._told.releases
 
     def close(self) -> None:
-        """Take effects, rumble and a warning light off if any were written and the controller answers; let it go."""
+        """Switch off effects, rumble and a warning light if any were written and the controller answers; close it."""
         if self._closed:
             return
         self._closed = True
@@ -145,7 +144,7 @@ class HidDualSense:
                 _write(self._writing, self._packed(self._told.farewell))
                 self._released = True
         except DeviceError:
-            pass  # it is gone: nothing more can be told to it
+            pass  # it is gone: nothing can be written
         finally:
             self._close_handles()
 
@@ -164,10 +163,10 @@ class HidDualSense:
 
 
 def _open(backend: HidBackend, path: bytes) -> tuple[HidHandle, HidHandle]:
-    """Handles to read and to write by.
+    """Return the handles to read and to write by.
 
-    hidapi keeps the text of the last failure with each handle and frees it with every call. One handle must not be
-    read and written at once (background_writes.py). Both are opened now, while the path is still this controller's.
+    hidapi keeps the text of the last failure with each handle and frees it with every call. So one handle must not be
+    read and written concurrently (background_writes.py). Both are opened now, while the path is this controller's.
     """
     handles: list[HidHandle] = []
     for _ in range(2):
@@ -192,8 +191,8 @@ def _write(handle: HidHandle, report: bytes) -> None:
 
 
 def _ask(handle: HidHandle, path: bytes) -> Identity:
-    """Ask the controller for its facts; OSError when it goes away meanwhile."""
-    # Bluetooth starts with short reports: this is what ends them, so it comes before the first one is awaited.
+    """Read the controller's facts; OSError if it goes away meanwhile."""
+    # Bluetooth starts with short reports; this ends them, so it comes before the first one is awaited.
     _feature(handle, FIRMWARE_ID, bytes)
     first_report = _first_report(handle, path)
     try:
@@ -212,7 +211,7 @@ def _ask(handle: HidHandle, path: bytes) -> Identity:
 
 
 def _first_report(handle: HidHandle, path: bytes) -> bytes:
-    """The first full report, or a simple one where nothing else comes."""
+    """Return the first full report, or a simple one if nothing else comes."""
     newest = b""
     for _ in range(_FIRST_REPORT_ATTEMPTS):
         newest = bytes(handle.read(_READ_LENGTH, _FIRST_REPORT_MS)) or newest
@@ -227,7 +226,7 @@ def _first_report(handle: HidHandle, path: bytes) -> bytes:
 
 
 def _feature(handle: HidHandle, report_id: int, parse: Callable[[bytes], Read]) -> Read | None:
-    """One feature, read as `parse` does; None when the controller does not answer, or not rightly."""
+    """Read a feature by `parse`; None without a valid answer."""
     for _ in range(_FEATURE_ATTEMPTS):
         try:
             return parse(bytes(handle.get_feature_report(report_id, FEATURE_LENGTHS[report_id])))
@@ -237,7 +236,7 @@ def _feature(handle: HidHandle, report_id: int, parse: Callable[[bytes], Read]) 
 
 
 def _not_opened(path: bytes, reason: str) -> DeviceError:
-    """There is one, and the system does not let us at it."""
+    """Make the error for a controller that the system does not let us open."""
     name = os.fsdecode(path)
     denied = os.path.exists(name) and not os.access(name, os.R_OK | os.W_OK)  # noqa: PTH110  # hidapi's names need not be paths
     if denied or "permission denied" in reason.lower():
@@ -252,5 +251,5 @@ def _not_opened(path: bytes, reason: str) -> DeviceError:
 
 
 def _gone(reason: str) -> DeviceError:
-    """The controller was there a moment ago."""
+    """Make the error for a controller that has just gone."""
     return DeviceError(f"the controller is gone ({reason}): plug it in again, or press its PS button")

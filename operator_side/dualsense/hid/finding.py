@@ -1,4 +1,4 @@
-"""Which of the controllers that are there to use: the one from before, on USB rather than Bluetooth."""
+"""Choice among the connected controllers: the one from before, on USB rather than Bluetooth."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -12,37 +12,37 @@ from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport
 
 LOOKS_FOR_THE_SAME: Final = 3
-"""Number of looks in a row for the controller from before alone; then another one will do."""
+"""Number of searches in a row for the controller from before alone; then another one will do."""
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """A place where the system has a controller."""
+    """Place of a controller in the system."""
 
     path: bytes
     model: str
 
 
 def sightings(backend: HidBackend) -> list[Sighting]:
-    """Every place once, in the system's order; nothing is opened."""
+    """List every place once, in the system's order; open nothing."""
     listed = (
         Sighting(found["path"], model)
         for product_id, model in PRODUCT_IDS.items()
         for found in backend.enumerate(SONY_VENDOR_ID, product_id)
     )
-    # One that serves several purposes is listed for each.
+    # The system lists a controller for each of its HID usages.
     return list(dict.fromkeys(one for one in listed if isinstance(one.path, bytes) and one.path))
 
 
 class Finder:
-    """One look after the other, for the controller from before: another is taken only when that does not come back."""
+    """Searches in turn for the controller from before: another is taken only if that one does not return."""
 
     def __init__(self, backend: HidBackend) -> None:
         self._backend = backend
         self._looks = 0
 
     def __call__(self, preferred: str | None) -> OpenController:
-        """A look: `find_controller`, whose `others` is False for the first looks in a row that find nothing."""
+        """Call `find_controller`, with `others` False for the first searches in a row that find nothing."""
         self._looks += 1
         found = find_controller(self._backend, preferred, others=self._looks > LOOKS_FOR_THE_SAME)
         self._looks = 0
@@ -50,11 +50,11 @@ class Finder:
 
 
 def find_controller(backend: HidBackend, preferred: str | None = None, *, others: bool = True) -> OpenController:
-    """Open the controller of the address `preferred`, else the first; NoDeviceError and DeviceError say why none.
+    """Open the controller of address `preferred`, else the first; NoDeviceError or DeviceError gives the reason.
 
-    A controller that is there on USB and on Bluetooth at once is one: USB is taken, the other way is left alone.
-    With a `preferred` one, another is taken only if `others` allows it and none refuses to be opened. That one may be
-    it: the system gives permission a moment after a controller appears.
+    Of a controller on USB and on Bluetooth at once, USB is taken. With `preferred`, another one is taken only if
+    `others` allows it and none refuses to be opened. The refusing one may be the preferred: the system grants
+    permission a moment after a controller appears.
     """
     seen = sightings(backend)
     if not seen:
@@ -90,7 +90,7 @@ def find_controller(backend: HidBackend, preferred: str | None = None, *, others
 
 
 def _none_found() -> NoDeviceError:
-    """No controller is connected, or the system does not show it."""
+    """Make the error for no controller, or none that the system shows."""
     wanted = " or ".join(f"{name} ({SONY_VENDOR_ID:04X}:{product:04X})" for product, name in PRODUCT_IDS.items())
     return NoDeviceError(
         f"no {wanted} found: connect one by a USB cable that carries data, or by Bluetooth (hold Create and PS until"

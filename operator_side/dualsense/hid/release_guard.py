@@ -1,4 +1,4 @@
-"""Our end of the watchdog: start it, tell it which controller to release should we be killed or hang, replace it."""
+"""Control of the watchdog: start it, set the controller to release if this process is killed or hangs, replace it."""
 
 import contextlib
 import os
@@ -9,14 +9,14 @@ from typing import Final
 
 _WATCHDOG = Path(__file__).with_name("release_watchdog.py")
 _END_TIMEOUT_S = 2.0
-"""The watchdog ends within milliseconds, but a busy machine may let it wait."""
+"""Limit on the watchdog's end, in seconds: it takes milliseconds, but more on a busy machine."""
 MOST_REPLACEMENTS: Final = 3
-"""A cause that ended this number of watchdogs will end the next one, too."""
+"""Limit on replacements: a cause that ended this number of watchdogs will end the next one, too."""
 _LEFT_ALONE: Final = "should this one be killed or hang now, the triggers stay as stiff as they are"
 
 
 class ReleaseGuard:
-    """The watchdog process, from the opening of the context to its end."""
+    """Watchdog process for the time of the context."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
@@ -32,7 +32,7 @@ class ReleaseGuard:
     def __exit__(self, *_: object) -> None:
         if self._process is None:
             return
-        # It still holds a controller only if that could not be released: then it tries once more.
+        # It holds a controller only if that could not be released: it tries once more.
         if self._process.stdin is not None:
             self._process.stdin.close()
         try:
@@ -45,11 +45,11 @@ class ReleaseGuard:
 
     @property
     def running(self) -> bool:
-        """Whether there is anybody to release the triggers; False when somebody ended the watchdog."""
+        """Whether the watchdog process runs."""
         return self._process is not None and self._process.poll() is None
 
     def take_notes(self) -> list[str]:
-        """Replace a watchdog that has ended, which takes a few milliseconds; what a person has to know of it, once."""
+        """Replace an ended watchdog, which takes a few milliseconds; return notes for a person, each once."""
         if self._process is None or self._given_up:
             return []
         if self.running:
@@ -71,32 +71,32 @@ class ReleaseGuard:
         return ["the watchdog process has ended; another one has taken its place"]
 
     def hold(self, path: bytes, release: bytes) -> None:
-        """From now on, should we die, `release` is to be written to the controller at `path`."""
+        """Have `release` written to the controller at `path` if this process dies from now on."""
         self._held = (path, release)
         self._say(f"hold {path.hex()} {release.hex()}")
 
     def let_go(self) -> None:
-        """There is nothing to release any more."""
+        """Cancel `hold`."""
         self._held = None
         self._say("let-go")
 
     def beat(self) -> None:
-        """An effect is on, and we live: should no further beat follow in time, we hang."""
+        """Report that an effect is on and this process runs; without a further beat in time, it hangs."""
         self._say("beat")
 
     def rest(self) -> None:
-        """No effect is on: there are no beats until the next one."""
+        """Report that no effect is on: no beat is due until the next one."""
         self._say("rest")
 
     def _say(self, line: str) -> None:
         if self._process is None or self._process.stdin is None:
             return
-        # Without the watchdog we go on; `running` tells.
+        # The run continues without a watchdog; `running` is False.
         with contextlib.suppress(OSError):
             self._process.stdin.write(f"{line}\n".encode("ascii"))
 
     def _refusals(self) -> list[str]:
-        """Read the answers since the last look, without waiting."""
+        """Read the answers since the last call, without waiting."""
         if self._process is None or self._process.stdout is None:
             return []
         self._answers += self._process.stdout.read(4096) or b""
@@ -116,5 +116,5 @@ def _started() -> subprocess.Popen[bytes]:
     )
     for stream in (process.stdin, process.stdout):
         if stream is not None:
-            os.set_blocking(stream.fileno(), False)  # the loop waits for nobody
+            os.set_blocking(stream.fileno(), False)  # the loop must not block
     return process

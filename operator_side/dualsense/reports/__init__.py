@@ -1,1 +1,1 @@
-"""Bytes to values and back: the controller's input, output and feature reports."""
+"""Codec of the controller's input, output and feature reports."""

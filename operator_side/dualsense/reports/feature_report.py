@@ -1,4 +1,4 @@
-"""Feature reports, which are read once: calibration (0x05), address (0x09), firmware (0x20).
+"""Feature reports, read once: calibration (0x05), address (0x09), firmware (0x20).
 
 On Bluetooth their last four bytes are a checksum. Layout: Linux hid-playstation and the controllers wiki.
 """
@@ -14,7 +14,7 @@ CALIBRATION_ID: Final = 0x05
 ADDRESS_ID: Final = 0x09
 FIRMWARE_ID: Final = 0x20
 FEATURE_LENGTHS: Final = {CALIBRATION_ID: 41, ADDRESS_ID: 20, FIRMWARE_ID: 64}
-"""In bytes, with the id."""
+"""Lengths in bytes, with the id"""
 
 _VERSIONS: Final = struct.Struct("<II")
 _HARDWARE, _UPDATE = 24, 44
@@ -30,13 +30,13 @@ def _checked(report: bytes, report_id: int, transport: Transport) -> bytes:
 
 
 def _finished(report_id: int, content: bytes, transport: Transport) -> bytes:
-    """The report of `content`, filled up with zeros, and with its checksum where there is one."""
+    """Return the report of `content`, padded with zeros, with its checksum on Bluetooth."""
     report = (bytes((report_id,)) + content).ljust(FEATURE_LENGTHS[report_id], b"\0")
     return report if transport is Transport.USB else sealed(Seed.FEATURE, report[:-CHECKSUM_LENGTH])
 
 
 def build_calibration(transport: Transport) -> bytes:
-    """Make feature report 0x05 of motion sensors without error: what hid-playstation wants to know at its start.
+    """Make feature report 0x05 of error-free motion sensors, which hid-playstation reads at its start.
 
     Gyroscope: bias 0, 8640 counts either way at 540 degrees a second. Accelerometer: 8192 counts for one gravity.
     """
@@ -45,7 +45,7 @@ def build_calibration(transport: Transport) -> bytes:
 
 
 def parse_address(report: bytes, transport: Transport = Transport.USB) -> str:
-    """The controller's Bluetooth address, "aa:bb:cc:dd:ee:ff", from feature report 0x09.
+    """Read the controller's Bluetooth address, "aa:bb:cc:dd:ee:ff", from feature report 0x09.
 
     It is the same on USB and on Bluetooth. RemoteProtocolError for another id, length or checksum.
     """
@@ -53,17 +53,17 @@ def parse_address(report: bytes, transport: Transport = Transport.USB) -> str:
 
 
 def build_address(address: str, transport: Transport = Transport.USB) -> bytes:
-    """Make feature report 0x09, 20 bytes; ValueError for an address that is not "aa:bb:cc:dd:ee:ff"."""
+    """Make feature report 0x09, 20 bytes; ValueError unless the address has the form "aa:bb:cc:dd:ee:ff"."""
     return _finished(ADDRESS_ID, bytes.fromhex(checked_address(address).replace(":", ""))[::-1], transport)
 
 
 class Firmware(NamedTuple):
-    """The versions of a controller: words of 32 bits, and one of 16."""
+    """Versions of a controller: words of 32 bits, and one of 16."""
 
     hardware_version: int
     firmware_version: int
     update_version: int
-    """Which features of the firmware to expect."""
+    """Version by which to expect features of the firmware."""
 
     @classmethod
     def parse(cls, report: bytes, transport: Transport = Transport.USB) -> Self:

@@ -1,7 +1,7 @@
-"""Input reports, bytes to values and back: USB's 0x01 and Bluetooth's 0x31.
+"""Codec of input reports: USB's 0x01 and Bluetooth's 0x31.
 
-The driver reads them, the simulated controller makes them. Layout: Linux hid-playstation, SDL and the controllers
-wiki, which agree. Touch, motion and the triggers' own feedback are not read, as nothing here uses them.
+The driver decodes them, the simulated controller encodes them. Layout: Linux hid-playstation, SDL and the controllers
+wiki, which agree. Touch, motion and the triggers' own feedback are not decoded, as nothing here uses them.
 """
 
 import struct
@@ -30,7 +30,7 @@ _NOT_TOUCHED: Final = 0x80
 _USB_DATA_AND_POWER: Final = 0x18
 _SENSOR_TICKS_PER_S: Final = 3_000_000
 _HAS_STATE: Final = 0x01
-"""In the second byte of Bluetooth's report, below a sequence number: it holds the controller's state (wiki)."""
+"""Flag in the second byte of Bluetooth's report, below a sequence number: it holds the controller's state (wiki)."""
 
 _HAT_DIRECTIONS: Final = (
     frozenset({Button.UP}),
@@ -42,7 +42,7 @@ _HAT_DIRECTIONS: Final = (
     frozenset({Button.LEFT}),
     frozenset({Button.UP, Button.LEFT}),
 )
-"""Clockwise from up; any other number is HID's null state: no direction."""
+"""Directions clockwise from up; any other number is HID's null state, no direction"""
 _HAT_NONE: Final = 8
 _DIRECTIONS: Final = frozenset({Button.UP, Button.RIGHT, Button.DOWN, Button.LEFT})
 
@@ -67,29 +67,29 @@ _BUTTON_BITS: Final = {
     Button.LEFT_PADDLE: 22,
     Button.RIGHT_PADDLE: 23,
 }
-"""Bit numbers in the three bytes as one little-endian number; the low nibble is the directional pad's hat."""
+"""Bit numbers in the three bytes as one little-endian number; the low nibble is the directional pad's hat"""
 
 
 def _axis(byte: int) -> float:
-    """A stick's byte to -1 at 0, 0 at 128, 1 at 255: the halves differ by one step."""
+    """Convert a stick's byte: 0 to -1, 128 to 0, 255 to 1; the halves differ by one step."""
     return (byte - 128) / (127 if byte > 128 else 128)
 
 
 def byte_of_axis(axis: float) -> int:
-    """The nearest byte of -1 to 1."""
+    """Return the byte nearest to an axis, -1 to 1."""
     return 128 + round(axis * (127 if axis > 0.0 else 128))
 
 
 @lru_cache(maxsize=4096)
 def pressed_of(code: int) -> frozenset[Button]:
-    """Decode the three bytes as one number; results are cached, as hands hold few combinations."""
+    """Decode the three bytes as one number; cached, as hands hold few combinations."""
     pressed = {button for button, bit in _BUTTON_BITS.items() if code >> bit & 1}
     hat = code & 0x0F
     return frozenset(pressed | _HAT_DIRECTIONS[hat] if hat < len(_HAT_DIRECTIONS) else pressed)
 
 
 def code_of(pressed: frozenset[Button]) -> int:
-    """The three bytes as one number. `pressed`: no two opposite directions."""
+    """Encode the three bytes as one number. pressed: no two opposite directions."""
     directions = pressed & _DIRECTIONS
     code = _HAT_DIRECTIONS.index(directions) if directions else _HAT_NONE
     for button in pressed - _DIRECTIONS:
@@ -110,7 +110,7 @@ _BATTERY_CODES: Final = {state: code for code, state in _BATTERY_STATES.items()}
 
 @lru_cache
 def _battery(byte: int) -> Battery:
-    """A step of the fraction stands for ten per cent, and the middle of them is meant (hid-playstation)."""
+    """Decode the battery's byte: a step is ten per cent, taken at its middle (hid-playstation)."""
     state = _BATTERY_STATES.get(byte >> 4, BatteryState.UNKNOWN)
     if state is BatteryState.FULL:
         return Battery(1.0, state)
@@ -120,15 +120,15 @@ def _battery(byte: int) -> Battery:
 
 
 def _battery_byte(battery: Battery) -> int:
-    """The byte that says `battery`."""
+    """Encode the battery's byte."""
     tenths = 0 if battery.fraction is None else min(int(battery.fraction * 10 + 1e-9), 10)
     return _BATTERY_CODES[battery.state] << 4 | tenths
 
 
 def parse_input_report(report: bytes) -> ControllerState:
-    """Read an input report of either transport; every one of a valid id, length and checksum can be read.
+    """Decode an input report of either transport; every one of valid id, length and checksum can be decoded.
 
-    RemoteProtocolError for any other report, and for the simple ones that Bluetooth starts with.
+    RemoteProtocolError for any other report, and for the simple ones at the start of Bluetooth.
     """
     start = INPUT_FRAMING[_checked_transport(report)].start
     left_x, left_y, right_x, right_y, l2, r2, _, *buttons, _, _, _, _, battery, _ = _COMMON.unpack_from(report, start)
@@ -158,8 +158,8 @@ def build_input_report(
 ) -> bytes:
     """Make the full input report of a controller in `state`, rounded to the wire's steps.
 
-    64 bytes on USB, 78 with the checksum on Bluetooth. It lies flat, and nothing touches its pad. `sequence`: 0 to 255,
-    one more with each report on USB, on Bluetooth always 1 (controllers wiki); `sensor_time_s`: its own clock.
+    64 bytes on USB, 78 with the checksum on Bluetooth. The controller lies flat, its pad untouched. sequence: 0 to 255,
+    one more with each report on USB, on Bluetooth always 1 (controllers wiki). sensor_time_s: the controller's clock.
     """
     framing, (left_x, left_y), (right_x, right_y) = INPUT_FRAMING[transport], state.left_stick, state.right_stick
     report = bytearray(framing.length)

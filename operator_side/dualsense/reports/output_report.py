@@ -1,7 +1,7 @@
-"""Output reports, values to bytes and back: USB's 0x02, Bluetooth's 0x31.
+"""Codec of output reports: USB's 0x02, Bluetooth's 0x31.
 
 A report has a flag for each part of the controller that it sets; a part without its flag stays as it is. Only the flags
-of the parts that `Feel` sets are set here: the other lights, the mute key and the sound stay the system's.
+of the parts that `Feel` sets are used: the other lights, the mute key and the sound stay the system's.
 Layout: Linux hid-playstation, SDL and Nielk1's notes, which agree.
 """
 
@@ -41,9 +41,9 @@ _SET_LIGHTBAR, _CLASSIC_RUMBLE_V2 = 0x04, 0x04
 def build_output_report(feel: Feel, transport: Transport = Transport.USB, sequence: int = 0) -> bytes:
     """Make the report that sets what `feel` holds: 48 bytes on USB, 78 with the checksum on Bluetooth.
 
-    `sequence`: on Bluetooth, one more with each report; four bits of it are sent. Of the two framings of a Bluetooth
-    report that are in use this is the one of Linux hid-playstation, whose authors make the controller. ValueError for
-    packed bytes with any other code than the two of official.py.
+    sequence: on Bluetooth, one more with each report; four bits of it are sent. Bluetooth has two framings in use; this
+    is that of Linux hid-playstation, whose authors make the controller. ValueError if the packed bytes hold a code
+    other than the two of official.py.
     """
     framing = OUTPUT_FRAMING[transport]
     report = bytearray(framing.length)
@@ -53,7 +53,7 @@ def build_output_report(feel: Feel, transport: Transport = Transport.USB, sequen
     report[framing.start : framing.start + _COMMON_LENGTH] = _common_block(feel)
     for flag, place in ((_SET_L2_EFFECT, _L2_EFFECT), (_SET_R2_EFFECT, _R2_EFFECT)):
         code = report[framing.start + place]
-        # The last gate before the wire, on the very bytes that are sent.
+        # The last check before the wire, on the bytes that are sent.
         if len(report) != framing.length or (code not in COMMANDED_CODES if report[framing.start] & flag else code):
             raise ValueError(f"report holds the effect code 0x{code:02x}; valid: 0x05, 0x21")
     return bytes(report) if transport is Transport.USB else sealed(Seed.OUTPUT, bytes(report[:-CHECKSUM_LENGTH]))
@@ -76,11 +76,11 @@ def _common_block(feel: Feel) -> bytearray:
 
 
 def parse_output_report(report: bytes) -> Feel:
-    """Read an output report of either transport; flags for other parts of the controller are passed over.
+    """Decode an output report of either transport; flags for other parts of the controller are ignored.
 
-    USB: 48 to 64 bytes. Bluetooth: 78 bytes in either framing. Another program's effect holds nothing: free.
+    USB: 48 to 64 bytes. Bluetooth: 78 bytes in either framing. Another program's effect decodes as a free trigger.
     RemoteProtocolError for another id, length, framing or checksum, and for a debug code in either trigger's place even
-    where its flag is not set.
+    if its flag is not set.
     """
     block = _block_of(report)
     flags = block[_FLAGS_0]
@@ -96,7 +96,7 @@ def parse_output_report(report: bytes) -> Feel:
 
 
 def encoded_effects(report: bytes) -> tuple[bytes | None, bytes | None]:
-    """The eleven bytes of L2's effect and of R2's, whoever made them; None where not set. As `parse_output_report`."""
+    """Return the eleven bytes of L2's and of R2's effect, of any program; None if not set. As `parse_output_report`."""
     return _effects(_block_of(report))
 
 
@@ -110,7 +110,7 @@ def _block_of(report: bytes) -> bytes:
 
 
 def _effects(block: bytes) -> tuple[bytes | None, bytes | None]:
-    """The encoded effects of L2 and R2; None for one that is not set."""
+    """Return the encoded effects of L2 and R2; None for one that is not set."""
     l2, r2 = (
         block[place : place + EFFECT_LENGTH] if block[_FLAGS_0] & flag else None
         for place, flag in ((_L2_EFFECT, _SET_L2_EFFECT), (_R2_EFFECT, _SET_R2_EFFECT))
@@ -119,7 +119,7 @@ def _effects(block: bytes) -> tuple[bytes | None, bytes | None]:
 
 
 def transport_of_output(report: bytes) -> Transport:
-    """Tell the transport by the report's id and length; RemoteProtocolError for any other id or length."""
+    """Return the transport by the report's id and length; RemoteProtocolError for any other id or length."""
     usb, bluetooth = OUTPUT_FRAMING[Transport.USB], OUTPUT_FRAMING[Transport.BLUETOOTH]
     if report and report[0] == usb.report_id and usb.length <= len(report) <= _USB_MAX_LENGTH:
         return Transport.USB
@@ -132,7 +132,7 @@ def transport_of_output(report: bytes) -> Transport:
 
 
 def _common_start(report: bytes) -> int:
-    """Find the begin of the common block; a Bluetooth report's second byte shows the framing."""
+    """Return the start of the common block; a Bluetooth report's second byte shows the framing."""
     transport = transport_of_output(report)
     if transport is Transport.USB:
         return OUTPUT_FRAMING[transport].start

@@ -1,8 +1,8 @@
 """Transports and their reports: ids, lengths, the place of the common block, the checksum.
 
-The same block of fields travels on USB and on Bluetooth, one byte further in on Bluetooth and with a checksum at
-the end. Layout: Linux hid-playstation, SDL and the controllers wiki, which agree. The transport is told from the
-reports themselves: a virtual controller's bus type and interface number say nothing (measured over uhid).
+USB and Bluetooth carry the same block of fields, on Bluetooth one byte further in and with a checksum at the end.
+Layout: Linux hid-playstation, SDL and the controllers wiki, which agree. The reports themselves reveal the transport:
+a virtual controller's bus type and interface number do not (measured over uhid).
 """
 
 import zlib
@@ -14,7 +14,7 @@ from common.errors import RemoteProtocolError
 
 
 class Transport(Enum):
-    """The carrier of the reports."""
+    """Carrier of the reports."""
 
     USB = "USB"
     BLUETOOTH = "Bluetooth"
@@ -22,7 +22,7 @@ class Transport(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Framing:
-    """One kind of report: its id, its length in bytes with the id, and where the common block begins."""
+    """Kind of report: id, length in bytes with the id, and start of the common block."""
 
     report_id: int
     length: int
@@ -33,8 +33,8 @@ INPUT_FRAMING: Final = {Transport.USB: Framing(0x01, 64, 1), Transport.BLUETOOTH
 OUTPUT_FRAMING: Final = {Transport.USB: Framing(0x02, 48, 1), Transport.BLUETOOTH: Framing(0x31, 78, 3)}
 
 _SIMPLE_KINDS: Final = ((0x01, 10), (0x01, 78))
-"""Bluetooth starts with short reports under USB's id, until a feature is read or an effect written. Some systems pad
-each to the longest one (SDL)."""
+"""Ids and lengths of the short reports with which Bluetooth starts, until a feature is read or an effect written.
+Some systems pad each to the longest one (SDL)."""
 _INPUT_KINDS: Final = {
     (0x01, 64): Transport.USB,
     (0x31, 78): Transport.BLUETOOTH,
@@ -43,7 +43,7 @@ _INPUT_KINDS: Final = {
 
 
 def transport_of_input(report: bytes) -> Transport:
-    """Tell by an input report's id and length what carried it; RemoteProtocolError for any other id or length."""
+    """Return the transport by an input report's id and length; RemoteProtocolError for any other id or length."""
     transport = _INPUT_KINDS.get((report[0], len(report))) if report else None
     if transport is None:
         raise RemoteProtocolError(
@@ -54,16 +54,16 @@ def transport_of_input(report: bytes) -> Transport:
 
 
 def is_simple_report(report: bytes) -> bool:
-    """Whether it is one of those that Bluetooth starts with, which nothing here reads."""
+    """Return whether it is one of the short reports with which Bluetooth starts, which nothing here reads."""
     return report[:1] == b"\x01" and (0x01, len(report)) in _SIMPLE_KINDS
 
 
 def described(report: bytes) -> str:
-    """The id and the length of a report, for an error's text."""
+    """Return a report's id and length, for an error's text."""
     return f"id 0x{report[0]:02x}, {len(report)} bytes" if report else "no bytes"
 
 
-# Every Bluetooth report ends in a CRC-32 (zlib's) over a byte that is not sent, and the report (hid-playstation).
+# Every Bluetooth report ends in a CRC-32 (zlib's) over an unsent byte and the report (hid-playstation).
 
 CHECKSUM_LENGTH: Final = 4
 
@@ -74,27 +74,27 @@ class Seed(IntEnum):
     INPUT = 0xA1
     OUTPUT = 0xA2
     FEATURE = 0xA3
-    """A feature that was read."""
+    """Seed of a feature that was read."""
 
 
 _STARTS: Final = {seed: zlib.crc32(bytes([seed])) for seed in Seed}
-"""The checksum of the header byte alone, from which the report's goes on."""
+"""CRC-32 of the header byte alone, from which a report's continues"""
 _RESIDUE: Final = 0x2144DF1C
-"""The CRC-32 of anything that its own CRC-32 follows."""
+"""CRC-32 of any content followed by its own CRC-32"""
 
 
 def checksum(seed: Seed, content: bytes) -> int:
-    """The CRC-32 of a report without its last four bytes."""
+    """Return the CRC-32 of a report without its last four bytes."""
     return zlib.crc32(content, _STARTS[seed])
 
 
 def sealed(seed: Seed, content: bytes) -> bytes:
-    """`content` with its checksum after it, little-endian."""
+    """Append the checksum to `content`, little-endian."""
     return content + checksum(seed, content).to_bytes(CHECKSUM_LENGTH, "little")
 
 
 def check(seed: Seed, report: bytes) -> None:
-    """RemoteProtocolError for a report that does not end in its checksum."""
+    """Raise RemoteProtocolError unless the report ends in its checksum."""
     if zlib.crc32(report, _STARTS[seed]) != _RESIDUE or len(report) <= CHECKSUM_LENGTH:
         found = int.from_bytes(report[-CHECKSUM_LENGTH:], "little")
         valid = checksum(seed, report[:-CHECKSUM_LENGTH])

@@ -1,1 +1,1 @@
-"""A controller without hardware, with a model of the triggers."""
+"""Controller without hardware, with a model of the triggers."""

@@ -1,4 +1,4 @@
-"""A simulated DualSense: the same port as a real one, with a simulated person's hands on it."""
+"""Simulated DualSense: the same port as a real one, with a simulated person's hands on it."""
 
 import math
 from typing import Final
@@ -23,26 +23,26 @@ from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.trigger_model import STRENGTH_STEP_N, SimulatedTrigger
 
 INPUT_REPORT_PERIOD_S: Final = 0.004
-"""About 250 reports a second on USB (SDL)."""
+"""Period of input reports: about 250 a second on USB (SDL)."""
 SIMULATED_ADDRESS: Final = "02:00:00:00:0c:e6"
-"""Locally administered, so that it is no real controller's."""
+"""Locally administered address, which no real controller has."""
 SIMULATED_FIRMWARE: Final = Firmware(hardware_version=0x0413, firmware_version=0x0110_0224, update_version=0x0224)
-"""Made up, but new enough for Linux hid-playstation's present way to rumble (2.21, so 0x0215)."""
+"""Invented, but new enough for the rumble of present Linux hid-playstation (2.21, so 0x0215)."""
 
 _ROUNDING_OF_TICKS = 1e-6
 """Tolerance for a `now_s` of exactly n periods, in floating point."""
 _BLUETOOTH_SEQUENCE = 1
-"""The constant sequence number of the common block on Bluetooth (controllers wiki)."""
+"""Constant sequence number of the common block on Bluetooth (controllers wiki)."""
 _TRIGGER_BUTTONS: Final = frozenset({Button.L2, Button.R2})
 _EDGE_BUTTONS: Final = frozenset({Button.LEFT_FUNCTION, Button.RIGHT_FUNCTION, Button.LEFT_PADDLE, Button.RIGHT_PADDLE})
 
 
 class SimulatedDualSense:
-    """The port without hardware, in virtual or real time: `now_s` is all it knows of clocks.
+    """Port without hardware, in virtual or real time: `now_s` is its only clock.
 
-    It wakes at the first `now_s` it is given and makes an input report at once, then one a period. What the
-    `set_*` methods change holds from the last `now_s` on, until it is set again; at first nobody touches it. Forces are
-    those of trigger_model: assumptions. On Bluetooth it sends full reports from the start.
+    It wakes at the first `now_s` and makes an input report at once, then one each period. A value from a `set_*`
+    method holds from the last `now_s` until the next one; at first nobody touches it. Forces are those of
+    trigger_model: assumptions. On Bluetooth it sends full reports from the start.
     """
 
     def __init__(
@@ -53,9 +53,9 @@ class SimulatedDualSense:
         address: str = SIMULATED_ADDRESS,
         strength_step_n: float = STRENGTH_STEP_N,
     ) -> None:
-        """`strength_step_n`: the resistance that one strength of an effect adds, an eighth of the strongest.
+        """strength_step_n: resistance that one strength of an effect adds, an eighth of the strongest.
 
-        ValueError for an address that is none.
+        ValueError for an invalid address.
         """
         self.transport: Final = transport
         self.model: Final = model
@@ -75,7 +75,7 @@ class SimulatedDualSense:
         self._newest_report = -1
         self._unread: bytes | None = None
         self.told = RELEASED
-        """All that it has been told and still does; None where nothing was."""
+        """All effects in force; None for parts never set."""
         self._apply(RELEASED)
 
     # The hands
@@ -103,7 +103,7 @@ class SimulatedDualSense:
             self._held = replace(self._held, pressed=pressed)
 
     def hands_off(self) -> None:
-        """Let go of everything."""
+        """Release everything."""
         self.set_finger_force(0.0, 0.0)
         self.set_sticks()
         self.set_buttons(frozenset())
@@ -112,48 +112,48 @@ class SimulatedDualSense:
 
     @property
     def travel(self) -> tuple[float, float]:
-        """Mechanical travel of L2 and R2, 0 to 1, at the last time given."""
+        """Mechanical travel of L2 and R2, 0 to 1, at the last `now_s`."""
         return self._l2.travel, self._r2.travel
 
     @property
     def strengths(self) -> tuple[Strengths, Strengths]:
-        """The strengths in force, L2 and R2."""
+        """Strengths in force, L2 and R2."""
         return self._l2.strengths, self._r2.strengths
 
     @property
     def released(self) -> bool:
-        """Both triggers are free."""
+        """Whether both triggers are free."""
         return self.strengths == (FREE_TRIGGER, FREE_TRIGGER)
 
     @property
     def rumble(self) -> Rumble:
-        """The motors' present drive."""
+        """Present drive of the motors."""
         return self.told.rumble or Rumble()
 
     # The port
 
     def read(self, now_s: float) -> ControllerState | None:
-        """The newest report's state, in the wire's steps, or None until the next one is due; else as `read_report`."""
+        """Return the newest report's state, in the wire's steps; None until the next one is due. As `read_report`."""
         report = self.read_report(now_s)
         return None if report is None else parse_input_report(report)
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Do what `feel` sets from `now_s` on; DeviceError when it is closed."""
+        """Apply `feel` from `now_s` on; DeviceError if it is closed."""
         self._require_open()
         self._advance(now_s)
         self._apply(feel)
 
     def close(self) -> None:
-        """Take effects, rumble and a warning light off; `read` and `write` raise DeviceError from then on."""
+        """Switch off effects, rumble and a warning light; `read` and `write` raise DeviceError from then on."""
         self._apply(self.told.farewell)
         self._closed = True
 
-    # The wire, for a system that is offered this controller
+    # The wire, for a system to which this controller is offered
 
     def read_report(self, now_s: float) -> bytes | None:
-        """The newest input report, of the state at its own time, or None until the next one is due.
+        """Return the newest input report, of the state at its own time; None until the next one is due.
 
-        ValueError when `now_s` runs backwards or is not finite; DeviceError when it is closed.
+        ValueError if `now_s` runs backwards or is not finite; DeviceError if it is closed.
         """
         self._require_open()
         self._advance(now_s)
@@ -161,7 +161,7 @@ class SimulatedDualSense:
         return report
 
     def take_report(self, report: bytes, now_s: float) -> None:
-        """Take an output report off the wire; ValueError, and nothing changed, for one that cannot be read."""
+        """Apply an output report; ValueError, and nothing changed, if it cannot be decoded."""
         self._require_open()
         try:
             if transport_of_output(report) is not self.transport:
@@ -174,7 +174,7 @@ class SimulatedDualSense:
     def get_feature(self, report_id: int) -> bytes:
         """Answer a feature report: calibration 0x05, address 0x09, firmware 0x20.
 
-        DeviceError for another id, and when it is closed.
+        DeviceError for another id, and if it is closed.
         """
         self._require_open()
         if report_id not in self._features:
@@ -192,7 +192,7 @@ class SimulatedDualSense:
         self._r2.set_strengths(self.told.r2 or FREE_TRIGGER)
 
     def _advance(self, now_s: float) -> None:
-        """Let time pass until `now_s`, and make the newest input report on the way that has come due."""
+        """Let time pass until `now_s`, and make the newest input report that has come due."""
         if not math.isfinite(now_s):
             raise ValueError(f"now_s = {now_s}; valid: a finite number")
         if now_s < self._now_s:
@@ -217,7 +217,7 @@ class SimulatedDualSense:
         return build_input_report(self._state(), self.transport, sequence, number * INPUT_REPORT_PERIOD_S)
 
     def _state(self) -> ControllerState:
-        """The present values of the sensors."""
+        """Return the present values of the sensors."""
         triggers = {Button.L2: self._l2, Button.R2: self._r2}
         moved = {button for button, trigger in triggers.items() if round(trigger.sensed_travel * 255) > 0}
         return replace(

@@ -1,4 +1,4 @@
-"""A finger on an adaptive trigger, as mechanics: where it comes to rest, and how fast it gets there.
+"""Mechanics of a finger on an adaptive trigger: its rest position, and its speed towards it.
 
 Travel here is mechanical, 0 at rest to 1 at the stop. Every force is an assumption: no public measurement of the
 DualSense's trigger forces exists. A steadily pressing finger feels the whole range of effects.
@@ -12,24 +12,24 @@ from operator_side.controller.feel import FREE_TRIGGER, MAX_STRENGTH, SENSED_TRA
 SPRING_PRELOAD_N: Final = 0.5
 """Force at which the trigger begins to move (assumed)."""
 SPRING_RISE_N: Final = 4.0
-"""How much more it takes at the end of the travel, growing linearly (assumed)."""
+"""Additional force at the end of the travel, growing linearly (assumed)."""
 STRENGTH_STEP_N: Final = 0.25
-"""The resistance that one strength of an effect adds within its zone (assumed)."""
+"""Resistance that one strength of an effect adds within its zone (assumed)."""
 FINGER_TIME_CONSTANT_S: Final = 0.04
-"""How fast a finger gets to where its force balances (assumed)."""
+"""Time constant of a finger's approach to the equilibrium of forces (assumed)."""
 NORMAL_FINGER_FORCE_N: Final = 3.7
-"""A normal pull (assumed). Against the bare spring it rests at 80 % of the travel, which is reported as full. Against
+"""Force of a normal pull (assumed). Against the bare spring it rests at 80 % of the travel, reported as full. Against
 the strongest effect it rests at 30 %, reported as 40 %: it overcomes any stiffness."""
 
 
 def equilibrium_travel(
     finger_force_n: float, zone_strengths: tuple[float, ...], strength_step_n: float = STRENGTH_STEP_N
 ) -> float:
-    """Where a finger that presses from rest with a constant force comes to a stop, 0 to 1.
+    """Return the travel, 0 to 1, at which a finger that presses from rest with a constant force stops.
 
-    It is the first travel at which spring and effect together hold the force. The effect is constant within a
-    zone, so this may be the very boundary of a stiffer zone. Never grows with any strength, never falls with
-    the force. `zone_strengths`: ten, 0 to 8. ValueError for a negative or non-finite force or step.
+    It is the first travel at which spring and effect together hold the force. The effect is constant within a zone, so
+    the result may be a stiffer zone's boundary. It never grows with any strength, and never falls with the force.
+    zone_strengths: ten, 0 to 8. ValueError for a negative or non-finite force or step.
     """
     for name, value in (("finger_force_n", finger_force_n), ("strength_step_n", strength_step_n)):
         if not (math.isfinite(value) and value >= 0.0):
@@ -44,21 +44,21 @@ def equilibrium_travel(
 
 
 def zone_of(travel: float) -> int:
-    """The zone, 0 to 9, of a mechanical travel, 0 to 1."""
+    """Return the zone, 0 to 9, of a mechanical travel, 0 to 1."""
     return min(int(travel * ZONE_COUNT), ZONE_COUNT - 1)
 
 
 class SimulatedTrigger:
-    """A trigger and the finger on it, relaxing exponentially towards the equilibrium travel.
+    """Trigger and the finger on it, relaxing exponentially towards the equilibrium travel.
 
     Force and effect are constant between the calls that set them. `advance` is exact: one long step and many short ones
     agree to rounding.
     """
 
     def __init__(self, strength_step_n: float = STRENGTH_STEP_N) -> None:
-        """`strength_step_n`: resistance of one strength; with 0 effects are shown and not felt."""
+        """strength_step_n: resistance of one strength; with 0 effects are shown and not felt."""
         self.strengths = FREE_TRIGGER
-        """The strengths in force; `set_strengths` changes them."""
+        """Strengths in force; `set_strengths` changes them."""
         self.travel = 0.0
         """Mechanical travel, 0 to 1."""
         self._strength_step_n = strength_step_n
@@ -67,7 +67,7 @@ class SimulatedTrigger:
 
     @property
     def sensed_travel(self) -> float:
-        """What the controller measures of it, 0 to 1, before rounding to a byte."""
+        """Travel as the controller measures it, 0 to 1, before rounding to a byte."""
         return min(self.travel / SENSED_TRAVEL, 1.0)
 
     def set_finger_force(self, finger_force_n: float) -> None:

@@ -1,1 +1,1 @@
-"""Offering a simulated controller to every program on a Linux machine."""
+"""Simulated controller offered to every program on a Linux machine."""

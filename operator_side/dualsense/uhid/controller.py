@@ -1,8 +1,7 @@
-"""A simulated controller offered to Linux through /dev/uhid: its side of the protocol, bytes only, without I/O.
+"""Simulated controller offered to Linux through /dev/uhid: its side of the protocol, bytes only, without I/O.
 
-Each read and each write is one `struct uhid_event` of linux/uhid.h: a type and, packed, what belongs to it. The
-kernel fills short writes up with zeros, and a reader does the same with short reads. Integers are in the machine's
-byte order.
+Each read and each write is one `struct uhid_event` of linux/uhid.h: a type and, packed, its content. The kernel pads
+short writes with zeros, and a reader does the same with short reads. Integers are in the machine's byte order.
 """
 
 import struct
@@ -20,17 +19,17 @@ from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 
 EVENT_LENGTH: Final = 4380
-"""sizeof(struct uhid_event), padded to 8 bytes; the length to ask for with each read."""
+"""sizeof(struct uhid_event), padded to 8 bytes; the length of each read"""
 _REPORT_MAX_LENGTH: Final = 4096
 BUS: Final = {Transport.USB: 0x03, Transport.BLUETOOTH: 0x05}
 _FEATURE_REPORT, _OUTPUT_REPORT = 0, 1
 _INPUT_OUTPUT_ERROR: Final = 5
-"""EIO, which hidraw and drivers report for an answer with an error."""
+"""EIO, which hidraw and drivers report for an answer with an error"""
 _VERSION, _COUNTRY = 0x0100, 0
 
 
 class _Type(IntEnum):
-    """enum uhid_event_type, without what is obsolete or not heeded."""
+    """enum uhid_event_type, without obsolete and ignored ones."""
 
     DESTROY = 1
     START = 2
@@ -62,16 +61,16 @@ class UhidIdentity(Limited):
     transport: Transport = Transport.USB
     model: Model = Model.DUALSENSE
     unique_id: Annotated[str, Meta(max_length=63)] = ""
-    """A Bluetooth address; drivers may refuse a second device that has the same."""
+    """A Bluetooth address; drivers may refuse a second device with the same one."""
 
     @property
     def name(self) -> str:
-        """The name that the kernel shows."""
+        """Name that the kernel shows."""
         maker = "Sony Interactive Entertainment " if self.transport is Transport.USB else ""
         return f"{maker}{self.model.title} Wireless Controller"
 
     def create(self) -> bytes:
-        """UHID_CREATE2: let the device appear."""
+        """Make UHID_CREATE2: the device appears."""
         descriptor = USB_DESCRIPTOR if self.transport is Transport.USB else BLUETOOTH_DESCRIPTOR
         texts = (text.encode() for text in (self.name, "feelahead/virtual-dualsense", self.unique_id))
         numbers = (SONY_VENDOR_ID, self.model.value, _VERSION, _COUNTRY)
@@ -85,34 +84,34 @@ class UhidCounts:
     inputs: int = 0
     outputs: int = 0
     refused: int = 0
-    """Reports that the controller did not take, and questions that it could not answer."""
+    """Reports that the controller refused, and questions that it could not answer"""
     features: int = 0
 
 
 class UhidController:
-    """One controller on one file of /dev/uhid: each method gives what is to be written to it."""
+    """Controller on one file of /dev/uhid: each method returns the bytes to write to it."""
 
     def __init__(self, controller: SimulatedDualSense, told: UhidIdentity) -> None:
         self.counts = UhidCounts()
         self.driven = False
-        """A driver has taken the device."""
+        """Whether a driver has taken the device"""
         self._controller = controller
         self._identity = told
 
     def plug_in(self) -> bytes:
-        """Let it appear. The kernel asks it for its features next, so `handle` must be called soon."""
+        """Make the device appear. The kernel asks for its features next, so call `handle` soon."""
         return self._identity.create()
 
     def unplug(self) -> bytes:
-        """UHID_DESTROY: let it disappear; `plug_in` may follow."""
+        """Make UHID_DESTROY: the device disappears; `plug_in` may follow."""
         self.driven = False
         return _TYPE.pack(_Type.DESTROY)
 
     def handle(self, event: bytes, now_s: float) -> bytes | None:
-        """Take what the kernel said; the answer, if it wants one. ValueError for an impossible length.
+        """Take an event of the kernel; return the answer, if it wants one. ValueError for an impossible length.
 
-        Questions wait up to 5 s for the answer with the same number. All else is passed over: somebody opened or closed
-        the device, or a newer kernel said something.
+        The kernel waits up to 5 s for the answer with a question's number. All else is ignored: a program opened or
+        closed the device, or a newer kernel sent an unknown event.
         """
         if not _TYPE.size <= len(event) <= EVENT_LENGTH:
             raise ValueError(f"event has {len(event)} bytes; valid: {_TYPE.size} to {EVENT_LENGTH}")
@@ -138,7 +137,7 @@ class UhidController:
         return None
 
     def next_input(self, now_s: float) -> bytes | None:
-        """The controller's newest input report for the kernel; None when there is no new one or nobody takes it."""
+        """Return the newest input report for the kernel; None without a new one or without a driver."""
         report = self._controller.read_report(now_s)
         if report is None or not self.driven:
             return None

@@ -1,4 +1,4 @@
-"""/dev/uhid as a file, and the loop in which a simulated controller lives on it."""
+"""/dev/uhid as a file, and the loop of a simulated controller on it."""
 
 import contextlib
 import errno
@@ -19,10 +19,10 @@ _IN_A_CONTAINER = "in a container, on its host, and start it with --device=/dev/
 
 
 class UhidFile:
-    """The open file; closing it lets the device disappear, whichever way the process ends."""
+    """Open file; the device disappears when it closes, however the process ends."""
 
     def __init__(self, path: Path = UHID_PATH) -> None:
-        """Open it; ConfigurationError says in one line what to do where it is missing or not permitted."""
+        """Open it; ConfigurationError gives the remedy in one line if it is missing or not permitted."""
         self._descriptor: int | None = None
         try:
             self._descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | os.O_NONBLOCK)
@@ -46,24 +46,24 @@ class UhidFile:
         self.close()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for the kernel to say something; whether it has."""
+        """Wait for an event of the kernel; return whether there is one."""
         return bool(select.select([self._open_descriptor()], [], [], max(0.0, timeout_s))[0])
 
     def read(self) -> bytes | None:
-        """One event, or None when there is none."""
+        """Return one event, or None without one."""
         try:
             return os.read(self._open_descriptor(), EVENT_LENGTH) or None
         except BlockingIOError:
             return None
 
     def write(self, event: bytes) -> None:
-        """Tell the kernel; DeviceError when it does not have the device."""
+        """Write an event; DeviceError if the kernel does not have the device."""
         try:
             os.write(self._open_descriptor(), event)
         except OSError as error:
             reason = os.strerror(error.errno or 0)
-            said = "the kernel has let the controller go" if error.errno == errno.EINVAL else "the kernel refused"
-            raise DeviceError(f"{said} ({reason}); what it says of it: sudo dmesg | grep playstation") from error
+            said = "the kernel has released the controller" if error.errno == errno.EINVAL else "the kernel refused"
+            raise DeviceError(f"{said} ({reason}); its messages: sudo dmesg | grep playstation") from error
 
     def close(self) -> None:
         """Close it; safe to call again."""
@@ -73,7 +73,7 @@ class UhidFile:
 
     def _open_descriptor(self) -> int:
         if self._descriptor is None:
-            raise DeviceError("/dev/uhid is closed; open it anew")
+            raise DeviceError("/dev/uhid is closed; open it again")
         return self._descriptor
 
 
@@ -84,9 +84,9 @@ def offer(
     period_s: float,
     going: Callable[[float], bool],
 ) -> None:
-    """Plug `controller` in and let it live until `going(now_s)`, asked every `period_s`, says no; unplug it then.
+    """Plug `controller` in, and run it while `going(now_s)`, called every `period_s`, is True; then unplug it.
 
-    The kernel is answered as it asks; input reports go out at the deadlines, none made up for.
+    Questions of the kernel are answered at once. Input reports are sent at the deadlines; missed ones are skipped.
     """
     file.write(controller.plug_in())
     pacer = Pacer(period_s, clock.now())

@@ -1,1 +1,1 @@
-"""The browser console: a process of its own, behind a gate that lets in who has this run's token."""
+"""Browser console: a separate process behind a gate that admits holders of this run's token."""

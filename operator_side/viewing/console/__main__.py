@@ -1,9 +1,9 @@
-"""The console's own process: what comes from the operator side goes to viser and to the pages, and back.
+"""Process of the console: from the operator side to viser and the pages, and back.
 
-operator side ──▶ here    f facts, v a view payload as it came, n a note, r what does not change in a run,
-                          p where in a recording we are
-here ──▶ operator side    a the address, w how many pages are open, s what a page said, e why there is none,
-                          l which pictures in H.264 are lacking: said once where they can be shown, and at each change
+operator side ──▶ here    f facts, v a view payload as received, n a note, r the constants of a run,
+                          p the position in a recording
+here ──▶ operator side    a the address, w the number of open pages, s a page's words, e the reason for none,
+                          l the H.264 pictures that are lacking: once if they can be shown, and at each change
 """
 
 import contextlib
@@ -39,17 +39,17 @@ from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts, ShownKind
 
 _NICENESS: Final = 5
-"""Behind both sides."""
+"""Increment of niceness, so that both sides have priority"""
 _FRAME: Final = struct.Struct("<Bd")
-"""Before a picture: its view, and when it was taken, on the robot side's clock."""
+"""Header of a picture: its view, and its time on the robot side's clock"""
 _MOST_LISTED: Final = 6
 _SLOW_PERIOD_S: Final = 0.25
-"""Between two drawings for a browser without a graphics processor."""
+"""Period of drawings for a browser without a graphics processor, in seconds"""
 _LASTING: Final = {b"r": ShownKind.RUN, b"p": ShownKind.PLAYER}
 
 
 class _Process:
-    """Everything but the first and last moment happens in the server's thread."""
+    """The process; all but its first and last moment runs in the server's thread."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
@@ -63,7 +63,7 @@ class _Process:
         self._lacks: tuple[int, int] | None = None
 
     def run(self, port: int) -> None:
-        """Serve until the channel ends; what makes it impossible is said through it."""
+        """Serve until the channel ends; report through it if that is impossible."""
         try:
             from operator_side.viewing.console.drawing import Drawing  # noqa: PLC0415  # an extra, and slow to import
             from operator_side.viewing.console.gate import Gate  # noqa: PLC0415
@@ -91,11 +91,11 @@ class _Process:
             return
         self._drawing = Drawing(server.viser)
         if (hole := prove(port, token)) is not None:
-            self._give_up(f"its gate is not tight: {hole}")
+            self._give_up(f"its gate failed a check: {hole}")
             return
-        assert server.loop is not None  # noqa: S101  # Server sees to it
+        assert server.loop is not None  # noqa: S101  # Server guarantees it
         server.loop.call_soon_threadsafe(self._begin, server.loop, gate.address)
-        # Only now, as it takes up to a second: until then pictures come as JPEG, and without it for good.
+        # Late, as it takes up to a second: until then, and without it, pictures are JPEG.
         with contextlib.suppress(ImportError, ValueError):
             from common.video.steps import Steps  # noqa: PLC0415  # an extra
 
@@ -125,14 +125,14 @@ class _Process:
                 state = self._take(message[:1], message[1:]) or state
             if state is not None:
                 self._show_scene(state)
-        except Exception as error:  # it would come again with every message
+        except Exception as error:  # it would recur with every message
             self._give_up(f"the console failed: {error!r}")
             self._ended.set()
         if self._channel.ended:
             self._ended.set()
 
     def _take(self, kind: bytes, content: bytes) -> SceneState | None:
-        """One message; a scene's state is left to the caller, as only the newest counts."""
+        """Take one message; return a scene's state to the caller, as only the newest counts."""
         if kind == b"f":
             self._facts = facts = msgspec.msgpack.decode(content, type=OperatorFacts)
             at = [None if trigger.raw is None else SENSED_TRAVEL * trigger.raw for trigger in (facts.l2, facts.r2)]
@@ -199,7 +199,7 @@ class _Process:
 
 
 def said(facts: OperatorFacts) -> dict[str, Any]:
-    """The sentences of a page, and how it looks; None for what is not known."""
+    """Make the words of a page, and its look; None for unknown ones."""
     status, view = facts.status, LiveView(None, facts.status)
     state = view.phase if view.alarm or view.look is Look.STARTING else words(view.look)
     return {
@@ -214,12 +214,12 @@ def said(facts: OperatorFacts) -> dict[str, Any]:
 
 
 def main() -> None:
-    """The companion: its arguments are the channel's number and the port."""
+    """Run the companion process; its arguments are the channel's number and the port."""
     channel, (port,) = companion_channel(sys.argv[1:])
     os.nice(_NICENESS)
-    logging.getLogger("websockets").setLevel(logging.CRITICAL)  # whoever is refused is not worth a line each
+    logging.getLogger("websockets").setLevel(logging.CRITICAL)  # no line for each refused request
     _Process(channel).run(int(port))
-    os._exit(0)  # viser's thread would be waited for
+    os._exit(0)  # does not wait for viser's thread
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The console as whoever feeds it sees it: a process beside ours, which ours never waits for."""
+"""Console as its feeder sees it: a separate process that never blocks this one."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -10,37 +10,37 @@ from common.companion.process import Companion
 from operator_side.viewing.facts import OperatorFacts
 
 _VIDEO_WAITS_BYTES: Final = 1 << 18
-"""Pictures are left out while more than this waits: a later one is newer."""
+"""Limit on waiting bytes above which pictures are skipped: a later one is newer."""
 _FACTS_WAIT_BYTES: Final = 1 << 20
 _MOST_HEARD: Final = 256
 _END_LIMIT_S: Final = 0.3
-"""It may still be starting, and has nothing to lose."""
+"""Limit on its end, in seconds: it may still be starting, and has nothing to lose."""
 
 
 PageWords = tuple[int, dict[str, Any] | None]
-"""Which of the pages of this run, and its `hands`, what it wants to `tune`, or to `play`; None: this page is gone."""
+"""Number of a page in this run, and its `hands`, its wish to `tune` or to `play`; None: this page is gone."""
 
 
 class Console:
-    """The browser console; without viser there is none, which a note says."""
+    """Browser console; without viser there is none, which a note reports."""
 
     def __init__(self, title: str, *, port: int = 0, live: bool = True) -> None:
-        """Start it on `port` of this machine, 0 for any; `live`: no recording."""
+        """Start it on `port` of this machine, 0 for any free one. live: no recording."""
         self.address: str | None = None
-        """Where its page is, with the token that lets in; None until it is ready, and when it is gone."""
+        """Address of its page, with the token; None until it is ready, and when it is gone."""
         self.pages = 0
-        """How many are open: with none, nothing needs to be sent or rendered."""
+        """Number of open pages; with none, nothing must be sent or rendered."""
         self.lacks: tuple[int, int] | None = None
-        """As in `Watch`; None until it is known that pictures in H.264 can be shown."""
+        """As in `Watch`; None until it can show pictures in H.264."""
         self.came = 0
-        """How often one came to look."""
+        """Number of times that a page was opened."""
         self.words: deque[PageWords] = deque(maxlen=_MOST_HEARD)
-        """What the pages said, the oldest first, for whoever takes it."""
+        """Words of the pages, oldest first, for the caller to take."""
         self._handling: set[int] = set()
-        """The pages that have said something of their hands, and are not gone."""
+        """Open pages that have sent hands."""
         self._notes: list[str] = []
         self.gone = False
-        """Whether there is none any more; a note says why."""
+        """Whether it has ended; a note gives the reason."""
         self._companion = Companion("operator_side.viewing.console", [str(port)])
         self._companion.channel.send(b"r", msgspec.msgpack.encode({"title": title, "live": live}))
 
@@ -51,29 +51,29 @@ class Console:
         self.close()
 
     def fileno(self) -> int:
-        """To wait for what it says."""
+        """Return the descriptor to wait for its messages."""
         return self._companion.channel.fileno()
 
     def facts(self, facts: OperatorFacts) -> None:
-        """Show these, unless it does not keep up."""
+        """Show these facts, unless it does not keep up."""
         if self.pages and self._companion.channel.waiting < _FACTS_WAIT_BYTES:
             self._companion.channel.send(b"f", msgspec.msgpack.encode(facts))
 
     def view(self, payload: bytes, *, video: bool) -> None:
-        """Show what the robot side published, as it came; `video`: the next picture is as good."""
+        """Show a payload of the robot side. video: it may be skipped, as the next picture is as good."""
         if self.pages and not (video and self._companion.channel.waiting > _VIDEO_WAITS_BYTES):
             self._companion.channel.send(b"v", payload)
 
     def played(self, state: Mapping[str, Any]) -> None:
-        """Show where a recording is: `at_s`, `length_s`, `speed`, `paused`."""
+        """Show a recording's position: `at_s`, `length_s`, `speed`, `paused`."""
         self._companion.channel.send(b"p", msgspec.msgpack.encode(state))
 
     def note(self, text: str) -> None:
-        """Show a line that stays."""
+        """Show a lasting line."""
         self._companion.channel.send(b"n", text.encode())
 
     def receive(self) -> None:
-        """Take what the console says; call it often."""
+        """Take the console's messages; call it often."""
         channel = self._companion.channel
         if self.gone:
             return
@@ -92,7 +92,7 @@ class Console:
             elif kind == b"s":
                 self._hear(*msgspec.msgpack.decode(content, type=PageWords))
         if channel.ended:
-            self._end("the console has ended; the run goes on without it")
+            self._end("the console has ended; the run continues without it")
 
     def _hear(self, page: int, said: dict[str, Any] | None) -> None:
         self.words.append((page, said))
@@ -102,7 +102,7 @@ class Console:
             self._handling.add(page)
 
     def _end(self, why: str) -> None:
-        """Whoever watched sees no more; whose hands moved something through a page is gone, too."""
+        """Note the end: no page is open, and all hands at pages are gone."""
         self.gone, self.address = True, None
         self.pages = 0
         for page in sorted(self._handling):
@@ -110,10 +110,10 @@ class Console:
         self._notes.append(why)
 
     def take_notes(self) -> list[str]:
-        """Lines for people since the last call."""
+        """Return the notes for people since the last call."""
         taken, self._notes = self._notes, []
         return taken
 
     def close(self) -> None:
-        """End it, at once."""
+        """End it at once."""
         self._companion.close(_END_LIMIT_S)

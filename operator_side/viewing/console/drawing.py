@@ -1,6 +1,6 @@
-"""The robot side's scene in viser: the robot as believed, the objects, and the gripper where it would be felt.
+"""Drawing of the robot side's scene in viser: the robot as believed, the objects, and the gripper where it is felt.
 
-Only what changed is sent: a batch of poses for all shapes that share a mesh.
+Only changes are sent: a batch of poses for all shapes that share a mesh.
 """
 
 from typing import Any, Final
@@ -15,7 +15,7 @@ from common.roles import ROLES, Role
 from operator_side.viewing.console.solids import Solid, solid_of, sphere
 
 Floats = NDArray[np.float64]
-"""Poses are rows of x, y, z and the quaternion w, x, y, z."""
+"""Array of float64; a pose is a row of x, y, z and the quaternion w, x, y, z"""
 
 _COLOR_OF: Final = {
     Role.OBSTACLE: (150, 150, 156),
@@ -26,29 +26,29 @@ _COLOR_OF: Final = {
 _ROLE_COLORS: Final = np.array([_COLOR_OF[role] for role in ROLES], np.float64)
 L2_COLOR: Final = (0, 114, 189)
 R2_COLOR: Final = (230, 130, 0)
-"""Blue and orange, which every eye tells apart; the page's style has the same."""
+"""Blue and orange, distinct also to the colour-blind; the page's style has the same"""
 _HALF_TINTED_M3: Final = 2e-6
-"""An overlap that colours an object half."""
+"""Overlap that tints an object by half, in cubic metres"""
 _GHOST_OPACITY: Final = 0.16
 _SEEN_FROM_M: Final = (0.42, -0.5, 0.34)
-"""The first look at the tool is from here, relative to it."""
+"""First camera position, relative to the tool"""
 _LIGHT_FROM: Final = (0.4, -1.0, 1.5)
 _FIELD_OF_VIEW: Final = 0.9
-"""The angle in radians."""
+"""Angle in radians"""
 _STILL: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _GONE: Final = 1e-6
-"""The size of what is not to be seen."""
+"""Scale of an invisible shape"""
 
 
 def compose(outer: Floats, inner: Floats) -> Floats:
-    """Poses (n, 7): `inner`, in the frame of `outer`, in the frame that that is in."""
+    """Transform poses (n, 7): `inner`, given in the frame `outer`, to the frame in which `outer` is given."""
     turn, inner_turn = (Rotation.from_quat(poses[:, 3:], scalar_first=True) for poses in (outer, inner))
     turns = (turn * inner_turn).as_quat(scalar_first=True)
     return np.concatenate([outer[:, :3] + turn.apply(inner[:, :3]), turns], axis=1)
 
 
 def _add(scene: viser.SceneApi, name: str, solid: Solid, places: Any, **looks: Any) -> viser.BatchedMeshHandle:
-    """Draw a solid at many places (n, 3), not turned yet."""
+    """Draw a solid at places (n, 3), not turned yet."""
     return scene.add_batched_meshes_simple(
         name,
         solid.vertices,
@@ -64,7 +64,7 @@ def _add(scene: viser.SceneApi, name: str, solid: Solid, places: Any, **looks: A
 
 
 class _Batch:
-    """Shapes that share a mesh."""
+    """Batch of shapes that share a mesh."""
 
     def __init__(self, scene: viser.SceneApi, name: str, solid: Solid, members: list[tuple[Shape, Any]]) -> None:
         shapes = [shape for shape, _ in members]
@@ -77,7 +77,7 @@ class _Batch:
         self._poses = np.full((len(members), 7), np.nan, np.float32)
 
     def place(self, links: Floats, objects: Floats, object_colors: NDArray[np.uint8]) -> None:
-        """Move and colour them; poses (n, 7) of the owners."""
+        """Move and colour them. links, objects: poses (n, 7) of the owners."""
         outer = np.empty((len(self.owner), 7))
         outer[self.of_robot] = links[self.owner[self.of_robot]]
         outer[~self.of_robot] = objects[self.owner[~self.of_robot]]
@@ -98,7 +98,7 @@ class _Batch:
 
 
 class _Ghost:
-    """The gripper's spheres where one trigger makes them felt."""
+    """Spheres of the gripper where one trigger makes it felt."""
 
     def __init__(self, scene: viser.SceneApi, name: str, color: tuple[int, int, int]) -> None:
         self._scene, self._name, self._color = scene, name, color
@@ -107,7 +107,7 @@ class _Ghost:
         self._radii: NDArray[np.float32] = np.zeros(0, np.float32)
 
     def place(self, spheres: NDArray[np.float32], moved_m: Floats | None, inflated_m: float) -> None:
-        """Spheres (m, 4), moved by (3,) and inflated; None: they are felt nowhere."""
+        """Draw spheres (m, 4), moved by (3,) and inflated; None hides them."""
         moved: NDArray[np.float32] = (spheres[:, :3] + (0.0 if moved_m is None else moved_m)).astype(np.float32)
         radii = np.full(len(spheres), _GONE, np.float32) if moved_m is None else spheres[:, 3] + np.float32(inflated_m)
         if self._handle is None or self._count != len(spheres):
@@ -124,7 +124,7 @@ class _Ghost:
 
 
 class Drawing:
-    """The scene as last told."""
+    """Drawing of the newest scene."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
@@ -144,7 +144,7 @@ class Drawing:
         server.scene.add_light_directional("/light from above", intensity=1.3, position=_LIGHT_FROM)
 
     def shapes(self, shapes: SceneShapes) -> None:
-        """Build what there is, unless it is there."""
+        """Build the shapes, unless this version is built."""
         if self._shapes is not None and self._shapes.version == shapes.version:
             return
         for batch in self._batches:
@@ -162,7 +162,7 @@ class Drawing:
         ]
 
     def state(self, state: SceneState, needed_m: tuple[float | None, float | None], advancing: str) -> None:
-        """Move everything; `needed_m`: D of L2 and R2. What belongs to other shapes is passed over."""
+        """Move everything. needed_m: D of L2 and R2. A state of another version's shapes is ignored."""
         shapes = self._shapes
         if shapes is None or shapes.version != state.version:
             return
@@ -200,7 +200,7 @@ class Drawing:
                 self._label.visible = False
             return
         index, text = int(targets[0]), f"target: {shapes.objects[targets[0]]}"
-        # The middle of its first shape: its own frame may be anywhere.
+        # At its first shape's centre: the object's own frame may be anywhere.
         pose = next((shape.pose for shape in shapes.shapes if shape.owner == index and not shape.of_robot), _STILL)
         position = compose(self._objects[index : index + 1], np.array([pose]))[0, :3]
         if self._label is None:
@@ -210,7 +210,7 @@ class Drawing:
 
 
 def _colors(roles: NDArray[np.uint8], state: SceneState) -> NDArray[np.uint8]:
-    """Colours by role; towards a trigger's colour the more of it that one's gripper overlaps."""
+    """Compute colours by role, tinted towards a trigger's colour by the overlap that it causes."""
     colors = _ROLE_COLORS[roles]
     for index, by_l2_m3, by_r2_m3 in state.overlaps:
         if 0 <= index < len(roles):

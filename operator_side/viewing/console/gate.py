@@ -1,4 +1,4 @@
-"""Who may see the console: any web site can reach a local port, so an address, a token and an origin must be right.
+"""Access to the console. Any web site can reach a local port, so address, token and origin must be right.
 
 http://127.0.0.1:PORT/TOKEN/        our page
 http://127.0.0.1:PORT/TOKEN/live    its WebSocket
@@ -12,29 +12,29 @@ from typing import Final, Protocol
 LIVE: Final = "/live"
 SCENE: Final = "/scene"
 SOCKETS: Final = (LIVE, SCENE)
-"""The places that are WebSockets, and nothing else."""
+"""Places that are WebSockets, and nothing else"""
 
 
 class Headers(Protocol):
-    """As websockets' are."""
+    """Headers as of `websockets`."""
 
     def get_all(self, key: str) -> Sequence[str]:
-        """Every value of one header, whose name is found in any case."""
+        """Return every value of a header, by its name in any case."""
 
 
 class Gate:
-    """Judges requests; it says of none why it was refused."""
+    """Judge of requests; it gives no reason for a refusal."""
 
     def __init__(self, token: str, port: int) -> None:
         self.address = f"http://127.0.0.1:{port}/{token}/"
-        """What to open: whoever knows it is let in."""
+        """Address of the page; it admits anyone who knows it."""
         self._token = token.encode("ascii")
         self._hosts = (f"127.0.0.1:{port}", f"localhost:{port}")
 
     def admits(self, path: str, headers: Headers) -> str | None:
-        """Where within the console a request for `path` leads, from `/` on and without a query; None: it is refused.
+        """Return the place in the console of a request for `path`, from `/` on and without a query; None to refuse.
 
-        A WebSocket must come from a page of ours, which only its Origin says; a page may come without one.
+        A WebSocket must come from a page of ours, by its Origin; a page may come without one.
         """
         hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
         upgrade = bool(headers.get_all("Upgrade"))
@@ -50,10 +50,11 @@ class Gate:
         return place if (place in SOCKETS) is upgrade else None
 
     def headers(self, place: str) -> dict[str, str]:
-        """What goes with an answer for `place`: it is kept nowhere, framed nowhere else, and asks nobody else.
+        """Return the headers of an answer for `place`: no caching, no foreign frames, no foreign sources.
 
-        viser's page is one file that unpacks itself, and starts a worker of WebAssembly. Ours shows it from the other
-        of our two names, as another site: it then has a process of its own in the browser, and no way into ours.
+        viser's page is one file that unpacks itself, and starts a worker of WebAssembly. Our page embeds it by the
+        other of our two names, as another site: the browser then isolates it in a separate process, without access to
+        ours.
         """
         sockets = " ".join(f"ws://{host}" for host in self._hosts)
         sites = " ".join(f"http://{host}" for host in self._hosts)

@@ -1,4 +1,4 @@
-"""The codes that the page shares with us, as the script `names.js` that is served with it: an object for each set."""
+"""Codes that the page shares with this side, as the script `names.js`: one object for each set."""
 
 import json
 from typing import Final, get_args
@@ -13,7 +13,7 @@ _CODES: Final = (ShownKind, LinkState, SessionState, Doing, Hands)
 
 
 def names() -> str:
-    """The script; `VIEWS` are in the order of their numbers on the wire."""
+    """Return the script; `VIEWS` are in the order of their numbers on the wire."""
     codes = {one.__name__: {member.name: member.value for member in one} for one in _CODES}
     codes["MotionState"] = {state.upper(): state for state in get_args(MotionState)}
     lines = [f"export const {name} = Object.freeze({json.dumps(members)});" for name, members in codes.items()]

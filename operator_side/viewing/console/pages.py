@@ -1,4 +1,4 @@
-"""The open pages: each gets the newest of everything as fast as it takes it, and says what its hands do."""
+"""Open pages: each receives the newest of every kind at its own pace, and reports its hands."""
 
 import asyncio
 import contextlib
@@ -12,22 +12,22 @@ from websockets.exceptions import ConnectionClosed
 from operator_side.viewing.facts import ShownKind
 
 MOST_PAGES: Final = 8
-"""At once; as many may draw the scene."""
+"""Limit on open pages, and on pages that draw the scene"""
 _MOST_NOTES: Final = 50
 _A_SECOND: Final = 500
-"""Messages that a page may send in a second: hands at 60 Hz, and every key's edge."""
+"""Limit on a page's messages in a second: hands at 60 Hz, and every key's edge"""
 _TOO_MANY, _NOT_OURS = 1013, 1008
-"""WebSocket's own codes: try again later; policy violation."""
+"""WebSocket's codes: try again later; policy violation"""
 
 ROUND_ENDS: Final = f'{{"kind":"{ShownKind.END}"}}'
-"""A page answers it with `taken`."""
+"""Message that a page answers with `taken`"""
 
 Heard = Callable[[str, bytes], None]
-"""Called with `s` and MessagePack of PageWords."""
+"""Callback with `s` and MessagePack of PageWords"""
 
 
 class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a page may say, as JSON; what is in the first three is not ours to judge."""
+    """Message of a page, in JSON. Others validate the content of the first three fields."""
 
     hands: dict[str, Any] | None = None
     tune: dict[str, Any] | None = None
@@ -35,14 +35,14 @@ class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     slow: bool | None = None
     """Whether its browser draws the scene without a graphics processor"""
     looks: bool | None = None
-    """Whether its tab can be seen: what is hidden is shown nothing"""
+    """Whether its tab is visible: a hidden one is sent nothing but lasting messages"""
     taken: bool | None = None
-    """All up to the last ROUND_ENDS has been looked at: the next round may come. Browsers store what a page has no time
-    for, without a bound, so that it would see everything, later and later."""
+    """Answer to ROUND_ENDS: the next round may follow. Browsers queue unread messages without a bound, so that a slow
+    page would see everything, later and later."""
 
 
 class _Page:
-    """What one page has not been sent yet: the newest of each kind, so that a slow one only misses some."""
+    """Queue of one page: the newest of each kind, so that a slow page only misses some."""
 
     def __init__(self) -> None:
         self.newest: dict[str, bytes | str] = {}
@@ -52,7 +52,7 @@ class _Page:
         self.looks = True
 
     async def send(self, connection: ServerConnection) -> None:
-        with contextlib.suppress(ConnectionClosed):  # whoever listens to it notices, too
+        with contextlib.suppress(ConnectionClosed):  # `_listen` notices it, too
             while True:
                 await self.something.wait()
                 self.something.clear()
@@ -64,10 +64,10 @@ class _Page:
 
 
 class Pages:
-    """All open pages. Everything here happens in the server's own thread."""
+    """All open pages; runs in the server's thread."""
 
     def __init__(self, changed: Callable[[int], None], heard: Heard) -> None:
-        """`changed` is told how many there are to look at now."""
+        """changed: called with the number of visible pages."""
         self._changed = changed
         self._heard = heard
         self._pages: dict[int, _Page] = {}
@@ -77,11 +77,11 @@ class Pages:
 
     @property
     def slow(self) -> bool:
-        """Whether one of them draws the scene slowly."""
+        """Whether any page draws the scene slowly."""
         return any(page.slow for page in self._pages.values())
 
     def show(self, kind: str, message: bytes | str, *, lasting: bool = False) -> None:
-        """Send this, text or bytes, instead of what of this kind has not left yet; `lasting`: to later pages, too."""
+        """Send text or bytes, in place of an unsent message of this kind. lasting: to later pages, too."""
         if lasting:
             self._lasting.pop(kind, None)  # the newest comes last
             self._lasting[kind] = message
@@ -91,12 +91,12 @@ class Pages:
                 page.something.set()
 
     def note(self, message: str) -> None:
-        """Send this to every page, and to later ones."""
+        """Send a note to every page, and to later ones."""
         self._noted += 1
         self.show(f"{ShownKind.NOTE} {self._noted % _MOST_NOTES}", message, lasting=True)
 
     async def serve(self, connection: ServerConnection) -> None:
-        """One page, until it goes."""
+        """Serve one page until it closes."""
         if len(self._pages) >= MOST_PAGES:
             await connection.close(_TOO_MANY, f"{MOST_PAGES} pages are open")
             return

@@ -1,4 +1,4 @@
-"""Requests from outside that must be refused: viser may change how it opens its server, and nobody would notice."""
+"""Proof of the gate by requests from outside: viser may change how it opens its server, unnoticed."""
 
 import http.client
 from collections.abc import Mapping
@@ -14,9 +14,9 @@ _UPGRADE: Final = {
 
 
 def prove(port: int, token: str) -> str | None:
-    """What the server on `port` of this machine lets in or keeps out against the gate's rules; None: nothing.
+    """Return the first answer of the server on `port` of this machine that breaks the gate's rules; None without one.
 
-    OSError when it does not answer.
+    OSError if it does not answer.
     """
     here = f"127.0.0.1:{port}"
     ours, foreign = {"Origin": f"http://{here}"}, {"Origin": "http://example.com"}

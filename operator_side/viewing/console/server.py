@@ -1,8 +1,8 @@
-"""One server for the page and viser's scene, with the gate in front of both.
+"""Server of the page and of viser's scene, with the gate in front of both.
 
-viser opens its server with one call of `websockets.asyncio.server.serve`. That call is ours while it does so: it gets
-our socket, bound to this machine alone, and our judgement of each request, so that nothing of viser's is reached that
-the gate has not admitted. `prove` asks from outside whether that is so.
+viser opens its server with one call of `websockets.asyncio.server.serve`. Ours replaces that call meanwhile: it passes
+our socket, bound to this machine alone, and our check of each request, so that only admitted requests reach viser.
+`prove` tests that from outside.
 """
 
 import asyncio
@@ -24,10 +24,10 @@ from operator_side.viewing.console.names import names
 from operator_side.viewing.console.pages import MOST_PAGES, Pages
 
 _LARGEST_MESSAGE: Final = 1 << 16
-"""From a page: its hands, or where viser's camera is."""
+"""Limit on a page's message, in bytes: its hands, or viser's camera"""
 _PING_S: Final = 5.0
 _CLOSE_S: Final = 0.5
-"""Who is shown out for talking too much still talks."""
+"""Limit on a WebSocket's closing, in seconds: a page closed for sending too much still sends"""
 _TYPES: Final[Mapping[str, str]] = {
     ".html": "text/html; charset=utf-8",
     ".css": "text/css; charset=utf-8",
@@ -40,16 +40,16 @@ ProcessRequest = Callable[[ServerConnection, Request], Response | None]
 
 
 class Viser(viser.ViserServer):
-    """As viser's, without the tunnel through which it would show the scene to the world if a page asked for it."""
+    """viser's server, without the tunnel that would publish the scene at a page's request."""
 
     def request_share_url(self, verbose: bool = True) -> str | None:
-        """Refuse it."""
+        """Refuse the tunnel."""
         del verbose
         return None
 
 
 def read_page() -> dict[str, tuple[str, bytes]]:
-    """The page's files by their place, and its names: content type and content."""
+    """Read the page's files and its names: by place, content type and content."""
     folder = resources.files("operator_side.viewing.console") / "page"
     files = {
         f"/{file.name}": (_TYPES[file.name[file.name.rindex(".") :]], file.read_bytes())
@@ -60,10 +60,10 @@ def read_page() -> dict[str, tuple[str, bytes]]:
 
 
 class Server:
-    """viser's server behind the gate; everything of ours happens in its thread's `loop`."""
+    """viser's server behind the gate; our code runs in its thread's `loop`."""
 
     def __init__(self, gate: Gate, pages: Pages, part: socket.socket) -> None:
-        """`part`: bound. RuntimeError when viser did not open its server as we know it."""
+        """part: a bound socket. RuntimeError if viser does not open its server in the known way."""
         self._gate = gate
         self._pages = pages
         self._part = part
@@ -108,7 +108,7 @@ class Server:
             websockets.asyncio.server.serve = opens  # type: ignore[misc]
 
     def _answer(self, connection: ServerConnection, request: Request, visers: ProcessRequest) -> Response | None:
-        """The answer to a request, None for a WebSocket that is let in."""
+        """Return the answer to a request; None for an admitted WebSocket."""
         place = self._gate.admits(request.path, request.headers)
         if place in SOCKETS:
             return None

@@ -1,8 +1,6 @@
-"""The shapes of a scene as triangles that a browser draws: one mesh for all that differ in size alone.
+"""Shapes of a scene as triangles for a browser: one mesh for all that differ in size alone. Meshes are trimesh's.
 
-The meshes are trimesh's.
-
-Vertices (v, 3) float32 in metres, triangles (t, 3) uint32, seen from outside counterclockwise.
+Vertices (v, 3) float32 in metres, triangles (t, 3) uint32, counterclockwise from outside.
 """
 
 from functools import cache
@@ -21,7 +19,7 @@ _SHEET_M: Final = 1e-3
 
 
 class Solid(NamedTuple):
-    """Triangles, before they are scaled along each axis."""
+    """Triangles before scaling along each axis."""
 
     vertices: Floats
     triangles: NDArray[np.uint32]
@@ -30,7 +28,7 @@ class Solid(NamedTuple):
 
 
 def solid_of(shape: Shape) -> tuple[tuple[object, ...], Solid, tuple[float, float, float]]:
-    """A key that is equal for shapes that share a mesh, that mesh, and the scale."""
+    """Return a key that is equal for shapes that share a mesh, that mesh, and the scale."""
     x, y, z = shape.size_m
     if shape.kind == "box":
         return ("box",), box(), (x, y, z)
@@ -53,13 +51,13 @@ def solid_of(shape: Shape) -> tuple[tuple[object, ...], Solid, tuple[float, floa
 
 @cache
 def box() -> Solid:
-    """Half sizes of 1."""
+    """Return a box with half sizes of 1."""
     return _solid(trimesh.creation.box((2.0, 2.0, 2.0)), flat=True)
 
 
 @cache
 def sphere(divisions: int = 2) -> Solid:
-    """Radius 1: an icosahedron whose triangles are divided into four, `divisions` times."""
+    """Return a sphere of radius 1: an icosahedron whose triangles are divided into four, `divisions` times."""
     return _solid(trimesh.creation.icosphere(subdivisions=divisions))
 
 

@@ -1,4 +1,4 @@
-"""A page of the console as a controller: what its hands do is a state like any controller's, and counts as given."""
+"""Console page as a controller: its hands give a controller's state, used as it is."""
 
 from collections.abc import Callable
 from typing import Final
@@ -13,20 +13,20 @@ from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.pages.page_messages import PageHands
 
 _PRESS_S: Final = 0.2
-"""For so long the arming button is pressed, and then let go, until the arm is armed: each press is another edge."""
+"""Half period of presses of the arming button until the arm is armed, in seconds: each press is an edge."""
 _GRIPPER: Final = {1: Action.CLOSE_GRIPPER, -1: Action.OPEN_GRIPPER}
 
 
 class BrowserHands:
-    """Hold-to-run arms, once per press; what moves the arm counts from when it was seen at rest while armed."""
+    """Hands of a page. Hold-to-run arms, once per press; motion counts once the hands were at rest while armed."""
 
     has_person = False
-    """Whether there is a scripted person who could go on."""
+    """Whether there is a scripted person to continue."""
 
     def __init__(
         self, pages: DrivingPage, calibrate: Callable[[TravelCalibration], None], *, swap_sides: bool = False
     ) -> None:
-        """`calibrate`: is told how to read the states: a page's travel has no dead zones."""
+        """calibrate: called with the calibration for the states: a page's travel has no dead zones."""
         self._pages = pages
         self._calibrate = calibrate
         self._swap_sides = swap_sides
@@ -38,24 +38,24 @@ class BrowserHands:
 
     @property
     def hands(self) -> Hands:
-        """Whose hands they are."""
+        """Owner of the hands."""
         return Hands.BROWSER
 
     @property
     def doing(self) -> Doing:
-        """What they do."""
+        """Present action of the hands."""
         if self._pages.doing is not Doing.RUNNING or self._moves:
             return self._pages.doing
         return Doing.AT_REST_FIRST if self._was_armed else Doing.ARMING
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Do what the page's hands do; the screen says whether the arm is armed."""
+        """Take the page's hands; the screen reports whether the arm is armed."""
         del delay_s
         self._calibrate(AS_GIVEN)
         hands = self._pages.hands(now_s)
         armed = screen is not None and screen.state == "armed"
         if hands is not None and self._was_armed and not armed:
-            # It stopped under these hands: it arms again when they have rested, not by itself.
+            # It stopped under these hands: they must rest before it arms again.
             self._pages.rest_anew()
             hands = None
         if hands is None:
@@ -75,21 +75,21 @@ class BrowserHands:
 
     @property
     def released(self) -> bool:
-        """Nothing that was told holds or shakes; a page only shows it."""
+        """Whether the last write neither resists nor rumbles; a page only shows it."""
         return self._told.releases
 
     def read(self, now_s: float) -> ControllerState | None:
-        """The state by the last tick."""
+        """Return the state of the last tick."""
         del now_s
         return self._state
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Remember it."""
+        """Store `feel`."""
         del now_s
         self._told = feel.following(self._told)
 
     def close(self) -> None:
-        """There is nothing to let go."""
+        """Store the release: there is no device to close."""
         self._told = self._told.farewell
 
     def _held(self, hands: PageHands, pressed: set[Action]) -> ControllerState:

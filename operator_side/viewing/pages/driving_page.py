@@ -1,9 +1,9 @@
-"""Which page drives, and whether its hands count: keys that a browser lost must never move the arm.
+"""Choice of the page that drives, and whether its hands count: keys lost by a browser must never move the arm.
 
-nobody ─▶ resting ─▶ ready ─▶ running         of the page that drives, the first that began on purpose
+nobody ─▶ resting ─▶ ready ─▶ running         the page that drives: the first that began on purpose
              ▲         │         │
-             └─────────┴─────────┘  a key besides hold-to-run, hold-to-run let go, a stop, a disarmed arm
-silence for 150 ms, a page that lets go or closes: nobody, and whoever drives next rests first
+             └─────────┴─────────┘  a key besides hold-to-run, hold-to-run released, a stop, a disarmed arm
+silence for 150 ms, a page that stops driving or closes: nobody, and the next driver rests first
 """
 
 from collections import deque
@@ -17,34 +17,34 @@ from operator_side.viewing.facts import HandsFacts
 from operator_side.viewing.pages.page_messages import PageHands, PageMessage, TuneWish
 
 SILENCE_S: Final = 0.15
-"""Without a message for so long a page drives no more, and a stop of it is not pressed any more."""
+"""Silence after which a page drives no more, and its stop counts as released, in seconds."""
 REST_S: Final = 1.0
-"""All keys are up for so long before hold-to-run counts."""
+"""Time with all keys up before hold-to-run counts, in seconds."""
 _MOST_WISHES: Final = 16
-"""From one turn to the next."""
+"""Capacity between two turns."""
 
 
 class DrivingPage:
-    """Takes what pages say; `now_s` is the time at which that arrived."""
+    """Receiver of pages' messages; `now_s` is the time of arrival."""
 
     def __init__(self, *, may_drive: bool = True) -> None:
-        """`may_drive`: False where a real controller drives: pages can still stop, and tune."""
+        """may_drive: False while a real controller drives: pages can still stop, and tune."""
         self.may_drive = may_drive
         self.rejected = 0
-        """Messages that were none."""
+        """Number of invalid messages."""
         self.stale = 0
-        """Messages that others of the same page had overtaken; only a stop in them counts."""
+        """Number of messages that others of the same page had overtaken; only their stop counts."""
         self.silences = 0
-        """How often a page that drove was silent for too long"""
+        """Number of times that a driving page was silent for too long"""
         self._numbers: dict[int, int] = {}
-        """The newest message of each open page"""
+        """Number of the newest message of each open page"""
         self._refused: set[int] = set()
         self._driver: int | None = None
         self._newest: PageHands | None = None
         self._heard_s = 0.0
         self._up_since_s: float | None = None
         self.doing = Doing.NOBODY_DRIVES
-        """Of the page that drives, by what was last heard or asked"""
+        """Action of the page that drives, as of the last call"""
         self._stop_s: float | None = None
         self._giving_back: set[int] = set()
         self._give_back = False
@@ -52,11 +52,11 @@ class DrivingPage:
 
     @property
     def driver(self) -> str | None:
-        """The word of the page that drives, by what was last heard or asked; None for none."""
+        """Word of the page that drives, as of the last call; None for none."""
         return None if self._newest is None else self._newest.page
 
     def receive(self, page: int, content: object, now_s: float) -> None:
-        """Take one message of the page of this number; what is invalid is refused whole, and counted."""
+        """Take one message of the page of this number; an invalid one is refused whole, and counted."""
         self._expire(now_s)
         try:
             message = msgspec.convert(content, PageMessage)
@@ -69,7 +69,7 @@ class DrivingPage:
             self._take(page, message.hands, now_s)
 
     def close(self, page: int, now_s: float) -> None:
-        """The page is gone."""
+        """Forget the page, as it is gone."""
         self._expire(now_s)
         self._numbers.pop(page, None)
         for gone in (self._refused, self._giving_back):
@@ -78,31 +78,31 @@ class DrivingPage:
             self._let_go()
 
     def hands(self, now_s: float) -> PageHands | None:
-        """What the driving page's hands do, once they count; None while they rest, or nobody drives."""
+        """Return the driving page's hands once they count; None while they rest, or nobody drives."""
         self._expire(now_s)
         return self._newest if self.doing is Doing.RUNNING else None
 
     def driven(self, now_s: float) -> bool:
-        """Whether a page drives, its hands at rest or not."""
+        """Return whether a page drives, even at rest."""
         self._expire(now_s)
         return self._driver is not None
 
     def stopping(self, now_s: float) -> bool:
-        """Whether a page presses the emergency stop, whoever drives."""
+        """Return whether any page presses the emergency stop."""
         return self._stop_s is not None and now_s - self._stop_s < SILENCE_S
 
     def rest_anew(self) -> None:
-        """All keys have to be up again first."""
+        """Require all keys up again before hold-to-run counts."""
         if self._driver is not None:
             self.doing, self._up_since_s = Doing.ALL_KEYS_UP_FIRST, None
 
     def take_give_back(self) -> bool:
-        """Whether a page has let the scripted person go on since the last call."""
+        """Return whether a page has handed back to the scripted person since the last call."""
         given, self._give_back = self._give_back, False
         return given
 
     def follow(self, core: OperatorSide, now_s: float) -> None:
-        """In every turn: a stop on a page counts like the controller's, and what a page wants tuned is asked for."""
+        """Apply pages' stops, as the controller's, and their tuning wishes; call it every turn."""
         if self.stopping(now_s):
             core.press_stop(now_s)
         while self.wishes:
@@ -110,12 +110,12 @@ class DrivingPage:
             core.tune(wish.probability, wish.link, now_s)
 
     def facts(self, core: OperatorSide, now_s: float, *, person: bool) -> HandsFacts:
-        """Facts for the pages; person: as in these."""
+        """Return the facts for the pages. person: as in HandsFacts."""
         self._expire(now_s)
         return HandsFacts(self.may_drive, self.driver, person, core.tuner.why, core.tuner.link)
 
     def _take(self, page: int, hands: PageHands, now_s: float) -> None:
-        if hands.stop:  # however late it comes
+        if hands.stop:  # even an overtaken one
             self._stop_s = now_s
             self.rest_anew()
         if hands.number <= self._numbers.get(page, -1):
@@ -128,7 +128,7 @@ class DrivingPage:
             self._follow(hands, now_s)
 
     def _choose(self, page: int, hands: PageHands) -> None:
-        """Who drives after this message: nobody takes over from a page that does."""
+        """Choose the driver after this message: nobody takes over from a page that drives."""
         may_give_back = self._driver in (None, page) and page not in self._giving_back
         (self._giving_back.add if hands.give_back else self._giving_back.discard)(page)
         if hands.give_back and may_give_back:
@@ -141,7 +141,7 @@ class DrivingPage:
             self._driver = page
             self.doing, self._up_since_s = Doing.ALL_KEYS_UP_FIRST, None
         elif page != self._driver:
-            # It asks anew once it has let go of asking: nobody drives without meaning it.
+            # It must stop asking before it may ask again: nobody drives by accident.
             self._refused.add(page)
 
     def _follow(self, hands: PageHands, now_s: float) -> None:

@@ -1,4 +1,4 @@
-"""A controller that a person in a browser may take out of the scripted person's hands, and give back."""
+"""Controller that a person in a browser may take over from the scripted person, and hand back."""
 
 from collections.abc import Callable
 
@@ -14,10 +14,10 @@ from operator_side.viewing.pages.driving_page import DrivingPage
 
 
 class SharedHands(BrowserHands):
-    """The scripted person lets go as soon as a page drives or stops, and goes on only when told to: silence tells
-    nothing. Whoever goes on is a new person, who believes nothing of what was before.
+    """Hands of the scripted person, until a page drives or stops. Only a page's wish hands back to them, never its
+    silence; then a new person begins, without memory.
 
-    As a controller it is the person's, or the page; both are told what to feel.
+    As a controller it is the person's, or the page; both receive each write.
     """
 
     has_person = True
@@ -32,23 +32,23 @@ class SharedHands(BrowserHands):
         *,
         swap_sides: bool = False,
     ) -> None:
-        """`device` is held by who comes from `new_person`, and read by `calibration`."""
+        """device: held by the result of `new_person`. calibration: of that device."""
         super().__init__(pages, calibrate, swap_sides=swap_sides)
         self._device, self._calibration, self._new_person = device, calibration, new_person
         self._person: Whoever | None = new_person()
 
     @property
     def hands(self) -> Hands:
-        """Whose hands they are: the person's or a browser's."""
+        """Owner of the hands: the person or a browser."""
         return Hands.BROWSER if self._person is None else Hands.PERSON
 
     @property
     def doing(self) -> Doing:
-        """What they do."""
+        """Present action of the hands."""
         return super().doing if self._person is None else self._person.doing
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Move the hands; `delay_s` is the round trip that the person has got used to."""
+        """Move the hands. delay_s: round trip that the person is used to."""
         given_back = self._pages.take_give_back()
         if self._pages.stopping(now_s) or self._pages.driven(now_s):
             self._person = None
@@ -65,15 +65,15 @@ class SharedHands(BrowserHands):
 
     @property
     def released(self) -> bool:
-        """Both are."""
+        """Whether both are released."""
         return self._device.released and super().released
 
     def read(self, now_s: float) -> ControllerState | None:
-        """The state by whose hands they are."""
+        """Return the state of the present owner's controller."""
         return super().read(now_s) if self._person is None else self._device.read(now_s)
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Tell both: whoever goes on feels what there is."""
+        """Write to both, so that the next owner feels the present effects."""
         self._device.write(feel, now_s)
         super().write(feel, now_s)
 

@@ -1,1 +1,1 @@
-"""The console's facts, drawn in a terminal, for machines without a browser."""
+"""View of the console's facts in a terminal, for machines without a browser."""

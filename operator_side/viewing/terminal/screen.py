@@ -1,4 +1,4 @@
-"""A whole screen of one moment: it grows wider with the room, and a low screen loses its end."""
+"""Screen of one moment: curves grow with the width, and a low terminal cuts the end."""
 
 import math
 from collections import deque
@@ -18,7 +18,7 @@ from operator_side.viewing.facts import OperatorFacts
 
 SILENT_AFTER_S: Final = 0.5
 _KEPT: Final = 200
-"""Facts that the curves show: 20 s of them, at ten a second; and notes."""
+"""Number of facts in the curves, 20 s at ten a second, and of notes"""
 _CURVES: Final = (("delay", "ms"), ("stiffness", ""), ("overlap", "mm³"), ("tick p99", "µs"))
 _BLOCKS: Final = " ▁▂▃▄▅▆▇█"
 _ALARM, _ARMED, _QUIET = "bold white on red", "bold black on bright_cyan", "reverse"
@@ -26,7 +26,7 @@ _FAINT, _TITLE, _PULL, _FELT = "bright_black", "bold", "bright_cyan", "bold brig
 
 
 class Screen:
-    """Remembers what the terminal shows."""
+    """Content of the terminal."""
 
     def __init__(self) -> None:
         self.facts: OperatorFacts | None = None
@@ -34,13 +34,13 @@ class Screen:
         self._history: deque[tuple[float, ...]] = deque(maxlen=_KEPT)
 
     def add(self, facts: OperatorFacts) -> None:
-        """Show these facts, and their figures in the curves; 0 for unknown."""
+        """Show these facts, with their figures in the curves; 0 for unknown."""
         self.facts, stiffest = facts, max(facts.l2.stiffness or 0.0, facts.r2.stiffness or 0.0)
         ahead = (None, None) if facts.scene is None else (facts.scene.overlap_mm3, facts.scene.tick_p99_us)
         self._history.append(tuple(number(value) or 0.0 for value in (facts.to_operator.newest_ms, stiffest, *ahead)))
 
     def lines(self, age_s: float, width: int) -> Group:
-        """Draw at most `width` columns, the most important lines first. `age_s`: time since the facts came."""
+        """Draw at most `width` columns, most important lines first. age_s: time since the facts came."""
         facts = self.facts
         view = LiveView() if facts is None else LiveView(facts.robot, facts.status)
         drawn: list[RenderableType] = [_banner(view, 0.0 if facts is None else age_s, width)]
@@ -55,7 +55,7 @@ class Screen:
 
 
 def _line(*pieces: str | tuple[str, str], style: str = "") -> Text:
-    """One line of plain or styled pieces; control characters of a peer do not reach the terminal."""
+    """Make a line of plain or styled pieces; a peer's control characters do not reach the terminal."""
     styled = [(piece, "") if isinstance(piece, str) else piece for piece in pieces]
     safe = ((printable(text), look) for text, look in styled)
     return Text.assemble(*safe, style=style, no_wrap=True, overflow="ellipsis")
@@ -67,7 +67,7 @@ def _named(**said: object) -> Text:
 
 
 def _banner(view: LiveView, age_s: float, width: int) -> Text:
-    """The state in words and signs that need no colour; only an alarm fills the whole line."""
+    """Draw the state in words and signs that need no colour; only an alarm fills the line."""
     text = view.phase if view.reason is None else f"{view.phase}: {view.reason}"
     if (old := age_s > SILENT_AFTER_S) or view.alarm:
         return _line(f"!!! {f'NO NEWS for {age_s:.1f} s' if old else text} ".ljust(width, "!"), style=_ALARM)
@@ -78,7 +78,7 @@ def _banner(view: LiveView, age_s: float, width: int) -> Text:
 
 
 def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
-    """Show what both sides say of the link, over the last second, and of what is ahead and in the hand."""
+    """Draw both sides' figures of the link, over the last second, of objects ahead and of the held one."""
     status, robot, known = view.operator, view.robot, view.scene
     felt = {} if status.feel in (None, Sight.SEEING) else {"feel": words(status.feel)}
     who = {"lease": words(status.owner), "hands": words(facts.hands), "controller": words(status.controller)}
@@ -109,7 +109,7 @@ def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
 
 
 def _trigger(facts: OperatorFacts, name: str, cells: int) -> Group:
-    """The finger's place, the strengths along its way, and the distances at which they begin; `cells` for a zone."""
+    """Draw the finger's place, the strengths over the travel, and the onset distances. cells: width of a zone."""
     trigger, does = facts.l2 if name == "L2" else facts.r2, "advances" if facts.advancing == name else "retreats"
     raw, metres, cells = number(trigger.raw), number(trigger.needed_m), max(1, cells)
     reached = math.ceil(min(1.0, max(0.0, (raw or 0.0) * SENSED_TRAVEL)) * cells * 10)
@@ -128,7 +128,7 @@ def _trigger(facts: OperatorFacts, name: str, cells: int) -> Group:
 
 
 def _curve(name: str, unit: str, past: Sequence[float], width: int) -> Text:
-    """One figure over the last `_KEPT` facts as blocks, each the largest of a few; and its newest and largest value."""
+    """Draw a figure's last `_KEPT` values as blocks, each the largest of a few; and its newest and largest value."""
     few, top = math.ceil(_KEPT / max(1, width - 34)), max(1.0, *past)
     highest = (max(past[max(0, end - few) : end]) for end in range(len(past), 0, -few))
     blocks = "".join(_BLOCKS[round(8 * max(0.0, value) / top)] for value in highest)[::-1].rjust(math.ceil(_KEPT / few))
@@ -136,7 +136,7 @@ def _curve(name: str, unit: str, past: Sequence[float], width: int) -> Text:
 
 
 def _figure(value: float | None, width: int = 0) -> str:
-    """A figure with as many digits as say something."""
+    """Format a figure with its significant digits."""
     if (known := number(value)) is None:
         return f"{UNKNOWN:>{width}}"
     return f"{known:{width}.{0 if abs(known) >= 100.0 else 1 if abs(known) >= 1.0 else 2}f}"

@@ -1,7 +1,7 @@
-"""The terminal view in the place of the status line: the same calls, drawn by a process that nobody waits for.
+"""Terminal view instead of the status line: the same calls, drawn by a separate process that never blocks this one.
 
-`python -m operator_side.viewing.terminal.status FD` is that process. It may wait for the terminal; facts that came
-meanwhile are passed over. It ends when the other end of the channel does, and puts the terminal back.
+`python -m operator_side.viewing.terminal.status FD` is that process. It may wait for the terminal; facts that arrive
+meanwhile are skipped. It ends with the other end of the channel, and restores the terminal.
 """
 
 import contextlib
@@ -31,7 +31,7 @@ _INPUT, _LOCAL, _LETTERS = 0, 3, 6
 
 
 class TerminalStatus(Status):
-    """Shows facts on the whole terminal while the context is open; notes after it are results, written as ever."""
+    """Status on the whole terminal while the context is open; later notes are results, written as usual."""
 
     wants_facts: Final = True
     _companion: Companion | None = None
@@ -48,41 +48,41 @@ class TerminalStatus(Status):
         return self
 
     def __exit__(self, *ended: Any) -> None:
-        """End the process that draws, and put the terminal back where it could not do so itself."""
+        """End the drawing process, and restore the terminal if that process could not."""
         companion, self._companion = self._companion, None
         if companion is not None:
             companion.close(_END_LIMIT_S)
             _put_back(self._before)
 
     def show(self, now_s: float, *, robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> None:
-        """Show nothing: the same is in the facts."""
+        """Show nothing: the facts contain it."""
         del robot, operator
         self._next_s = now_s + _PERIOD_S
 
     def show_facts(self, facts: OperatorFacts | str) -> None:
-        """Have them drawn, or dropped while the terminal stalls; a note, too."""
+        """Send facts, or a note, to be drawn; they are dropped while the terminal stalls."""
         if self._companion is not None:
             self._companion.channel.send(msgspec.msgpack.encode(facts))
             if self._companion.channel.ended:
                 self.__exit__()
 
     def note(self, text: str) -> None:
-        """Show a line for a while; after the context, for good."""
+        """Show a line for a while; after the context, print it."""
         (super().note if self._companion is None else self.show_facts)(text)
 
 
 def _put_back(attributes: list[Any]) -> None:
-    """Bring the first screen back, with the cursor; what was typed meanwhile is dropped. A closed one is left alone."""
+    """Restore the first screen and its cursor, and drop typed input. A closed terminal is left alone."""
     with contextlib.suppress(termios.error, OSError):
         termios.tcsetattr(sys.stdout, termios.TCSAFLUSH, attributes)
         os.write(sys.stdout.fileno(), _LEAVE)
 
 
 def main() -> None:
-    """Draw until the channel ends, or the terminal: the program that started us gets its own signal then."""
+    """Draw until the channel or the terminal ends: the program that started us gets its own signal then."""
     channel, _ = companion_channel(sys.argv[1:])
     before, changed = termios.tcgetattr(sys.stdout), termios.tcgetattr(sys.stdout)
-    # Ctrl-Z would leave an arm to itself, and Ctrl-S an old screen that looks like a new one.
+    # Ctrl-Z would leave the arm uncontrolled, and Ctrl-S an old screen that looks current.
     changed[_LETTERS][termios.VSUSP] = b"\x00"
     changed[_INPUT] &= ~termios.IXON
     changed[_LOCAL] &= ~termios.ECHO

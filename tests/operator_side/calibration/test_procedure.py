@@ -83,7 +83,7 @@ def test_the_wrong_trigger_is_pointed_out_and_does_not_count() -> None:
         hands.run(hands.now_s + REPORT_S)
     for r2 in (0.0, 0.5, 1.0, 0.5, 0.0):
         hands.procedure.feed(ControllerState(r2=r2), hands.now_s)
-    assert hands.procedure.complaint == "that is R2; let go of it and pull L2"
+    assert hands.procedure.complaint == "that is R2; release it and pull L2"
     assert hands.procedure.progress == 0.0
 
 

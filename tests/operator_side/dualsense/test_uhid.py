@@ -116,7 +116,7 @@ def test_questions_are_answered_as_they_come_and_reports_go_out_in_time_while_a_
 
 def test_a_kernel_that_lets_it_go_ends_its_life_with_an_error() -> None:
     kernel = FakeKernel(VirtualClock(), deque([(0.0, said(START))]), refuses_from_s=0.01)
-    with pytest.raises(DeviceError, match="let the controller go"):
+    with pytest.raises(DeviceError, match="released the controller"):
         lived(kernel, until_s=1.0)
     assert kernel.clock.now() == pytest.approx(0.012)
 
@@ -147,7 +147,7 @@ def test_the_file_reads_and_writes_without_waiting_and_quotes_a_refusal(
         assert file.wait(-1.0)
         assert file.read() == b"\x01\x00\x00\x00"
         monkeypatch.setattr(os, "write", refusing(22))
-        with pytest.raises(DeviceError, match=r"has let the controller go \(Invalid argument\)"):
+        with pytest.raises(DeviceError, match=r"has released the controller \(Invalid argument\)"):
             file.write(b"x")
     for use in (file.read, lambda: file.wait(0.0), lambda: file.write(b"x")):
         with pytest.raises(DeviceError, match="closed"):

@@ -1,4 +1,4 @@
-// The page: what the console sends, shown as it comes.
+// The page: shows the console's messages as they arrive.
 import { Chart } from "./charts.js";
 import { Hands as PageHands } from "./hands.js";
 import { make } from "./make.js";
@@ -11,7 +11,7 @@ const SILENCE_MS = 400; // facts come 30 times a second
 const RETRY_MS = 500;
 const MOST_NOTES = 50;
 const FIGURES = {
-  // of the bar: where, and what it is called
+  // in the bar: element and title
   link: "Link",
   lease: "Lease",
   whose: "Hands",
@@ -85,7 +85,7 @@ function receive(message) {
   }
 }
 
-// A robot side that was recorded alone: its pictures and its scene are there, and nothing is known of an operator side.
+// Recording of a robot side alone: its pictures and scene exist, and nothing of an operator side.
 function goWithoutFacts(atS) {
   everHeard = true;
   clock.set(atS, null);
@@ -123,12 +123,12 @@ function showFacts(message) {
   triggers.r2.show(facts.r2, message.fingers[1], facts.advancing === "R2");
   charts.delay.add(clock.nowMs, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
   const asked = [["robot", facts.to_robot.asked], ["operator", facts.to_operator.asked]].filter(([, words]) => words);
-  charts.delay.said = asked.map(([side, words]) => `asked to the ${side}: ${words}`).join("; ");
+  charts.delay.said = asked.map(([side, words]) => `emulated to the ${side}: ${words}`).join("; ");
   charts.stiffness.add(clock.nowMs, [facts.l2.stiffness, facts.r2.stiffness]);
   hands.show(facts);
 }
 
-// The link's rate and queue by the robot side's own measure, the packets that were lost, and what was held back.
+// Rate and queue as measured by the robot side, lost packets, and held-back streams.
 function showLink(status) {
   const figure = (value, digits = 0) => (value == null ? "?" : value.toFixed(digits));
   const rate = status.rate_kbit_s == null ? "?" : `${figure(status.rate_kbit_s / 1000, 1)} Mbit/s`;
@@ -145,14 +145,14 @@ byId("drawn").onclick = ({ currentTarget }) => {
   if (!drawn) frame.removeAttribute("src");
 };
 
-// Without a graphics processor the drawing takes processor time from everything else: it is then drawn less often.
+// Without a graphics processor the drawing takes processor time from all else: it is drawn less often.
 function drawsSlowly() {
   const context = document.createElement("canvas").getContext("webgl");
   const renderer = context?.getParameter(context.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? 0);
   return /swiftshader|llvmpipe|software|basic render/i.test(renderer ?? "software");
 }
 
-// Under our other name the scene is another site, with a process of its own: drawing it slows nothing here.
+// Under our other name the scene is another site, in a separate process: drawing it slows nothing here.
 function sceneAddress() {
   const address = new URL("scene/", location.href);
   address.hostname = location.hostname === "localhost" ? "127.0.0.1" : "localhost";
@@ -161,7 +161,7 @@ function sceneAddress() {
 }
 
 function showScene(scene) {
-  // Only now does viser know where to look at the scene from.
+  // Earlier, viser has no camera position for the scene.
   if (drawn && !frame.src) frame.src = sceneAddress();
   frame.hidden = !drawn;
   charts.overlap.add(clock.nowMs, scene.overlap_mm3);
@@ -198,7 +198,7 @@ function look() {
     const [word, because] = byId("lost").children;
     word.textContent = open ? (everHeard ? "NOTHING HEARD" : "WAITING FOR THE OPERATOR SIDE") : "CONNECTION LOST";
     const old = everHeard ? `What you see is ${(silentMs / 1000).toFixed(1)} s old. ` : "";
-    because.textContent = old + (open ? "The operator side says nothing." : `The console: ${closedBecause || "not reached yet"}.`);
+    because.textContent = old + (open ? "The operator side is silent." : `The console: ${closedBecause || "not reached yet"}.`);
   }
   for (const view of views) view.look();
 }

@@ -1,6 +1,6 @@
-// A line for each series over the last 20 seconds; series differ by dashes, not by colour alone.
+// Chart with a line for each series over the last 20 seconds; series differ by dashes, not by colour alone.
 const SPAN_MS = 20000;
-const GAP_MS = 1000; // nothing is known of what was in between
+const GAP_MS = 1000; // a longer gap interrupts the line
 const FONT = "system-ui, sans-serif";
 
 function roundUp(value) {
@@ -18,7 +18,7 @@ export class Chart {
     [this.#title, this.#unit, this.#series, this.#full] = [title, unit, series, full];
   }
 
-  // A moment before the newest one: a recording was put back.
+  // An earlier time than the newest one: the recording was moved back.
   add(nowMs, values) {
     if (this.#samples.at(-1)?.[0] > nowMs) this.#samples = [];
     this.#samples.push([nowMs, values]);

@@ -2,9 +2,9 @@
 //
 // watching ─▶ resting ─▶ ready ─▶ running       resting: all keys up for a second; ready: hold-to-run counts
 //     ▲          ▲         │         │
-//     └──────────┴─────────┴─────────┘  a key up, a blurred or hidden page, a stop, silence: everything is released
+//     └──────────┴─────────┴─────────┘  a key up, a blurred or hidden page, a stop, silence: all is released
 //
-// The operator side judges the same by itself (operator_side/viewing/pages/driving_page.py); this is to show it.
+// The operator side decides by the same rules (operator_side/viewing/pages/driving_page.py); this is for display.
 import { atRest, both, Grips, Keys, readGamepads, REST } from "./inputs.js";
 import { Doing, MotionState } from "./names.js";
 import { Panel } from "./panel.js";
@@ -12,9 +12,9 @@ import { Tuning } from "./tuning.js";
 
 const PERIOD_MS = 20;
 const REST_MS = 1000;
-const HELD_UP_MS = 150; // a page that was held up for so long releases, as the operator side does
-const SILENCE_MS = 500; // without facts for so long nobody knows what the arm does
-const AGREES_MS = 500; // until what we say shows in the facts
+const HELD_UP_MS = 150; // a page that was suspended for longer releases, as the operator side does
+const SILENCE_MS = 500; // without facts for longer the arm's state is unknown
+const AGREES_MS = 500; // until the facts reflect our messages
 const STOP_MS = 200;
 const STOP_TRIES_MS = 5000;
 const EDITS = "input:not([type=button]), select, textarea, [contenteditable=true]";
@@ -29,7 +29,7 @@ export class Hands {
   #page = crypto.getRandomValues(new Uint32Array(2)).join("-");
   #number = 0;
   #state = "watching";
-  #sinceMs = 0; // in this state
+  #sinceMs = 0; // start of this state
   #drivingSinceMs = null;
   #upSinceMs = null;
   #steppedMs = performance.now();
@@ -37,7 +37,7 @@ export class Hands {
   #sentMs = 0;
   #facts = null;
   #factsMs = 0;
-  #stopMs = null; // when the stop was pressed last
+  #stopMs = null; // time of the last press of the stop
   #stopHeld = new Set();
   #giveBack = false;
   #why = "";
@@ -46,7 +46,7 @@ export class Hands {
     this.#document = document;
     this.#send = send;
     this.#panel = new Panel(document, {
-      drive: () => (this.#state === "watching" ? this.#begin() : this.#end("You let go.")),
+      drive: () => (this.#state === "watching" ? this.#begin() : this.#end("You stopped driving.")),
       stop: (held) => this.#stop("pointer", held),
       giveBack: () => this.#giveBackNow(),
     });
@@ -61,7 +61,7 @@ export class Hands {
       if (document.visibilityState === "hidden") this.#release("The tab was hidden.");
     });
     document.addEventListener("focusin", ({ target }) => {
-      if (target.matches?.(EDITS)) this.#release("A field has the keys.");
+      if (target.matches?.(EDITS)) this.#release("A field has the focus.");
     });
     setInterval(() => this.#step(), PERIOD_MS);
   }
@@ -82,7 +82,7 @@ export class Hands {
     return this.#facts?.status.state === MotionState.ARMED;
   }
 
-  // Armed by the operator side's own hands, which may know it later than the status line.
+  // Armed by the operator side's own hands, which may learn of it later than the status.
   get #moves() {
     return this.#armed && this.#facts.status.person === Doing.RUNNING;
   }
@@ -95,12 +95,12 @@ export class Hands {
     }
     if (event.target.matches?.(EDITS)) return;
     if (event.ctrlKey || event.altKey || event.metaKey) {
-      this.#release("A key for the browser was pressed."); // whose keys up it may keep to itself
+      this.#release("A browser shortcut was pressed."); // the browser may keep its release to itself
       return;
     }
-    // While we only watch, too: a key that is down already has to come up first.
+    // Also while watching: a key that is down already must come up first.
     if (!this.#keys.press(event.code) || this.#state === "watching") return;
-    event.preventDefault(); // no scrolling, and no button pressed by Space
+    event.preventDefault(); // neither scroll nor press a button by Space
     if (!event.repeat) this.#step();
   }
 
@@ -111,7 +111,7 @@ export class Hands {
     this.#step();
   }
 
-  // The window has lost the focus, or the scene has it, which is another site's: its keys never reach us.
+  // The window has lost the focus, perhaps to the scene, which is another site: its keys never reach us.
   #left() {
     this.#release("The page lost the focus.");
     this.#stopHeld.delete("Escape");
@@ -136,7 +136,7 @@ export class Hands {
     this.#say(REST);
   }
 
-  // Whatever is held is held no more; a second of rest follows.
+  // Release all held inputs; a second of rest follows.
   #release(why) {
     this.#clear();
     if (this.#state === "watching") return;
@@ -168,7 +168,7 @@ export class Hands {
   }
 
   #giveBackNow() {
-    this.#end("The scripted person goes on.");
+    this.#end("The scripted person continues.");
     this.#giveBack = true;
     this.#say(REST);
     this.#giveBack = false;
@@ -191,14 +191,14 @@ export class Hands {
     this.#stop("gamepad", there && pads.stop);
     this.#panel.showGamepad(pads, there);
     if (this.#state !== "watching") {
-      if (passedMs > HELD_UP_MS) this.#release("This page was held up.");
+      if (passedMs > HELD_UP_MS) this.#release("This page was suspended.");
       if (nowMs - this.#factsMs > SILENCE_MS) this.#release("Nothing is heard from the operator side.");
     }
     const moves = this.#state === "running" && this.#moves;
     const keys = this.#keys.read(passedMs / 1000, moves);
     let hands = both(keys.hands, this.#grips.read());
     if (there) hands = both(hands, pads.hands);
-    // Without the focus no key is known to be up.
+    // Without the focus it is unknown which keys are up.
     this.#follow(hands, there && atRest(hands) && !keys.pressed && !this.#stops, nowMs);
     this.#say(this.#state === "running" ? hands : REST);
     this.#draw();
@@ -213,11 +213,11 @@ export class Hands {
       if (hands.run && !this.#stops) this.#enter("running", "");
       else this.#enter("resting", "Hold-to-run comes first.");
     } else if (this.#state === "running" && (!hands.run || this.#stops)) {
-      this.#enter("resting", "Hold-to-run was let go.");
+      this.#enter("resting", "Hold-to-run was released.");
     }
   }
 
-  // What the operator side says of us counts more than what we think.
+  // The operator side's view of us overrides ours.
   #agree() {
     const known = this.#hands;
     if (this.#state === "watching" || known === null) return;
@@ -230,7 +230,7 @@ export class Hands {
     }
   }
 
-  // At once when anything changes, and 50 times a second while we drive or stop.
+  // Send at once on any change, and 50 times a second while we drive or stop.
   #say(hands) {
     const stop = this.#stops;
     const driving = this.#state !== "watching";
@@ -239,7 +239,7 @@ export class Hands {
     const nowMs = performance.now();
     const changed = text !== this.#sent;
     if (!changed && (!(driving || stop) || nowMs - this.#sentMs < PERIOD_MS - 2)) return;
-    if (this.#sent === "" && !driving && !stop && !this.#giveBack) return; // there is nothing to say yet
+    if (this.#sent === "" && !driving && !stop && !this.#giveBack) return; // nothing to send yet
     this.#sent = text;
     this.#sentMs = nowMs;
     this.#send({ hands: { page: this.#page, number: this.#number++, ...said } });

@@ -1,7 +1,7 @@
-// What hands do at this page: keys by their place, whatever their layout; pointers; gamepads in the standard mapping.
+// Inputs of this page: keys by their place, for any layout; pointers; gamepads in the standard mapping.
 
 export const KEYS = [
-  // what it does, codes of the keys
+  // action, codes of the keys, label
   ["run", ["Space"], "hold to run (arms, too)"],
   ["advance", ["KeyW", "ArrowUp"], "advance"],
   ["retreat", ["KeyS", "ArrowDown"], "retreat"],
@@ -22,8 +22,8 @@ const DOES = new Map(KEYS.flatMap(([does, codes]) => codes.map((code) => [code, 
 const WORDS = { Space: "Space", ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRight: "→" };
 const LEVEL = /^(?:Digit|Numpad)([1-9])$/;
 const RAMP_S = 0.6;
-const PULLED = 0.05; // of a gamepad's trigger
-const DEFLECTED = 0.12; // of its sticks
+const PULLED = 0.05; // dead zone of a gamepad's trigger
+const DEFLECTED = 0.12; // dead zone of its sticks
 
 export const REST = Object.freeze({
   run: false, l2: 0, r2: 0, lateral: [0, 0], turning: [0, 0], gripper: 0, next_target: false, hand_over: false,
@@ -33,7 +33,7 @@ export const atRest = (hands) =>
   !hands.run && hands.l2 === 0 && hands.r2 === 0 && hands.gripper === 0 && !hands.next_target && !hands.hand_over &&
   [...hands.lateral, ...hands.turning].every((part) => part === 0);
 
-// Keys that are down, and how far what they do has come: up over RAMP_S, and to nothing at once.
+// Keys that are down, and the travel of each action: it rises over RAMP_S, and falls to zero at once.
 export class Keys {
   level = 4; // of 9
   #down = new Set();
@@ -56,7 +56,7 @@ export class Keys {
     this.#ways.clear();
   }
 
-  // `moves`: only then ways grow; keys that are held count as pressed in any case.
+  // moves: travels grow only then; held keys count as pressed in any case.
   read(passed_s, moves) {
     const held = new Set([...this.#down].map((code) => DOES.get(code)));
     const most = this.level / 9;
@@ -82,7 +82,7 @@ export class Keys {
 }
 
 export async function keyWords() {
-  // The words on this keyboard where the browser knows them, else those of the keys' own places.
+  // The key's label on this keyboard if the browser knows it, else the one of its place.
   const layout = await navigator.keyboard?.getLayoutMap?.().catch(() => null);
   return (code) => WORDS[code] ?? (layout?.get(code) ?? code.replace("Key", "")).toUpperCase();
 }
@@ -95,7 +95,7 @@ function stick(x, y) {
   return [x * part + 0, -y * part + 0]; // a gamepad's y points down
 }
 
-// `swapped`: left and right exchanged, as for a controller of ours.
+// swapped: left and right exchanged, as for a controller of ours.
 export function readGamepads(swapped) {
   const found = [...(navigator.getGamepads?.() ?? [])].filter((pad) => pad?.connected);
   const known = found.filter((pad) => pad.mapping === "standard");
@@ -121,7 +121,7 @@ export function readGamepads(swapped) {
   return { hands, stop, name: known[0]?.id ?? null, unknown: known.length ? null : found[0]?.id ?? null };
 }
 
-// Two ways to do things at once: the farther one of each.
+// Merge two hands: the larger value of each.
 export function both(one, other) {
   const farther = (a, b) => (Math.hypot(...a) >= Math.hypot(...b) ? a : b);
   return {
@@ -136,7 +136,7 @@ export function both(one, other) {
   };
 }
 
-// Places on the page that are held with a pointer; each holds to run, too, and what it says grows from where it began.
+// Elements held with a pointer; each also holds to run, and its value grows from the place of the press.
 export class Grips {
   #held = new Map();
 
@@ -144,7 +144,7 @@ export class Grips {
     this.changed = changed;
   }
 
-  // `says(right, up)`: what so much of the way from where the pointer went down says; 1 is `reach` pixels.
+  // says(right, up): hands for these shares of `reach` pixels from the place of the press.
   add(element, says, reach = 90) {
     const share = (pixels) => Math.max(-1, Math.min(1, pixels / reach));
     element.addEventListener("pointerdown", (event) => {

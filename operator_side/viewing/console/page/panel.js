@@ -1,9 +1,9 @@
-// What the hands' part of the page shows, and what of it can be held.
+// Panel of the hands: its texts, buttons and grips.
 import { KEYS, keyWords } from "./inputs.js";
 import { make } from "./make.js";
 import { Doing, Hands, MotionState, SessionState } from "./names.js";
 
-const FULL = "How far a key goes: 1 to 9";
+const FULL = "Travel of keys: 1 to 9";
 
 export class Panel {
   #section;
@@ -29,7 +29,7 @@ export class Panel {
       place("drive", make("button", { type: "button", id: "drive", onclick: drive }, "Drive from here")),
       stopButton,
       place("giveBack", make("button", { type: "button", id: "give_back", onclick: giveBack, hidden: true },
-        "Let the person go on")),
+        "Let the person continue")),
       place("state", make("p", { id: "hands_state", tabIndex: -1, role: "status" })),
       place("rest", make("p", { id: "hands_rest" })),
       place("stopped", make("p", { id: "hands_stopped", role: "alert" })),
@@ -48,8 +48,8 @@ export class Panel {
     keyWords().then((word) => {
       keys.replaceChildren(...KEYS.flatMap(([, codes, does]) => [
         make("dt", {}, ...codes.flatMap((code, k) => [k ? " or " : "", make("kbd", {}, word(code))])), make("dd", {}, does),
-      ]), make("dt", {}, make("kbd", {}, "1"), " … ", make("kbd", {}, "9")), make("dd", {}, "how far keys go"),
-      make("dt", {}, make("kbd", {}, "Esc")), make("dd", {}, "emergency stop, any driver"));
+      ]), make("dt", {}, make("kbd", {}, "1"), " … ", make("kbd", {}, "9")), make("dd", {}, "travel of keys"),
+      make("dt", {}, make("kbd", {}, "Esc")), make("dd", {}, "emergency stop, for any driver"));
     });
   }
 
@@ -78,18 +78,18 @@ export class Panel {
 
   showGamepad({ name, unknown }, there) {
     if (unknown) this.#text("pad", `Gamepad not used, as its mapping is unknown: ${unknown}`);
-    else this.#text("pad", name ? `Gamepad: ${name}${there ? "" : " (not while the page has no focus)"}` : "");
+    else this.#text("pad", name ? `Gamepad: ${name}${there ? "" : " (unused: the page has no focus)"}` : "");
   }
 
   show({ state, why, restMs, moves, facts, hands, mine, level, stop }) {
     const { drive, giveBack } = this.#places;
     this.#section.dataset.state = state;
-    const cannot = hands === null ? "Nothing to drive is known yet."
+    const cannot = hands === null ? "No robot to drive yet."
       : !hands.may_drive ? "A real controller drives here; this page can stop the robot."
       : facts.status.owner === SessionState.OBSERVING ? "Another operator owns the robot; this one observes."
       : "";
     const taken = hands?.driver && !mine && state === "watching" ? "Another page drives." : "";
-    const words = state === "watching" ? "Drive from here" : "Let go";
+    const words = state === "watching" ? "Drive from here" : "Stop driving";
     if (drive.textContent !== words) drive.textContent = words;
     drive.disabled = state === "watching" && (hands === null || !hands.may_drive || taken !== "");
     giveBack.hidden = !(hands?.person && facts.hands === Hands.BROWSER && (mine || !hands.driver));
@@ -97,7 +97,7 @@ export class Panel {
       watching: [why, taken, cannot || (taken ? "" : "You are watching.")].filter(Boolean).join(" "),
       resting: [why, "All keys up for a second."].filter(Boolean).join(" "),
       ready: "Ready: hold Space to arm and run.",
-      running: moves ? "You drive." : facts?.status.person === Doing.AT_REST_FIRST ? "Let go of all but hold-to-run." : "Arming: keep holding.",
+      running: moves ? "You drive." : facts?.status.person === Doing.AT_REST_FIRST ? "Release all but hold-to-run." : "Arming: keep holding.",
     }[state]);
     this.#text("rest", state === "resting" ? `still ${(restMs / 1000).toFixed(1)} s` : "");
     this.#text("level", state === "watching" ? "" : `${FULL}; now ${level}`);

@@ -1,8 +1,8 @@
-// A recording: play and pause, the moment that is shown, and the speed.
+// Player of a recording: play and pause, the moment that is shown, and the speed.
 import { make } from "./make.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10];
-const FOLLOWS_MS = 500; // after a move of the slider it stays, and then shows what holds
+const FOLLOWS_MS = 500; // after a move the slider stays for this time, then shows the actual moment
 
 export class Player {
   #send;

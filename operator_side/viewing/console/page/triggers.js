@@ -1,4 +1,4 @@
-// One trigger: how stiff each tenth of its travel is, where the finger is, and what that meets.
+// View of one trigger: the strength of each tenth of its travel, the finger's place, and the strength there.
 import { make } from "./make.js";
 
 const ZONES = 10;
@@ -36,6 +36,6 @@ export class Trigger {
     this.#words[0].textContent = `pulled ${percent(facts.travel)} · free to ${percent(facts.free)}`;
     const ahead = facts.needed_m === null ? "?" : `${Math.round(1000 * facts.needed_m) + 0} mm`; // no -0
     const stiffness = facts.stiffness === null ? "?" : facts.stiffness.toFixed(2);
-    this.#words[1].textContent = `felt D = ${ahead} ahead · stiffness s(δ) ${stiffness}`;
+    this.#words[1].textContent = `D = ${ahead} ahead · stiffness s(δ) ${stiffness}`;
   }
 }

@@ -1,10 +1,10 @@
-// What may be tuned while the run goes on: P of eq. 10 and the emulated link, where the run permits it.
+// Tuning during a run: P of eq. 10 and the emulated link, if the run permits it.
 import { make } from "./make.js";
 import { SessionState } from "./names.js";
 
 const PROBABILITIES = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998, 0.999];
-const PAUSE_MS = 250; // what is dragged is sent once it rests
-const FOLLOWS_MS = 2000; // after a wish the slider shows what was wished for, and then what holds
+const PAUSE_MS = 250; // a slider's value is sent once it rests
+const FOLLOWS_MS = 2000; // after a wish the slider shows it for this time, then the actual value
 const UNITS = { us: 1e-3, ms: 1, s: 1e3 };
 
 const nearest = (value) =>
@@ -87,6 +87,6 @@ export class Tuning {
     }, PAUSE_MS);
     const { slider, now, words } = this.#sliders[name];
     slider.setAttribute("aria-valuetext", words(Number(slider.value)));
-    now.textContent = `${words(Number(slider.value))} wished for`;
+    now.textContent = `${words(Number(slider.value))} requested`;
   }
 }

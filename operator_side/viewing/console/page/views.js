@@ -1,8 +1,8 @@
-// Camera pictures, the newest only, and how old what they show is.
+// Camera pictures, the newest only, with their age.
 const OLD_S = 0.3;
 const SILENT_MS = 500;
 
-// The operator side's clock, as far as a page can tell it: the fastest of the messages says best.
+// Estimate of the operator side's clock, by the fastest message.
 export class Clock {
   live = true;
   #ahead = [];
@@ -18,12 +18,12 @@ export class Clock {
     [this.#nowS, this.#offsetS] = [nowS, offsetS];
   }
 
-  // What pictures and charts go by: a recording has its own time.
+  // Time of pictures and charts: a recording has its own.
   get nowMs() {
     return this.live ? performance.now() : 1000 * this.#nowS;
   }
 
-  // How long ago a moment of the robot side's clock was; null while nobody knows.
+  // Age of a time on the robot side's clock; null while unknown.
   ageS(robotS) {
     if (this.#offsetS === null || !this.#ahead.length) return null;
     const nowS = this.live ? performance.now() / 1000 + Math.max(...this.#ahead) : this.#nowS;
@@ -68,7 +68,7 @@ export class View {
         this.#shownMs = this.#clock.nowMs;
         this.#place.dataset.frames = Number(this.#place.dataset.frames ?? 0) + 1;
       } catch {
-        continue; // a broken picture is as good as none
+        continue; // ignore a broken picture
       }
     }
     this.#busy = false;

@@ -204,7 +204,7 @@ def test_the_hands_of_a_console_that_is_killed_are_gone_and_the_run_goes_on() ->
         asyncio.run(story(console))
         assert list(console.words) == [(1, None)]
         assert (console.pages, console.address) == (0, None)
-        assert console.take_notes() == ["the console has ended; the run goes on without it"]
+        assert console.take_notes() == ["the console has ended; the run continues without it"]
         feed = Feed(console)
         for _ in range(100):
             feed.step(CLOCK.now())
