@@ -85,7 +85,7 @@ class Budget(Generic[Name]):
         """Smoothed rate of haptics and telemetry."""
         self._heard_from: OutgoingQueue | None = None
         self._measured: OutgoingQueue | None = None
-        """Queue of the last peer."""
+        """Queue of the peer that was measured last."""
 
     def hear(self, queue: OutgoingQueue | None, now_s: float) -> None:
         """Process the present peer's new echoes; None: no peer echoes."""

@@ -33,11 +33,11 @@ class Joining:
     """Joiner of one topic's pieces, in any order; memory is bounded by twice `limit_bytes`."""
 
     def __init__(self, limit_bytes: int) -> None:
-        """limit_bytes: largest size of a whole."""
+        """limit_bytes: largest size of a message."""
         self.rejected = 0
-        """Number of pieces that fit no whole."""
+        """Number of pieces that belong to no message."""
         self.incomplete = 0
-        """Number of wholes with a lost piece."""
+        """Number of messages with a lost piece."""
         self._limit_bytes = limit_bytes
         self._begun: dict[int, _Whole] = {}
 

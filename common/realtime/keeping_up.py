@@ -29,7 +29,7 @@ class KeepingUp:
         helps: Mapping[str, str],
         taken: Callable[[], Taken] = read_taken,
     ) -> None:
-        """`helps`: remedy for each stage, by name; "" for the time outside of stages."""
+        """helps: from a stage's name to its remedy; the name "" is the time outside of all stages."""
         self.said: str | None = None
         """The sentence, once there is one."""
         self.stages = stages
@@ -98,8 +98,8 @@ class KeepingUp:
         elif waited is not None and waited > _LEFT_OUT:
             whose = f"others had the processor for {100.0 * waited:.0f} % of the time: {whose}"
         return (
-            f"this machine is too busy: a turn lasts {1e3 * wall_s:.2g} ms and computes for {1e3 * computed_s:.2g} of"
-            f" them, and {left_out}; {whose} would help"
+            f"this machine is too busy: a turn lasts {1e3 * wall_s:.2g} ms and computes for {1e3 * computed_s:.2g} ms,"
+            f" and {left_out}; {whose} would help"
         )
 
     def _longest(self, before_s: list[float], computed_s: float) -> tuple[str, float]:

@@ -228,7 +228,7 @@ def connect(path: Path) -> tuple[Channel, Recorder | None]:
 
 
 def _wait_until_sent(channel: Channel, limit_s: float) -> None:
-    """Send the waiting messages, as long as some leave within each `limit_s`."""
+    """Send the waiting messages; give up when none leaves for `limit_s`."""
     while channel.waiting and not channel.ended:
         if not select.select([], [channel], [], limit_s)[1]:
             return

@@ -55,7 +55,7 @@ _USUAL: Final[dict[str, dict[str, Any]]] = {
     "/telemetry": {"target": "post"},
     "/robot/status": {"stopped_because": "a gap", "nearest": "post", "target": "post"},
 }
-"""Sample values of fields that are empty in a first message."""
+"""Example values, to infer a schema where a first message has empty fields."""
 
 
 def schema_of(topic: str, first: dict[str, Any]) -> dict[str, Any]:

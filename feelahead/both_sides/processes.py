@@ -84,7 +84,7 @@ class StartedSide:
         stop: StopSignal | None,
         meanwhile: Callable[[dict[str, Any]], None] | None = None,
     ) -> dict[str, Any] | None:
-        """Wait like `wait_for`; None once `stop` is set. Other events go to `meanwhile`, or wait for `events`."""
+        """Wait like `wait_for`; None once `stop` is set. `meanwhile` or, later, `events` gets the others."""
         remaining_s = timeout_s
         while True:
             try:

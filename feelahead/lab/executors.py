@@ -59,7 +59,7 @@ def cluster(address: str, own_file: str | None) -> Iterator[Executor]:
         client: Any = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:
         raise ConfigurationError(
-            f"--scheduler {address}: no dask scheduler answers there; valid: as tcp://127.0.0.1:8786"
+            f"--scheduler {address}: no dask scheduler answers there; valid: a running scheduler's address, such as tcp://127.0.0.1:8786"
         ) from error
     try:
         if own_file is not None:

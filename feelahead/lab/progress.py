@@ -17,7 +17,7 @@ class Shown:
     """Display of the work's progress."""
 
     def __init__(self, what: str, total: float, bars: Progress | None) -> None:
-        """bars: on a terminal; None: lines on standard error."""
+        """bars: a terminal's progress bars; without them, lines go to standard error."""
         self._what, self._total, self._done = what, total, 0.0
         self._bars, self._clock = bars, MonotonicClock()
         self._task = None if bars is None else bars.add_task(what, total=total)

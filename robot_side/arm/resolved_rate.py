@@ -16,7 +16,7 @@ _THRESHOLD_2: Final = 0.06 * 0.06
 """Square of the singular value below which the damping begins"""
 _LARGEST_DAMPING: Final = 0.06
 _HALVINGS: Final = 60
-"""Bisections that find the smallest eigenvalue to the last digit"""
+"""Number of bisections that find the smallest eigenvalue to the last digit"""
 _gram, _factor, _solution = on_stack(6, 6), on_stack(6, 6), on_stack(6)
 
 

@@ -16,7 +16,7 @@ class Tuning:
     """Grants requests where the run permits it; records the granted ones with their time, and counts the refused."""
 
     def __init__(self, probability: float | None = None, expect: Callable[[float], None] | None = None) -> None:
-        """probability: P at the start. expect: applies another P; None permits no tuning."""
+        """probability: P at the start. expect: called with each new P; without it, no tuning is permitted."""
         self.probability = probability
         """Present P."""
         self.refused = 0

@@ -143,7 +143,7 @@ def _owners(objects: PerceivedObjects) -> tuple[IntArray, ...]:
 
 
 def moved_table(last: SceneTable, objects: PerceivedObjects) -> SceneTable | None:
-    """Return the table of the same objects at new poses; None for other objects, or if some have no volume."""
+    """Return the table of the same objects at new poses; None if the objects differ or any has no volume."""
     same = last.flat == 0 and len(last.objects.names) == len(objects.names)
     owners = zip(_owners(last.objects), _owners(objects), strict=True)
     if not (same and all(old is new or old.tobytes() == new.tobytes() for old, new in owners)):

@@ -250,7 +250,7 @@ def _draw_comparison(table: Table, frozen: str, path: Path) -> None:
             panel.set(title=f"{force_n:g} N", xlabel="delay each way, ms (beside each other: the laws)")
             panel.grid(alpha=0.3)
         panels[0][0].set_ylim(bottom=-5.0)
-        panels[0][0].set_ylabel("speed at contact, mm/s (0: none)")
+        panels[0][0].set_ylabel("speed at contact, mm/s (0: no contact)")
         drawn.legend(loc="outside right upper", fontsize=7)
 
 

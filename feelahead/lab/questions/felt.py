@@ -153,7 +153,7 @@ def show(settings: FeltSweep, table: Table) -> Iterator[Shown]:
         nearest = [rows.rows[-1] for _, rows in table.groups("scene")]
         figures = ("free_mm", *map(way_name, DRAWN), "sigma_mm")
         rows_of = ((row["scene"], *map(row.get, figures)) for row in nearest)
-        yield shown("free ways, and ways after which R2 begins to resist", ("scene", *figures), rows_of)
+        yield shown("contact distances, and distances at which R2 begins to resist", ("scene", *figures), rows_of)
         return
     if settings.ways:
         figures = ("looks", "ways", "late", "earliest_mm", "latest_mm", "p999_mm", "grazes", "out_of_band")

@@ -68,7 +68,7 @@ class HapticsSettings(Sweep):
         for name in ("scenes", "delays"):
             values = getattr(self, name)
             if not values or len(set(values)) < len(values):
-                raise ValueError(f"--{name} {' '.join(map(str, values))}: valid: one or more, each once")
+                raise ValueError(f"--{name} {' '.join(map(str, values))}; valid: one or more values, each once")
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ class UhidFile:
             ) from None
         except OSError as error:
             raise ConfigurationError(
-                f"{path} cannot be opened ({os.strerror(error.errno or 0)}): sudo modprobe uhid ({_IN_A_CONTAINER})"
+                f"{path} cannot be opened ({os.strerror(error.errno or 0)}); try sudo modprobe uhid ({_IN_A_CONTAINER})"
             ) from None
 
     def __enter__(self) -> "UhidFile":

@@ -8,8 +8,8 @@ import math
 from robot_side.compiled.kernel import inlined
 
 OutsidePart = tuple[float, float, float]
-"""Part of an edge outside the ball, from P to P' relative to the sphere's centre: (t' - t, t·t', |P||P'| + P·P').
-t and t' are signed distances (m) from the foot of the edge's line; see also `SplitEdge`."""
+"""(t' - t, t·t', |P||P'| + P·P') of the part of an edge outside the ball, from P to P' relative to the sphere's centre.
+t and t' are signed distances (m) along the edge from its line's point nearest to the centre; see also `SplitEdge`."""
 
 SplitEdge = tuple[float, OutsidePart, float, OutsidePart, float]
 """(inside, before, before_norms, after, after_norms): `inside` (m) is the length of the edge in the ball; the parts

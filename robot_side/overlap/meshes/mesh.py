@@ -32,8 +32,8 @@ class Mesh:
     """Solid bounded by triangles, prepared once for many queries; immutable.
 
     `vertices` (v, 3) in m, `triangles` (t, 3) indices of these, anticlockwise as seen from outside. Vertices at exactly
-    the same place count as one. Every edge must be used equally often in both directions, and no triangle be given
-    twice. Parts that share no edge may touch but not overlap. A part inside another one is a cavity and must be
+    the same place count as one. Every edge must be used equally often in both directions. A triangle must not be
+    given twice. Parts that share no edge may touch but not overlap. A part inside another one is a cavity and must be
     oriented inward. Triangles without area are tolerated. Parts that overlap only partly are not detected: their common
     volume then counts wrongly.
 
@@ -103,7 +103,7 @@ def sphere_mesh(
 ) -> FloatArray | Overlaps:
     """Return the overlap of the spheres `centers` (..., 3), `radii` (...) with one mesh; see `Mesh` and `volumes`.
 
-    The last eight meshes are cached, so that they are not prepared again. A `Mesh` object also saves the look-up.
+    The last eight meshes are cached, so that they are not prepared again. A `Mesh` object also avoids the look-up.
     """
     places = np.ascontiguousarray(checked_vertices(vertices))
     indices = checked_triangles(triangles, len(places))

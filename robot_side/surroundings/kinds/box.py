@@ -151,8 +151,9 @@ def overlap_one_box(
     _meshes: IntArray,
     push: FloatArray,
 ) -> float:
-    """Return the overlap with a box: the ball less its parts beyond each face, plus those beyond two faces.
+    """Return the overlap of a sphere with a box, by inclusion-exclusion over the parts beyond its faces.
 
+    Subtract the parts beyond each face, then add back those beyond two.
     `box_lane` takes over at corners. Units are radii. Faces 0 to 2 are the upper ones of each axis, 3 to 5 the lower.
     """
     a, b, c = x - shapes[row, 0], y - shapes[row, 1], z - shapes[row, 2]

@@ -83,7 +83,7 @@ def test_too_busy_when_others_have_the_processor() -> None:
     loop = Loop(waited=0.4)
     loop.run(2 * WINDOW_S, 0.3e-3, 1.4e-3)
     (text,) = loop.said
-    assert text.startswith("this machine is too busy: a turn lasts 1.4 ms and computes for 0.3 of them")
+    assert text.startswith("this machine is too busy: a turn lasts 1.4 ms and computes for 0.3 ms")
     assert "others had the processor for 40 % of the time: closing other programs, or --realtime, would help" in text
     assert loop.keeping_up.summary()["waited"] == pytest.approx(0.4)
 
