@@ -245,7 +245,7 @@ class OperatorSide:
 
     def status(self, now_s: float) -> OperatorStatus:
         """Return the status for a person, without what only the process knows."""
-        mean_s, lease, screen, felt = self.link.delay.mean, self.lease, self.screen, self.stiffness
+        mean_s, screen, felt = self.link.delay.mean, self.screen, self.stiffness
         intent, rendering = self.hands.present(now_s), self.haptics.rendering
         order, linked = -1 if self.settings.swap_sides else 1, self.felt.within(STIFFNESS_EXPIRES_S, now_s)
         left, right = ((None, None) if felt is None else (felt.l2.stiffness, felt.r2.stiffness))[::order]
@@ -256,7 +256,7 @@ class OperatorSide:
         return OperatorStatus(
             **link,
             state=None if felt is None else felt.state,
-            stopped_because=lease.why if lease is not None and self.felt.stopped else None,
+            stopped_because=self._standing.stop_reason if self.felt.stopped else None,
             l2=left,
             r2=right,
             l2_pulled=left_pulled,

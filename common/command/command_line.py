@@ -136,7 +136,8 @@ def _config_path(arguments: Sequence[str]) -> str | None:
 
 
 def _refuse_unknown_keys(content: dict[str, Any], settings_type: Any, path: Path, prefix: str, elsewhere: str) -> None:
-    hints = get_type_hints(settings_type)
+    # A file that a file names is not read.
+    hints = {name: hint for name, hint in get_type_hints(settings_type).items() if name != "config"}
     for key, value in content.items():
         if key not in hints:
             raise ConfigurationError(

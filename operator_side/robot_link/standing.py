@@ -23,6 +23,8 @@ class Standing:
     def __init__(self) -> None:
         self.lease: LeaseNotice | None = None
         """Newest notice; None before the first and once it has expired."""
+        self.stop_reason: str | None = None
+        """Reason of the newest notice by which the arm must not move; becoming ready to arm keeps it."""
         self.history: list[str] = []
         """Our standings in turn, the latest ones."""
         self.other_version: str | None = None
@@ -46,6 +48,8 @@ class Standing:
         if not self.history or self.history[-1] != standing:
             self.history = [*self.history, standing][-_REMEMBERED:]
         self.lease, self._heard_s = notice, now_s
+        if notice.session in (SessionState.DISARMED, SessionState.STOPPED):
+            self.stop_reason = notice.why
         if notice.session is not SessionState.ENDED or anew:
             return False
         self._anew_s = now_s
@@ -86,4 +90,4 @@ class Standing:
 
     def forget(self) -> None:
         """Forget the lease, as it was another robot side's."""
-        self.lease = None
+        self.lease = self.stop_reason = None

@@ -198,6 +198,8 @@ def test_why_it_stopped_is_shown_once_it_has_been_armed(bench: Bench) -> None:
     bench.notice(SessionState.STOPPED, "emergency stop")
     bench.feel(0, "stopped")
     assert bench.side.status(bench.now_s).stopped_because == "emergency stop"
+    bench.notice(SessionState.STOPPED_READY, "may be armed again")
+    assert bench.side.status(bench.now_s).stopped_because == "emergency stop"
 
 
 def permit(bench: Bench, **fields: Any) -> None:

@@ -24,7 +24,7 @@ EXTRAS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
         "a real controller and the browser console",
         ("hidraw" if sys.platform == "linux" else "hid", "viser", "trimesh"),
     ),
-    "video": ("pictures in H.264, a tenth of JPEG's bytes", ("av",)),
+    "video": ("pictures in H.264, a tenth of JPEG's bytes or less", ("av",)),
     "record": ("recording runs", ("foxglove", "mcap")),
     "experiments": ("sweeps over many runs", ("matplotlib", "pyarrow", "distributed")),
 }

@@ -91,6 +91,7 @@ def test_bad_flags_become_one_line_that_names_them(arguments: list[str], named: 
         (f"seed = {4500 * '['}", "nested too deeply"),
         (f"camera{4500 * '.a'} = 1", "nested too deeply"),
         (9000 * "a" + " = 1", "unknown key"),
+        ('config = "other.toml"', "unknown key 'config'"),
         (f"[{9000 * 'a'}]\n[{9000 * 'a'}]", "no valid TOML"),
         ("#" * 1_000_001, "more than 1000000 bytes"),
     ],
