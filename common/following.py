@@ -7,13 +7,15 @@ import numpy as np
 from common.arrays import FloatArray
 
 
-def follow(way_m: float, speed: float, target: float, acceleration: float, duration_s: float) -> tuple[float, float]:
+def follow(
+    displacement_m: float, speed: float, target: float, acceleration: float, duration_s: float
+) -> tuple[float, float]:
     """Return position and speed after `duration_s` towards the speed `target`, at most at `acceleration`."""
     changing_s = abs(target - speed) / acceleration
     if changing_s > duration_s:
         after = speed + math.copysign(acceleration * duration_s, target - speed)
-        return way_m + 0.5 * (speed + after) * duration_s, after
-    return way_m + 0.5 * (speed + target) * changing_s + target * (duration_s - changing_s), target
+        return displacement_m + 0.5 * (speed + after) * duration_s, after
+    return displacement_m + 0.5 * (speed + target) * changing_s + target * (duration_s - changing_s), target
 
 
 def follow_together(

@@ -14,14 +14,14 @@ from operator_side.dualsense.hid.finding import Finder
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.evdev.pad import find_pad
-from operator_side.people.whoever import whoever
+from operator_side.people.simulated_hands import simulated_hands
 from operator_side.settings import DeviceName, OperatorSettings
 from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.pages.shared_hands import SharedHands
 
 
-class Given(NamedTuple):
+class OpeningParts(NamedTuple):
     """Parts that a controller may be opened with."""
 
     settings: OperatorSettings
@@ -41,7 +41,7 @@ class Opening(NamedTuple):
     """Hands on it that must be moved in every turn; None for a person's own"""
 
 
-def _hid(given: Given) -> Opening:
+def _hid(given: OpeningParts) -> Opening:
     find = Finder(load_backend() if given.backend is None else given.backend)
     # Without haptics nothing must be released.
     return Opening(
@@ -56,25 +56,27 @@ def _with_background_writes(find: Finder, preferred: str | None) -> OpenControll
     return dataclasses.replace(found, device=writes, stalls=writes.stalls)
 
 
-def _evdev(given: Given) -> Opening:
+def _evdev(given: OpeningParts) -> Opening:
     del given
     return Opening(BackgroundSearch(find_pad))
 
 
-def _simulated(given: Given) -> Opening:
+def _simulated(given: OpeningParts) -> Opening:
     settings, device, core = given.settings, SimulatedDualSense(), given.core
     calibration, swap_sides = settings.calibration, settings.swap_sides
-    person = functools.partial(whoever, device, settings.person, settings.seed, calibration, swap_sides=swap_sides)
+    person = functools.partial(
+        simulated_hands, device, settings.person, settings.seed, calibration, swap_sides=swap_sides
+    )
     shared = SharedHands(given.pages, core.calibrate, device, calibration, person, swap_sides=swap_sides)
     return Opening(Ready(OpenController(shared, "simulated DualSense")), hands=shared)
 
 
-def _browser(given: Given) -> Opening:
+def _browser(given: OpeningParts) -> Opening:
     page = BrowserHands(given.pages, given.core.calibrate, swap_sides=given.settings.swap_sides)
     return Opening(Ready(OpenController(page, "a page of the console")), hands=page)
 
 
-DEVICES: Final[Mapping[DeviceName, Callable[[Given], Opening]]] = {
+DEVICES: Final[Mapping[DeviceName, Callable[[OpeningParts], Opening]]] = {
     "hid": _hid,
     "evdev": _evdev,
     "simulated": _simulated,

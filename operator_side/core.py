@@ -30,8 +30,8 @@ from operator_side.hands.intent import OperatorIntent
 from operator_side.hands.newest import Hands
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.robot_link.commanding import HEARTBEAT_PERIOD_S, STOPPING, Commands, ToRobot
+from operator_side.robot_link.lease_state import LeaseState
 from operator_side.robot_link.newest import STIFFNESS_EXPIRES_S, NewestStiffness, overtakes
-from operator_side.robot_link.standing import Standing
 from operator_side.robot_link.tuner import Tuner
 
 
@@ -83,7 +83,7 @@ class OperatorSide:
         self.rejected = 0
         self._listeners = tuple(listeners)
         self._blindness = Blindness()
-        self._standing = Standing()
+        self._standing = LeaseState()
 
     @property
     def lease(self) -> LeaseNotice | None:
@@ -139,7 +139,7 @@ class OperatorSide:
 
     def _follow(self, notice: LeaseNotice, now_s: float) -> None:
         if self._standing.follow(notice, now_s):
-            self.link.begin_anew()
+            self.link.begin_epoch()
         if not self._standing.owns:
             self._blindness.end()
             self.commands.stop_button.forget()

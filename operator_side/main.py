@@ -12,12 +12,12 @@ from common.silence import MOTION_PERIOD_S
 from common.sockets.authentication import OperatorKeys
 from common.sockets.operator import OperatorSockets
 from operator_side.controller.connection import Connection
-from operator_side.controllers import DEVICES, Given
+from operator_side.controllers import DEVICES, OpeningParts
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.device import HidBackend
 from operator_side.recorded import OperatorEncoder, build_recorded
 from operator_side.settings import OperatorSettings
-from operator_side.turns import HELPS, Desk, OperatorTurns
+from operator_side.turns import REMEDIES, Devices, OperatorTurns
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.terminal.status import TerminalStatus
@@ -32,7 +32,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     status = TerminalStatus("operator") if settings.tui else Status(settings.status, "operator")
-    loop = Loop(MOTION_PERIOD_S, HELPS, settings.seed)
+    loop = Loop(MOTION_PERIOD_S, REMEDIES, settings.seed)
     with Process(settings, "operator", status, OperatorEncoder(), loop) as process:
         topics, connections = view_topics(settings), settings.connections
         sockets = OperatorSockets(
@@ -47,10 +47,10 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
         return process.run(lambda: OperatorTurns(settings, core, desk, sockets, process, stored_travel=stored_travel))
 
 
-def _desk(settings: OperatorSettings, core: OperatorSide, process: Process, backend: HidBackend | None) -> Desk:
+def _desk(settings: OperatorSettings, core: OperatorSide, process: Process, backend: HidBackend | None) -> Devices:
     """Open the controller, and the console before the priority is raised, which the console would inherit."""
     pages, stack = DrivingPage(), process.stack
-    search, guard, person = DEVICES[settings.device](Given(settings, core, pages, backend))
+    search, guard, person = DEVICES[settings.device](OpeningParts(settings, core, pages, backend))
     pages.may_drive = person is not None
     if guard is not None:
         stack.enter_context(guard)
@@ -59,4 +59,4 @@ def _desk(settings: OperatorSettings, core: OperatorSide, process: Process, back
     console = None
     if settings.console:
         console = stack.enter_context(Console(settings.connect, port=settings.console_port))
-    return Desk(connection, guard, person, pages, console)
+    return Devices(connection, guard, person, pages, console)

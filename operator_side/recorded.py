@@ -57,7 +57,7 @@ class Recorder(Listener):
 class OperatorEncoder:
     """Encoder of these notes as entries."""
 
-    def begin_anew(self) -> None:
+    def begin_epoch(self) -> None:
         """Do nothing: each entry is complete."""
 
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
@@ -68,8 +68,8 @@ class OperatorEncoder:
             return now_s, b"".join((entry(kind, now_s), *sent))
         if kind == Kind.OUTPUT:
             asked = entry(kind, now_s)
-            told = b"" if content is None else entry(Kind.TOLD, now_s, msgspec.msgpack.encode(content))
-            return now_s, asked + told
+            encoded = b"" if content is None else entry(Kind.TOLD, now_s, msgspec.msgpack.encode(content))
+            return now_s, asked + encoded
         if kind == Kind.SEEN:
             views(now_s, content)
             if len(content) > MAXIMUM_BYTES:  # a picture, which the core ignores

@@ -15,7 +15,7 @@ class StoredTravel:
     def __init__(self, connection: Connection, core: OperatorSide, note: Callable[[str], None]) -> None:
         self._connection, self._core, self._note = connection, core, note
         self._calibrated = 0
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
     def follow(self) -> None:
         """Load the calibration of a newly found controller; call it every turn.
@@ -34,13 +34,13 @@ class StoredTravel:
             if first:
                 raise
             self._core.calibrate(TravelCalibration())
-            self._told.discard(controller.address)
+            self._reported.discard(controller.address)
             self._note(f"{error}; its travel is read by the defaults")
             return
         self._core.calibrate(stored or TravelCalibration())
-        if controller.address in self._told:
+        if controller.address in self._reported:
             return
-        self._told.add(controller.address)
+        self._reported.add(controller.address)
         if stored is None:
             self._note("its travel has not been calibrated: feelahead calibrate does that")
         else:

@@ -22,7 +22,7 @@ from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.viewing import Viewing
 
-HELPS: Final = {
+REMEDIES: Final = {
     "sockets": "a slower link",
     "messages": "a slower link",
     "feeling": "--no-haptics",
@@ -35,7 +35,7 @@ _GUARD_PERIOD_S: Final = 0.5
 """Period of checks of the watchdog."""
 
 
-class Desk(NamedTuple):
+class Devices(NamedTuple):
     """Devices before the operator: a controller, and who may hold it."""
 
     connection: Connection
@@ -54,7 +54,7 @@ class OperatorTurns:
         self,
         settings: OperatorSettings,
         core: OperatorSide,
-        desk: Desk,
+        desk: Devices,
         sockets: OperatorSockets,
         process: Process,
         *,

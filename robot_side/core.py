@@ -156,7 +156,7 @@ class RobotSide:
         session.safety.arm_measured(late_s, now_s)
         if session.take_owner_changed():
             loop_age.reset()
-            self.reports.begin_anew()
+            self.reports.begin_epoch()
         if (age_s := session.loop_age_s(now_s)) is None:
             return loop_age.value(now_s)
         # In every tick, so that a link that falls silent ages, too (eq. 8).
@@ -197,7 +197,7 @@ class RobotSide:
             r2=sensed.r2.stiffness,
             enlargement_mm=1e3 * sensed.enlargement_m,
             holding=None if self.held is None else self.held[:SHOWN_NAME],
-            stands=self.grip.touching_down.stands,
+            stands=self.grip.touchdown.stands,
             nearest=None if apart.nearest is None else apart.nearest[:SHOWN_NAME],
             nearest_mm=scaled(apart.nearest_m, 1e3),
             target=None if target is None else objects.names[target][:SHOWN_NAME],

@@ -16,13 +16,13 @@ from common.sockets.authentication import RobotKeys
 from common.sockets.robot import RobotSockets
 from robot_side.compiled.warm_up import warm_up
 from robot_side.core import RobotParts, RobotSide
-from robot_side.drivers.remote.beside import Beside
+from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
 from robot_side.events import Listener
 from robot_side.parts import build_parts
 from robot_side.recording.recorder import Recorder, RobotEncoder, robot_header
 from robot_side.reporting.sending import SENT_STREAMS
 from robot_side.settings import RobotSettings
-from robot_side.turn_stages import HELPS, StageTiming
+from robot_side.turn_stages import REMEDIES, StageTiming
 from robot_side.turns import RobotTurns
 from robot_side.viewing.perceived_shapes import PerceivedModel
 from robot_side.viewing.pictures import Cameras
@@ -60,10 +60,10 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
     keys = None if settings.keys is None else RobotKeys.load(settings.keys)
     raise_descriptor_limit()
     open_sockets = partial(RobotSockets, settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys)
-    status, loop = Status(settings.status, "robot"), Loop(TICK_PERIOD_S, HELPS, settings.seed)
+    status, loop = Status(settings.status, "robot"), Loop(TICK_PERIOD_S, REMEDIES, settings.seed)
     with Process(settings, "robot", status, RobotEncoder(), loop) as process:
         epoch, recording = secrets.randbits(53), process.recording
-        beside = Beside(settings.arm, settings.objects, process.note, insecure=settings.insecure, keys=keys)
+        beside = ConnectedDrivers(settings.arm, settings.objects, process.note, insecure=settings.insecure, keys=keys)
         process.stack.enter_context(beside)
         # Fail at once for an occupied port, even if `beside` has just taken it.
         open_sockets().close()

@@ -30,7 +30,7 @@ class Motion:
     ) -> None:
         """Command the arm; stop it without permission. felt: the law's result of the tick before."""
         command = permission.command
-        if command is None or grip.touching_down.gives_way:
+        if command is None or grip.touchdown.gives_way:
             self.commanded_rad_s, self.told_m_s, self.rises_m_s = None, 0.0, 0.0
             # Valid until the state's time: expiry between two physics steps would let a load sink, each time.
             self._arm.command(self._still, state.time_s)
@@ -39,7 +39,7 @@ class Motion:
         if self._assists and felt is not None:
             command = assisted(command, felt.l2, felt.r2)
         where = pose, state.joint_positions_rad, self._limits, self._settings
-        velocity, self.told_m_s = commanded(command, *where, stands=grip.touching_down.stands)
+        velocity, self.told_m_s = commanded(command, *where, stands=grip.touchdown.stands)
         self.commanded_rad_s = velocity
         self.rises_m_s = 0.0 if grip.held is None else float(pose.tool_jacobian[2] @ velocity)
         self._arm.command(velocity, permission.valid_until_s)

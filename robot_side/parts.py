@@ -24,7 +24,7 @@ from robot_side.drivers.mujoco.kinematics import MujocoKinematics
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.drivers.remote.arm import RemoteArm
-from robot_side.drivers.remote.beside import Beside
+from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
 from robot_side.drivers.remote.driver_session import ArmShape
 from robot_side.drivers.remote.frame_message import perceived
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
@@ -97,7 +97,7 @@ def build_parts(
     clock_domain: str,
     scene: Scene | None = None,
     announce: Callable[[str], None] | None = None,
-    beside: Beside | None = None,
+    beside: ConnectedDrivers | None = None,
 ) -> SceneParts:
     """Make the parts; ConfigurationError for a model that cannot be used.
 
@@ -162,7 +162,7 @@ def build_parts(
 
 
 def _arm(
-    scene: Scene, encoder: Encoder, limits: MotionLimits, beside: Beside | None
+    scene: Scene, encoder: Encoder, limits: MotionLimits, beside: ConnectedDrivers | None
 ) -> tuple[MujocoArm | RemoteArm, tuple[FloatArray, FloatArray]]:
     """Return the arm, simulated or a driver's, and its joints' lower and upper ends, (n,) each."""
     if beside is None or not beside.has_arm:

@@ -8,7 +8,7 @@ from robot_side.events import Listener, Step
 STAGES: Final = ("sockets", "messages", "physics", "sensing")
 """Stages of a turn: sending and receiving; decoding and judging messages; the arm's state, which advances a
 simulation; the law. Everything else in a tick is the rest."""
-HELPS: Final = {
+REMEDIES: Final = {
     "sockets": "fewer views and observers",
     "messages": "fewer observers",
     "physics": 'fewer free bodies, a longer timestep or <flag sleep="enable"/> in the model',

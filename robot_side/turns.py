@@ -12,14 +12,14 @@ from common.sockets.admission import Admission
 from common.sockets.robot import RobotSockets
 from common.status.statuses import RobotStatus
 from robot_side.core import RobotSide
-from robot_side.drivers.remote.beside import Beside
+from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
 from robot_side.reporting.link_reporter import LinkReporter
 from robot_side.reporting.sending import Sending
 from robot_side.settings import RobotSettings
 from robot_side.tick_times import TickTimes
-from robot_side.viewing.looking import Looking
 from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.scene_view import SceneView
+from robot_side.viewing.view_scheduler import ViewScheduler
 
 KEYS_PERIOD_S: Final = 0.2
 """Period of reading the allow-list: a revoked operator is out within a second."""
@@ -36,7 +36,7 @@ class RobotTurns:
         cameras: Cameras | None,
         sockets: RobotSockets,
         process: Process,
-        beside: Beside,
+        beside: ConnectedDrivers,
     ) -> None:
         """cameras: None without pictures."""
         self._process, self._core, self._sockets, self._beside = process, core, sockets, beside
@@ -46,7 +46,7 @@ class RobotTurns:
         self._admission = Admission()
         self._sending = Sending(settings.link_spec(), sockets, secrets.randbits(32))
         always = () if process.recording is None else (*VIEW_NAMES, "scene")
-        self._looking = Looking(core, view, cameras, self._sending, always=always, seed=settings.seed)
+        self._looking = ViewScheduler(core, view, cameras, self._sending, always=always, seed=settings.seed)
         self._reporter = LinkReporter(
             core.session, self._sending.budget, lambda: self._looking.pictures, sockets.tcp_figures
         )

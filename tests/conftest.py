@@ -14,7 +14,7 @@ settings.load_profile("here")
 STARTS = {"subprocess.Popen", "os.fork", "os.posix_spawn"}
 FONTS = "fc-list"
 """Program that matplotlib runs before its first figure on a machine."""
-KERNELS = "robot_side.compiled.beside"
+KERNELS = "robot_side.compiled.helper_processes"
 """Module that compiles the kernels before the first test that needs them on a machine."""
 unmarked: list[str] = []
 """Name of the running test, unless it carries the marker."""

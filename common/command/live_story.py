@@ -49,9 +49,9 @@ class Story:
     """Story of a run; remembers the reported state."""
 
     def __init__(self) -> None:
-        self._state = self._told = _State()
+        self._state = self._reported = _State()
         self._start_s: float | None = None
-        self._told_s = -math.inf
+        self._reported_s = -math.inf
         self._peaks = {"L2": 0.0, "R2": 0.0}
         """Largest stiffness of each trigger since it last yielded."""
 
@@ -62,12 +62,12 @@ class Story:
         for trigger in view.triggers:
             self._peaks[trigger.name] = max(self._peaks[trigger.name], trigger.resists or 0.0)
         self._state = state = _next_state(self._state, view)
-        told = self._told
-        alarm = view.alarm and state[:2] != told[:2]
-        if state == told or (now_s - self._told_s < SHORTEST_GAP_S and not alarm):
+        reported = self._reported
+        alarm = view.alarm and state[:2] != reported[:2]
+        if state == reported or (now_s - self._reported_s < SHORTEST_GAP_S and not alarm):
             return None
-        self._told, self._told_s = state, now_s
-        news = "; ".join(_news(told, state, view, self._peaks))
+        self._reported, self._reported_s = state, now_s
+        news = "; ".join(_news(reported, state, view, self._peaks))
         for trigger, felt in zip(view.triggers, state.felt, strict=True):
             if felt is Resistance.NONE:
                 self._peaks[trigger.name] = 0.0
@@ -85,22 +85,22 @@ def _next_state(before: _State, view: LiveView) -> _State:
     return _State(view.phase, view.reason, linked, view.armed, tuple(felt), touched, view.holding, view.stands)
 
 
-def _news(told: _State, state: _State, view: LiveView, peaks: Mapping[str, float]) -> list[str]:
+def _news(reported: _State, state: _State, view: LiveView, peaks: Mapping[str, float]) -> list[str]:
     news = []
-    if state.linked and not told.linked:
+    if state.linked and not reported.linked:
         news.append("link up")
-    if state.armed and not told.armed and state.phase != "armed":
+    if state.armed and not reported.armed and state.phase != "armed":
         news.append("armed")
-    if state[:2] != told[:2]:
+    if state[:2] != reported[:2]:
         news.append(state.phase if state.reason is None else f"{state.phase}: {state.reason}")
-    for trigger, before, after in zip(view.triggers, told.felt, state.felt, strict=True):
+    for trigger, before, after in zip(view.triggers, reported.felt, state.felt, strict=True):
         if after is not before:
             news.append(_resistance(trigger, before, after, peaks[trigger.name], view.operator.haptics))
-    if state.touched != told.touched:
+    if state.touched != reported.touched:
         news.append("touches nothing" if state.touched is None else f"touches {state.touched}, as perceived")
-    if state.holding != told.holding:
-        news.append(f"lets go of {told.holding}" if state.holding is None else f"holds {state.holding}")
-    if state.stands and not told.stands:
+    if state.holding != reported.holding:
+        news.append(f"lets go of {reported.holding}" if state.holding is None else f"holds {state.holding}")
+    if state.stands and not reported.stands:
         news.append("what is held stands")
     return news
 

@@ -90,8 +90,8 @@ class Status:
             text = live_line(view, self._console.width - 1)
             style = "bold red" if view.alarm else ""
             self._live.update(Text(text, style=style, overflow="crop", no_wrap=True), refresh=True)
-        elif (told := self._story.tell(now_s, view)) is not None:
-            self._output.write(f"{told}\n")
+        elif (reported := self._story.tell(now_s, view)) is not None:
+            self._output.write(f"{reported}\n")
 
     def show_facts(self, facts: Any) -> None:
         """Write the facts of one moment, a struct, at once."""

@@ -6,8 +6,8 @@ from typing import Any, Final, Protocol, TypeVar
 from common.clock import Clock, MonotonicClock, ThreadClock
 from common.command.stop_signal import StopSignal
 from common.realtime.garbage import IdleCollection
-from common.realtime.keeping_up import KeepingUp
 from common.realtime.pacing import Pacer, wait_for_turn
+from common.realtime.period_monitor import PeriodMonitor
 from common.realtime.stages import Stages
 
 Received = TypeVar("Received")
@@ -50,15 +50,15 @@ class Side(Protocol[Received]):
 class Loop:
     """Loop that runs a side, and measures whether it keeps the period."""
 
-    def __init__(self, period_s: float, helps: Mapping[str, str], seed: int, clock: Clock | None = None) -> None:
-        """helps: remedy for each stage of a turn, by name; "" for the time outside of stages."""
+    def __init__(self, period_s: float, remedies: Mapping[str, str], seed: int, clock: Clock | None = None) -> None:
+        """remedies: remedy for each stage of a turn, by name; "" for the time outside of stages."""
         self.clock = MonotonicClock() if clock is None else clock
         self.computed = ThreadClock()
         """Processor time of the loop's thread"""
-        self.stages = Stages(tuple(filter(None, helps)), self.clock, self.computed, seed)
+        self.stages = Stages(tuple(filter(None, remedies)), self.clock, self.computed, seed)
         self.start_s = self.clock.now()
         self.pacer = Pacer(period_s, self.start_s, seed)
-        self._keeping_up = KeepingUp(self.pacer, self.stages, self.clock, self.computed, helps)
+        self._period = PeriodMonitor(self.pacer, self.stages, self.clock, self.computed, remedies)
         self._collection = IdleCollection(self.clock)
 
     def run(self, side: Side[Received], stop: StopSignal, duration_s: float | None) -> None:
@@ -69,7 +69,7 @@ class Loop:
             self.start_s = clock.now()
             pacer.restart(self.start_s)
             while not stop.is_set:
-                self._keeping_up.begin()
+                self._period.begin()
                 received = receive()
                 # Read after receiving: a process that was paused in between must not take old messages for new.
                 now_s = clock.now()
@@ -85,7 +85,7 @@ class Loop:
                     rest_s = clock.now()
                     side.rest(rest_s, now_s)
                     self._collection.idle(rest_s, resting=side.resting)
-                if (said := self._keeping_up.end(turned=turned)) is not None:
+                if (said := self._period.end(turned=turned)) is not None:
                     side.note(said)
                 wait_for_turn(pacer, clock, side.wait, side.next_due())
 
@@ -94,6 +94,6 @@ class Loop:
         return {
             "duration_s": self.clock.now() - self.start_s,
             "stages": {side: self.stages.summary()},
-            "machine": {side: self._keeping_up.summary()},
+            "machine": {side: self._period.summary()},
             "pacing": {side: self.pacer.summary() | {"garbage": self._collection.summary()}},
         }

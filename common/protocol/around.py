@@ -53,21 +53,21 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
             )
 
     @classmethod
-    def of(cls, full_s: float, ways_m: FloatArray, changes_s: FloatArray) -> "Around":
+    def of(cls, full_s: float, onsets_m: FloatArray, changes_s: FloatArray) -> "Around":
         """Pack distances (LISTS, PROBES), infinite beyond the horizon and clipped at 0.5 m.
 
         changes_s (n, AXES): see `changes`; clipped at 8 s.
         """
-        steps = np.minimum(np.maximum(ways_m / STEP_M, 0.0), _FREE - 1)
-        steps[ways_m == np.inf] = _FREE
+        steps = np.minimum(np.maximum(onsets_m / STEP_M, 0.0), _FREE - 1)
+        steps[onsets_m == np.inf] = _FREE
         changes = np.minimum(np.maximum(np.rint(changes_s / CHANGE_STEP_S), -(2**15)), 2**15 - 1)
         return cls(full_s, steps.astype(np.uint8).tobytes(), changes.astype("<i2").tobytes())
 
-    def ways_m(self, horizon_m: float) -> FloatArray:
+    def onsets_m(self, horizon_m: float) -> FloatArray:
         """Return the distances (LISTS, PROBES) in metres, at most the horizon."""
         steps = np.frombuffer(self.steps, dtype=np.uint8).reshape(LISTS, PROBES)
-        ways_m: FloatArray = np.where(steps == _FREE, horizon_m, np.minimum(steps * STEP_M, horizon_m))
-        return ways_m
+        onsets_m: FloatArray = np.where(steps == _FREE, horizon_m, np.minimum(steps * STEP_M, horizon_m))
+        return onsets_m
 
     def changes_s(self) -> FloatArray:
         """Return `changes` in seconds (n, AXES)."""

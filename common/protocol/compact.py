@@ -23,12 +23,12 @@ from common.protocol.messages import (
     Message,
     MotionCommand,
     MotionState,
+    OnsetDistances,
     StiffnessUpdate,
     Telemetry,
     TriggerField,
     Tune,
     Watch,
-    Ways,
 )
 
 STEP_M: Final = 2.0**-14
@@ -138,8 +138,12 @@ def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
     horizon_m = horizon * STEP_M
     return StiffnessUpdate(
         message.header,
-        TriggerField(_ways(content[:8], horizon_m), _ways(content[8:16], horizon_m), *content[32:36]),
-        TriggerField(_ways(content[16:24], horizon_m), _ways(content[24:32], horizon_m), *content[36:40]),
+        TriggerField(
+            _onset_distances(content[:8], horizon_m), _onset_distances(content[8:16], horizon_m), *content[32:36]
+        ),
+        TriggerField(
+            _onset_distances(content[16:24], horizon_m), _onset_distances(content[24:32], horizon_m), *content[36:40]
+        ),
         speed_m_s,
         horizon_m,
         rumble / 8.0,
@@ -155,28 +159,28 @@ def _unpack_around(behind: bytes) -> Around:
     return Around(full_s, steps, behind[_AROUND.size :])
 
 
-def _steps(ways: Ways, horizon_m: float) -> list[int]:
-    within = bisect_left(ways, horizon_m)
+def _steps(onsets: OnsetDistances, horizon_m: float) -> list[int]:
+    within = bisect_left(onsets, horizon_m)
     if not within:
         return _ALL_BEYOND
-    steps = list(map(math.floor, map(_IN_STEPS, ways[:within])))
+    steps = list(map(math.floor, map(_IN_STEPS, onsets[:within])))
     if steps[0] <= _PAST or steps[-1] > _FARTHEST:
         steps = [max(_PAST, min(step, _FARTHEST)) for step in steps]
     return steps + _ALL_BEYOND[within:]
 
 
-def _ways(steps: tuple[int, ...], horizon_m: float) -> Ways:
+def _onset_distances(steps: tuple[int, ...], horizon_m: float) -> OnsetDistances:
     if steps == _NOTHING_NEAR:
         return (horizon_m,) * 8
-    ways = tuple(map(_IN_METRES, steps))
+    onsets = tuple(map(_IN_METRES, steps))
     if steps[0] == _PAST or steps[-1] == _BEYOND:
         if steps != tuple(sorted(steps)):
-            raise ValueError(f"ways = {steps}; valid: none shorter than the one before")
+            raise ValueError(f"distances = {steps}; valid: none shorter than the one before")
         past, within = steps.count(_PAST), len(steps) - steps.count(_BEYOND)
-        ways = (_PAST_M,) * past + ways[past:within] + (horizon_m,) * (len(steps) - within)
-    if ways[-1] > horizon_m:
-        raise ValueError(f"ways = {ways}; valid: none beyond the horizon, {horizon_m}")
-    return ways  # type: ignore[return-value]  # the format says eight
+        onsets = (_PAST_M,) * past + onsets[past:within] + (horizon_m,) * (len(steps) - within)
+    if onsets[-1] > horizon_m:
+        raise ValueError(f"distances = {onsets}; valid: none beyond the horizon, {horizon_m}")
+    return onsets  # type: ignore[return-value]  # the format says eight
 
 
 def _pack_telemetry(view: Telemetry) -> bytes:

@@ -87,7 +87,7 @@ class LinkEnd:
         self._newest_received_s = 0.0
         self._last_sent_s = self._last_received_s = 0.0
 
-    def begin_anew(self) -> None:
+    def begin_epoch(self) -> None:
         """Begin our next epoch after the peer ended this one; the number is a hash, which strangers cannot guess."""
         self._epoch = int.from_bytes(hashlib.sha256(self._epoch.to_bytes(8)).digest()[:8]) >> 11
 

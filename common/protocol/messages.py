@@ -22,7 +22,7 @@ Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 
 MotionState = Literal["disarmed", "armed", "stopped"]
-Ways = tuple[float, float, float, float, float, float, float, float]
+OnsetDistances = tuple[float, float, float, float, float, float, float, float]
 Compensation = Literal["operator", "robot"]
 """Side that compensates the delay: the operator side by its commands under way, or the robot side by eq. 8."""
 
@@ -56,12 +56,12 @@ def _finite(name: str, value: float) -> None:
         raise ValueError(f"{name} = {value}; valid: a finite number")
 
 
-def _rising(name: str, ways: Ways) -> None:
-    a, b, c, d, e, f, g, h = ways
+def _rising(name: str, onsets: OnsetDistances) -> None:
+    a, b, c, d, e, f, g, h = onsets
     if -_FARTHEST_M <= a <= b <= c <= d <= e <= f <= g <= h <= _FARTHEST_M:  # fast path: two in each tick
         return
-    _all_in_range(name, -_FARTHEST_M, _FARTHEST_M, ways)
-    raise ValueError(f"{name} = {ways}; valid: eight ways, none shorter than the one before")
+    _all_in_range(name, -_FARTHEST_M, _FARTHEST_M, onsets)
+    raise ValueError(f"{name} = {onsets}; valid: eight distances, none shorter than the one before")
 
 
 def _both_or_neither(name: str, sent_s: float | None, held_s: float | None) -> None:
@@ -222,10 +222,10 @@ class LinkReport(Message, frozen=True, tag="report"):
 class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """Onset distances of the eight strengths along one trigger (§4.2)."""
 
-    fast_m: Ways
+    fast_m: OnsetDistances
     """Distances, never falling, at which strengths 1 to 8 begin; `horizon_m` for those beyond it. Below 0: the gripper
     is past the onset."""
-    slow_m: Ways
+    slow_m: OnsetDistances
     """Distances for slow zones, in which touching the target is allowed."""
     full_speed_m_s: float
     """v_max: speed that a full pull commands in this pose."""

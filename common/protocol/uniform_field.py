@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from common.protocol.messages import TriggerField, Ways
+from common.protocol.messages import OnsetDistances, TriggerField
 
 STRENGTHS: Final = 8
 FAR_M: Final = 10.0
@@ -14,10 +14,10 @@ def uniform_field(strength: int, full_speed_m_s: float = 0.25, acceleration_m_s2
     if not 0 <= strength <= STRENGTHS:
         raise ValueError(f"strength = {strength}; valid: 0 to {STRENGTHS}")
     near, far = (-FAR_M,) * strength, (FAR_M,) * (STRENGTHS - strength)
-    ways: Ways = (*near, *far)  # type: ignore[assignment]
+    onsets: OnsetDistances = (*near, *far)  # type: ignore[assignment]
     return TriggerField(
-        fast_m=ways,
-        slow_m=ways,
+        fast_m=onsets,
+        slow_m=onsets,
         full_speed_m_s=full_speed_m_s,
         acceleration_m_s2=acceleration_m_s2,
         displacement_m=0.0,

@@ -106,7 +106,7 @@ class Budget(Generic[Name]):
         if stream == "haptics":
             self._haptic_bytes += (taken - self._haptic_bytes) / 64.0
 
-    def may_tell(self, size_bytes: int, now_s: float) -> bool:
+    def may_send_telemetry(self, size_bytes: int, now_s: float) -> bool:
         """Return whether telemetry of that size may leave now, and count it if so; if not, the next one is newer."""
         self._fill(now_s)
         flows = self.controller.may_send(now_s)

@@ -75,9 +75,9 @@ class RateController:
         """Allowed rate of all streams together, headers included."""
         self._limited_s = -math.inf
         self._updated_s = -math.inf
-        self.begin_anew()
+        self.begin_epoch()
 
-    def begin_anew(self) -> None:
+    def begin_epoch(self) -> None:
         """Forget the link, for another peer or none; keep the rate."""
         self._capacity_bit_s: float | None = None
         """Delivered rate at the last queue; None before the first."""
@@ -220,7 +220,7 @@ class RateController:
         if limited:
             self._limited_s = now_s
         if self._newest_sent_s is not None and now_s - self._heard_s > _SILENT_S:
-            self.begin_anew()
+            self.begin_epoch()
             self.rate_bit_s = min(self.rate_bit_s, 0.25 * START_BIT_S)
         heard = now_s - self._heard_s < _LIMITED_S
         if heard and now_s - self._limited_s < _LIMITED_S and self.may_send(now_s):

@@ -12,7 +12,7 @@ from common.statistics import BLOCK, RunningStatistics
 
 EVERY: Final = 7
 """Sampling interval, in turns."""
-Given = ParamSpec("Given")
+Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 
 
@@ -34,12 +34,12 @@ class Stages:
         self._turns_s: list[list[float]] = []
         self._statistics = [RunningStatistics(seed) for _ in self.spent_s]
 
-    def timed(self, name: str, function: Callable[Given, Result]) -> Callable[Given, Result]:
+    def timed(self, name: str, function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
         """Wrap `function` so that its time counts for the stage `name`; raises ValueError for an unknown one."""
         place = 2 * self.names.index(name)
         wall, processor = self._wall.now, self._processor.now
 
-        def measured(*arguments: Given.args, **others: Given.kwargs) -> Result:
+        def measured(*arguments: Parameters.args, **others: Parameters.kwargs) -> Result:
             if not self.looks:
                 return function(*arguments, **others)
             began_s, computed_s = wall(), processor()

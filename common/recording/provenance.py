@@ -20,11 +20,11 @@ _OF_THIS_RUN: Final = ("summary", "record", "config", "keys")
 
 def provenance(settings: Any, epoch: int, clock_domain: str) -> dict[str, Any]:
     """Return all values from which a core was made, as plain ones."""
-    told = dataclasses.replace(settings, **{name: None for name in _OF_THIS_RUN if hasattr(settings, name)})
+    kept = dataclasses.replace(settings, **{name: None for name in _OF_THIS_RUN if hasattr(settings, name)})
     return {
         "epoch": epoch,
         "clock_domain": clock_domain,
-        "settings": msgspec.to_builtins(told, enc_hook=_plain),
+        "settings": msgspec.to_builtins(kept, enc_hook=_plain),
         "versions": {"python": platform.python_version(), **_versions()},
         "processor": processor_name(),
         "system": f"{platform.system()} {platform.machine()}",

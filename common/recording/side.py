@@ -39,7 +39,7 @@ class Encoder(Protocol):
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
         """Return the note's time and entries; pass view payloads to `views`, with their times."""
 
-    def begin_anew(self) -> None:
+    def begin_epoch(self) -> None:
         """Encode the next values whole: earlier ones may be lost."""
 
 
@@ -122,7 +122,7 @@ class SideRecording:
         self._entries.clear()
         if not self._channel.send(BLOCK, block):
             self.dropped += 1
-            self._encoder.begin_anew()
+            self._encoder.begin_epoch()
 
     def _listen(self) -> None:
         failed = self._said["error"] is not None

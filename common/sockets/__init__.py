@@ -5,5 +5,5 @@ the operator, apart so that a frame never delays a stiffness. No call but `wait`
 leave now is dropped and counted, because a newer one follows. A shell belongs to one thread.
 
 `turns` rotates messages over several connections of one peer; `peers` assigns connections to peers.
-Neither knows ZeroMQ, nor do `keys`, `allow_list`, `endpoints`, `crowd`, `descriptors` and `admission`.
+Neither knows ZeroMQ, nor do `keys`, `allow_list`, `endpoints`, `port_connections`, `descriptors` and `admission`.
 """

@@ -165,12 +165,12 @@ class HandshakeWatch:
         """Process the events since the last call; never blocks."""
         for _ in range(_EVENTS_PER_CALL):
             try:
-                told = parse_monitor_message(self._events.recv_multipart(zmq.NOBLOCK))
+                event_fields = parse_monitor_message(self._events.recv_multipart(zmq.NOBLOCK))
             except zmq.Again:
                 return
-            event = told["event"]
+            event = event_fields["event"]
             if event == zmq.EVENT_CONNECTED:
-                hold_little(told["value"], self._unsent_bytes)
+                hold_little(event_fields["value"], self._unsent_bytes)
                 continue
             self.failed = event != zmq.EVENT_HANDSHAKE_SUCCEEDED
             self.trouble = self._reason(event) if self.failed else None

@@ -5,8 +5,8 @@ import resource
 import zmq
 from zmq.utils.monitor import parse_monitor_message
 
-from common.sockets.crowd import Crowd
 from common.sockets.descriptors import hold_little
+from common.sockets.port_connections import PortConnections
 from common.sockets.readable import readable
 
 
@@ -23,11 +23,11 @@ class Gate:
     ) -> None:
         """Allow `most` connections, at most a quarter of the descriptors that this process may open.
 
-        `introduced_s` as for Crowd, `unsent_bytes` as for hold_little.
+        `introduced_s` as for PortConnections, `unsent_bytes` as for hold_little.
         """
         self._part = part
         self._unsent_bytes = unsent_bytes
-        self.crowd = Crowd(min(most, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 4), introduced_s)
+        self.connections = PortConnections(min(most, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 4), introduced_s)
         address = f"inproc://gate-{id(part)}"
         part.monitor(address, zmq.EVENT_ACCEPTED | zmq.EVENT_DISCONNECTED)
         self.events = context.socket(zmq.PAIR)
@@ -41,10 +41,10 @@ class Gate:
             return False
         event = parse_monitor_message(self.events.recv_multipart())
         if event["event"] == zmq.EVENT_ACCEPTED:
-            self.crowd.came(event["value"], now_s)
+            self.connections.accepted(event["value"], now_s)
             hold_little(event["value"], self._unsent_bytes)
         else:
-            self.crowd.went(event["value"])
+            self.connections.ended(event["value"])
         return True
 
     def close(self) -> None:

@@ -18,7 +18,15 @@ from common.sockets.shell import (
     check_size,
     connect_socket,
 )
-from common.sockets.turns import CONNECTIONS, MOST_CONNECTIONS_EACH, Offered, Turns, Way, new_group, routing_id
+from common.sockets.turns import (
+    CONNECTIONS,
+    MOST_CONNECTIONS_EACH,
+    Offered,
+    TurnConnection,
+    Turns,
+    new_group,
+    routing_id,
+)
 
 _RETRY_S = 0.5
 _ATTEMPT_LIMIT_S = 3.0
@@ -30,7 +38,7 @@ _HANDSHAKE_LIMIT_S = 10.0
 
 
 @dataclass(eq=False)
-class _Connection(Way):
+class _Connection(TurnConnection):
     """Control connection."""
 
     part: "zmq.Socket[bytes]"
@@ -79,7 +87,7 @@ class OperatorSockets(SocketShell):
                 part.setsockopt(zmq.IMMEDIATE, 1)
                 self._connections.append(_Connection(part, Inbox(part, frames=1)))
                 self._join(part, control, "--connect", keys, CONTROL_UNSENT_BYTES)
-            self._turns.ways.extend(self._connections)
+            self._turns.connections.extend(self._connections)
             self._view = self._open_view(zmq.SUB)
             for topic in topics:
                 self._view.setsockopt(zmq.SUBSCRIBE, topic)

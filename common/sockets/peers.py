@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.peer_name import peer_name
-from common.sockets.turns import Offered, Turns, Way, group_of
+from common.sockets.turns import Offered, TurnConnection, Turns, group_of
 
 _REMEMBERED_CONNECTIONS: Final = 1024
 
 
 @dataclass(eq=False)
-class Connection(Way):
+class Connection(TurnConnection):
     """State of one connection."""
 
     name: bytes
@@ -21,7 +21,7 @@ class Connection(Way):
     descriptor: int = -1
     """Descriptor by which the last message came; -1 if unknown."""
     number: int | None = None
-    """Number of that connection in the crowd; 0 for an ended one, None while unknown."""
+    """Number of that connection at the port; 0 for an ended one, None while unknown."""
     hung_up: bool = False
 
     def stands_for(self, descriptor: int, number: int | None) -> None:
@@ -70,7 +70,7 @@ class Peers:
             self._forget(min(self.connections.values(), key=lambda each: each.heard_s))
         self._peers[connection.peer.name] = connection.peer
         self.connections[name] = connection
-        connection.peer.turns.ways.append(connection)
+        connection.peer.turns.connections.append(connection)
         return connection
 
     def count(self, peer: Peer) -> int:
@@ -95,7 +95,7 @@ class Peers:
     def _forget(self, connection: Connection) -> None:
         del self.connections[connection.name]
         connection.peer.turns.forget(connection)
-        if not connection.peer.turns.ways:
+        if not connection.peer.turns.connections:
             del self._peers[connection.peer.name]
 
 

@@ -66,7 +66,7 @@ class RobotSockets(SocketShell):
         self._keys = keys
         self.crowded = 0
         """Number of connections that were ended as surplus."""
-        self._told: list[str] = []
+        self._reported: list[str] = []
         self._peers = Peers(self._offer)
         self._all_seen = False
         """Whether the gates had processed all events of connections."""
@@ -105,7 +105,7 @@ class RobotSockets(SocketShell):
         news: list[str] = []
         wrong = []
         if self.crowded:
-            limit = self._gates[0].crowd.limit
+            limit = self._gates[0].connections.limit
             wrong.append(f"more than {limit} connections at once: new strangers are cut off, admitted peers stay")
         if self._keys is not None and self._authenticator is not None:
             allowed = self._keys.allowed
@@ -114,8 +114,8 @@ class RobotSockets(SocketShell):
             if allowed.unreadable is not None:
                 who = "admitted peers stay" if allowed.names else "nobody is let in any more"
                 wrong.append(f"{who}: {allowed.unreadable}")
-        told, self._told = self._told, wrong
-        return news + [text for text in wrong if text not in told]
+        reported, self._reported = self._reported, wrong
+        return news + [text for text in wrong if text not in reported]
 
     def refresh_keys(self) -> None:
         """Refresh the allow-list, and cut off revoked peers; call a few times a second."""
@@ -172,7 +172,9 @@ class RobotSockets(SocketShell):
     def tcp_figures(self, peer: bytes) -> TcpFigures:
         """Return the sum of the kernel's figures of the connections to `peer`."""
         known = self._peers.get(peer)
-        return tcp_figures([] if known is None else [each.descriptor for each in known.turns.ways if each.number])
+        return tcp_figures(
+            [] if known is None else [each.descriptor for each in known.turns.connections if each.number]
+        )
 
     def publish(self, topic: bytes, payload: bytes) -> None:
         """Send to the subscribers of `topic`; only a viewer that does not keep up loses the message.
@@ -217,7 +219,7 @@ class RobotSockets(SocketShell):
         else:
             return
         for gate in self._gates:
-            for descriptor in gate.crowd.surplus(now_s):
+            for descriptor in gate.connections.surplus(now_s):
                 shut_down(descriptor)
                 self.crowded += 1
 
@@ -254,7 +256,7 @@ class RobotSockets(SocketShell):
         """Return the connection of one message if it may be decoded; each frame names its sender."""
         key = "" if self._keys is None else user_of(frame)
         descriptor = descriptor_of(frame)
-        connection, crowd = self._peers.connection(name, key), self._gates[0].crowd
+        connection, crowd = self._peers.connection(name, key), self._gates[0].connections
         if descriptor != connection.descriptor or connection.number is None:
             self._watch_connections()
             # The previous connection, whose routing id was taken over: ZeroMQ neither reads nor ends it.
@@ -262,7 +264,7 @@ class RobotSockets(SocketShell):
             connection.stands_for(descriptor, crowd.number(descriptor) if self._all_seen else None)
         peer, is_allowed = connection.peer, self._allows(key)
         if is_allowed:
-            crowd.spoke(descriptor)
+            crowd.introduced(descriptor)
         is_surplus = self._peers.count(peer) > PEER_LIMIT_PER_S
         if is_allowed and not is_surplus:
             return connection
@@ -272,7 +274,7 @@ class RobotSockets(SocketShell):
         number = crowd.number(descriptor)
         if self._all_seen and number != connection.number and self._is_there(connection):
             connection.stands_for(descriptor, number)
-        for each in peer.turns.ways:
+        for each in peer.turns.connections:
             self._hang_up(each)
         return None
 
@@ -286,7 +288,7 @@ class RobotSockets(SocketShell):
     def _hang_up(self, connection: Connection) -> None:
         """End a connection, so that it does not fill our memory; ZeroMQ has no call for that."""
         # A message may be read long after its sender left: the descriptor may belong to another connection by now.
-        number, now_number = connection.number, self._gates[0].crowd.number(connection.descriptor)
+        number, now_number = connection.number, self._gates[0].connections.number(connection.descriptor)
         if self._all_seen and not connection.hung_up and number and number == now_number:
             connection.hung_up = True
             shut_down(connection.descriptor)

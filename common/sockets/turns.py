@@ -50,7 +50,7 @@ class Offered(Enum):
 
 
 @dataclass(eq=False, kw_only=True)
-class Way:
+class TurnConnection:
     """Connection of a peer."""
 
     heard_s: float = 0.0
@@ -61,26 +61,26 @@ class Way:
     """Time of the last message offered to it; those sent everywhere do not count."""
 
 
-AnyWay = TypeVar("AnyWay", bound=Way)
+AnyConnection = TypeVar("AnyConnection", bound=TurnConnection)
 
 
-class Turns(Generic[AnyWay]):
+class Turns(Generic[AnyConnection]):
     """Connections of a peer, the next in turn first."""
 
-    def __init__(self, offer: Callable[[AnyWay, bytes], Offered]) -> None:
+    def __init__(self, offer: Callable[[AnyConnection, bytes], Offered]) -> None:
         """`offer` sends without waiting, and forgets connections that are gone."""
-        self.ways: deque[AnyWay] = deque()
+        self.connections: deque[AnyConnection] = deque()
         self._heard_s = 0.0
         self._offer = offer
 
-    def heard(self, way: AnyWay, now_s: float) -> None:
-        """Note a message from `way`."""
-        way.heard_s = self._heard_s = now_s
+    def heard(self, connection: AnyConnection, now_s: float) -> None:
+        """Note a message from `connection`."""
+        connection.heard_s = self._heard_s = now_s
 
-    def forget(self, way: AnyWay) -> None:
+    def forget(self, connection: AnyConnection) -> None:
         """Remove a lost connection; silence is measured against the remaining ones."""
-        self.ways.remove(way)
-        self._heard_s = max((each.heard_s for each in self.ways), default=0.0)
+        self.connections.remove(connection)
+        self._heard_s = max((each.heard_s for each in self.connections), default=0.0)
 
     def send(self, payload: bytes, now_s: float, *, everywhere: bool) -> bool:
         """Send over the next connection that takes the payload, or over each; return whether any did.
@@ -89,19 +89,19 @@ class Turns(Generic[AnyWay]):
         Twice a second a silent one gets a copy: it may be back, and the peer waits to hear from it, too.
         """
         taken = False
-        for _ in range(len(self.ways)):
-            way = self.ways[0]
-            self.ways.rotate(-1)
-            is_silent = way.heard_s < self._heard_s - SILENCE_S
+        for _ in range(len(self.connections)):
+            connection = self.connections[0]
+            self.connections.rotate(-1)
+            is_silent = connection.heard_s < self._heard_s - SILENCE_S
             if not everywhere:
-                if now_s < way.full_until_s or (is_silent and now_s < way.tried_s + SILENCE_S):
+                if now_s < connection.full_until_s or (is_silent and now_s < connection.tried_s + SILENCE_S):
                     continue
-                way.tried_s = now_s
-            offered = self._offer(way, payload)
+                connection.tried_s = now_s
+            offered = self._offer(connection, payload)
             if offered is Offered.TAKEN:
                 taken |= everywhere or not is_silent
                 if not everywhere and taken:
                     break
             elif offered is Offered.FULL:
-                way.full_until_s = now_s + _REST_S * len(self.ways)
+                connection.full_until_s = now_s + _REST_S * len(self.connections)
         return taken

@@ -23,7 +23,7 @@ from operator_side.controller.connection import Connection
 from operator_side.controller.port import OpenController
 from operator_side.controller.search import Ready
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.people.whoever import whoever
+from operator_side.people.simulated_hands import simulated_hands
 from operator_side.settings import OperatorSettings
 from operator_side.viewing.pages.driving_page import DrivingPage
 from robot_side import events as robot_events
@@ -97,7 +97,7 @@ class Loopback:
         self.person: Person = (
             person(self.device)
             if person is not None
-            else whoever(
+            else simulated_hands(
                 self.device,
                 settings.operator.person,
                 settings.operator.seed,

@@ -40,7 +40,7 @@ class StartedSide:
         self._interrupted = False
         self._has_spoken = False
         self._events: queue.Queue[dict[str, Any]] = queue.Queue(maxsize=1000)
-        self._passed_over: list[dict[str, Any]] = []
+        self._kept_events: list[dict[str, Any]] = []
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -66,7 +66,7 @@ class StartedSide:
 
     def events(self) -> list[dict[str, Any]]:
         """Return the events since the last call."""
-        said, self._passed_over = self._passed_over, []
+        said, self._kept_events = self._kept_events, []
         while not self._events.empty():
             said.append(self._events.get_nowait())
         return said
@@ -104,7 +104,7 @@ class StartedSide:
                 self._process.wait(timeout=10.0)
                 self.check()
                 raise SideFailedError(f"the {self.name} side ended early")
-            (meanwhile or self._passed_over.append)(event)
+            (meanwhile or self._kept_events.append)(event)
 
     def check(self) -> None:
         """Raise SideFailedError, with the side's text, if it ended with an error; ConfigurationError for bad input."""

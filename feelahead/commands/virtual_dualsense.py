@@ -65,8 +65,8 @@ def live(
     """Run one controller from plug to unplug; raises DeviceError if the kernel removes it."""
     transport = Transport.USB if settings.transport == "usb" else Transport.BLUETOOTH
     controller = _Narrated(transport, Model.EDGE if settings.edge else Model.DUALSENSE, say)
-    told = UhidIdentity(transport, controller.model, controller.address)
-    offered = UhidController(controller, told)
+    identity = UhidIdentity(transport, controller.model, controller.address)
+    offered = UhidController(controller, identity)
     start_s = clock.now()
     driven, patient = False, True
 
@@ -84,7 +84,7 @@ def live(
             controller.set_sticks(left=stick)
         return not stopped() and (settings.duration is None or now_s - start_s < settings.duration)
 
-    say(f"plugging in: {told.name} on {transport.value}, {controller.address}")
+    say(f"plugging in: {identity.name} on {transport.value}, {controller.address}")
     offer(file, offered, clock, INPUT_REPORT_PERIOD_S, going)
     counts = offered.counts
     say(f"unplugged: {counts.inputs} reports sent, {counts.outputs} taken, {counts.refused} refused")
@@ -104,14 +104,14 @@ class _Narrated(SimulatedDualSense):
         super().take_report(report, now_s)
         l2, r2 = encoded_effects(report)
         self._effects = {"L2": l2 or self._effects["L2"], "R2": r2 or self._effects["R2"]}
-        told = self._state_in_words()
-        for part, doing in told.items():
+        words = self._state_in_words()
+        for part, doing in words.items():
             if doing != self._last_words[part]:
                 self._say(f"{part}: {doing}")
-        self._last_words = told
+        self._last_words = words
 
     def _state_in_words(self) -> dict[str, str]:
-        light = self.told.light
+        light = self.commanded.light
         return {name: described(encoded) for name, encoded in self._effects.items()} | {
             "rumble": f"left {self.rumble.left:.0%}, right {self.rumble.right:.0%}",
             "lightbar": "as it was" if light is None else "red {}, green {}, blue {}".format(*light),

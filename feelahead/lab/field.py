@@ -52,9 +52,9 @@ def looks_before(cell: Facing, free_mm: Iterable[float]) -> Iterator[Look]:
     scene = load_scene(cell.model, cell.site)
     posed, gripper, things = PosedScene(scene), PosedGripper(scene), len(scene.objects)
     pose = gripper.at(gripper.home_rad)
-    posed.put(gripper.home_rad, gripper.fingers, np.zeros(3))
-    way_m = posed.way_m(_FARTHEST_M)
-    if way_m >= _FARTHEST_M:
+    posed.set_pose(gripper.home_rad, gripper.fingers, np.zeros(3))
+    contact_distance_m = posed.contact_distance_m(_FARTHEST_M)
+    if contact_distance_m >= _FARTHEST_M:
         raise ConfigurationError(
             f"--model {cell.model}: nothing is ahead of the gripper within {_FARTHEST_M:g} m; valid: a scene with"
             " something on its way"
@@ -65,7 +65,7 @@ def looks_before(cell: Facing, free_mm: Iterable[float]) -> Iterator[Look]:
     axis = np.ascontiguousarray(pose.tool_rotation[:, 2])
     r2 = Along(axis, 0.0, CameraSettings().sd_m ** 2, float(standard_quantile(_PROBABILITY)), _REACH_M)
     for free in free_mm:
-        posed.put(gripper.home_rad, gripper.fingers, (1e-3 * free - way_m) * axis)
+        posed.set_pose(gripper.home_rad, gripper.fingers, (1e-3 * free - contact_distance_m) * axis)
         seen = scene_table(posed.perceived(np.zeros((things, 3))))
         yield functools.partial(ahead.look, pose, seen, classes, r2)
 
@@ -78,12 +78,12 @@ def look_ahead(cell: Facing) -> Iterator[Row]:
         found_mm = (1e3 * way if math.isfinite(way) else None for way in found.fast_m.tolist())
         yield {
             "free_mm": free_mm,
-            **{way_name(strength): way_mm for strength, way_mm in enumerate(found_mm, 1)},
+            **{strength_column(strength): way_mm for strength, way_mm in enumerate(found_mm, 1)},
             "sigma_mm": 1e3 * found.sigma_m,
         }
 
 
-def way_name(strength: int) -> str:
+def strength_column(strength: int) -> str:
     """Name the column of the distance from which a strength is felt; None in it if it never is."""
     return f"strength_{strength}_mm"
 
@@ -93,7 +93,7 @@ def draw_field(table: Table, frozen: str, path: Path) -> None:
     with figure(path, 1, 1, f"where strength begins (frozen {frozen})", figsize=(7.5, 4.2)) as (_, axes):
         for number, ((scene,), rows) in enumerate(table.groups("scene")):
             for strength, line in DRAWN.items():
-                ways = (row[way_name(strength)] for row in rows)
+                ways = (row[strength_column(strength)] for row in rows)
                 before = [
                     math.nan if way is None else free - way
                     for free, way in zip(rows.values("free_mm"), ways, strict=True)

@@ -33,7 +33,7 @@ class Replayed:
 
     took_us: FloatArray
     """(t,) processor time of the law: the least of all passes over the tick"""
-    ways_m: FloatArray
+    onsets_m: FloatArray
     """(t, 8) distances of WAYS; the horizon where nothing is felt"""
     horizon_m: FloatArray
     """(t,)"""
@@ -54,7 +54,7 @@ def errors_mm(found: Replayed, finest: Replayed, kind: str) -> dict[str, float]:
     """
     columns = [place for place, name in enumerate(WAYS) if name.endswith(kind)]
     horizon = np.minimum(found.horizon_m, finest.horizon_m)[:, None]
-    ours, theirs = (np.minimum(one.ways_m[:, columns], horizon) for one in (found, finest))
+    ours, theirs = (np.minimum(one.onsets_m[:, columns], horizon) for one in (found, finest))
     apart: FloatArray = 1e3 * (ours - theirs)[np.minimum(ours, theirs) < horizon]
     if not apart.size:
         return {}
@@ -83,7 +83,7 @@ def replay(recorded: Recorded, covers_m: Sequence[float], times: int) -> list[Re
     return [
         Replayed(
             took_us=1e6 * took_s[number],
-            ways_m=felt[number, :, :-1],
+            onsets_m=felt[number, :, :-1],
             horizon_m=felt[number, :, -1],
             spheres=len(own[0].situation.pose.sphere_radii_m),
             looks_per_s=law.summary()["fields"] / passed_s,

@@ -44,9 +44,9 @@ class Comparison:
         """Whether the differences are at most those between processors."""
         return self.worst_eighths <= WITHIN_EIGHTHS and self.worst_m <= WITHIN_M
 
-    def take(self, first: bytes | None, second: bytes | None, told: int | None = None) -> None:
-        """Compare a recorded message with the recomputed one; None if missing. `told`: kind of an entry of FEELS."""
-        counts = told is not None or _is_stiffness(first if second is None else second) or self.side == "operator"
+    def take(self, first: bytes | None, second: bytes | None, feel_kind: int | None = None) -> None:
+        """Compare a recorded message with the recomputed one; None if missing. `feel_kind`: a kind of FEELS."""
+        counts = feel_kind is not None or _is_stiffness(first if second is None else second) or self.side == "operator"
         same = first == second
         if counts:
             self.made += second is not None
@@ -58,15 +58,15 @@ class Comparison:
             return
         eighths, metres = math.inf, 0.0
         if first is not None and second is not None:
-            eighths, metres = _difference(first, second, told)
+            eighths, metres = _difference(first, second, feel_kind)
         self.worst_eighths = max(self.worst_eighths, eighths)
         self.worst_m = max(self.worst_m, metres)
 
-    def missed(self, made: deque[Any], told: int | None = None) -> None:
+    def missed(self, made: deque[Any], feel_kind: int | None = None) -> None:
         """Compare, and remove, items that had not been recorded: messages, or values for the controller."""
         while made:
             one = made.popleft()
-            self.take(None, one if isinstance(one, bytes) else b"", told)
+            self.take(None, one if isinstance(one, bytes) else b"", feel_kind)
 
     def lines(self) -> list[str]:
         """Return lines for people."""
@@ -135,11 +135,11 @@ def _is_stiffness(payload: bytes | None) -> bool:
         return False
 
 
-def _difference(first: bytes, second: bytes, told: int | None) -> tuple[float, float]:
+def _difference(first: bytes, second: bytes, feel_kind: int | None) -> tuple[float, float]:
     """Return the difference in eighths of strength and in metres; infinite eighths if anything else differs."""
     with contextlib.suppress(RemoteProtocolError):
-        if told is not None:
-            return _feel_difference(recorded_feel(told, first), recorded_feel(told, second))
+        if feel_kind is not None:
+            return _feel_difference(recorded_feel(feel_kind, first), recorded_feel(feel_kind, second))
         one, other = decode(first), decode(second)
         if isinstance(one, StiffnessUpdate) and isinstance(other, StiffnessUpdate):
             return _message_difference(one, other)

@@ -139,7 +139,7 @@ def _vectors(joined: Table) -> dict[str, dict[str, str]]:
     }
     if "stiffness.r2.stiffness" in joined.columns():
         vectors["observation.stiffness"] = {f"{side}_stiffness": f"stiffness.{side}.stiffness" for side in ("l2", "r2")}
-        vectors["observation.ways"] = {
+        vectors["observation.onset_distances"] = {
             f"{side}_{kind}_{strength + 1}_m": f"stiffness.{side}.{kind}_m.{strength}"
             for side in ("l2", "r2")
             for kind in ("fast", "slow")

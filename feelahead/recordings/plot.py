@@ -37,7 +37,7 @@ def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
 
     joined = tables.joined(PLOT_HZ)
     times_s = np.array(joined.times_s)
-    panels: list[Callable[[Any, Any, Table, FloatArray], None]] = [_ways, _felt("r2", "R2"), _felt("l2", "L2")]
+    panels: list[Callable[[Any, Any, Table, FloatArray], None]] = [_onsets, _felt("r2", "R2"), _felt("l2", "L2")]
     panels += [_speed, _enlargement, _distances, _delays]
     with mpl.rc_context(_STYLE):
         layout: Any = {"figsize": _INCHES, "height_ratios": _HEIGHTS, "layout": "constrained"}
@@ -63,14 +63,14 @@ def _title(recording: Recording, tables: Tables) -> str:
     settings = recording.headers.get("robot", header)["settings"]
     links = {found["settings"].get("link") or "none" for found in recording.headers.values()}
     when = datetime.fromtimestamp(1e-9 * recording.began_ns(), UTC).isoformat(sep=" ", timespec="seconds")
-    told = [
+    lines = [
         f"{recording.path.name}: {tables.duration_s:.1f} s, {when}",
         f"emulated link: {'; '.join(sorted(links))}",
         f"scene {settings.get('scene') or settings.get('model') or 'table'}, law {settings.get('law', 'unknown')},"
         f" P {settings.get('probability', 'unknown')}, seed {settings.get('seed')},"
         f" feelahead {header['versions'].get('feelahead', 'unknown')}",
     ]
-    return "\n".join(told)
+    return "\n".join(lines)
 
 
 def _bands(axis: Any, joined: Table, times_s: FloatArray) -> None:
@@ -83,7 +83,7 @@ def _bands(axis: Any, joined: Table, times_s: FloatArray) -> None:
             axis.axvspan(times_s[start], last_s, color=_STATES[str(states[start])], lw=0, zorder=0)
 
 
-def _ways(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
+def _onsets(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
     horizon_mm = 1e3 * joined.numbers("stiffness.horizon_m")
     for side, label, color in _SIDES:
         ways = np.stack([1e3 * joined.numbers(f"stiffness.{side}.fast_m.{k}") for k in range(8)])

@@ -132,7 +132,7 @@ def replay_operator(recording: Recording) -> Comparison:
     core = build_operator_side(settings, header["epoch"], header["clock_domain"])
     compared = Comparison("operator", "commands and reports to the controller")
     sent: deque[bytes] = deque()
-    told: deque[Feel] = deque()
+    feels: deque[Feel] = deque()
     for entry in recorded_entries(recording, "operator", compared.notes):
         now_s, content = entry.now_s, entry.content
         if (give := _INPUTS.get(entry.kind)) is not None:
@@ -141,18 +141,18 @@ def replay_operator(recording: Recording) -> Comparison:
             with contextlib.suppress(RemoteProtocolError):  # the core ignored invalid reports, too
                 core.read_state(recorded_state(entry.kind, content), now_s)
         elif entry.kind in FEELS:
-            compared.take(content, as_recorded(entry.kind, told.popleft()) if told else None, entry.kind)
+            compared.take(content, as_recorded(entry.kind, feels.popleft()) if feels else None, entry.kind)
         match entry.kind:
             case Kind.MOTION:
                 compared.missed(sent)
                 sent.extend(message.payload for message in core.motion(now_s))
             case Kind.OUTPUT:
-                compared.missed(told, Kind.TOLD)
+                compared.missed(feels, Kind.TOLD)
                 if (feel := core.feel_now(now_s)) is not None:
-                    told.append(feel)
+                    feels.append(feel)
             case Kind.SENT:
                 payload = split_text(split_text(content)[1])[1]
                 compared.take(payload, sent.popleft() if sent else None)
     compared.missed(sent)
-    compared.missed(told, Kind.TOLD)
+    compared.missed(feels, Kind.TOLD)
     return compared

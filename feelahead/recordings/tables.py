@@ -134,8 +134,8 @@ def _row(entry: Entry, zones: dict[str, tuple[float, ...]]) -> tuple[str, dict[s
             hands = recorded_state(entry.kind, entry.content)
             return "controller", {"l2_raw": hands.l2, "r2_raw": hands.r2}
         if entry.kind in FEELS:
-            told = recorded_feel(entry.kind, entry.content)
-            zones.update((name, strengths) for name, strengths in (("l2", told.l2), ("r2", told.r2)) if strengths)
+            feel = recorded_feel(entry.kind, entry.content)
+            zones.update((name, strengths) for name, strengths in (("l2", feel.l2), ("r2", feel.r2)) if strengths)
             return "felt", {f"{name}.{zone}": value for name in zones for zone, value in enumerate(zones[name])}
     except (RemoteProtocolError, ValueError):
         return None

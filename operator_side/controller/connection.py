@@ -14,7 +14,7 @@ from operator_side.controller.state import ControllerState
 
 BEAT_PERIOD_S: Final = 0.05
 """Period of beats to the watchdog while an effect is on."""
-RETELL_AFTER_S: Final = 0.1
+REWRITE_AFTER_S: Final = 0.1
 """Silence after which effects are written again: half the watchdog's patience. If the watchdog has released the
 triggers, one of two consecutive gaps was longer, even if the process was suspended between clock and beat."""
 LOOK_PERIOD_S: Final = 1.0
@@ -108,7 +108,7 @@ class Connection:
         silence_s = 0.0 if self._beat_s is None else now_s - self._beat_s
         if self._beat_s is not None and silence_s < BEAT_PERIOD_S:
             return
-        silent = silence_s > RETELL_AFTER_S
+        silent = silence_s > REWRITE_AFTER_S
         if self.controller.stalls(now_s):
             if silent:
                 self._say_once("a write to the controller does not return; until it does, its triggers are released")

@@ -100,7 +100,7 @@ class EvdevPad:
         self._ioctl = ioctl
         self._changed = True
         self._state = ControllerState()
-        self._told = Feel()
+        self._commanded = Feel()
         self._effect_id = -1
         self._drives = (0, 0)
         self._said_s = 0.0
@@ -122,7 +122,7 @@ class EvdevPad:
     @property
     def released(self) -> bool:
         """Whether the last command neither resists nor rumbles."""
-        return self._told.releases
+        return self._commanded.releases
 
     def read(self, now_s: float) -> ControllerState | None:
         """Return the state after all events until now, and drive the motors by it."""
@@ -142,7 +142,7 @@ class EvdevPad:
     def write(self, feel: Feel, now_s: float) -> None:
         """Render `feel` as rumble from now on; a light is ignored."""
         self._open_descriptor()
-        self._told = feel.following(self._told)
+        self._commanded = feel.following(self._commanded)
         self._shake(now_s)
 
     def close(self) -> None:
@@ -153,7 +153,7 @@ class EvdevPad:
         with contextlib.suppress(OSError):  # it is gone: nothing can be written
             if any(self._drives):
                 os.write(descriptor, _played(self._effect_id, 0))
-            self._told = self._told.farewell
+            self._commanded = self._commanded.farewell
         os.close(descriptor)
 
     def _take(self, kind: int, code: int, value: int) -> None:
@@ -190,11 +190,11 @@ class EvdevPad:
 
     def _shake(self, now_s: float) -> None:
         """Drive the motors by the last command and the present travel; again before the effect ends."""
-        told, state = self._told, self._state
-        left, right = (0.0, 0.0) if told.rumble is None else (told.rumble.left, told.rumble.right)
+        commanded, state = self._commanded, self._state
+        left, right = (0.0, 0.0) if commanded.rumble is None else (commanded.rumble.left, commanded.rumble.right)
         drives = (
-            round(_FULL * max(left, _share(told.l2, state.l2))),
-            round(_FULL * max(right, _share(told.r2, state.r2))),
+            round(_FULL * max(left, _share(commanded.l2, state.l2))),
+            round(_FULL * max(right, _share(commanded.r2, state.r2))),
         )
         if drives == self._drives and (not any(drives) or 0.0 <= now_s - self._said_s < _AGAIN_S):
             return

@@ -29,7 +29,7 @@ _CLOCK_RATES_S: Final = 0.001
 class Displacement(NamedTuple):
     """Effect of the commands under way, along the direction in which R2 advances."""
 
-    way_m: float
+    displacement_m: float
     """δ, signed: from the gripper's place in the report to its place when a command sent now is followed."""
     speed_m_s: float
     """w, signed: its speed at that time."""
@@ -66,7 +66,7 @@ class Report(NamedTuple):
 class Course(NamedTuple):
     """Sampled course of the gripper by the commands under way."""
 
-    ways_m: FloatArray
+    displacements_m: FloatArray
     """(k,) displacement since the report, signed along the direction in which R2 advances"""
     speed_m_s: float
     """w: speed at the end, with the same sign"""
@@ -80,7 +80,7 @@ class Course(NamedTuple):
     def turned_back(self) -> "Course":
         """Return the course along the direction in which L2 retreats."""
         changes_s = self.changes_s * [-1.0, 1.0, 1.0, 1.0, 1.0]
-        return self._replace(ways_m=-self.ways_m, speed_m_s=-self.speed_m_s, changes_s=changes_s)
+        return self._replace(displacements_m=-self.displacements_m, speed_m_s=-self.speed_m_s, changes_s=changes_s)
 
 
 class CommandsUnderWay:
@@ -152,11 +152,11 @@ class CommandsUnderWay:
         counting = self._counting(now_s, report)
         if counting is None:
             return None
-        way_m, speed = 0.0, report.speed_m_s
+        displacement_m, speed = 0.0, report.speed_m_s
         for one, following in pairwise(counting):
             target, lasts_s = one.travel * report.full_speed_m_s, following.sent_s - one.sent_s
-            way_m, speed = follow(way_m, speed, target, acceleration_m_s2, lasts_s)
-        return Displacement(way_m, speed)
+            displacement_m, speed = follow(displacement_m, speed, target, acceleration_m_s2, lasts_s)
+        return Displacement(displacement_m, speed)
 
     def course(self, now_s: float, report: Report, changes_s: FloatArray) -> Course | None:
         """Follow trigger and sticks to the time at which a command sent at `now_s` is followed; see `displacement`.
@@ -179,8 +179,8 @@ class CommandsUnderWay:
             gained, followed = follow_together(followed, target, changes_s, lasts_s)
             passed.append(passed[-1] + gained)
         points = np.array(passed[before:])
-        ways_m = full_speed_m_s * (points[:, 0] - points[0, 0])
-        return Course(ways_m, full_speed_m_s * float(followed[0]), points[:, 1:], followed[1:], changes_s)
+        displacements_m = full_speed_m_s * (points[:, 0] - points[0, 0])
+        return Course(displacements_m, full_speed_m_s * float(followed[0]), points[:, 1:], followed[1:], changes_s)
 
     def _counting(self, now_s: float, report: Report) -> list[Command] | None:
         """List the commands in force from e to now, oldest first, and the end; None if they are unknown."""

@@ -9,9 +9,9 @@ from common.reaction import WRITE_S
 from operator_side.controller.feel import RELEASED, Feel
 from operator_side.feel.blindness import Blindness
 from operator_side.feel.commands_under_way import CommandsUnderWay, Displacement, Report
-from operator_side.feel.path_ahead import Aside
+from operator_side.feel.path_ahead import CourseOnMap
 from operator_side.feel.rendering import RenderingSettings, TriggerRendering
-from operator_side.feel.write_bound import WriteBound
+from operator_side.feel.write_bucket import WriteBucket
 from operator_side.feel.zones import moving_along, needed_m
 from operator_side.hands.travel_calibration import TravelCalibration
 
@@ -39,12 +39,12 @@ class Haptics:
         self._enabled = enabled
         self._swap_sides = swap_sides
         self._compensation = compensation
-        self._bound = WriteBound()
+        self._bound = WriteBucket()
         self._written: Feel | None = RELEASED
         self._commands = CommandsUnderWay()
         self._commanding = False
         self._mapped: StiffnessUpdate | None = None
-        self._traced: Aside | None = None
+        self._traced: CourseOnMap | None = None
         self._traced_s = -math.inf
         self.calibrate(calibration)
 
@@ -114,7 +114,7 @@ class Haptics:
         if felt.around is not None and newer:
             self._mapped, self._traced_s = felt, -math.inf
 
-    def _aside(self, felt: StiffnessUpdate, now_s: float) -> Aside | None:
+    def _aside(self, felt: StiffnessUpdate, now_s: float) -> CourseOnMap | None:
         """Return our sticks' course on the newest map; None while they rest, or without a map.
 
         Cached between two writes to a controller: a path is traced once for each write.
@@ -123,7 +123,7 @@ class Haptics:
             self._traced, self._traced_s = self._newest_aside(felt, now_s), now_s
         return self._traced
 
-    def _newest_aside(self, felt: StiffnessUpdate, now_s: float) -> Aside | None:
+    def _newest_aside(self, felt: StiffnessUpdate, now_s: float) -> CourseOnMap | None:
         mapped = self._mapped
         if mapped is None or mapped.around is None or self._compensation == "robot":
             return None
@@ -134,7 +134,7 @@ class Haptics:
         course = self._commands.course(now_s, _report(mapped), mapped.around.changes_s())
         if course is None:
             return None
-        return Aside(mapped.around, mapped.horizon_m, course, self._commands.sticks_at(now_s))
+        return CourseOnMap(mapped.around, mapped.horizon_m, course, self._commands.sticks_at(now_s))
 
     def needed_m(self, felt: StiffnessUpdate, pulled: tuple[float, float], now_s: float) -> tuple[float, float]:
         """Compute D at the present travel, in metres: of the trigger that retreats and of the one that advances.

@@ -36,7 +36,7 @@ _LEFT_OUT: Final = 0.02
 _ACROSS, _TURNED = slice(0, 2), slice(2, 4)
 
 
-class Aside(NamedTuple):
+class CourseOnMap(NamedTuple):
     """Map and the gripper's course on it."""
 
     around: Around
@@ -47,13 +47,19 @@ class Aside(NamedTuple):
     sticks: Sticks
     """Deflections, as commanded now"""
 
-    def ways_m(self, *, advancing: bool) -> FloatArray:
+    def onsets_m(self, *, advancing: bool) -> FloatArray:
         """Return the contact distances (2, PROBES) of one trigger, fast and slow."""
-        return self.around.ways_m(self.horizon_m)[slice(0, 2) if advancing else slice(2, 4)]
+        return self.around.onsets_m(self.horizon_m)[slice(0, 2) if advancing else slice(2, 4)]
 
 
 def traced_zones(
-    aside: Aside, field: TriggerField, travels: Sequence[float], other_travel: float, horizon_s: float, *, forth: bool
+    aside: CourseOnMap,
+    field: TriggerField,
+    travels: Sequence[float],
+    other_travel: float,
+    horizon_s: float,
+    *,
+    forth: bool,
 ) -> Zones:
     """Compute the zones: full where a zone's path meets something, and rising before that as `field` does.
 
@@ -68,7 +74,13 @@ def traced_zones(
 
 
 def _traced(
-    aside: Aside, field: TriggerField, travels: Sequence[float], other_travel: float, horizon_s: float, *, forth: bool
+    aside: CourseOnMap,
+    field: TriggerField,
+    travels: Sequence[float],
+    other_travel: float,
+    horizon_s: float,
+    *,
+    forth: bool,
 ) -> Zones:
     course = aside.course if forth else aside.course.turned_back()
     full_m_s = field.full_speed_m_s
@@ -76,11 +88,11 @@ def _traced(
     first = int(np.searchsorted(speeds_m_s, 0.0, side="right"))
     if first == len(travels):
         return FREE
-    some = np.unique(np.linspace(0, len(course.ways_m) - 1, _UNDER_WAY).astype(np.int64))
+    some = np.unique(np.linspace(0, len(course.displacements_m) - 1, _UNDER_WAY).astype(np.int64))
     speeds_m_s, here_s = speeds_m_s[first:, None], course.aside_s[some]
     ahead_m, ahead_s = _ahead(course, speeds_m_s, aside.sticks, full_m_s, horizon_s)
     points = np.concatenate([here_s, ahead_s.reshape(-1, 4)]) / aside.around.full_s
-    free_m = free_ways_m(aside.ways_m(advancing=forth), points)
+    free_m = contact_distances_m(aside.onsets_m(advancing=forth), points)
     # From here on one row for each zone: displacement along its path, and the contact distances there.
     slow = speeds_m_s < touch_speed_m_s(full_m_s)
     slow[0] = True
@@ -88,14 +100,14 @@ def _traced(
     under_way_m = np.where(slow, free_m[1, :count], free_m[0, :count])
     then_m = np.where(slow, free_m[1, count:].reshape(zones, -1), free_m[0, count:].reshape(zones, -1))
     free_m = np.hstack([under_way_m, then_m])
-    known_m = np.broadcast_to(course.ways_m[some[1:]], (zones, count - 1))
+    known_m = np.broadcast_to(course.displacements_m[some[1:]], (zones, count - 1))
     path_m = np.hstack([known_m, ahead_m])
     # Between two points the shorter contact distance counts.
     short_m = (path_m - np.minimum(free_m[:, :-1], free_m[:, 1:])).max(axis=1).tolist()
     found = [0] * first
     for of_slow, beyond_m in zip(slow[:, 0].tolist(), short_m, strict=True):
-        ways = field.slow_m if of_slow else field.fast_m
-        weaker = bisect_right(ways, ways[-1] + beyond_m) if beyond_m > -_RISES_M else 0
+        onsets = field.slow_m if of_slow else field.fast_m
+        weaker = bisect_right(onsets, onsets[-1] + beyond_m) if beyond_m > -_RISES_M else 0
         strength = MAX_STRENGTH if beyond_m >= 0.0 else weaker
         found.append(max(found[-1] if found else 0, strength))
     return Zones(tuple(found), int((path_m[:, -1] > aside.horizon_m).sum())) if any(found) else FREE
@@ -120,7 +132,7 @@ def _ahead(
     going_s, since_s = np.minimum(after_s, horizon_s), np.maximum(after_s - horizon_s, 0.0)
     passed = followed * going_s[..., None] + change[:, None] * _counts_s(going_s, changing_s)[..., None]
     passed += then[:, None] * since_s[..., None] + braking[:, None] * _counts_s(since_s, braking_s)[..., None]
-    return course.ways_m[-1] + full_m_s * passed[..., 0], course.aside_s[-1] + passed[..., 1:]
+    return course.displacements_m[-1] + full_m_s * passed[..., 0], course.aside_s[-1] + passed[..., 1:]
 
 
 def _counts_s(after_s: FloatArray, changing_s: FloatArray) -> FloatArray:
@@ -129,14 +141,14 @@ def _counts_s(after_s: FloatArray, changing_s: FloatArray) -> FloatArray:
     return after_s - growing_s + 0.5 * growing_s**2 / np.maximum(changing_s, _LEAST_S)
 
 
-def free_ways_m(ways_m: FloatArray, aside: FloatArray) -> FloatArray:
+def contact_distances_m(onsets_m: FloatArray, aside: FloatArray) -> FloatArray:
     """Interpolate contact distances (n, PROBES) at points (k, 4): times of fully deflected sticks over T.
 
     Points: across, right and up, and turned, right and up. The shorter of across and turned counts. Across, objects
     begin abruptly: the nearest probe. Turned, walls approach steadily: linear. Beyond the last probe: constant.
     """
-    sides_m = ways_m[:, 1:].reshape(-1, DIRECTIONS, ACROSS + TURNED)
-    here_m = np.broadcast_to(ways_m[:, :1, None], (len(ways_m), DIRECTIONS, 1))
+    sides_m = onsets_m[:, 1:].reshape(-1, DIRECTIONS, ACROSS + TURNED)
+    here_m = np.broadcast_to(onsets_m[:, :1, None], (len(onsets_m), DIRECTIONS, 1))
     across_m, turned_m = (np.dstack([here_m, part]) for part in (sides_m[..., :ACROSS], sides_m[..., ACROSS:]))
     moves, turns = (np.abs(aside[:, part]).max(axis=1) > _LEFT_OUT for part in (_ACROSS, _TURNED))
     across_m = _between(across_m, aside[:, _ACROSS], linear=False)
@@ -144,19 +156,19 @@ def free_ways_m(ways_m: FloatArray, aside: FloatArray) -> FloatArray:
     return np.where(turns & ~moves, turned_m, np.where(turns, np.minimum(across_m, turned_m), across_m))
 
 
-def _between(ways_m: FloatArray, aside: FloatArray, *, linear: bool) -> FloatArray:
+def _between(onsets_m: FloatArray, aside: FloatArray, *, linear: bool) -> FloatArray:
     """Interpolate contact distances (n, DIRECTIONS, r + 1), at points (k, 2): by radius 0 to 1, then by angle.
 
     linear: linear in both; else the nearest distance, and the shorter of two about equally near.
     """
     size = np.abs(aside).sum(axis=1)
     share = np.abs(aside[:, 0]) / np.where(size > 0.0, size, 1.0)
-    ring = np.minimum(np.hypot(aside[:, 0], aside[:, 1]), 1.0) * (ways_m.shape[2] - 1)
-    inner: IntArray = np.minimum(ring.astype(np.int64), ways_m.shape[2] - 2)
+    ring = np.minimum(np.hypot(aside[:, 0], aside[:, 1]), 1.0) * (onsets_m.shape[2] - 1)
+    inner: IntArray = np.minimum(ring.astype(np.int64), onsets_m.shape[2] - 2)
     part, found = ring - inner, []
     for axis in range(2):
         side = np.where(aside[:, axis] >= 0.0, axis, axis + 2)
-        one, other = ways_m[:, side, inner], ways_m[:, side, inner + 1]
+        one, other = onsets_m[:, side, inner], onsets_m[:, side, inner + 1]
         nearest = np.where(part < 0.5 + _ALIKE, one, other), np.where(part > 0.5 - _ALIKE, other, one)
         found.append((1.0 - part) * one + part * other if linear else np.minimum(*nearest))
     if linear:

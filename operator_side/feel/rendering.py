@@ -23,7 +23,7 @@ from operator_side.controller.feel import (
     Strengths,
 )
 from operator_side.feel.commands_under_way import Displacement
-from operator_side.feel.path_ahead import Aside, traced_zones
+from operator_side.feel.path_ahead import CourseOnMap, traced_zones
 from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 
@@ -59,7 +59,7 @@ class RenderedTrigger:
         self._travels = zone_travels(travel)
         self._levels = [0.0] * ZONE_COUNT
         self._last_s = -math.inf
-        self._traced: Aside | None = None
+        self._traced: CourseOnMap | None = None
         self._zones = FREE
         self._strengths = FREE_TRIGGER
 
@@ -70,7 +70,7 @@ class RenderedTrigger:
         other_travel: float,
         moving: Displacement,
         now_s: float,
-        aside: Aside | None = None,
+        aside: CourseOnMap | None = None,
         *,
         forth: bool = True,
     ) -> Strengths:
@@ -135,7 +135,7 @@ class TriggerRendering:
         pulled: tuple[float, float],
         known: Displacement | None,
         now_s: float,
-        aside: Aside | None = None,
+        aside: CourseOnMap | None = None,
     ) -> Feel:
         """Render both triggers and the motors at `now_s`; RELEASED at once for None.
 

@@ -49,14 +49,14 @@ def moving_along(update: StiffnessUpdate, known: Displacement | None) -> tuple[D
     if known is None:
         speed_m_s = update.speed_m_s
         return Displacement(update.l2.displacement_m, -speed_m_s), Displacement(update.r2.displacement_m, speed_m_s)
-    return Displacement(-known.way_m, -known.speed_m_s), known
+    return Displacement(-known.displacement_m, -known.speed_m_s), known
 
 
 def needed_m(field: TriggerField, speed_m_s: float, moving: Displacement, horizon_s: float = HORIZON_S) -> float:
     """Compute D, the distance to feel ahead, if the trigger commands `speed_m_s`, 0 or more."""
     excess_m_s = max(0.0, moving.speed_m_s - speed_m_s)
     stopping_m = (speed_m_s**2 + excess_m_s**2) / (2.0 * field.acceleration_m_s2)
-    return moving.way_m + speed_m_s * horizon_s + stopping_m
+    return moving.displacement_m + speed_m_s * horizon_s + stopping_m
 
 
 def zone_strengths(
@@ -76,7 +76,7 @@ def zone_strengths(
     fastest_m_s = max(0.0, (travels[-1] - other_travel) * full_m_s)
     excess_m_s = max(0.0, moving.speed_m_s)
     # No zone needs more than its fastest speed and the whole excess together.
-    most_m = moving.way_m + fastest_m_s * horizon_s
+    most_m = moving.displacement_m + fastest_m_s * horizon_s
     most_m += (fastest_m_s**2 + excess_m_s**2) / (2.0 * field.acceleration_m_s2)
     if most_m <= horizon_m and most_m < field.fast_m[0] and most_m < field.slow_m[0]:
         return FREE
@@ -87,13 +87,13 @@ def zone_strengths(
     for travel in travels:
         speed_m_s = (travel - other_travel) * full_m_s
         if speed_m_s > 0.0:
-            ways = field.slow_m if first or speed_m_s < touch_m_s else field.fast_m
+            onsets = field.slow_m if first or speed_m_s < touch_m_s else field.fast_m
             first = False
             ahead_m = needed_m(field, speed_m_s, moving, horizon_s)
             if ahead_m > horizon_m:
                 beyond += 1
                 strength = MAX_STRENGTH
             else:
-                strength = max(strength, bisect_right(ways, ahead_m))
+                strength = max(strength, bisect_right(onsets, ahead_m))
         strengths.append(strength)
     return Zones(tuple(strengths), beyond)

@@ -95,7 +95,7 @@ class TravelCalibration:
     right_stick: StickRest = field(default_factory=StickRest)
 
 
-AS_GIVEN: Final = TravelCalibration(
+IDENTITY: Final = TravelCalibration(
     TriggerTravel(0.0, 1.0), TriggerTravel(0.0, 1.0), StickRest(dead_zone=0.0), StickRest(dead_zone=0.0)
 )
 """Calibration of a controller without play or noise: raw travel is calibrated travel."""

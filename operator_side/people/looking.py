@@ -25,20 +25,20 @@ class Glance:
     """Time from a motion of the hand to its seen outcome, as far as the person expects it"""
 
 
-class NoNearer:
+class StalledApproach:
     """Detector of a target that has come no nearer for long, which the person takes for as near as it gets."""
 
     def __init__(self, now_s: float) -> None:
         self._nearest_m, self._nearer_s = math.inf, now_s
 
-    def see(self, way_m: float, look: Glance) -> bool:
+    def see(self, distance_m: float, look: Glance) -> bool:
         """Take in the distance that seems left; return the judgement."""
-        if way_m < self._nearest_m - _PROGRESS_M:
-            self._nearest_m, self._nearer_s = way_m, look.now_s
+        if distance_m < self._nearest_m - _PROGRESS_M:
+            self._nearest_m, self._nearer_s = distance_m, look.now_s
         return look.now_s - self._nearer_s > _NO_FURTHER_S + look.lag_s
 
 
-class SinksNoMore:
+class StalledDescent:
     """Detector of an object that had begun to sink, and has not sunk for a moment."""
 
     def __init__(self) -> None:

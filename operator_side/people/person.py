@@ -25,7 +25,7 @@ from operator_side.controller.state import Button
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.fingers import Cue, Fingers, within_unit_circle
-from operator_side.people.looking import Glance, NoNearer, SinksNoMore
+from operator_side.people.looking import Glance, StalledApproach, StalledDescent
 from operator_side.people.settings import PersonSettings
 from operator_side.people.submove import MoveAndWait
 
@@ -85,7 +85,7 @@ class SimulatedOperator:
         self._gripped_height_m = 0.0
         self._holding_s = 0.0
         self._moves = MoveAndWait()
-        self._nearing, self._sinking = NoNearer(0.0), SinksNoMore()
+        self._nearing, self._sinking = StalledApproach(0.0), StalledDescent()
         self._warned_s = -math.inf
 
     @property
@@ -103,7 +103,7 @@ class SimulatedOperator:
         while self._seen and self._seen[0][0] <= now_s - self._settings.visual_reaction_s:
             self._view = self._seen.popleft()[1]
         self._feel(now_s)
-        if self._device.told.light == WARNING_LIGHT:
+        if self._device.commanded.light == WARNING_LIGHT:
             self._warned_s = now_s
         if self._view is None or now_s - self._warned_s < _CALM_S:
             self._fingers.do(0.0, _REST)
@@ -124,7 +124,7 @@ class SimulatedOperator:
             self._moves.break_off(now_s)
         self._gently_along |= stiff
         self._gently_across |= rumbles
-        seeing = self._device.told.light != WARNING_LIGHT
+        seeing = self._device.commanded.light != WARNING_LIGHT
         self._stands |= self._pulse.acted_on(now_s, seeing and self._device.rumble.right > 0.0)
 
     def _enter(self, phase: Doing, now_s: float) -> None:
@@ -132,7 +132,7 @@ class SimulatedOperator:
         self._since_s = now_s
         self._gently_along = self._gently_across = self._stands = False
         self._moves.forget()
-        self._nearing, self._sinking = NoNearer(now_s), SinksNoMore()
+        self._nearing, self._sinking = StalledApproach(now_s), StalledDescent()
 
     def _elapsed_s(self, look: Glance) -> float:
         return look.now_s - (look.now_s if self._since_s is None else self._since_s)

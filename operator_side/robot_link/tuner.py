@@ -8,7 +8,7 @@ from common.emulation.tuned import tunable_profile
 from common.errors import ConfigurationError
 from common.protocol.link_end import LinkEnd
 from common.protocol.messages import LeaseNotice, Tune
-from operator_side.robot_link.standing import Standing
+from operator_side.robot_link.lease_state import LeaseState
 
 _REPEATED_S: Final = 0.1
 _REMEMBERED: Final = 1000
@@ -31,7 +31,7 @@ class Tuner:
         self._sent_s = -math.inf
         self._asked: deque[dict[str, Any]] = deque(maxlen=_REMEMBERED)
 
-    def ask(self, probability: float | None, link: str | None, standing: Standing, now_s: float) -> None:
+    def ask(self, probability: float | None, link: str | None, standing: LeaseState, now_s: float) -> None:
         """Take a wish. Refuse it whole if the run does not permit it, or if P or link is invalid."""
         lease = standing.lease
         try:

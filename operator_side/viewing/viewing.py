@@ -68,7 +68,7 @@ class Viewing:
         self._status = status
         self._figures = SceneFigures()
         self._joining = {topic: Joining(VIEW_MAXIMUM_BYTES) for topic in (VIDEO_TOPIC, SCENE_TOPIC)}
-        self._told: str | None = None
+        self._reported: str | None = None
         self._asked = False
         """Whether the newest Watch requests a whole picture"""
         self._watch_s = self._facts_s = -math.inf
@@ -125,10 +125,10 @@ class Viewing:
     def _looks_at_console(self, console: Console) -> bool:
         for text in console.take_notes():
             self._status.note(text)
-        if console.address not in (None, self._told):
-            self._told = console.address
-            if not self._status.event("console", address=self._told):
-                self._status.note(f"console: {self._told}")
+        if console.address not in (None, self._reported):
+            self._reported = console.address
+            if not self._status.event("console", address=self._reported):
+                self._status.note(f"console: {self._reported}")
         return console.pages > 0
 
     def show(self, status: OperatorStatus, now_s: float) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import refuse, resolve
-from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, output_array
+from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, input_array, output_array
 from robot_side.compiled.stack import on_stack
 
 _MET = 1e-6
@@ -69,11 +69,11 @@ def ability(pose: GripperPose, limits: JointLimits, direction: FloatArray, full_
     return Ability(speed_m_s, acceleration_m_s2, within_reach=off_m_s <= _MET * full_speed_m_s)
 
 
-ABILITY: Final = (*(input_array(2), input_array(1), NUMBER, input_array(1), input_array(1), output_array(1)),)
+ABILITY: Final = (*(input_array(2), input_array(1), FLOAT64, input_array(1), input_array(1), output_array(1)),)
 """Numba types of the arguments of `find_ability`, for a call by its address."""
 
 
-@compiled(*ABILITY, returns=TRUTH)
+@compiled(*ABILITY, returns=BOOL)
 def find_ability(
     jacobian: FloatArray,
     direction: FloatArray,
@@ -123,7 +123,7 @@ def change_times_s(pose: GripperPose, limits: JointLimits, twists: FloatArray) -
     return times_s.T
 
 
-@compiled(*(input_array(2),) * 3, *(input_array(1),) * 2, output_array(2), returns=TRUTH)
+@compiled(*(input_array(2),) * 3, *(input_array(1),) * 2, output_array(2), returns=BOOL)
 def _find_change_times(
     jacobian: FloatArray,
     rotation: FloatArray,

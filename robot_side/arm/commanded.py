@@ -10,7 +10,7 @@ from robot_side.arm.ability import JointLimits
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import refuse, resolve
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_motion
-from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, output_array
+from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, input_array, output_array
 from robot_side.compiled.stack import on_stack
 
 _AT_END_RAD = 0.002
@@ -52,8 +52,8 @@ def commanded(
 
 @compiled(
     *(input_array(2), input_array(2), input_array(1), input_array(1), input_array(1), input_array(1)),
-    *(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, TRUTH, output_array(1)),
-    returns=NUMBER,
+    *(FLOAT64, FLOAT64, FLOAT64, FLOAT64, FLOAT64, FLOAT64, BOOL, output_array(1)),
+    returns=FLOAT64,
 )
 def _command_loop(
     rotation: FloatArray,
@@ -83,12 +83,12 @@ def _command_loop(
         twist[2] = 0.0
     if not resolve(jacobian, twist, limits, velocity):
         return math.nan
-    told = 0.0
+    speed = 0.0
     for joint in range(velocity.size):
         rate, position = velocity[joint], positions[joint]
         stays = (rate < 0.0 and position <= lower[joint] + _AT_END_RAD) or (
             rate > 0.0 and position >= upper[joint] - _AT_END_RAD
         )
         for row in range(0 if stays else 3):
-            told += rotation[row, 2] * jacobian[row, joint] * rate
-    return told
+            speed += rotation[row, 2] * jacobian[row, joint] * rate
+    return speed

@@ -6,7 +6,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.compiled.kernel import TRUTH, building_block, compiled, inlined, input_array, output_array, record_array
+from robot_side.compiled.kernel import BOOL, building_block, compiled, inlined, input_array, output_array, record_array
 from robot_side.compiled.vectors import Vector, add, cross, scale, subtract
 
 Quaternion = tuple[float, float, float, float]
@@ -202,7 +202,7 @@ def _place_links(
     *(record_array(LINK), record_array(JOINT), record_array(POINT), input_array(1), record_array(POINT)),
     *(input_array(1), input_array(1), output_array(2)),
     *(output_array(1), output_array(2), output_array(2), output_array(2)),
-    returns=TRUTH,
+    returns=BOOL,
 )
 def _place(
     links: Records,

@@ -11,7 +11,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.arm.port import ArmState
-from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, input_array, output_array
+from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, input_array, output_array
 
 TIME_CONSTANT_S = 0.02
 _LOST_S = 0.1
@@ -89,9 +89,9 @@ class JointEstimate:
 
 
 @compiled(
-    *(NUMBER, NUMBER, input_array(1), input_array(1), input_array(1), input_array(1), input_array(1), input_array(1)),
+    *(FLOAT64, FLOAT64, input_array(1), input_array(1), input_array(1), input_array(1), input_array(1), input_array(1)),
     *(output_array(1), output_array(1), output_array(1)),
-    returns=TRUTH,
+    returns=BOOL,
 )
 def _estimate_loop(
     since: float,

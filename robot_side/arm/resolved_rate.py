@@ -9,7 +9,7 @@ from typing import Final, NoReturn
 import numpy as np
 
 from common.arrays import FloatArray, require_finite
-from robot_side.compiled.kernel import TRUTH, building_block, compiled, inlined, input_array, output_array
+from robot_side.compiled.kernel import BOOL, building_block, compiled, inlined, input_array, output_array
 from robot_side.compiled.stack import on_stack
 
 _THRESHOLD_2: Final = 0.06 * 0.06
@@ -157,7 +157,7 @@ def _limit(velocity: FloatArray, limits: FloatArray) -> bool:
     return True
 
 
-@compiled(input_array(2), input_array(1), input_array(1), output_array(1), returns=TRUTH)
+@compiled(input_array(2), input_array(1), input_array(1), output_array(1), returns=BOOL)
 def _resolve_loop(
     jacobian: FloatArray,
     twist: FloatArray,

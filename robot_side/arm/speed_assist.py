@@ -37,6 +37,6 @@ def assisted(command: MotionCommand, l2: TriggerField, r2: TriggerField) -> Moti
     return msgspec.structs.replace(command, l2=0.0 if travel > 0.0 else most, r2=most if travel > 0.0 else 0.0)
 
 
-def _stops_within_m_s(way_m: float, acceleration_m_s2: float) -> float:
+def _stops_within_m_s(distance_m: float, acceleration_m_s2: float) -> float:
     lost = acceleration_m_s2 * FOLLOWS_S
-    return math.sqrt(lost * lost + 2.0 * acceleration_m_s2 * max(way_m, 0.0)) - lost
+    return math.sqrt(lost * lost + 2.0 * acceleration_m_s2 * max(distance_m, 0.0)) - lost

@@ -6,7 +6,7 @@ from typing import Any, cast
 import numba
 import numba.extending
 
-from robot_side.compiled.kernel import COUNT
+from robot_side.compiled.kernel import INT64
 from robot_side.compiled.numba_inside import call_at
 
 
@@ -26,7 +26,7 @@ def call_at_address(returns: Any, arguments: tuple[Any, ...]) -> Callable[[int, 
             unpacked = [builder.extract_value(packed, place) for place in range(len(wanted.args))]
             return call_at(context, builder, wanted, address, unpacked)
 
-        return wanted.return_type(COUNT, given), generate
+        return wanted.return_type(INT64, given), generate
 
     return cast(Callable[[int, tuple[Any, ...]], Any], cast(Any, numba.extending.intrinsic)(call))
 

@@ -84,7 +84,7 @@ def _view(columns: Any, forms: tuple[Form, ...]) -> Any:
     # One intrinsic for all: a call for each column would take longer to compile than the code that uses them.
     def at(_typing: Any, bundle: Any) -> Any:
         arrays = [numba.types.Array(numba.from_dtype(form.dtype), 1 + len(form.inner), "C") for form in forms]
-        together = cast(Any, numba.types.BaseTuple).from_types(arrays, columns)
+        tuple_type = cast(Any, numba.types.BaseTuple).from_types(arrays, columns)
 
         def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
             values = []
@@ -94,8 +94,8 @@ def _view(columns: Any, forms: tuple[Form, ...]) -> Any:
                 pointer = builder.inttoptr(address, context.get_value_type(numba.types.voidptr))
                 shape = [length, *(length.type(size) for size in form.inner)]
                 values.append(array_at(context, builder, array, pointer, shape))
-            return context.make_tuple(builder, together, values)
+            return context.make_tuple(builder, tuple_type, values)
 
-        return together(BUNDLE), generate
+        return tuple_type(BUNDLE), generate
 
     return cast(Any, numba.extending.intrinsic)(at)

@@ -66,16 +66,16 @@ def record_array(dtype: np.dtype) -> Any:
     return numba.types.Array(numba.from_dtype(dtype), 1, "C")
 
 
-def together(*parts: Any) -> Any:
+def tuple_type(*parts: Any) -> Any:
     """Return the Numba type of a tuple of these; a kernel takes a tuple of a dozen arrays as fast as one array."""
     return cast(Any, numba.types).Tuple(parts)
 
 
-NUMBER: Any = numba.types.float64
+FLOAT64: Any = numba.types.float64
 """Numba type of a float"""
-TRUTH: Any = numba.types.boolean
+BOOL: Any = numba.types.boolean
 """Numba type of a bool"""
-COUNT: Any = numba.types.int64
+INT64: Any = numba.types.int64
 """Numba type of an int"""
 
 
@@ -96,7 +96,7 @@ def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         return builder.fma(*arguments)
 
-    return NUMBER(NUMBER, NUMBER, NUMBER), generate
+    return FLOAT64(FLOAT64, FLOAT64, FLOAT64), generate
 
 
 fused_multiply_add: Callable[[float, float, float], float] = cast(Any, numba.extending.intrinsic)(_fused_multiply_add)
@@ -105,11 +105,11 @@ fused_multiply_add: Callable[[float, float, float], float] = cast(Any, numba.ext
 
 def _power_of_two_below(_typing: Any, _length: Any) -> Any:
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        integer, double = context.get_value_type(numba.types.int64), context.get_value_type(NUMBER)
+        integer, double = context.get_value_type(numba.types.int64), context.get_value_type(FLOAT64)
         exponent = builder.and_(builder.bitcast(arguments[0], integer), integer(0x7FF0000000000000))
         return builder.bitcast(exponent, double)
 
-    return NUMBER(NUMBER), generate
+    return FLOAT64(FLOAT64), generate
 
 
 power_of_two_below: Callable[[float], float] = cast(Any, numba.extending.intrinsic)(_power_of_two_below)

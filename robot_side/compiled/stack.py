@@ -8,7 +8,7 @@ import numba
 import numba.extending
 import numpy as np
 
-from robot_side.compiled.kernel import COUNT
+from robot_side.compiled.kernel import INT64
 from robot_side.compiled.numba_inside import array_at, room_on_stack
 
 
@@ -25,7 +25,7 @@ def on_stack(*shape: int, dtype: Any = np.float64) -> Callable[[], np.ndarray]:
 
         def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
             room = room_on_stack(context, builder, array_type.dtype, math.prod(shape))
-            integer = context.get_value_type(COUNT)
+            integer = context.get_value_type(INT64)
             return array_at(context, builder, array_type, room, [integer(size) for size in shape])
 
         return array_type(), generate

@@ -8,7 +8,7 @@ from pkgutil import walk_packages
 from typing import Final
 
 from common.clock import MonotonicClock
-from robot_side.compiled.beside import compile_beside
+from robot_side.compiled.helper_processes import compile_in_helpers
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.machine_code import can_keep
 from robot_side.compiled.sources import code_sizes, digest
@@ -42,7 +42,7 @@ def warm_up(
         if announce is not None:
             announce()
             announce = None
-        compile_beside(missing, processors, done)
+        compile_in_helpers(missing, processors, done)
     compiled = False
     for kernel in kernels:
         kernel.prepare()

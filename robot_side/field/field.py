@@ -32,7 +32,7 @@ class Along:
     """μ_δ"""
     variance_along_m2: float = 0.0
     """σ_δ²"""
-    early_m: FloatArray | None = None
+    approach_m: FloatArray | None = None
     """Approach of each object (k,), by which its contact distances shorten; None: all are at rest"""
 
 
@@ -40,7 +40,7 @@ class Along:
 class Field:
     """Result of one look."""
 
-    ways_m: FloatArray
+    onsets_m: FloatArray
     """(2, 8) onset distances of strengths 1 to 8, rising, infinite beyond the reach. The fast list, then the slow one:
     there an object that is to be touched is felt less, and at its expected place."""
     sigma_m: float
@@ -51,13 +51,13 @@ class Field:
     @property
     def fast_m(self) -> FloatArray:
         """(8,)"""
-        fast_m: FloatArray = self.ways_m[0]
+        fast_m: FloatArray = self.onsets_m[0]
         return fast_m
 
     @property
     def slow_m(self) -> FloatArray:
         """(8,)"""
-        slow_m: FloatArray = self.ways_m[1]
+        slow_m: FloatArray = self.onsets_m[1]
         return slow_m
 
 
@@ -81,9 +81,11 @@ class Ahead:
         silently give no warning.
         """
         objects = len(scene.first_rows) - 1
-        early_m = _STILL if along.early_m is None else along.early_m
-        if len(classes) != objects or len(early_m) not in (0, objects):
-            raise ValueError(f"classes holds {len(classes)}, early_m {len(early_m)}; valid: each of {objects} objects")
+        approach_m = _STILL if along.approach_m is None else along.approach_m
+        if len(classes) != objects or len(approach_m) not in (0, objects):
+            raise ValueError(
+                f"classes holds {len(classes)}, approach_m {len(approach_m)}; valid: each of {objects} objects"
+            )
         needed = len(pose.sphere_radii_m), len(scene.kinds), len(scene.first_rows)
         if not self.scratch.fits(*needed):
             self.scratch = Scratch(*needed)
@@ -93,7 +95,7 @@ class Ahead:
             *(pose.tool_position_m, np.ascontiguousarray(pose.tool_jacobian), self._encoder_variance),
             *(along.direction, along.mean_m, along.variance_m2, along.mean_along_m, along.variance_along_m2),
             *(along.quantile, widest_m, along.reach_m),
-            *(classes, early_m, scene.bundle, scratch.bundle),
+            *(classes, approach_m, scene.bundle, scratch.bundle),
         )
         if not found:
             _refuse(pose, along)
@@ -106,6 +108,6 @@ def _refuse(pose: GripperPose, along: Along) -> NoReturn:
         require_finite(f"pose.{name}", getattr(pose, name))
     for name in ("direction", "mean_m", "variance_m2", "mean_along_m", "variance_along_m2", "quantile", "reach_m"):
         require_finite(f"along.{name}", getattr(along, name))
-    if along.early_m is not None:
-        require_finite("along.early_m", along.early_m)
+    if along.approach_m is not None:
+        require_finite("along.early_m", along.approach_m)
     raise ValueError("the encoders' errors or the sums of all these are not finite; valid: metres and radians")

@@ -8,7 +8,7 @@ import math
 from typing import NamedTuple
 
 from common.arrays import BoolArray, FloatArray
-from robot_side.compiled.kernel import NUMBER, compiled, inlined, input_array, output_array
+from robot_side.compiled.kernel import FLOAT64, compiled, inlined, input_array, output_array
 from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, scale, subtract
 from robot_side.enlargement.distance import statistical_distance
 from robot_side.field.scratch import CLUSTER, Error, ScratchColumns
@@ -46,7 +46,7 @@ def variance_at(spread: Spread, arm: Vector) -> float:
     return 0.0 if variance < 0.0 else variance
 
 
-class Missed(NamedTuple):
+class DirectionalErrors(NamedTuple):
     """Errors along a direction, without the joints' part (eq. 9-10)."""
 
     mean: float
@@ -62,7 +62,7 @@ class Missed(NamedTuple):
 
 
 @inlined
-def inflation_and_distance(missed: Missed, kinematic: float) -> tuple[float, float]:
+def inflation_and_distance(missed: DirectionalErrors, kinematic: float) -> tuple[float, float]:
     """Return the inflation and D_σ of a point. kinematic: variance (m²) from the joints."""
     both = kinematic + missed.variance
     inflation = statistical_distance(missed.mean, both, missed.quantile)
@@ -80,7 +80,7 @@ def inflate(
     jacobian: FloatArray,
     encoder_variance: FloatArray,
     along: Vector,
-    missed: Missed,
+    missed: DirectionalErrors,
     scratch: ScratchColumns,
 ) -> bool:
     """Fill the scratch's spheres, inflations, D_σ, errors and clusters. Return False for numbers that are not finite.
@@ -124,7 +124,7 @@ def around_spheres(spheres: FloatArray, inflated: FloatArray, first: int, end: i
 
 @compiled(
     *(input_array(2), input_array(1), input_array(2), input_array(1), input_array(1)),
-    *(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, output_array(1), output_array(1)),
+    *(FLOAT64, FLOAT64, FLOAT64, FLOAT64, FLOAT64, output_array(1), output_array(1)),
 )
 def explain_inflation(
     centers: FloatArray,
@@ -145,5 +145,5 @@ def explain_inflation(
     spread, origin = spread_along(jacobian, encoder_variance, along), load(tool.reshape(1, 3), 0)
     for i in range(distances.size):
         kinematic_variance[i] = variance_at(spread, subtract(load(centers, i), origin))
-        missed = Missed(mean, variance, mean_along, variance_along, quantile)
+        missed = DirectionalErrors(mean, variance, mean_along, variance_along, quantile)
         _, distances[i] = inflation_and_distance(missed, kinematic_variance[i])

@@ -12,8 +12,8 @@ from typing import Final
 from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import (
-    NUMBER,
-    TRUTH,
+    BOOL,
+    FLOAT64,
     building_block,
     compiled,
     inlined,
@@ -22,9 +22,9 @@ from robot_side.compiled.kernel import (
     input_indices,
 )
 from robot_side.compiled.vectors import Vector, load
-from robot_side.field.inflation import Missed, around_spheres, inflate
+from robot_side.field.inflation import DirectionalErrors, around_spheres, inflate
 from robot_side.field.nearest_first import drop_first, push
-from robot_side.field.object_class import PASSED_OVER
+from robot_side.field.object_class import SKIPPED
 from robot_side.field.pairs import enter, pairs_of
 from robot_side.field.profile import follow
 from robot_side.field.samples import Profile
@@ -114,7 +114,7 @@ def _look_at(
     object_class: int,
     early: float,
     along: Vector,
-    widest: float,
+    half_gap: float,
     reach: float,
 ) -> None:
     """Shorten the onset distances by one object, whose rows within the reach are kept: best first.
@@ -153,7 +153,7 @@ def _look_at(
         else:
             clear = first > -math.inf
             for i in range((-1 - item) * CLUSTER, min(-item * CLUSTER, spheres)):
-                met = pairs_of(bundles, pairs, i, rows, thing, object_class, early, along, widest, last, clear)
+                met = pairs_of(bundles, pairs, i, rows, thing, object_class, early, along, half_gap, last, clear)
                 for place in range(pairs, pairs + met):
                     pair = scratch.pairs[place]
                     count = push(keys, items, count, pair.contact - pair.lead, place)
@@ -171,12 +171,12 @@ def _key(bound: float, early: float, rough: bool) -> float:
 
 LOOK: Final = (
     *(input_array(2), input_array(1), input_flags(), input_array(1), input_array(2), input_array(1), input_array(1)),
-    *(NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, NUMBER, input_indices(), input_array(1), BUNDLE, BUNDLE),
+    *(FLOAT64, FLOAT64, FLOAT64, FLOAT64, FLOAT64, FLOAT64, FLOAT64, input_indices(), input_array(1), BUNDLE, BUNDLE),
 )
 """Argument types of `look`, for calls by address"""
 
 
-@compiled(*LOOK, returns=TRUTH)
+@compiled(*LOOK, returns=BOOL)
 def look(
     centers: FloatArray,
     radii: FloatArray,
@@ -190,7 +190,7 @@ def look(
     mean_along: float,
     variance_along: float,
     quantile: float,
-    widest: float,
+    half_gap: float,
     reach: float,
     classes: IntArray,
     early: FloatArray,
@@ -201,15 +201,15 @@ def look(
 
     centers (m, 3), radii (m,), on_finger (m,): the gripper's spheres. tool (3,), jacobian (6, n),
     encoder_variance (n,), direction: the unit û (3,). mean, variance, mean_along, variance_along, quantile: see
-    `Missed`. widest: half the gap between the fingers, the largest inflation of a finger's sphere towards the
-    target (§3.4). classes (k,): the objects' (`object_class`). early (k,): the objects' approach, by which contact
+    `DirectionalErrors`. half_gap: half the gap between the fingers, the largest inflation of a finger's sphere towards
+    the target (§3.4). classes (k,): the objects' (`object_class`). early (k,): the objects' approach, by which contact
     distances shorten; empty if all are at rest.
     """
     bundles, scene, scratch = Bundles(scene_bundle, scratch_bundle), scene_at(scene_bundle), scratch_at(scratch_bundle)
     along, margin, spheres = load(direction.reshape(1, 3), 0), MARGIN_M, radii.size
     scratch.distances_m[:], scratch.counts[:] = math.inf, 0
     origin = load(tool.reshape(1, 3), 0)
-    missed = Missed(mean, variance, mean_along, variance_along, quantile)
+    missed = DirectionalErrors(mean, variance, mean_along, variance_along, quantile)
     finite = inflate(centers, radii, on_finger, origin, jacobian, encoder_variance, along, missed, scratch)
     if not (finite and math.isfinite(reach)):
         return False
@@ -226,7 +226,7 @@ def look(
         if place >= scene.object_order.size:
             break
         thing = scene.object_order[place]
-        if classes[thing] != PASSED_OVER:
+        if classes[thing] != SKIPPED:
             first, end, sooner = scene.first_rows[thing], scene.first_rows[thing + 1], shorter
             sooner += early[thing] if moves else 0.0
             rows, nearest = _near_rows(bundles, first, end, middle, size, along, reach + margin + sooner)
@@ -238,7 +238,7 @@ def look(
         first, end, sooner = scene.first_rows[thing], scene.first_rows[thing + 1], shorter
         sooner += early[thing] if moves else 0.0
         rows, _ = _near_rows(bundles, first, end, middle, size, along, reach + margin + sooner)
-        _look_at(bundles, spheres, rows, thing, classes[thing], sooner, along, widest, reach)
+        _look_at(bundles, spheres, rows, thing, classes[thing], sooner, along, half_gap, reach)
     for kind in range(2):
         soonest = math.inf
         for level in range(STRENGTHS - 1, -1, -1):

@@ -7,5 +7,5 @@ TOUCHABLE: Final = 1
 """Object that is to be touched: a support, while an object is held"""
 TARGET: Final = 2
 """Object that is to be touched: a finger's inflation towards it ends at half the gap."""
-PASSED_OVER: Final = 3
+SKIPPED: Final = 3
 """Object that is ignored or held"""

@@ -45,15 +45,15 @@ def _pair(
     object_class: int,
     early: float,
     along: Vector,
-    widest: float,
+    half_gap: float,
     reach: float,
     clear: bool,
 ) -> Any:
     """Write the pair of a sphere and an object. The contact is infinite if they do not touch within the reach."""
     scratch = scratch_at(bundles.scratch)
     pair, inflated = scratch.pairs[place], scratch.inflation_m[i, 0]
-    if object_class == TARGET and scratch.on_finger[i] and inflated > widest:
-        inflated = widest
+    if object_class == TARGET and scratch.on_finger[i] and inflated > half_gap:
+        inflated = half_gap
         scratch.counts[Count.LIMITED] += 1 if not uninflated else 0
     sooner = inflated if uninflated else 0.0
     pair.sphere, pair.object, pair.radius = i, thing, scratch.spheres[i, 3] + inflated - sooner
@@ -102,7 +102,7 @@ def pairs_of(
     object_class: int,
     early: float,
     along: Vector,
-    widest: float,
+    half_gap: float,
     reach: float,
     clear: bool,
 ) -> int:
@@ -110,7 +110,7 @@ def pairs_of(
     found = 0
     for uninflated in (False, True):
         pair = _pair(
-            bundles, place + found, i, uninflated, rows, thing, object_class, early, along, widest, reach, clear
+            bundles, place + found, i, uninflated, rows, thing, object_class, early, along, half_gap, reach, clear
         )
         found += 1 if pair.contact < math.inf else 0
         # An inflated sphere that overlaps may contain the object ahead: the sphere counts uninflated, too.

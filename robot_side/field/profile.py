@@ -12,9 +12,9 @@ from typing import Final, NamedTuple
 
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block, inlined
+from robot_side.field.bounds_on_rise import begin, keep_tangents, latest_of, matters, may_count
 from robot_side.field.samples import NOTHING, Profile, Sample, cubic, next_entry, on_cubic, peak, sample
 from robot_side.field.scratch import SAMPLES, SCRATCH, STRENGTHS, Bundles, Count
-from robot_side.field.sooner import begin, keep_tangents, latest_of, matters, may_count
 
 scratch_at = SCRATCH.at
 _TOLERANCE_M: Final = 2e-5
@@ -42,7 +42,7 @@ class Rise(NamedTuple):
 
     free: Sample
     """Sample at d"""
-    floor: float
+    baseline: float
     """V(0)"""
     least: float
     """max(m |∇V(0)|, V_min)"""
@@ -71,7 +71,7 @@ def _crossing(profile: Profile, a: Sample, b: Sample, wanted: float, latest: flo
 
 
 @building_block
-def _top(profile: Profile, a: Sample, b: Sample, floor: float, bundles: Bundles) -> tuple[bool, Sample]:
+def _top(profile: Profile, a: Sample, b: Sample, baseline: float, bundles: Bundles) -> tuple[bool, Sample]:
     """Return whether V has a peak between two samples, and the sample of the highest overlap.
 
     There may be a peak although V rises, or falls, at both. The cubic misses a peak with a kink: it is refined.
@@ -86,7 +86,7 @@ def _top(profile: Profile, a: Sample, b: Sample, floor: float, bundles: Bundles)
         if top.volume > best.volume:
             peaks, best = True, top
         a, b = (top, b) if top.slope > 0.0 else (a, top)
-        if abs(top.slope) * (b.at - a.at) <= _FLAT * (top.volume - floor):
+        if abs(top.slope) * (b.at - a.at) <= _FLAT * (top.volume - baseline):
             break
     return peaks, best
 
@@ -97,47 +97,47 @@ def _first_rise(profile: Profile, last: Sample, rises: bool, full: float, bundle
 
     full: least rise of the overlap at full strength.
     """
-    scratch, floor = scratch_at(bundles.scratch), last.volume
+    scratch, baseline = scratch_at(bundles.scratch), last.volume
     pair, ball = profile.pair, 4.0 / 3.0 * math.pi * profile.pair.radius**3
     disc, step = math.pi * pair.radius * pair.radius, _FINE * profile.margin
     # A rise within rounding does not count.
     if last.slope * _TOLERANCE_M > NOTHING * ball:
-        return True, Rise(last, floor, full)
+        return True, Rise(last, baseline, full)
     given_up = True
     for _ in range(_MOST_SAMPLES):
         if not matters(profile, 0, last.at, scratch.distances_m):
             given_up = False
             break
-        at = last.at + max(step, (floor - last.volume) / disc)
+        at = last.at + max(step, (baseline - last.volume) / disc)
         if not rises:
-            at = max(next_entry(profile, last.at, scratch), last.at + (floor - last.volume) / disc)
+            at = max(next_entry(profile, last.at, scratch), last.at + (baseline - last.volume) / disc)
             if at >= profile.end:
                 given_up = False
                 break
         found, _, may_rise = sample(profile, at, bundles)
-        if rises and found.volume - floor <= NOTHING * ball:
-            _, found_top = _top(profile, last, found, floor, bundles)
-            found = found_top if found_top.volume - floor > NOTHING * ball else found
-        if rises and found.volume - floor > NOTHING * ball:
+        if rises and found.volume - baseline <= NOTHING * ball:
+            _, found_top = _top(profile, last, found, baseline, bundles)
+            found = found_top if found_top.volume - baseline > NOTHING * ball else found
+        if rises and found.volume - baseline > NOTHING * ball:
             for _ in range(_MOST_STEPS):
                 if found.at - last.at <= _TOLERANCE_M:
                     break
                 middle, _, _ = sample(profile, 0.5 * (last.at + found.at), bundles)
-                if middle.volume - floor > NOTHING * ball:
+                if middle.volume - baseline > NOTHING * ball:
                     found = middle
                 else:
                     last = middle
-            return True, Rise(last, floor, full)
+            return True, Rise(last, baseline, full)
         last, rises = found, may_rise
     # After the last sample the overlap counts as rising from there: early, and never silent.
-    return given_up, Rise(last, floor, full)
+    return given_up, Rise(last, baseline, full)
 
 
 @building_block
 def _most_over_margin(profile: Profile, rise: Rise, middle: Sample, full: Sample, bundles: Bundles) -> float:
     """Return W(d + m), and keep samples over the margin. middle, full: the samples at its half and its end."""
     scratch = scratch_at(bundles.scratch)
-    samples, step, most = scratch.samples, profile.margin / SAMPLES, max(0.0, full.volume - rise.floor)
+    samples, step, most = scratch.samples, profile.margin / SAMPLES, max(0.0, full.volume - rise.baseline)
     last = rise.free
     for k in range(SAMPLES + 1):
         if k == 0:
@@ -149,10 +149,10 @@ def _most_over_margin(profile: Profile, rise: Rise, middle: Sample, full: Sample
         else:
             found, _, _ = sample(profile, rise.free.at + k * step, bundles)
         samples[k, 0], samples[k, 1] = found.volume, found.slope
-        most = max(most, found.volume - rise.floor)
+        most = max(most, found.volume - rise.baseline)
         if k > 0:
-            _, top = _top(profile, last, found, rise.floor, bundles)
-            most = max(most, top.volume - rise.floor)
+            _, top = _top(profile, last, found, rise.baseline, bundles)
+            most = max(most, top.volume - rise.baseline)
         last = found
     return most
 
@@ -163,14 +163,14 @@ def _take(
     level: int,
     a: Sample,
     b: Sample,
-    floor: float,
+    baseline: float,
     reference: float,
     bundles: Bundles,
 ) -> int:
     """Enter the strengths from `level` on that begin between two samples; return the next level."""
     distances = scratch_at(bundles.scratch).distances_m
     while level < STRENGTHS:
-        wanted = floor + (level + 0.5) / STRENGTHS * reference
+        wanted = baseline + (level + 0.5) / STRENGTHS * reference
         if b.volume < wanted:
             break
         latest = latest_of(profile, level, distances)
@@ -196,36 +196,36 @@ def follow(profile: Profile, least: float, waits: bool, bundles: Bundles) -> boo
     pair, distances, entries, margin = profile.pair, scratch.distances_m, scratch.entries, profile.margin
     rise = Rise(Sample(pair.contact, 0.0, 0.0), 0.0, least)
     if pair.overlaps:
-        first, lean, rises = sample(profile, 0.0, bundles)
+        first, initial_gradient, rises = sample(profile, 0.0, bundles)
         if waits and rises and first.slope <= 0.0:
             return True
         scratch.counts[Count.PROFILES] += 1
         keep_tangents(profile, 0.0, True, entries)
-        if not may_count(profile, first.volume, max(least, margin * lean), distances, entries):
+        if not may_count(profile, first.volume, max(least, margin * initial_gradient), distances, entries):
             return False
-        rises, rise = _first_rise(profile, first, rises, max(least, margin * lean), bundles)
-        if not (rises and may_count(profile, rise.floor, rise.least, distances, entries)):
+        rises, rise = _first_rise(profile, first, rises, max(least, margin * initial_gradient), bundles)
+        if not (rises and may_count(profile, rise.baseline, rise.least, distances, entries)):
             return False
     elif not may_count(profile, 0.0, least, distances, entries):
         return False
     else:
         scratch.counts[Count.PROFILES] += 1
-    free, floor = rise.free, rise.floor
+    free, baseline = rise.free, rise.baseline
     full, _, may_rise = sample(profile, free.at + margin, bundles)
-    reference, smooth = max(rise.least, full.volume - floor), keep_tangents(profile, full.at, False, entries)
-    if not may_count(profile, floor, reference, distances, entries):
+    reference, smooth = max(rise.least, full.volume - baseline), keep_tangents(profile, full.at, False, entries)
+    if not may_count(profile, baseline, reference, distances, entries):
         return False
     second, _, _ = sample(profile, free.at + (_EARLY if smooth else 0.5) * margin, bundles)
     keep_tangents(profile, second.at, True, entries)
-    if not may_count(profile, floor, reference, distances, entries):
+    if not may_count(profile, baseline, reference, distances, entries):
         return False
     level, stored, last = 0, 0, free
     if smooth:
         # The overlap with convex primitives rises up to `full`.
-        level = _take(profile, level, free, second, floor, reference, bundles)
-        level = _take(profile, level, second, full, floor, reference, bundles)
+        level = _take(profile, level, free, second, baseline, reference, bundles)
+        level = _take(profile, level, second, full, baseline, reference, bundles)
         last = full
-    elif _is_late(profile, free, second, full, floor, reference, distances):
+    elif _is_late(profile, free, second, full, baseline, reference, distances):
         return False
     else:
         reference, stored = max(reference, _most_over_margin(profile, rise, second, full, bundles)), SAMPLES
@@ -235,10 +235,16 @@ def follow(profile: Profile, least: float, waits: bool, bundles: Bundles) -> boo
 
 @building_block
 def _is_late(
-    profile: Profile, free: Sample, second: Sample, full: Sample, floor: float, reference: float, distances: FloatArray
+    profile: Profile,
+    free: Sample,
+    second: Sample,
+    full: Sample,
+    baseline: float,
+    reference: float,
+    distances: FloatArray,
 ) -> bool:
     """Return whether every strength begins too late to count, of an overlap that seems to rise all along the margin."""
-    if not (floor <= second.volume <= full.volume and min(free.slope, second.slope, full.slope) >= 0.0):
+    if not (baseline <= second.volume <= full.volume and min(free.slope, second.slope, full.slope) >= 0.0):
         return False
     late = True
     for level in range(STRENGTHS):
@@ -246,7 +252,7 @@ def _is_late(
         at = min(latest + _DOUBT * (full.at - second.at), full.at)
         a, b = (free, second) if at < second.at else (second, full)
         reached = cubic(a, b, max(at - a.at, 0.0) / (b.at - a.at))
-        late = late and latest <= full.at and reached - floor < (level + 0.5) / STRENGTHS * reference
+        late = late and latest <= full.at and reached - baseline < (level + 0.5) / STRENGTHS * reference
     return late
 
 
@@ -262,7 +268,7 @@ def _go_on(
     bundles: Bundles,
 ) -> None:
     """Enter the strengths from `level` on that begin beyond a sample. The next `stored` samples are kept ones."""
-    scratch, floor = scratch_at(bundles.scratch), rise.floor
+    scratch, baseline = scratch_at(bundles.scratch), rise.baseline
     step = profile.margin / SAMPLES
     for k in range(_MOST_SAMPLES):
         if level == STRENGTHS or not matters(profile, level, last.at, scratch.distances_m):
@@ -279,9 +285,9 @@ def _go_on(
             if not may_rise:
                 at = max(at, comes)
             found, _, may_rise = sample(profile, at, bundles)
-        peaks, top = _top(profile, last, found, floor, bundles)
+        peaks, top = _top(profile, last, found, baseline, bundles)
         if peaks:
-            level = _take(profile, level, last, top, floor, reference, bundles)
+            level = _take(profile, level, last, top, baseline, reference, bundles)
             last = top
-        level = _take(profile, level, last, found, floor, reference, bundles)
+        level = _take(profile, level, last, found, baseline, reference, bundles)
         last = found

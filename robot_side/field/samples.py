@@ -39,7 +39,7 @@ class Sample(NamedTuple):
 def sample(profile: Profile, at: float, bundles: Bundles) -> tuple[Sample, float, bool]:
     """Return V at a distance, |∇V| there, and whether any primitive's part of V may still rise."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
-    radius, push = profile.pair.radius, scratch.push
+    radius, overlap_gradient = profile.pair.radius, scratch.overlap_gradient
     center = add(profile.center, scale(at, profile.along))
     volume, gradient, may_rise = 0.0, (0.0, 0.0, 0.0), False
     for k in range(profile.entries):
@@ -47,9 +47,13 @@ def sample(profile: Profile, at: float, bundles: Bundles) -> tuple[Sample, float
         if entry.enters > at:
             continue
         kind = scene.kinds[entry.row]
-        part = overlap(kind, scene.kernels, scene.shapes, entry.row, center, radius, scene.meshes, push)
-        slope = push[0] * profile.along[0] + push[1] * profile.along[1] + push[2] * profile.along[2]
-        volume, gradient = volume + part, add(gradient, (push[0], push[1], push[2]))
+        part = overlap(kind, scene.kernels, scene.shapes, entry.row, center, radius, scene.meshes, overlap_gradient)
+        slope = (
+            overlap_gradient[0] * profile.along[0]
+            + overlap_gradient[1] * profile.along[1]
+            + overlap_gradient[2] * profile.along[2]
+        )
+        volume, gradient = volume + part, add(gradient, (overlap_gradient[0], overlap_gradient[1], overlap_gradient[2]))
         scratch.counts[Count.OVERLAPS] += 1
         entry.volume, entry.slope = part, slope
         rising = slope > NOTHING * math.pi * radius * radius or part <= NOTHING * radius**3

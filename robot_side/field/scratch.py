@@ -89,7 +89,7 @@ class ScratchColumns(NamedTuple):
     rows: IntArray
     entries: np.ndarray
     samples: FloatArray
-    push: FloatArray
+    overlap_gradient: FloatArray
     distances_m: FloatArray
     along_m: FloatArray
     counts: IntArray
@@ -128,7 +128,7 @@ class Scratch:
         self.entries: np.ndarray = np.zeros(primitives, dtype=ENTRY)
         self.samples: FloatArray = np.zeros((SAMPLES + 1, 2))
         """V and dV/dE over the margin"""
-        self.push: FloatArray = np.zeros(3)
+        self.overlap_gradient: FloatArray = np.zeros(3)
         """dV/dcentre of the newest overlap"""
         self.distances_m: FloatArray = np.zeros((2, STRENGTHS))
         """Onset distances, fast and slow"""

@@ -7,10 +7,10 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import NUMBER, compiled, input_array, input_indices, output_array
+from robot_side.compiled.kernel import FLOAT64, compiled, input_array, input_indices, output_array
 from robot_side.compiled.vectors import add, load
 from robot_side.field.inflation import around_spheres
-from robot_side.field.object_class import PASSED_OVER
+from robot_side.field.object_class import SKIPPED
 from robot_side.surroundings.bounds import passes
 from robot_side.surroundings.kinds.layout import HALF_SPACE
 from robot_side.surroundings.overlaps import overlap
@@ -49,17 +49,17 @@ SUM_OVERLAPS: Final = (
 """Argument types of `sum_overlaps`, for calls by address"""
 
 
-@compiled(*SUM_OVERLAPS, returns=NUMBER)
+@compiled(*SUM_OVERLAPS, returns=FLOAT64)
 def sum_overlaps(
     spheres: FloatArray,
     inflated: FloatArray,
     moved: FloatArray,
     classes: IntArray,
     scene_bundle: IntArray,
-    push: FloatArray,
+    overlap_gradient: FloatArray,
     of_objects: FloatArray,
 ) -> float:
-    """Sum V_ij in m³ as in `total_overlap_m3`; NaN for numbers that are not finite. push (3,): scratch memory."""
+    """Sum V_ij in m³ as in `total_overlap_m3`; NaN for non-finite numbers. overlap_gradient (3,): scratch."""
     scene, shift, count = _scene_at(scene_bundle), load(moved.reshape(1, 3), 0), spheres.shape[0]
     check = shift[0] + shift[1] + shift[2]
     for i in range(count):
@@ -72,7 +72,7 @@ def sum_overlaps(
     while place < scene.object_order.size:
         thing, mine = scene.object_order[place], 0.0
         place = next_object(scene, place + 1, middle, nowhere, 0.0, size)
-        if classes[thing] == PASSED_OVER:
+        if classes[thing] == SKIPPED:
             continue
         for row in range(scene.first_rows[thing], scene.first_rows[thing + 1]):
             kind = scene.kinds[row]
@@ -81,7 +81,9 @@ def sum_overlaps(
             for i in range(count):
                 center, radius = add(load(spheres, i), shift), spheres[i, 3] + inflated[i, 0]
                 if kind == HALF_SPACE or passes(center, nowhere, 0.0, scene.bounds, row, radius):
-                    mine += overlap(kind, scene.kernels, scene.shapes, row, center, radius, scene.meshes, push)
+                    mine += overlap(
+                        kind, scene.kernels, scene.shapes, row, center, radius, scene.meshes, overlap_gradient
+                    )
         total += mine
         if of_objects.size > 0:
             of_objects[thing] = mine

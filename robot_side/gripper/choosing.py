@@ -31,7 +31,7 @@ def contained_points(centers_m: FloatArray, radii_m: FloatArray, points_m: Float
     return csr_array((np.ones(len(row)), (row, column)), shape=(len(centers_m), len(points_m)))
 
 
-def few_that_contain_all(inside: csr_array, costs: FloatArray) -> IntArray:
+def greedy_set_cover(inside: csr_array, costs: FloatArray) -> IntArray:
     """Choose rows of `inside` (m, p) that together cover every column that any row covers; `costs` (m,).
 
     The next column is the one hardest to cover, such as a corner: its best row gains least. That row is chosen. Thus
@@ -62,10 +62,10 @@ def few_that_contain_all(inside: csr_array, costs: FloatArray) -> IntArray:
         left[new] = False
         touched = of_column[new]
         gains -= np.bincount(touched.indices, np.repeat(weights[new], np.diff(touched.indptr)), minlength=len(gains))
-    return without_vain(inside, np.array(chosen, dtype=np.int64), costs)
+    return without_redundant(inside, np.array(chosen, dtype=np.int64), costs)
 
 
-def without_vain(inside: csr_array, chosen: IntArray, costs: FloatArray) -> IntArray:
+def without_redundant(inside: csr_array, chosen: IntArray, costs: FloatArray) -> IntArray:
     """Return the rows of `chosen` without redundant ones; the costliest and smallest are removed first."""
     times: FloatArray = np.asarray(inside[chosen].sum(axis=0), dtype=np.float64).ravel()
     sizes = np.diff(inside.indptr)

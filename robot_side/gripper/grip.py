@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from robot_side.arm.port import ArmState, GripperPose
-from robot_side.arm.touching_down import TouchingDown, carried_n
+from robot_side.arm.touchdown import Touchdown, carried_n
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.held_object import HeldObject, grip, gripped_object, with_held
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -21,7 +21,7 @@ class Grip:
     def __init__(self, surroundings: Surroundings, covers: HeldCovers | None = None) -> None:
         """covers: spheres of the objects, made beforehand; None: made when an object is gripped."""
         self.held: HeldObject | None = None
-        self.touching_down = TouchingDown()
+        self.touchdown = Touchdown()
         self._surroundings, self._covers = surroundings, covers
         self._held_s = -np.inf
 
@@ -38,14 +38,14 @@ class Grip:
         if state.gripper_holding:
             self._held_s = state.time_s
         if self.held is not None and state.time_s - self._held_s > _LET_GO_S:
-            self.held, self.touching_down = None, TouchingDown()
+            self.held, self.touchdown = None, Touchdown()
         elif self.held is None and state.gripper_holding:
             index = gripped_object(self._surroundings.see(objects), pose.tool_position_m, state.gripper_opening_m)
             if index is not None:
                 self.held = grip(objects, index, pose, self._covers)
-        if self.held is not None and self.touching_down.due(state.time_s):
+        if self.held is not None and self.touchdown.due(state.time_s):
             carried = carried_n(pose.tool_jacobian, state.joint_loads_nm)
-            self.touching_down.update(carried, float(pose.tool_position_m[2]), rises_m_s, state.time_s)
+            self.touchdown.update(carried, float(pose.tool_position_m[2]), rises_m_s, state.time_s)
 
     def joined(self, pose: GripperPose) -> GripperPose:
         """Return the pose with the held object's spheres."""

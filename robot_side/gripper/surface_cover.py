@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
-from robot_side.gripper.choosing import contained_points, containing, few_that_contain_all
+from robot_side.gripper.choosing import contained_points, containing, greedy_set_cover
 from robot_side.gripper.mirrors import mirror_images
 from robot_side.gripper.solids import Solid, corner_points, halved, triangles_within
 
@@ -112,7 +112,7 @@ def _cover(union: _Union, stand_out_m: float, frames: Sequence[FloatArray], most
     before: Spheres = np.empty((0, 3)), np.empty(0)
     for turn in range(_MOST_ROUNDS):
         inside = contained_points(centers - origin, depths + lean_m, points - origin, images)
-        rows = few_that_contain_all(inside, _orbit_sizes(centers - origin, images))
+        rows = greedy_set_cover(inside, _orbit_sizes(centers - origin, images))
         added = _all_images(centers[rows], depths[rows] + stand_out_m, origin, images)
         spheres = np.concatenate([before[0], added[0]]), np.concatenate([before[1], added[1]])
         if len(spheres[1]) > most:

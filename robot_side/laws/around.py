@@ -11,13 +11,13 @@ from typing import Final
 from common.arrays import FloatArray, IntArray
 from common.protocol.around import ACROSS, PERIOD_S, PROBES, TURNED
 from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import TRUTH, compiled, inlined, input_array, input_indices, output_array
+from robot_side.compiled.kernel import BOOL, compiled, inlined, input_array, input_indices, output_array
 from robot_side.compiled.vectors import Vector, add, dot, load, norm, scale
-from robot_side.field.object_class import PASSED_OVER
+from robot_side.field.object_class import SKIPPED
 from robot_side.field.scratch import STRENGTHS
 from robot_side.laws.memory import MOST_PLACES, memory_at
 from robot_side.laws.path import move
-from robot_side.laws.sensed import HORIZON, L2, OF_A_SIDE, R2
+from robot_side.laws.sensed import HORIZON, L2, NUMBERS_PER_SIDE, R2
 
 FIRST_PROBE: Final = 1 + MOST_PLACES
 """Place number of the first probe"""
@@ -45,9 +45,9 @@ def follow_motion(
     memory = memory_at(bundle)
     state = memory.state[0]
     if not by_operator:
-        state.anew = math.inf
-    elif state.anew == math.inf or abs(until - state.until) > _SAME_TIME * state.until:
-        state.anew, state.until, moves = now, until, True
+        state.counts_since = math.inf
+    elif state.counts_since == math.inf or abs(until - state.until) > _SAME_TIME * state.until:
+        state.counts_since, state.until, moves = now, until, True
     moves = moves or state.moved == math.inf or state.moves_fingers == 1
     if moves or norm(velocity) > STILL_M_S or norm(turning) > _STILL_RAD_S:
         state.moved = now
@@ -60,7 +60,7 @@ def is_known(bundle: IntArray) -> bool:
     state, known = memory.state[0], bool(memory.settings[0].around != 0.0)
     for probe in range(2 * PROBES):
         at = memory.around[probe].at
-        if at == -math.inf or at < state.anew or (at <= state.moved and state.measured - at > _HOLDS_S):
+        if at == -math.inf or at < state.counts_since or (at <= state.moved and state.measured - at > _HOLDS_S):
             known = False
     return known
 
@@ -71,15 +71,17 @@ def probe_waiting(bundle: IntArray, now: float, speed: float) -> tuple[float, in
     memory = memory_at(bundle)
     most, of_side, of_place = -math.inf, 0, 0
     state = memory.state[0]
-    if memory.settings[0].around == 0.0 or state.anew == math.inf:
+    if memory.settings[0].around == 0.0 or state.counts_since == math.inf:
         return most, of_side, of_place
     for side in (R2, L2):
         leads = speed > -_RETREATS_M_S if side == R2 else speed < _RETREATS_M_S
         for probe in range(PROBES):
             at = memory.around[side * PROBES + probe].at
             # A discarded look is due again at once: until then the operator side has the old map.
-            waited = (now - at) / (PERIOD_S if leads else _SELDOM * PERIOD_S) + (2.0 if at < state.anew else 0.0)
-            waited = waited if at <= state.moved or at < state.anew else -math.inf
+            waited = (now - at) / (PERIOD_S if leads else _SELDOM * PERIOD_S) + (
+                2.0 if at < state.counts_since else 0.0
+            )
+            waited = waited if at <= state.moved or at < state.counts_since else -math.inf
             if waited > most:
                 most, of_side, of_place = waited, side, FIRST_PROBE + probe
     return most, of_side, of_place
@@ -117,7 +119,7 @@ def go_to_probe(
 
 
 @inlined
-def keep_probe(bundle: IntArray, side: int, probe: int, now: float, tool: Vector, ways: FloatArray) -> None:
+def keep_probe(bundle: IntArray, side: int, probe: int, now: float, tool: Vector, onsets: FloatArray) -> None:
     """Keep a look from a probe, as `keep` does from a place."""
     memory = memory_at(bundle)
     along, prospect = load(memory.direction.reshape(1, 3), 0), memory.prospect[0]
@@ -126,7 +128,7 @@ def keep_probe(bundle: IntArray, side: int, probe: int, now: float, tool: Vector
     for axis in range(3):
         new.direction[axis] = along[axis]
     for kind in range(2):
-        new.ways[kind] = prospect.gone + prospect.stretch * ways[kind, STRENGTHS - 1]
+        new.onsets[kind] = prospect.gone + prospect.stretch * onsets[kind, STRENGTHS - 1]
 
 
 @inlined
@@ -134,14 +136,14 @@ def _closing(approach: Vector, classes: IntArray, velocities: FloatArray) -> flo
     """Return the highest speed of an object against `approach`, without objects that are passed over."""
     closing = 0.0
     for thing in range(velocities.shape[0]):
-        if classes[thing] != PASSED_OVER:
+        if classes[thing] != SKIPPED:
             closing = max(closing, -dot(approach, load(velocities, thing)))
     return closing
 
 
 @compiled(
     *(BUNDLE, input_array(1), input_array(2), input_indices(), input_array(2), input_array(1), output_array(2)),
-    returns=TRUTH,
+    returns=BOOL,
 )
 def ways_around(
     bundle: IntArray,
@@ -150,7 +152,7 @@ def ways_around(
     classes: IntArray,
     velocities: FloatArray,
     felt: FloatArray,
-    ways: FloatArray,
+    onsets: FloatArray,
 ) -> bool:
     """Fill ways (LISTS, PROBES), onset distances in m from the tool (3,). Return False while one is unknown.
 
@@ -168,10 +170,10 @@ def ways_around(
             # A look includes the objects' motion until the gripper stands, but not their motion since the look.
             gone += closing * (memory.state[0].measured - one.at)
             for kind in range(2):
-                ways[2 * side + kind, probe] = one.ways[kind] - gone
+                onsets[2 * side + kind, probe] = one.onsets[kind] - gone
         for kind in range(2):
             # Straight ahead the newest look knows more: new objects and the motion of the fingers.
-            newest = felt[side * OF_A_SIDE + kind * STRENGTHS + STRENGTHS - 1]
+            newest = felt[side * NUMBERS_PER_SIDE + kind * STRENGTHS + STRENGTHS - 1]
             if newest < felt[HORIZON]:
-                ways[2 * side + kind, 0] = min(ways[2 * side + kind, 0], newest)
+                onsets[2 * side + kind, 0] = min(onsets[2 * side + kind, 0], newest)
     return True

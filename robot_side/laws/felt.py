@@ -23,7 +23,7 @@ from robot_side.laws.sensed import (
     HORIZON,
     L2,
     NUMBERS,
-    OF_A_SIDE,
+    NUMBERS_PER_SIDE,
     OVERLAP,
     R2,
     RUMBLE,
@@ -37,7 +37,7 @@ MOST_M: Final = 100.0
 """Limit of distances and speeds in a message. A simulation that becomes unstable exceeds it, and must still report."""
 
 
-def room_to_feel() -> FloatArray:
+def felt_array() -> FloatArray:
     """Return an array for the numbers of `Sensed`, followed by the onset distances along the stick."""
     return np.zeros(NUMBERS + 2 * STRENGTHS)
 
@@ -54,24 +54,24 @@ def _moved(one: Any, tool: Vector) -> float:
 
 
 @building_block
-def _shortest(seen: np.ndarray, side: int, count: int, tool: Vector, ways: FloatArray) -> None:
+def _shortest(seen: np.ndarray, side: int, count: int, tool: Vector, onsets: FloatArray) -> None:
     """Fill ways (16,), fast and slow, with the shortest onset distances from the tool's present position."""
-    ways[: 2 * STRENGTHS] = math.inf
+    onsets[: 2 * STRENGTHS] = math.inf
     for k in range(ROOM * side, ROOM * side + count):
         one = seen[k]
         moved = _moved(one, tool)
         for kind in range(2):
             for strength in range(STRENGTHS):
                 place = STRENGTHS * kind + strength
-                ways[place] = min(ways[place], one.ways[kind, strength] - moved)
+                onsets[place] = min(onsets[place], one.onsets[kind, strength] - moved)
 
 
 @inlined
-def _reached(ways: FloatArray, first: int, reach: float) -> int:
+def _reached(onsets: FloatArray, first: int, reach: float) -> int:
     """Count the onset distances, of the eight from `first` on, that are at most `reach`."""
     count = 0
     for place in range(first, first + STRENGTHS):
-        if ways[place] <= reach:
+        if onsets[place] <= reach:
             count += 1
     return count
 
@@ -101,7 +101,7 @@ def feel(
     deflection: float,
     felt: FloatArray,
 ) -> None:
-    """Fill `felt`, made by `room_to_feel`, for a tool at `tool` that moves with `velocity`.
+    """Fill `felt`, made by `felt_array`, for a tool at `tool` that moves with `velocity`.
 
     loop_age: t_d in s, the worst case while unknown. deflection: the stick's, 0 to 1. Below the touch speed the slow
     onset distances count.
@@ -114,7 +114,7 @@ def feel(
         ahead = min(ahead, horizon_m(able.speed, able.acceleration, loop_age))
         ahead = min(ahead, _known(bundle, side, tool))
     for side in (R2, L2):
-        mine, able = felt[side * OF_A_SIDE :], newest[side]
+        mine, able = felt[side * NUMBERS_PER_SIDE :], newest[side]
         _shortest(seen, side, counts[side], tool, mine)
         # Commands under way from an operator who has echoed nothing are unknown: full speed is the worst case.
         under_way = speed if side == R2 else -speed
@@ -130,9 +130,9 @@ def feel(
         # D = u (t_d + h) + u²/2a (eq. 8).
         stick_speed = settings.stick_speed * min(deflection, 1.0)
         reach = stick_speed * (loop_age + HORIZON_S) + stick_speed * stick_speed / (2.0 * newest[STICK].acceleration)
-        ways = felt[NUMBERS:]
-        _shortest(seen, STICK, counts[STICK], tool, ways)
-        felt[RUMBLE] = _reached(ways, STRENGTHS if stick_speed < settings.touch_speed else 0, reach) / STRENGTHS
+        onsets = felt[NUMBERS:]
+        _shortest(seen, STICK, counts[STICK], tool, onsets)
+        felt[RUMBLE] = _reached(onsets, STRENGTHS if stick_speed < settings.touch_speed else 0, reach) / STRENGTHS
     leading, tool_speed = newest[R2 if speed >= 0.0 else L2], norm(velocity)
     felt[SPEED], felt[HORIZON] = _bounded(speed, -MOST_M, MOST_M), _bounded(ahead, 0.0, MOST_M)
     felt[ENLARGEMENT], felt[OVERLAP], felt[TOOL_SPEED] = (

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.compiled.calls import call_at_address
-from robot_side.compiled.kernel import NUMBER, TRUTH, building_block, inlined
+from robot_side.compiled.kernel import BOOL, FLOAT64, building_block, inlined
 from robot_side.compiled.vectors import Vector, dot, load
 from robot_side.field.look import LOOK
 from robot_side.field.scratch import SCRATCH, Count, Error
@@ -34,9 +34,9 @@ _FAR_BEHIND: Final = 5.0
 _ALL: Final = 1000
 
 scratch_at = SCRATCH.at
-_find_prospect = call_at_address(TRUTH, FIND_PROSPECT)
-_look = call_at_address(TRUTH, LOOK)
-_sum_overlaps = call_at_address(NUMBER, SUM_OVERLAPS)
+_find_prospect = call_at_address(BOOL, FIND_PROSPECT)
+_look = call_at_address(BOOL, LOOK)
+_sum_overlaps = call_at_address(FLOAT64, SUM_OVERLAPS)
 
 
 class Moment(NamedTuple):
@@ -55,7 +55,7 @@ class Moment(NamedTuple):
     loop_age: float
     by_operator: bool
     """Whether the operator side predicts δ"""
-    widest: float
+    half_gap: float
     """Half the gap between the fingers, m (§3.4)"""
     right: float
     up: float
@@ -75,7 +75,7 @@ def _fill_early(bundle: IntArray, velocities: FloatArray, stopping: float) -> No
     memory = memory_at(bundle)
     along = load(memory.direction.reshape(1, 3), 0)
     for thing in range(velocities.shape[0]):
-        memory.early_m[thing] = min(max(-dot(load(velocities, thing), along), 0.0) * stopping, MOST_M)
+        memory.approach_m[thing] = min(max(-dot(load(velocities, thing), along), 0.0) * stopping, MOST_M)
 
 
 @building_block
@@ -98,8 +98,8 @@ def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool
     settings = memory.settings[0]
     errors = memory.encoder_variance, memory.direction, prospect.mean, settings.camera_variance
     along = prospect.mean_along, prospect.variance_along, settings.quantile
-    early = memory.early_m[: moment.velocities.shape[0]]
-    around = moment.widest, prospect.reach, classes, early, moment.scene, moment.scratch
+    early = memory.approach_m[: moment.velocities.shape[0]]
+    around = moment.half_gap, prospect.reach, classes, early, moment.scene, moment.scratch
     if not _look(memory.kernels[Kernel.LOOK], (*gripper, *errors, *along, *around)):
         return False
     scratch, totals = scratch_at(moment.scratch), memory.totals
@@ -117,7 +117,7 @@ def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool
             memory.displacement_m[axis] = abs(moment.speed) * moment.loop_age * memory.direction[axis]
         spheres = scratch.spheres[:count], scratch.sigma_m[:count], memory.displacement_m
         state.overlap = _sum_overlaps(
-            memory.kernels[Kernel.OVERLAPS], (*spheres, classes, moment.scene, memory.push, memory.nothing)
+            memory.kernels[Kernel.OVERLAPS], (*spheres, classes, moment.scene, memory.overlap_gradient, memory.nothing)
         )
     keep(bundle, side, place, moment.now, moment.tool, scratch.distances_m)
     if place == 0:

@@ -42,26 +42,29 @@ class Total(IntEnum):
 
 STATE: Final = np.dtype(
     [
-        *((name, np.int64) for name in ("spheres", "moments", "finger_poses", "moves_fingers")),
-        *((name, np.float64) for name in ("measured", "next", "next_overlap", "overlap", "moved", "anew", "until")),
+        *((name, np.int64) for name in ("spheres", "even_places", "finger_poses", "moves_fingers")),
+        *(
+            (name, np.float64)
+            for name in ("measured", "next", "next_overlap", "overlap", "moved", "counts_since", "until")
+        ),
     ]
 )
-"""spheres: number of the gripper's spheres, -1 before the first tick. moments: number of even places on the path.
+"""spheres: number of the gripper's spheres, -1 before the first tick. even_places: number of even places on the path.
 finger_poses: number kept. measured: time of the last motion measurement (s). next: earliest time of the next look (s).
 next_overlap, overlap: time of the next overlap at δ (s), and the latest one (m³). moved: time of the last motion (s).
-anew: time from which looks from probes count (s, `around`). until: T, the time until the arm stands (s)."""
+counts_since: time from which looks from probes count (s, `around`). until: T, the time until the arm stands (s)."""
 SEEN: Final = np.dtype(
     [
         ("place", np.int64),
         ("at", np.float64),
         ("direction", np.float64, (3,)),
         ("began", np.float64),
-        ("ways", np.float64, (2, STRENGTHS)),
+        ("onsets", np.float64, (2, STRENGTHS)),
     ]
 )
 """One look: its place, time and onset distances, fast and slow. began: the tool's position along its direction (m)."""
 AROUND: Final = np.dtype(
-    [("at", np.float64), ("direction", np.float64, (3,)), ("began", np.float64), ("ways", np.float64, (2,))]
+    [("at", np.float64), ("direction", np.float64, (3,)), ("began", np.float64), ("onsets", np.float64, (2,))]
 )
 """Newest look from a probe (`around`): time and onset distances of full strength. direction, began: as in SEEN."""
 NEWEST: Final = np.dtype([(name, np.float64) for name in ("reach", "speed", "acceleration", "sigma", "overlap")])
@@ -105,12 +108,12 @@ class MemoryColumns(NamedTuple):
     rotation: FloatArray
     chord: FloatArray
     centers_m: FloatArray
-    early_m: FloatArray
+    approach_m: FloatArray
     prospect: np.ndarray
     direction: FloatArray
     able: FloatArray
     displacement_m: FloatArray
-    push: FloatArray
+    overlap_gradient: FloatArray
     nothing: FloatArray
     settings: np.ndarray
     missed_by_operator: FloatArray
@@ -145,7 +148,7 @@ class Memory:
         """missed: rows (k, 3) of loop age, μ_δ, σ_δ, first of the operator side's prediction, then the robot side's."""
         self.state: np.ndarray = np.zeros(1, dtype=STATE)
         self.state["spheres"] = -1
-        for name in ("measured", "next", "next_overlap", "moved", "anew"):
+        for name in ("measured", "next", "next_overlap", "moved", "counts_since"):
             self.state[name] = -np.inf
         self.seen: np.ndarray = np.zeros(SIDES * ROOM, dtype=SEEN)
         """Looks by side: a side's begin at `ROOM` times its number"""
@@ -177,7 +180,7 @@ class Memory:
         """Result of `find_ability`: speed, acceleration, error of the motion, and the joints' rates"""
         self.displacement_m: FloatArray = np.zeros(3)
         """δ of the overlap figure"""
-        self.push, self.nothing = np.zeros(3), np.zeros(0)
+        self.overlap_gradient, self.nothing = np.zeros(3), np.zeros(0)
         self.settings: np.ndarray = np.zeros(1, dtype=SETTINGS)
         able = limits.velocity_rad_s, limits.acceleration_rad_s2
         self.missed_by_operator, self.missed_by_robot, self.limits_rad_s, self.accelerations_rad_s2 = map(
@@ -187,7 +190,7 @@ class Memory:
         self.kernels: IntArray = np.zeros(len(Kernel), dtype=np.int64)
         """Addresses by `Kernel`"""
         self.totals: IntArray = np.zeros(len(Count) + len(Total), dtype=np.int64)
-        self.early_m: FloatArray = np.zeros(0)
+        self.approach_m: FloatArray = np.zeros(0)
         """Approach of each object, by which its contact distances shorten"""
         self.own_m_s: FloatArray = np.zeros((0, 3))
         """Velocity of each sphere against the tool (m, 3), in the world frame: the fingers' motion"""
@@ -198,8 +201,8 @@ class Memory:
 
     def make_room(self, spheres: int, objects: int) -> None:
         """Allocate columns for this number of spheres and objects. State of the same spheres stays."""
-        if objects > len(self.early_m):
-            self.early_m = np.zeros(objects)
+        if objects > len(self.approach_m):
+            self.approach_m = np.zeros(objects)
         if spheres > len(self.own_m_s):
             self.own_m_s, self.centers_m = np.zeros((spheres, 3)), np.zeros((spheres, 3))
             self.finger_poses_m = np.zeros((FINGER_POSES * spheres, 3))
@@ -208,4 +211,4 @@ class Memory:
 
     def fits(self, spheres: int, objects: int) -> bool:
         """Return whether there is room for these numbers of spheres and objects."""
-        return spheres <= len(self.own_m_s) and objects <= len(self.early_m)
+        return spheres <= len(self.own_m_s) and objects <= len(self.approach_m)

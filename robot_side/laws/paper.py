@@ -19,7 +19,7 @@ from robot_side.arm.port import GripperPose
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.enlargement.distance import Uncertainty, plain_enlargements_m
 from robot_side.enlargement.kinematic_error import position_covariance
-from robot_side.field.object_class import OBSTACLE, PASSED_OVER
+from robot_side.field.object_class import OBSTACLE, SKIPPED
 from robot_side.field.total_overlap import total_overlap_m3
 from robot_side.laws.explanation import Trigger, TriggerExplained, moved_and_inflated, overlaps_by_object
 from robot_side.laws.law import Situation
@@ -123,8 +123,8 @@ class PaperLaw:
 
 def _classes_of(situation: Situation) -> IntArray:
     classes = np.array(
-        [PASSED_OVER if role is Role.IGNORED else OBSTACLE for role in situation.objects.roles], dtype=np.int64
+        [SKIPPED if role is Role.IGNORED else OBSTACLE for role in situation.objects.roles], dtype=np.int64
     )
     if situation.held is not None:
-        classes[situation.held] = PASSED_OVER
+        classes[situation.held] = SKIPPED
     return classes

@@ -14,7 +14,7 @@ from typing import Final
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import COUNT, NUMBER, compiled, inlined, input_array
+from robot_side.compiled.kernel import FLOAT64, INT64, compiled, inlined, input_array
 from robot_side.compiled.vectors import Vector, add, cross, load, norm, scale, subtract, unit
 from robot_side.laws.memory import EVEN_PLACES, memory_at
 from robot_side.laws.sensed import L2
@@ -51,18 +51,18 @@ def plan_places(
     """
     memory = memory_at(bundle)
     state, farthest = memory.state[0], until * fastest_m_s(bundle, centers, tool, scale(ahead, approach))
-    state.moments = 0
+    state.even_places = 0
     if farthest >= _LEAST_M and math.isfinite(farthest):
-        state.moments = min(math.ceil(farthest / SPACING_M), EVEN_PLACES)
-    for number in range(state.moments):
-        memory.moments_s[number] = until * (number + 1) / state.moments
+        state.even_places = min(math.ceil(farthest / SPACING_M), EVEN_PLACES)
+    for number in range(state.even_places):
+        memory.moments_s[number] = until * (number + 1) / state.even_places
 
 
 @inlined
 def time_of_place(bundle: IntArray, side: int, place: int) -> float:
     """Return the time until the gripper is at a place. The last two places lie half a step beside the nearest one."""
     memory = memory_at(bundle)
-    even = memory.state[0].moments
+    even = memory.state[0].even_places
     if place <= even:
         after: float = memory.moments_s[place - 1] if place > 0 else 0.0
         return after
@@ -145,7 +145,7 @@ def go_to(
     return gone
 
 
-@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), COUNT, COUNT, NUMBER, NUMBER, returns=NUMBER)
+@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), INT64, INT64, FLOAT64, FLOAT64, returns=FLOAT64)
 def go_to_place(
     bundle: IntArray,
     tool: FloatArray,

@@ -8,7 +8,7 @@ from common.reaction import HORIZON_S
 from robot_side.arm.ability import ABILITY
 from robot_side.compiled.calls import call_at_address
 from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, compiled, inlined, input_array
+from robot_side.compiled.kernel import BOOL, FLOAT64, INT64, compiled, inlined, input_array
 from robot_side.compiled.vectors import load, norm
 from robot_side.enlargement.prediction_errors import prediction_error
 from robot_side.laws.memory import Kernel, memory_at
@@ -19,7 +19,7 @@ BEYOND_M: Final = 0.05
 FIELD_PERIOD_S: Final = 0.01
 """Period of looks from the gripper's place: controllers are written to no more often. Other places: three times it."""
 
-_find_ability = call_at_address(TRUTH, ABILITY)
+_find_ability = call_at_address(BOOL, ABILITY)
 _prediction_error = inlined(prediction_error)
 
 
@@ -38,11 +38,11 @@ def horizon_m(speed: float, acceleration: float, loop_age: float) -> float:
     return speed * (loop_age + HORIZON_S) + speed * speed / (2.0 * acceleration) + BEYOND_M
 
 
-FIND_PROSPECT: Final = (BUNDLE, COUNT, input_array(2), input_array(2), NUMBER, NUMBER, NUMBER, TRUTH, NUMBER)
+FIND_PROSPECT: Final = (BUNDLE, INT64, input_array(2), input_array(2), FLOAT64, FLOAT64, FLOAT64, BOOL, FLOAT64)
 """Argument types of `find_prospect`, for calls by address"""
 
 
-@compiled(*FIND_PROSPECT, returns=TRUTH)
+@compiled(*FIND_PROSPECT, returns=BOOL)
 def find_prospect(
     bundle: IntArray,
     side: int,

@@ -61,8 +61,8 @@ def longest_ago(bundle: IntArray) -> float:
 
 
 @inlined
-def keep(bundle: IntArray, side: int, place: int, now: float, tool: Vector, ways: FloatArray) -> None:
-    """Store a look along the memory's prospect. ways (2, 8): its onset distances, fast and slow. tool: its position.
+def keep(bundle: IntArray, side: int, place: int, now: float, tool: Vector, onsets: FloatArray) -> None:
+    """Store a look along the memory's prospect. onsets (2, 8): its onset distances, fast and slow. tool: its position.
 
     Looks from the same place are forgotten if too old or along another direction. Without room the oldest is dropped.
     """
@@ -85,5 +85,5 @@ def keep(bundle: IntArray, side: int, place: int, now: float, tool: Vector, ways
         new.direction[axis] = along[axis]
     for kind in range(2):
         for strength in range(STRENGTHS):
-            new.ways[kind, strength] = prospect.gone + prospect.stretch * ways[kind, strength]
-    memory.nearest_m[side, place] = new.ways[0, STRENGTHS - 1]
+            new.onsets[kind, strength] = prospect.gone + prospect.stretch * onsets[kind, strength]
+    memory.nearest_m[side, place] = new.onsets[0, STRENGTHS - 1]

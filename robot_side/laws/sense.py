@@ -9,8 +9,8 @@ from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.compiled.calls import call_at_address
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import (
-    NUMBER,
-    TRUTH,
+    BOOL,
+    FLOAT64,
     building_block,
     compiled,
     inlined,
@@ -30,7 +30,7 @@ from robot_side.laws.prospect import FIELD_PERIOD_S, FIND_PROSPECT, stopping
 from robot_side.laws.recent_looks import longest_ago, look_from
 from robot_side.laws.sensed import ENLARGEMENT, L2, OVERLAP, R2, STICK
 
-_find_prospect = call_at_address(TRUTH, FIND_PROSPECT)
+_find_prospect = call_at_address(BOOL, FIND_PROSPECT)
 
 
 @inlined
@@ -69,9 +69,9 @@ def _measure(bundle: IntArray, moment: Moment, velocity: Vector, turning: Vector
 
 @compiled(
     *(input_array(1), input_array(2), input_array(2), input_array(2), input_array(1), input_flags(), input_array(1)),
-    *(NUMBER, NUMBER, TRUTH, TRUTH, NUMBER, NUMBER, NUMBER, input_indices(), input_indices(), input_array(2)),
+    *(FLOAT64, FLOAT64, BOOL, BOOL, FLOAT64, FLOAT64, FLOAT64, input_indices(), input_indices(), input_array(2)),
     *(BUNDLE, BUNDLE, BUNDLE, output_array(1)),
-    returns=TRUTH,
+    returns=BOOL,
 )
 def sense(
     tool_position: FloatArray,
@@ -85,7 +85,7 @@ def sense(
     loop_age: float,
     is_known: bool,
     by_operator: bool,
-    widest: float,
+    half_gap: float,
     right: float,
     up: float,
     classes: IntArray,
@@ -96,7 +96,7 @@ def sense(
     bundle: IntArray,
     felt: FloatArray,
 ) -> bool:
-    """Fill `felt`, made by `room_to_feel`. Return False for wrong sizes, and for NaN, which would compare as far away.
+    """Fill `felt`, made by `felt_array`. Return False for wrong sizes, and for NaN, which would compare as far away.
 
     tool_position (3,), rotation (3, 3), jacobian (6, n), rates (n,), centers (m, 3), radii (m,), on_finger (m,). The
     others are those of `Moment`; is_known: the loop age is.
@@ -116,7 +116,7 @@ def sense(
     if now >= state.next or changed or deflected != (memory.places[STICK] > 0):
         moment = Moment(
             *(rotation, jacobian, centers, radii, on_finger, tool, approach, dot(velocity, approach), now, loop_age),
-            *(by_operator, widest, right, up, classes, closing, velocities, scene_bundle, scratch_bundle),
+            *(by_operator, half_gap, right, up, classes, closing, velocities, scene_bundle, scratch_bundle),
         )
         at_most = 1
         # Gripping and releasing change the number of spheres.
@@ -125,7 +125,7 @@ def sense(
                 return False
             at_most = 0
         for side in (R2, L2):
-            look_from(bundle, side, 1 + state.moments + (2 if state.moments > 0 else 0))
+            look_from(bundle, side, 1 + state.even_places + (2 if state.even_places > 0 else 0))
         look_from(bundle, STICK, 1 if deflected else 0)
         if not look_at_due(bundle, moment, at_most):
             return False

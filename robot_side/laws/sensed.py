@@ -6,14 +6,14 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray, require_finite
-from common.protocol.messages import TriggerField, Ways
+from common.protocol.messages import OnsetDistances, TriggerField
 from robot_side.field.scratch import STRENGTHS
 
 R2, L2, STICK = 0, 1, 2
 """Sides along which a law looks"""
-DISPLACEMENT, STIFFNESS, FULL_SPEED, ACCELERATION, OF_A_SIDE = (2 * STRENGTHS + k for k in range(5))
+DISPLACEMENT, STIFFNESS, FULL_SPEED, ACCELERATION, NUMBERS_PER_SIDE = (2 * STRENGTHS + k for k in range(5))
 """Indices of a side's numbers, R2 before L2: after eight fast and eight slow onset distances, δ (m), s(δ), v_max, a"""
-SPEED, HORIZON, RUMBLE, ENLARGEMENT, OVERLAP, TOOL_SPEED, NUMBERS = (2 * OF_A_SIDE + k for k in range(7))
+SPEED, HORIZON, RUMBLE, ENLARGEMENT, OVERLAP, TOOL_SPEED, NUMBERS = (2 * NUMBERS_PER_SIDE + k for k in range(7))
 """Indices after the numbers of R2 and L2; and the count of all numbers"""
 
 
@@ -29,7 +29,7 @@ class Sensed:
         """Build one from two fields and the properties below, 0 if not given; ValueError for NaN or infinity."""
         numbers: FloatArray = np.zeros(NUMBERS)
         for side, field in ((R2, r2), (L2, l2)):
-            numbers[side * OF_A_SIDE : (side + 1) * OF_A_SIDE] = (
+            numbers[side * NUMBERS_PER_SIDE : (side + 1) * NUMBERS_PER_SIDE] = (
                 *(*field.fast_m, *field.slow_m, field.displacement_m, field.stiffness),
                 *(field.full_speed_m_s, field.acceleration_m_s2),
             )
@@ -50,7 +50,7 @@ class Sensed:
 
     def stiffness(self, side: int) -> float:
         """s(δ) of R2 or L2, 0 to 1"""
-        return float(self.numbers[side * OF_A_SIDE + STIFFNESS])
+        return float(self.numbers[side * NUMBERS_PER_SIDE + STIFFNESS])
 
     @property
     def speed_m_s(self) -> float:
@@ -94,7 +94,7 @@ _PLACES: Final = {
 
 
 def _trigger_field(numbers: FloatArray, side: int) -> TriggerField:
-    mine = numbers[side * OF_A_SIDE : (side + 1) * OF_A_SIDE].tolist()
+    mine = numbers[side * NUMBERS_PER_SIDE : (side + 1) * NUMBERS_PER_SIDE].tolist()
     return TriggerField(
         fast_m=_eight(mine, 0),
         slow_m=_eight(mine, STRENGTHS),
@@ -105,6 +105,6 @@ def _trigger_field(numbers: FloatArray, side: int) -> TriggerField:
     )
 
 
-def _eight(numbers: list[float], first: int) -> Ways:
+def _eight(numbers: list[float], first: int) -> OnsetDistances:
     one, two, three, four, five, six, seven, eight = numbers[first : first + STRENGTHS]
     return one, two, three, four, five, six, seven, eight

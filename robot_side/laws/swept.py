@@ -26,7 +26,7 @@ from robot_side.arm.tool_motion import ToolMotionSettings, full_twists
 from robot_side.enlargement.distance import Uncertainty
 from robot_side.field.field import Along
 from robot_side.field.look import look
-from robot_side.field.object_class import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
+from robot_side.field.object_class import OBSTACLE, SKIPPED, TARGET, TOUCHABLE
 from robot_side.field.scratch import Count, Scratch
 from robot_side.field.total_overlap import sum_overlaps
 from robot_side.laws.around import STILL_M_S, ways_around
@@ -37,7 +37,7 @@ from robot_side.laws.explanation import (
     moved_and_inflated,
     overlaps_by_object,
 )
-from robot_side.laws.felt import room_to_feel
+from robot_side.laws.felt import felt_array
 from robot_side.laws.law import Situation
 from robot_side.laws.memory import Memory, Total
 from robot_side.laws.path import go_to_place
@@ -86,7 +86,7 @@ class SweptLaw:
         settings["camera_variance"], settings["mean"] = uncertainty.camera_sd_m**2, uncertainty.mean_m
         settings["quantile"] = uncertainty.quantile
         self._scratch = Scratch(0, 0, 0)
-        self._felt = room_to_feel()
+        self._felt = felt_array()
         self._classes: tuple[object, IntArray, IntArray] | None = None
         self._frame: PerceivedObjects | None = None
         self._room: tuple[int, SceneTable | None] = (-1, None)
@@ -96,7 +96,7 @@ class SweptLaw:
         pose, scene = situation.pose, self.surroundings.see(situation.objects)
         self._make_room(pose, scene)
         if (found := self._classes_of(situation)) is not self._classes:
-            self._look_around_anew()
+            self._discard_probes()
             self._classes = found
         _, classes, closing = found
         velocities, (right, up) = situation.objects.velocities_m_s, situation.lateral
@@ -121,18 +121,18 @@ class SweptLaw:
         """Set P of eq. 10; ConfigurationError outside (0, 1)."""
         self._uncertainty = replace(self._uncertainty, probability=probability)
         self.memory.settings["quantile"] = self._uncertainty.quantile
-        self._look_around_anew()
+        self._discard_probes()
 
     def around(self, pose: GripperPose) -> Around | None:
         """Return the map of onset distances around `pose`; None while one is unknown, or nobody asks for the map."""
-        until_s, ways_m = float(self.memory.state["until"][0]), np.empty((LISTS, PROBES))
+        until_s, onsets_m = float(self.memory.state["until"][0]), np.empty((LISTS, PROBES))
         if self._frame is None or self._classes is None or not 0.0 < until_s <= LONGEST_S:
             return None
         velocities = self._frame.velocities_m_s
         seen = self._classes[1], _NO_VELOCITIES if velocities is None else velocities, self._felt
-        if not ways_around(self.memory.bundle, pose.tool_position_m, pose.tool_rotation, *seen, ways_m):
+        if not ways_around(self.memory.bundle, pose.tool_position_m, pose.tool_rotation, *seen, onsets_m):
             return None
-        return Around.of(until_s, ways_m, change_times_s(pose, self._limits, self._twists))
+        return Around.of(until_s, onsets_m, change_times_s(pose, self._limits, self._twists))
 
     @property
     def fits_a_message(self) -> bool:
@@ -148,9 +148,9 @@ class SweptLaw:
         at = self.memory.around["at"]
         at[at < before_s] = -np.inf
 
-    def _look_around_anew(self) -> None:
+    def _discard_probes(self) -> None:
         """Discard the probes' looks, as the objects' classes or P have changed."""
-        self.memory.state["anew"] = np.inf
+        self.memory.state["counts_since"] = np.inf
 
     def summary(self) -> dict[str, int]:
         """Return counts of the work, done and saved, over the run."""
@@ -180,10 +180,10 @@ class SweptLaw:
         motion = memory.rotation, pose.tool_jacobian, right, up, age_s, by_operator
         if not find_prospect(memory.bundle, side, *motion, gone_m):
             self._refuse(situation)
-        found, early_m, velocities = memory.prospect[0], None, situation.objects.velocities_m_s
+        found, approach_m, velocities = memory.prospect[0], None, situation.objects.velocities_m_s
         if velocities is not None:
             until_s = stopping_s(found["speed"], found["acceleration"], age_s)
-            early_m = np.clip(-velocities @ found["direction"], 0.0, None) * until_s
+            approach_m = np.clip(-velocities @ found["direction"], 0.0, None) * until_s
         along = Along(
             direction=found["direction"].copy(),
             mean_m=float(found["mean"]),
@@ -192,7 +192,7 @@ class SweptLaw:
             reach_m=float(found["reach"]),
             mean_along_m=float(found["mean_along"]),
             variance_along_m2=float(found["variance_along"]),
-            early_m=early_m,
+            approach_m=approach_m,
         )
         there = replace(
             pose,
@@ -226,13 +226,13 @@ class SweptLaw:
             return self._classes
         of_role = {
             Role.TARGET: TARGET,
-            Role.IGNORED: PASSED_OVER,
+            Role.IGNORED: SKIPPED,
             Role.SUPPORT: OBSTACLE if held is None else TOUCHABLE,
         }
         classes = np.array([of_role.get(role, OBSTACLE) for role in roles], dtype=np.int64)
         if held is not None:
-            classes[held] = PASSED_OVER
-        return (roles, held), classes, np.where(classes == TARGET, PASSED_OVER, classes)
+            classes[held] = SKIPPED
+        return (roles, held), classes, np.where(classes == TARGET, SKIPPED, classes)
 
     def _refuse(self, situation: Situation, now_s: float = 0.0) -> NoReturn:
         """Raise the ValueError that names the field that is not finite or has the wrong size."""

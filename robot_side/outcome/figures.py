@@ -14,7 +14,7 @@ from robot_side.laws.sensed import (
     ENLARGEMENT,
     L2,
     NUMBERS,
-    OF_A_SIDE,
+    NUMBERS_PER_SIDE,
     OVERLAP,
     R2,
     RUMBLE,
@@ -35,7 +35,7 @@ _CONTACT_REST_S = 0.1
 a sliding touch chatters, and two fingers do not close simultaneously."""
 
 
-_L2_STIFFNESS, _R2_STIFFNESS = L2 * OF_A_SIDE + STIFFNESS, R2 * OF_A_SIDE + STIFFNESS
+_L2_STIFFNESS, _R2_STIFFNESS = L2 * NUMBERS_PER_SIDE + STIFFNESS, R2 * NUMBERS_PER_SIDE + STIFFNESS
 _MOST_ROWS = 8 * BLOCK
 """Most ticks that wait to be evaluated."""
 

@@ -18,7 +18,7 @@ from functools import cache
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import TRUTH, Compiled, compiled, inlined, input_array, output_array
+from robot_side.compiled.kernel import BOOL, Compiled, compiled, inlined, input_array, output_array
 from robot_side.compiled.vectors import load
 from robot_side.overlap.checks.arguments import LARGEST, SMALLEST_NORMAL
 from robot_side.overlap.closed_forms.ball import sphere_overlap
@@ -51,23 +51,23 @@ class DoubtfulNumbersError(ValueError):
 
 
 def sphere_pairs(
-    centers: FloatArray, radii: FloatArray, other_centers: FloatArray, other_radii: FloatArray, *, vouched: bool = True
+    centers: FloatArray, radii: FloatArray, other_centers: FloatArray, other_radii: FloatArray, *, trusted: bool = True
 ) -> Overlaps:
     """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with `other_centers` (p, 3), `other_radii` (p,)."""
-    return _one_by_one(_sphere_loop, (centers, radii, other_centers, other_radii), vouched)
+    return _one_by_one(_sphere_loop, (centers, radii, other_centers, other_radii), trusted)
 
 
 def half_space_pairs(
-    centers: FloatArray, radii: FloatArray, normals: FloatArray, offsets: FloatArray, *, vouched: bool = True
+    centers: FloatArray, radii: FloatArray, normals: FloatArray, offsets: FloatArray, *, trusted: bool = True
 ) -> Overlaps:
     """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with half-spaces normals (p, 3)·x <= offsets (p,)."""
-    return _one_by_one(_half_space_loop, (centers, radii, normals, offsets), vouched)
+    return _one_by_one(_half_space_loop, (centers, radii, normals, offsets), trusted)
 
 
-def _one_by_one(loop: Compiled, arguments: tuple[FloatArray, ...], vouched: bool) -> Overlaps:
+def _one_by_one(loop: Compiled, arguments: tuple[FloatArray, ...], trusted: bool) -> Overlaps:
     total = len(arguments[1])
     results = np.empty(total), np.empty((total, 3)), np.empty(total)
-    if not loop(*arguments, *results) and not vouched:
+    if not loop(*arguments, *results) and not trusted:
         raise DoubtfulNumbersError
     return results
 
@@ -79,7 +79,7 @@ def box_pairs(
     box_rotations: FloatArray,
     box_half_sizes: FloatArray,
     *,
-    vouched: bool = True,
+    trusted: bool = True,
     counts: PairCounts | None = None,
     threads: int | None = None,
 ) -> Overlaps:
@@ -88,7 +88,7 @@ def box_pairs(
     `threads` None chooses the number by the number of pairs.
     """
     arguments = centers, radii, box_centers, box_rotations, box_half_sizes
-    return _many(overlap_boxes, precise_boxes, arguments, vouched, counts, threads)
+    return _many(overlap_boxes, precise_boxes, arguments, trusted, counts, threads)
 
 
 def tetrahedron_pairs(
@@ -96,7 +96,7 @@ def tetrahedron_pairs(
     radii: FloatArray,
     vertices: FloatArray,
     *,
-    vouched: bool = True,
+    trusted: bool = True,
     counts: PairCounts | None = None,
     threads: int | None = None,
 ) -> Overlaps:
@@ -104,14 +104,14 @@ def tetrahedron_pairs(
 
     `threads` None chooses the number by the number of pairs.
     """
-    return _many(overlap_tetrahedra, precise_tetrahedra, (centers, radii, vertices), vouched, counts, threads)
+    return _many(overlap_tetrahedra, precise_tetrahedra, (centers, radii, vertices), trusted, counts, threads)
 
 
 def _many(
     overlap: Compiled,
     precise: Compiled,
     arguments: tuple[FloatArray, ...],
-    vouched: bool,
+    trusted: bool,
     counts: PairCounts | None,
     threads: int | None,
 ) -> Overlaps:
@@ -121,14 +121,14 @@ def _many(
     if threads is None:
         threads = min(total // PAIRS_PER_THREAD, os.cpu_count() or 1) if total >= 2 * PAIRS_PER_THREAD else 1
     if threads <= 1:
-        parts = [_part(overlap, precise, arguments, results, vouched)]
+        parts = [_part(overlap, precise, arguments, results, trusted)]
     else:
         ends = np.linspace(0, total, threads + 1).astype(int).tolist()
 
         def part_of(first: int, last: int) -> tuple[int, int]:
             rows = slice(first, last)
             own = results[0][rows], results[1][rows], results[2][rows]
-            return _part(overlap, precise, tuple(argument[rows] for argument in arguments), own, vouched)
+            return _part(overlap, precise, tuple(argument[rows] for argument in arguments), own, trusted)
 
         try:
             shared = _pool().map(part_of, ends[:-1], ends[1:])
@@ -144,14 +144,14 @@ def _many(
 
 
 def _part(
-    overlap: Compiled, precise: Compiled, arguments: tuple[FloatArray, ...], results: Overlaps, vouched: bool
+    overlap: Compiled, precise: Compiled, arguments: tuple[FloatArray, ...], results: Overlaps, trusted: bool
 ) -> tuple[int, int]:
     """Fill `results`; return the number of pairs that bounds did not settle, and of those with precise forms."""
     rows: IntArray = np.empty(len(arguments[1]) + 1, dtype=np.int64)
     unsettled = overlap(*arguments, *results, rows)
     partial = rows.item(-1)
     if partial < 0:
-        if not vouched:
+        if not trusted:
             raise DoubtfulNumbersError
         partial = ~partial
     if unsettled:
@@ -177,7 +177,7 @@ def _store(pair: int, overlap: Overlap, volumes: FloatArray, gradients: FloatArr
     areas[pair] = overlap[2]
 
 
-@compiled(input_array(2), input_array(1), input_array(2), input_array(1), *_RESULTS, returns=TRUTH)
+@compiled(input_array(2), input_array(1), input_array(2), input_array(1), *_RESULTS, returns=BOOL)
 def _sphere_loop(
     centers: FloatArray,
     radii: FloatArray,
@@ -197,7 +197,7 @@ def _sphere_loop(
     return sure
 
 
-@compiled(input_array(2), input_array(1), input_array(2), input_array(1), *_RESULTS, returns=TRUTH)
+@compiled(input_array(2), input_array(1), input_array(2), input_array(1), *_RESULTS, returns=BOOL)
 def _half_space_loop(
     centers: FloatArray,
     radii: FloatArray,

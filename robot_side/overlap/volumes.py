@@ -162,7 +162,7 @@ def _overlaps(kind: _Kind, given: tuple[Array, ...], gradient: bool) -> FloatArr
     if plain is not None:
         rows, shape = plain
         try:
-            return _result(kind.pairs(*rows, vouched=False), shape, gradient)
+            return _result(kind.pairs(*rows, trusted=False), shape, gradient)
         except DoubtfulNumbersError:
             pass
     arguments = [check(name, value, last) for (check, name, last), value in zip(kind.arguments, given, strict=True)]

@@ -81,7 +81,7 @@ class FramePacker:
     def __init__(self) -> None:
         self._last: PerceivedObjects | None = None
 
-    def begin_anew(self) -> None:
+    def begin_epoch(self) -> None:
         """Encode the next frame whole."""
         self._last = None
 

@@ -42,9 +42,9 @@ class RobotEncoder:
         self._state: ArmState | None = None
         self._frame: PerceivedObjects | None = None
 
-    def begin_anew(self) -> None:
+    def begin_epoch(self) -> None:
         """Encode state and frame whole the next time."""
-        self._frames.begin_anew()
+        self._frames.begin_epoch()
         self._state = self._frame = None
 
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:

@@ -22,7 +22,7 @@ from common.following import follow
 from common.protocol.messages import MotionCommand, MotionState, Telemetry
 from common.reaction import WRITE_S
 from common.silence import KEEP_ALIVE_S
-from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, compiled, inlined, input_array, output_array, record_array
+from robot_side.compiled.kernel import BOOL, FLOAT64, INT64, compiled, inlined, input_array, output_array, record_array
 from robot_side.laws.sensed import (
     ACCELERATION,
     DISPLACEMENT,
@@ -30,7 +30,7 @@ from robot_side.laws.sensed import (
     HORIZON,
     L2,
     NUMBERS,
-    OF_A_SIDE,
+    NUMBERS_PER_SIDE,
     R2,
     RUMBLE,
     SPEED,
@@ -50,12 +50,12 @@ _ARMED: Final = _STATES["armed"]
 _STANDS: Final = len(_STATES)
 _BELIEF: Final = np.dtype(
     [
-        *((name, np.float64) for name in ("sent", "now", "way", "speed", "target", "told")),
+        *((name, np.float64) for name in ("sent", "now", "displacement", "speed", "target", "commanded")),
         *((name, np.int64) for name in ("known", "state", "obeyed")),
     ]
 )
-"""Belief of the receiver. sent, now: times (s). way, speed, target: motion along R2 since the message, by commands.
-told: the arm's commanded speed in the message (m/s). known: a message has been sent. state: that of motion, plus
+"""Belief of the receiver. sent, now: times (s). displacement, speed, target: motion along R2 by commands since then.
+commanded: the arm's commanded speed in the message (m/s). known: a message has been sent. state: that of motion, plus
 _STANDS if the held object stands. obeyed: sequence number of the newest command."""
 
 _follow = inlined(follow)
@@ -114,13 +114,13 @@ def _wrong(numbers: FloatArray, sent: FloatArray, side: int, moved: float, patie
     patient: longer distances do not count. A distance at the horizon is no shorter one: nothing is known beyond it, and
     the last message still holds.
     """
-    for place in range(side * OF_A_SIDE, side * OF_A_SIDE + DISPLACEMENT):
-        way = numbers[place]
-        apart = way - sent[place] + moved
+    for place in range(side * NUMBERS_PER_SIDE, side * NUMBERS_PER_SIDE + DISPLACEMENT):
+        onset = numbers[place]
+        apart = onset - sent[place] + moved
         if apart < -_NEARER * _DEADBAND_M:
-            if apart < -_NEARER * _DEADBAND_SHARE * way and way < numbers[HORIZON]:
+            if apart < -_NEARER * _DEADBAND_SHARE * onset and onset < numbers[HORIZON]:
                 return True
-        elif apart > _DEADBAND_M and not patient and apart > _DEADBAND_SHARE * way:
+        elif apart > _DEADBAND_M and not patient and apart > _DEADBAND_SHARE * onset:
             return True
     return False
 
@@ -138,9 +138,11 @@ def _matters(
         return True
     patient, shown = since < WRITE_S, numbers[RUMBLE] != sent[RUMBLE]
     for side in (R2, L2):
-        first, sign = side * OF_A_SIDE, 1.0 if side == R2 else -1.0
+        first, sign = side * NUMBERS_PER_SIDE, 1.0 if side == R2 else -1.0
         # A receiver that does not compute δ adds δ of the message.
-        moved = sign * belief.way if by_operator else sent[first + DISPLACEMENT] - numbers[first + DISPLACEMENT]
+        moved = (
+            sign * belief.displacement if by_operator else sent[first + DISPLACEMENT] - numbers[first + DISPLACEMENT]
+        )
         # The braking distance from a speed above the trigger's adds to δ: at most this.
         moved += _braking_m(sign * belief.speed, sent[first + ACCELERATION])
         moved -= _braking_m(sign * numbers[SPEED], numbers[first + ACCELERATION])
@@ -155,22 +157,22 @@ def _matters(
         record_array(_BELIEF),
         output_array(1),
         input_array(1),
-        NUMBER,
-        COUNT,
-        COUNT,
-        NUMBER,
-        TRUTH,
-        NUMBER,
-        TRUTH,
-        NUMBER,
+        FLOAT64,
+        INT64,
+        INT64,
+        FLOAT64,
+        BOOL,
+        FLOAT64,
+        BOOL,
+        FLOAT64,
     ),
-    returns=TRUTH,
+    returns=BOOL,
 )
 def _due(
     beliefs: np.ndarray,
     sent: FloatArray,
     numbers: FloatArray,
-    told: float,
+    commanded: float,
     state: int,
     obeyed: int,
     travel: float,
@@ -182,18 +184,20 @@ def _due(
     """Decide, and update the receiver's belief; sent, numbers (NUMBERS,): those of `Sensed`."""
     belief = beliefs[0]
     if belief.known == 1:
-        acceleration = sent[R2 * OF_A_SIDE + ACCELERATION]
-        belief.way, belief.speed = _follow(belief.way, belief.speed, belief.target, acceleration, now - belief.now)
+        acceleration = sent[R2 * NUMBERS_PER_SIDE + ACCELERATION]
+        belief.displacement, belief.speed = _follow(
+            belief.displacement, belief.speed, belief.target, acceleration, now - belief.now
+        )
     belief.now = now
     if belief.known == 1 and not full_rate and not _matters(belief, sent, numbers, state, by_operator, interval, now):
         # The receiver does not know yet how fast the arm follows a later command.
-        later = travel * sent[R2 * OF_A_SIDE + FULL_SPEED]
-        belief.target = belief.told if obeyed == belief.obeyed else later
+        later = travel * sent[R2 * NUMBERS_PER_SIDE + FULL_SPEED]
+        belief.target = belief.commanded if obeyed == belief.obeyed else later
         return False
     for i in range(sent.size):
         sent[i] = numbers[i]
     belief.known, belief.state, belief.sent, belief.obeyed = 1, state, now, obeyed
-    belief.way, belief.speed, belief.told, belief.target = 0.0, numbers[SPEED], told, told
+    belief.displacement, belief.speed, belief.commanded, belief.target = 0.0, numbers[SPEED], commanded, commanded
     return True
 
 

@@ -33,7 +33,7 @@ class Reports:
         self._around, self._seen = MapSchedule(), TelemetryDeadband()
         self._next_observers_s = -np.inf
 
-    def begin_anew(self) -> None:
+    def begin_epoch(self) -> None:
         """Begin with another operator."""
         self.felt.forget()
         self._around = MapSchedule()
@@ -49,7 +49,7 @@ class Reports:
     ) -> list[Outgoing]:
         """Return the messages that are due."""
         session, (sight, grip, motion) = self._session, parts
-        felt = sensed, motion.told_m_s, permission.state, grip.touching_down.stands
+        felt = sensed, motion.told_m_s, permission.state, grip.touchdown.stands
         outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]
         if session.owner_peer is not None and self.felt.due(*felt, permission.command, now_s):
             self.stiffness_sent += 1

@@ -56,7 +56,7 @@ class Sending:
             elif message.stream == "haptics":
                 self.budget.spend("haptics", size_bytes, now_s)
                 self._enter(message, b"", now_s)
-            elif self.budget.may_tell(size_bytes, now_s):
+            elif self.budget.may_send_telemetry(size_bytes, now_s):
                 self._enter(message, TOPICS[message.stream], now_s)
 
     def send(self, queue: OutgoingQueue | None, now_s: float) -> None:

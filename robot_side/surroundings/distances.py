@@ -3,7 +3,7 @@
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import NUMBER, compiled, input_array, input_indices, output_array
+from robot_side.compiled.kernel import FLOAT64, compiled, input_array, input_indices, output_array
 from robot_side.compiled.vectors import load, norm, subtract
 from robot_side.surroundings.any_kind import nearest
 from robot_side.surroundings.bounds import around
@@ -74,7 +74,7 @@ def _nearest_loop(
             directions[k, axis] = direction[axis]
 
 
-@compiled(input_array(2), input_array(2), input_array(2), input_indices(), input_indices(), NUMBER, output_array(1))
+@compiled(input_array(2), input_array(2), input_array(2), input_indices(), input_indices(), FLOAT64, output_array(1))
 def _least_gaps(
     spheres: FloatArray,
     bounds: FloatArray,

@@ -94,10 +94,10 @@ class Movers:
             raise ValueError(f"numbers holds {numbers.dtype} {numbers.shape}; valid: contiguous float64 {shape}")
         if len(roles) != len(self.first.names):
             raise ValueError(f"roles holds {len(roles)}; valid: one for each of {len(self.first.names)} objects")
-        return _Elsewhere(**self._still, time_s=time_s, roles=roles, since=(self, numbers))
+        return _MoversFrame(**self._still, time_s=time_s, roles=roles, since=(self, numbers))
 
 
-class _Elsewhere(PerceivedObjects):
+class _MoversFrame(PerceivedObjects):
     """Frame of movers; each array is built on first read."""
 
     def __init__(self, **said: Any) -> None:

@@ -5,7 +5,7 @@ from typing import Final
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import COUNT, TRUTH, compiled, inlined, input_array, input_indices, output_array
+from robot_side.compiled.kernel import BOOL, INT64, compiled, inlined, input_array, input_indices, output_array
 from robot_side.surroundings.blocks import bound_blocks
 from robot_side.surroundings.bounds import write_around
 from robot_side.surroundings.kinds.layout import NUMBERS, SHAPE_NUMBERS, VELOCITY
@@ -49,9 +49,9 @@ def _judged(
 
 
 @compiled(
-    *(input_array(2), input_indices(), input_indices(), input_indices(), TRUTH, BUNDLE),
+    *(input_array(2), input_indices(), input_indices(), input_indices(), BOOL, BUNDLE),
     *(output_array(2), output_array(2)),
-    returns=COUNT,
+    returns=INT64,
 )
 def write_movers(
     numbers: FloatArray,

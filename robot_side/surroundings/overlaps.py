@@ -9,13 +9,13 @@ from typing import Any
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.calls import call_at_address
-from robot_side.compiled.kernel import NUMBER, inlined
+from robot_side.compiled.kernel import FLOAT64, inlined
 from robot_side.compiled.vectors import Vector
 from robot_side.surroundings.kinds.kind import by_kind
 from robot_side.surroundings.kinds.layout import OVERLAP
 from robot_side.surroundings.perceived import KINDS
 
-_by_address = call_at_address(NUMBER, OVERLAP)
+_by_address = call_at_address(FLOAT64, OVERLAP)
 
 
 def _overlap(number: int, closed_form: Callable[..., Any] | None) -> Callable[..., float]:
@@ -27,9 +27,9 @@ def _overlap(number: int, closed_form: Callable[..., Any] | None) -> Callable[..
         center: Vector,
         radius: float,
         meshes: IntArray,
-        push: FloatArray,
+        overlap_gradient: FloatArray,
     ) -> float:
-        found: float = _by_address(kernels[number], (shapes, row, *center, radius, meshes, push))
+        found: float = _by_address(kernels[number], (shapes, row, *center, radius, meshes, overlap_gradient))
         return found
 
     if closed_form is None:
@@ -43,10 +43,10 @@ def _overlap(number: int, closed_form: Callable[..., Any] | None) -> Callable[..
         center: Vector,
         radius: float,
         _meshes: IntArray,
-        push: FloatArray,
+        overlap_gradient: FloatArray,
     ) -> float:
         volume, gradient, _ = closed_form(shapes, row, center, radius)
-        push[0], push[1], push[2] = gradient
+        overlap_gradient[0], overlap_gradient[1], overlap_gradient[2] = gradient
         found: float = volume
         return found
 
@@ -65,8 +65,11 @@ def overlap(
     center: Vector,
     radius: float,
     meshes: IntArray,
-    push: FloatArray,
+    overlap_gradient: FloatArray,
 ) -> float:
-    """Return V of a sphere and the primitive in `row`; fill `push` (3,) with dV/dcentre. kernels: addresses by kind."""
-    found: float = _overlap_by_kind(kind, kernels, shapes, row, center, radius, meshes, push)
+    """Return V of a sphere and the primitive in `row`; fill `overlap_gradient` (3,) with dV/dcentre.
+
+    kernels: addresses by kind.
+    """
+    found: float = _overlap_by_kind(kind, kernels, shapes, row, center, radius, meshes, overlap_gradient)
     return found

@@ -9,14 +9,14 @@ import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from robot_side.compiled.columns import FLAGS, INDICES, NUMBERS, Declared, matrices, rows
-from robot_side.compiled.kernel import NUMBER, compiled, inlined
+from robot_side.compiled.kernel import FLOAT64, compiled, inlined
 from robot_side.compiled.vectors import Vector, dot, load, subtract
 from robot_side.overlap.meshes.mesh_kernels import to_world
 from robot_side.overlap.meshes.mesh_tables import FIELDS, MeshTables
 from robot_side.overlap.meshes.rounded_overlap import rounded_overlap
 from robot_side.overlap.meshes.tree_queries import is_clear_of
 from robot_side.overlap.meshes.triangle_lanes import SCRATCH
-from robot_side.surroundings.kinds.layout import CONTACT, LEAST_WAY_M, MESH_CONTACT, NEVER, OVERLAP, Contact
+from robot_side.surroundings.kinds.layout import CONTACT, LEAST_CONTACT_M, MESH_CONTACT, NEVER, OVERLAP, Contact
 from robot_side.surroundings.kinds.mesh_contact import closing_at, next_touch, overlaps, swept
 from robot_side.surroundings.perceived import PerceivedObjects
 
@@ -80,7 +80,7 @@ def _turned_back(rotation: FloatArray, vector: Vector) -> Vector:
     return dot(load(turned, 0), vector), dot(load(turned, 1), vector), dot(load(turned, 2), vector)
 
 
-@compiled(*OVERLAP, returns=NUMBER)
+@compiled(*OVERLAP, returns=FLOAT64)
 def overlap_one_mesh(
     _shapes: FloatArray,
     row: int,
@@ -89,18 +89,18 @@ def overlap_one_mesh(
     z: float,
     radius: float,
     bundle: IntArray,
-    push: FloatArray,
+    overlap_gradient: FloatArray,
 ) -> float:
     """Return the overlap with a closed mesh."""
     meshes = _at(bundle)
     tables, place, center = _tables(meshes), meshes.rows[row], (x, y, z)
     mesh = meshes.mesh[place]
-    push[0] = push[1] = push[2] = 0.0
+    overlap_gradient[0] = overlap_gradient[1] = overlap_gradient[2] = 0.0
     own = _turned_back(meshes.rotations[place], subtract(center, load(meshes.positions, place)))
     if is_clear_of(tables, mesh, own, radius):
         return 0.0
     volume, gradient = rounded_overlap(own, radius, tables, mesh, meshes.near, meshes.scratch)
-    push[0], push[1], push[2] = to_world(meshes.rotations, place, gradient)
+    overlap_gradient[0], overlap_gradient[1], overlap_gradient[2] = to_world(meshes.rotations, place, gradient)
     return volume
 
 
@@ -132,5 +132,5 @@ def contact_with_mesh(
     found, triangle = next_touch(tables, mesh, sweep, meshes.near, meshes.scratch)
     if not found <= reach:
         return NEVER
-    found = max(found, 0.0 if inside else LEAST_WAY_M)
+    found = max(found, 0.0 if inside else LEAST_CONTACT_M)
     return found, closing_at(tables, triangle, sweep, found) if meshes.convex[mesh] else 0.0

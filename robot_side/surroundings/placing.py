@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import TRUTH, building_block, compiled, input_indices, output_array
+from robot_side.compiled.kernel import BOOL, building_block, compiled, input_indices, output_array
 from robot_side.surroundings.bounds import write_around
 from robot_side.surroundings.kinds.kind import by_kind
 from robot_side.surroundings.kinds.layout import SHAPE_NUMBERS
@@ -24,7 +24,7 @@ def place_one(kind: int, numbers: FloatArray, k: int, bounds: FloatArray, row: i
 @compiled(
     *(output_array(2), input_indices(), input_indices()),
     *(output_array(2), output_array(1), output_array(2), output_array(1)),
-    returns=TRUTH,
+    returns=BOOL,
 )
 def _place(
     numbers: FloatArray,

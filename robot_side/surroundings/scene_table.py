@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from robot_side.surroundings.placed_meshes import PlacedMeshes
 
 
-class Moving:
+class MoverRows:
     """Places of the movers in a table."""
 
     def __init__(self, movers: SomeObjects, table: "SceneTable") -> None:
@@ -54,7 +54,7 @@ class SceneTable:
     flat: int
     """Number of primitives without volume: nothing can overlap them, so they are left out."""
     order: InitVar[IntArray | None] = None
-    moving: Moving | None = None
+    moving: MoverRows | None = None
     """Movers whose newest numbers the table holds, if any"""
 
     def __post_init__(self, order: IntArray | None) -> None:
@@ -116,7 +116,7 @@ def go_to(table: SceneTable, objects: PerceivedObjects) -> bool:
         _write_movers(table, before, before.movers.at_first)
         table.objects, table.moving = before.movers.first, None
     if since is not None:
-        moving = table.moving or Moving(since[0], table)
+        moving = table.moving or MoverRows(since[0], table)
         found = _write_movers(table, moving, since[1]) if moving.solid else FLAT
         if found != WRITTEN:
             require_valid(objects)
@@ -126,7 +126,7 @@ def go_to(table: SceneTable, objects: PerceivedObjects) -> bool:
     return True
 
 
-def _write_movers(table: SceneTable, moving: Moving, numbers: FloatArray) -> int:
+def _write_movers(table: SceneTable, moving: MoverRows, numbers: FloatArray) -> int:
     """Write the movers by their numbers; return the result of `write_movers`."""
     movers = moving.movers
     where = movers.things, moving.places, moving.blocks

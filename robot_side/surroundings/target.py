@@ -7,7 +7,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 from common.roles import Role
 from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import COUNT, compiled, output_array
+from robot_side.compiled.kernel import INT64, compiled, output_array
 from robot_side.surroundings.kinds.layout import HALF_SPACE, TETRAHEDRON
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.scene_columns import SCENE
@@ -33,7 +33,7 @@ def object_centers(objects: PerceivedObjects) -> FloatArray:
     return centers_m
 
 
-@compiled(BUNDLE, COUNT, output_array(1))
+@compiled(BUNDLE, INT64, output_array(1))
 def _center(bundle: IntArray, thing: int, center: FloatArray) -> None:
     scene, count = _scene(bundle), 0
     center[:] = 0.0

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray, IntArray, require_finite
-from robot_side.compiled.kernel import TRUTH, building_block, compiled, inlined, input_array, input_indices
+from robot_side.compiled.kernel import BOOL, building_block, compiled, inlined, input_array, input_indices
 from robot_side.surroundings.kinds.kind import Check, Kind
 from robot_side.surroundings.kinds.layout import NUMBERS
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
@@ -133,7 +133,7 @@ def is_possible(kind: int, numbers: FloatArray, row: int) -> bool:
     return True
 
 
-@compiled(input_array(2), input_indices(), returns=TRUTH)
+@compiled(input_array(2), input_indices(), returns=BOOL)
 def _are_possible(numbers: FloatArray, kinds: IntArray) -> bool:
     possible = True
     for row in range(kinds.size):

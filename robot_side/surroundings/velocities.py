@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.compiled.kernel import COUNT, NUMBER, compiled, input_array, output_array
+from robot_side.compiled.kernel import FLOAT64, INT64, compiled, input_array, output_array
 
 WINDOW_S = 0.2
 """Time over which a velocity is measured: the result is a tenth of a second late, and a frame's noise counts little."""
@@ -48,7 +48,7 @@ class ObjectVelocities:
         return velocities
 
 
-@compiled(output_array(1), output_array(2), COUNT, NUMBER, NUMBER, input_array(1), output_array(1), returns=COUNT)
+@compiled(output_array(1), output_array(2), INT64, FLOAT64, FLOAT64, input_array(1), output_array(1), returns=INT64)
 def _see(
     times: FloatArray,
     seen: FloatArray,

@@ -14,7 +14,7 @@ from common.protocol.messages import Header
 from common.protocol.view_messages import VIEW_NAMES, VideoFrame, VideoStep, ViewName
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.viewing.exchange import Order, Picture, Ready, Refusal, Setup, decode_from_companion, encode
-from robot_side.viewing.giving_way import GivingWay, Step
+from robot_side.viewing.picture_rate_control import PictureRateControl, Step
 from robot_side.viewing.settings import CamerasSettings
 from robot_side.viewing.viewpoints import viewpoints
 
@@ -87,7 +87,7 @@ class Cameras:
         """Whether the companion makes H.264; assumed until it denies"""
         shape = settings.width, settings.height
         self._setup = encode(Setup(saved_model(scene), *shape, viewpoints(scene), self._h264))
-        self.giving_way = GivingWay(settings.rate_hz, settings.quality)
+        self.picture_rate_control = PictureRateControl(settings.rate_hz, settings.quality)
         """Controller of the pictures' rate, quality and size"""
         self.starts = 0
         self.took_s: list[float] = []
@@ -197,7 +197,7 @@ class Cameras:
             return
         data = self._data
         mocap = np.concatenate([data.mocap_pos, data.mocap_quat], axis=1).tobytes() if len(data.mocap_pos) else b""
-        step, h264 = self.giving_way.step, self.makes_h264(lacks)
+        step, h264 = self.picture_rate_control.step, self.makes_h264(lacks)
         number, came_s = self._whole.get(view, (0, -math.inf))
         # A lost picture is newer than the newest whole one.
         lost = lacks is not None and lacks[VIEW_NAMES.index(view)] > number
@@ -225,7 +225,7 @@ class Cameras:
                 self._whole[message.view] = message.number, now_s
             else:
                 step = self._ordered_as[message.view]
-                self.giving_way.made(len(message.content), step, h264=message.number > 0)
+                self.picture_rate_control.made(len(message.content), step, h264=message.number > 0)
             self.took_s = [*self.took_s[-999:], message.took_s]
             pictures.append(message)
         if companion.channel.ended:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from common.protocol.around import AXES, CHANGE_STEP_S, LISTS, PROBES, STEP_M, Around
 
-COUNT = LISTS * PROBES
+INT64 = LISTS * PROBES
 CHANGES_S = np.full((6, AXES), 0.05)
 ways = st.floats(-0.1, 1.0) | st.just(float("inf"))
 
@@ -15,9 +15,9 @@ ways = st.floats(-0.1, 1.0) | st.just(float("inf"))
 @pytest.mark.parametrize(
     ("full_s", "count", "changes", "said"),
     [
-        *((full_s, COUNT, 2 * AXES, "full_s") for full_s in (0.0, -1.0, float("nan"), float("inf"), 101.0)),
-        *((0.8, count, 2 * AXES, f"steps has {count} bytes; valid: {COUNT}") for count in (0, COUNT - 1, COUNT + 1)),
-        *((0.8, COUNT, n, f"changes has {n} bytes; valid: 10 for each of 1 to 32") for n in (0, AXES, 66 * AXES)),
+        *((full_s, INT64, 2 * AXES, "full_s") for full_s in (0.0, -1.0, float("nan"), float("inf"), 101.0)),
+        *((0.8, count, 2 * AXES, f"steps has {count} bytes; valid: {INT64}") for count in (0, INT64 - 1, INT64 + 1)),
+        *((0.8, INT64, n, f"changes has {n} bytes; valid: 10 for each of 1 to 32") for n in (0, AXES, 66 * AXES)),
     ],
 )
 def test_what_cannot_be_is_named(full_s: float, count: int, changes: int, said: str) -> None:
@@ -31,10 +31,10 @@ def test_changes_are_told_to_a_quarter_of_a_millisecond_up_to_8_s() -> None:
     np.testing.assert_allclose(told_s, np.clip(changes_s, -8.0, 8.0 - CHANGE_STEP_S), atol=0.5 * CHANGE_STEP_S)
 
 
-@given(st.lists(ways, min_size=COUNT, max_size=COUNT), st.floats(0.1, 2.0))
+@given(st.lists(ways, min_size=INT64, max_size=INT64), st.floats(0.1, 2.0))
 def test_no_way_gets_longer_and_by_two_millimetres_at_most_shorter(metres: list[float], horizon_m: float) -> None:
     sent_m = np.array(metres).reshape(LISTS, PROBES)
-    told_m, within_m = Around.of(0.8, sent_m, CHANGES_S).ways_m(horizon_m), np.clip(sent_m, 0.0, horizon_m)
+    told_m, within_m = Around.of(0.8, sent_m, CHANGES_S).onsets_m(horizon_m), np.clip(sent_m, 0.0, horizon_m)
     assert (told_m <= within_m).all()
     assert (told_m >= np.minimum(within_m, 254 * STEP_M) - STEP_M).all()
     np.testing.assert_array_equal(told_m[np.isinf(sent_m)], horizon_m)

@@ -37,7 +37,7 @@ from common.protocol.messages import (
 from common.protocol.session import SessionState
 from common.protocol.uniform_field import FAR_M, STRENGTHS, uniform_field
 from common.protocol.view_messages import AnyViewMessage, SceneShapes, Shape, VideoFrame, VideoStep
-from tests.helpers.felt import felt, field, scene_state, ways
+from tests.helpers.felt import felt, field, onsets, scene_state
 
 HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
 FULL = Header(2**53 - 1, 10_000_000, 1e6 / 3.0, 1e5 / 3.0, 0.02 / 3.0, 1e5 / 7.0, 0.01 / 3.0)
@@ -64,7 +64,7 @@ unit, stick = st.floats(0.0, 1.0), st.floats(-1.0, 1.0)
 finite = st.floats(-1e6, 1e6)
 stamps = st.integers(0, 2**63 - 1)
 headers = st.builds(Header, stamps, stamps, finite) | st.builds(Header, stamps, stamps, finite, finite, unit)
-eight_ways = st.lists(st.floats(-100.0, 100.0), min_size=8, max_size=8).map(lambda metres: ways(*sorted(metres)))
+eight_ways = st.lists(st.floats(-100.0, 100.0), min_size=8, max_size=8).map(lambda metres: onsets(*sorted(metres)))
 BY_HAND: dict[str, st.SearchStrategy[Any]] = {
     **dict.fromkeys(("header",), headers),
     **dict.fromkeys(("fast_m", "slow_m"), eight_ways),
@@ -338,13 +338,13 @@ REFUSED: tuple[tuple[Any, dict[str, Any], str], ...] = (
     (VALID[2], {"speed_m_s": math.nan}, "speed_m_s = nan"),
     (VALID[2], {"horizon_m": -0.1}, "horizon_m = -0.1"),
     (VALID[2], {"told_m_s": math.inf}, "told_m_s = inf"),
-    (field(ways(0.1)), {"fast_m": ways(0.2, 0.1)}, "fast_m = .* none shorter than the one before"),
-    (field(ways(0.1)), {"slow_m": ways(0.0, math.nan)}, "slow_m = nan"),
-    (field(ways(0.1)), {"slow_m": ways(0.0, math.inf)}, "slow_m = inf"),
-    (field(ways(0.1)), {"full_speed_m_s": 0.0}, "full_speed_m_s = 0"),
-    (field(ways(0.1)), {"acceleration_m_s2": math.inf}, "acceleration_m_s2 = inf"),
-    (field(ways(0.1)), {"displacement_m": math.nan}, "displacement_m = nan"),
-    (field(ways(0.1)), {"stiffness": 1.1}, "stiffness = 1.1"),
+    (field(onsets(0.1)), {"fast_m": onsets(0.2, 0.1)}, "fast_m = .* none shorter than the one before"),
+    (field(onsets(0.1)), {"slow_m": onsets(0.0, math.nan)}, "slow_m = nan"),
+    (field(onsets(0.1)), {"slow_m": onsets(0.0, math.inf)}, "slow_m = inf"),
+    (field(onsets(0.1)), {"full_speed_m_s": 0.0}, "full_speed_m_s = 0"),
+    (field(onsets(0.1)), {"acceleration_m_s2": math.inf}, "acceleration_m_s2 = inf"),
+    (field(onsets(0.1)), {"displacement_m": math.nan}, "displacement_m = nan"),
+    (field(onsets(0.1)), {"stiffness": 1.1}, "stiffness = 1.1"),
     (SCENE, {"link_poses": b"123"}, "link_poses, spheres; valid: whole rows"),
     (SCENE, {"spheres": b"123"}, "link_poses, spheres; valid: whole rows"),
     (SCENE, {"object_poses": b""}, "object_poses; valid: a row for each"),

@@ -12,7 +12,7 @@ import msgspec
 
 from common.protocol.messages import Telemetry
 from operator_side.hands.intent import OperatorIntent, operator_intent
-from operator_side.hands.travel_calibration import AS_GIVEN
+from operator_side.hands.travel_calibration import IDENTITY
 from operator_side.viewing.console.names import names
 from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
@@ -109,7 +109,7 @@ class HandsAlone:
         self.shared.tick(now_s, screen, 0.0)
         state = self.shared.read(now_s)
         assert state is not None
-        self.intent = operator_intent(state, AS_GIVEN)
+        self.intent = operator_intent(state, IDENTITY)
         if self.intent.arm:
             self.state = "armed"
         if self.hears:

@@ -5,19 +5,19 @@ from typing import Any
 
 import msgspec
 
-from common.protocol.messages import Header, MotionState, StiffnessUpdate, Telemetry, TriggerField, Ways
+from common.protocol.messages import Header, MotionState, OnsetDistances, StiffnessUpdate, Telemetry, TriggerField
 from common.protocol.uniform_field import FAR_M, uniform_field
 from common.protocol.view_messages import EnlargementTerms, SceneState
 from operator_side.controller.feel import Strengths
 
 
-def ways(*metres: float) -> Ways:
+def onsets(*metres: float) -> OnsetDistances:
     """Return eight distances; the last given one fills the rest."""
-    whole: Ways = (*metres, *(metres[-1],) * (8 - len(metres)))  # type: ignore[assignment]
+    whole: OnsetDistances = (*metres, *(metres[-1],) * (8 - len(metres)))  # type: ignore[assignment]
     return whole
 
 
-def field(fast_m: Ways, slow_m: Ways | None = None, **changes: Any) -> TriggerField:
+def field(fast_m: OnsetDistances, slow_m: OnsetDistances | None = None, **changes: Any) -> TriggerField:
     """Return a field with these distances, v_max = 0.25 m/s and a = 3 m/s² unless changed."""
     return msgspec.structs.replace(uniform_field(0), fast_m=fast_m, slow_m=slow_m or fast_m, **changes)
 

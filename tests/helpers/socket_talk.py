@@ -38,7 +38,7 @@ def greet(robot: RobotSockets, operator: OperatorSockets) -> bytes:
         name, payload = receive_one(robot)
         assert payload == b"hello"
         peer = robot._peers.get(name)
-        if peer is not None and len(peer.turns.ways) == connections:
+        if peer is not None and len(peer.turns.connections) == connections:
             return name
     pytest.fail("some connections do not come up")
 

@@ -92,8 +92,8 @@ class World:
 
     def is_stiff(self) -> bool:
         """Return whether R2's last command was stiff."""
-        told = [report.r2 for report in self.written if report.r2 is not None]
-        return bool(told) and told[-1] != FREE_TRIGGER
+        commanded = [report.r2 for report in self.written if report.r2 is not None]
+        return bool(commanded) and commanded[-1] != FREE_TRIGGER
 
     def hang(self) -> None:
         """Stop it while the triggers are stiff; retry if a busy machine had it release them just before."""

@@ -89,17 +89,17 @@ def test_without_haptics_nothing_is_ever_written_and_the_hands_rest_all_the_same
 
 def test_a_controller_that_comes_while_blind_is_released_then_told(bench: Bench) -> None:
     bench.feel(5)
-    assert bench.device.told.light is None
+    assert bench.device.commanded.light is None
     bench.now_s += 0.201
     bench.notice(SessionState.ARMED)
     bench.write()
     for light in (None, WARNING_LIGHT):
         bench.side.controller_found(bench.now_s) if light is None else None
         bench.write()
-    assert bench.device.told.light == WARNING_LIGHT
+    assert bench.device.commanded.light == WARNING_LIGHT
     assert bench.side.status(bench.now_s).feel is Sight.BLIND
     bench.feel(5)
-    assert bench.device.told.light == USUAL_LIGHT
+    assert bench.device.commanded.light == USUAL_LIGHT
     assert bench.device.strengths[1] == (5,) * 10
     assert bench.side.status(bench.now_s).feel is Sight.WAITING
     assert bench.side.summary()["rendering"]["blind"] == 1

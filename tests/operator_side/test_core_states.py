@@ -64,7 +64,7 @@ class Core(RuleBasedStateMachine):
         self.field: tuple[float, MotionState, int] | None = None
         self.hands: tuple[float, dict[str, Any]] | None = None
         self.sight, self.blind_s, self.lost_s, self.pressed_s = "seeing", math.nan, math.inf, math.nan
-        self.told_s, self.told = -math.inf, cast(dict[str, Any] | None, None)
+        self.told_s, self.commanded = -math.inf, cast(dict[str, Any] | None, None)
         self.older: list[bytes] = []
         self.held: tuple[tuple[float, float], bool, frozenset[Button]] | None = None
         self.hung, self.waited, self.presses = False, True, 0
@@ -183,9 +183,9 @@ class Core(RuleBasedStateMachine):
         if self.bench.now_s - self.heard_s > 0.5:
             self.lease = None
         commands, expected = self.bench.commands(), self.expected()
-        leaves = expected is not None and (expected != self.told or self.bench.now_s - self.told_s > 0.018)
+        leaves = expected is not None and (expected != self.commanded or self.bench.now_s - self.told_s > 0.018)
         assert [fields_of(command) for command in commands] == ([expected] if leaves else [])
-        self.told_s, self.told = (self.bench.now_s if leaves else self.told_s), expected
+        self.told_s, self.commanded = (self.bench.now_s if leaves else self.told_s), expected
         self.bench.write()
         device, seen = self.bench.device, self.field
         if seen is None or seen[1] != "armed":
@@ -196,7 +196,7 @@ class Core(RuleBasedStateMachine):
             assert device.rumble == Rumble()
         elif self.waited:  # Otherwise the bound on writes may delay it by a twentieth of a second.
             assert device.rumble != Rumble()
-            assert device.told.light == WARNING_LIGHT
+            assert device.commanded.light == WARNING_LIGHT
         self.waited = False
         assert self.bench.side.status(self.bench.now_s).feel == self.sight
         assert (self.bench.side.lease is None) == (self.lease is None)

@@ -10,7 +10,7 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Compensation, StiffnessUpdate
 from common.protocol.session import SessionState
 from operator_side.controller.state import Button
-from tests.helpers.felt import felt, field, ways
+from tests.helpers.felt import felt, field, onsets
 from tests.operator_side.operator_bench import Bench
 
 PERIOD_S = 0.004
@@ -40,7 +40,7 @@ class Driving(Bench):
 
     def report(self, **changes: Any) -> StiffnessUpdate:
         """Return the report of a wall ahead of R2, by a robot side that heard nothing after `echo_s`."""
-        wall = field(ways(LEFT_M), displacement_m=changes.pop("displacement_m", 0.0))
+        wall = field(onsets(LEFT_M), displacement_m=changes.pop("displacement_m", 0.0))
         header = msgspec.structs.replace(
             self.robot.stamp(self.now_s), echo_sent_s=self.echo_s, echo_held_s=0.0, last_sent_s=None, last_held_s=None
         )

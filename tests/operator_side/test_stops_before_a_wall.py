@@ -18,7 +18,7 @@ from common.protocol.uniform_field import uniform_field
 from operator_side.controller.state import Button
 from operator_side.core import CoreSettings, OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from tests.helpers.felt import field, ways
+from tests.helpers.felt import field, onsets
 
 STEP_S = 0.002
 FULL_M_S, ACCELERATION_M_S2 = 0.25, 3.0
@@ -86,7 +86,7 @@ class Approach:
         """Return the profile of a wall: a sphere's overlap grows with the square of the distance."""
         begin_m = [self.left_m - RAMP_M * (1.0 - math.sqrt((strength - 0.5) / 8)) for strength in range(1, 9)]
         wall = field(
-            ways(*(min(metres, HORIZON_M) for metres in begin_m)),
+            onsets(*(min(metres, HORIZON_M) for metres in begin_m)),
             full_speed_m_s=FULL_M_S,
             acceleration_m_s2=ACCELERATION_M_S2,
             displacement_m=self.speed_m_s * self.loop_s,

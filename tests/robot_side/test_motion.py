@@ -38,7 +38,7 @@ class ToldArm(Arm):
 @pytest.mark.parametrize("gives_way", [True, False])
 def test_the_arm_is_told_what_is_said(permitted: bool, gives_way: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     arm, grip, now_s = ToldArm(), Grip(PARTS.surroundings), 1.0
-    monkeypatch.setattr(type(grip.touching_down), "gives_way", property(lambda _: gives_way))
+    monkeypatch.setattr(type(grip.touchdown), "gives_way", property(lambda _: gives_way))
     motion, state = Motion(arm, PARTS.limits, PARTS.motion), arm.state(now_s)
     command = MotionCommand(Header(1, 1, 0.0), l2=0.0, r2=0.4, gripper=1.0, run=True) if permitted else None
     motion.follow(Permission("armed", command, 1.1), PARTS.kinematics.pose(state), state, grip, None, now_s)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from robot_side.arm.port import ArmState
-from robot_side.arm.touching_down import carried_n
+from robot_side.arm.touchdown import carried_n
 from robot_side.parts import build_parts
 from tests.helpers.repository import DATA
 from tests.robot_side.passed_on_arm import PassedOnArm

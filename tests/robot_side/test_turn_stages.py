@@ -8,7 +8,7 @@ from common.realtime.stages import Stages
 from robot_side.core import RobotSide
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
-from robot_side.turn_stages import HELPS, STAGES, StageTiming
+from robot_side.turn_stages import REMEDIES, STAGES, StageTiming
 
 
 def test_a_timed_core_sends_what_a_plain_one_does_and_counts_physics_and_sensing() -> None:
@@ -28,7 +28,7 @@ def test_a_timed_core_sends_what_a_plain_one_does_and_counts_physics_and_sensing
 
 
 def test_each_stage_has_its_help() -> None:
-    assert set(HELPS) == {*STAGES, ""}
+    assert set(REMEDIES) == {*STAGES, ""}
 
 
 class Ticking:

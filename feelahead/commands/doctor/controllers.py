@@ -79,8 +79,8 @@ def _look_at(backend: HidBackend, path: bytes, model: str) -> Finding:
         return Finding(_NAME, Verdict.MISSING, f"{place}: {said}", remedy or None)
     identity, firmware, battery = device.identity, "unknown", "unknown"
     device.close()
-    if (told := identity.firmware) is not None:
-        firmware = f"0x{told.firmware_version:08x} (hardware 0x{told.hardware_version:08x})"
+    if (known := identity.firmware) is not None:
+        firmware = f"0x{known.firmware_version:08x} (hardware 0x{known.hardware_version:08x})"
     with contextlib.suppress(RemoteProtocolError):
         state = parse_input_report(identity.first_report).battery
         battery = f"{'' if state.fraction is None else f'about {state.fraction:.0%}, '}{state.state.value}"

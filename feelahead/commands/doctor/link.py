@@ -17,8 +17,8 @@ from common.sockets.authentication import public_part
 from common.sockets.operator import OperatorSockets
 from feelahead.commands.doctor.port import (
     VIEW_CONNECT,
-    Way,
-    WayError,
+    PathError,
+    RobotAddress,
     host_and_port,
     judge_port,
     judge_view,
@@ -54,7 +54,7 @@ class Talk:
     """Number of observers."""
 
 
-def look_along(way: Way) -> tuple[Talk, WayError | None]:
+def check_path(way: RobotAddress) -> tuple[Talk, PathError | None]:
     """Check everything up to the first fault; return the answers and the fault."""
     clock, talk = MonotonicClock(), Talk()
     try:
@@ -68,12 +68,12 @@ def look_along(way: Way) -> tuple[Talk, WayError | None]:
             judge_view(way, knock(to_view, clock), loopback=to_view.is_loopback())
             questions.expect_telemetry()
             questions.expect_large()
-    except WayError as error:
+    except PathError as error:
         return talk, error
     return talk, None
 
 
-def told(way: Way, talk: Talk, error: WayError | None) -> dict[str, object]:
+def as_json(way: RobotAddress, talk: Talk, error: PathError | None) -> dict[str, object]:
     """Return the findings for programs."""
     trips_s = talk.round_trips_s
     return {
@@ -104,7 +104,7 @@ def reached(talk: Talk) -> str:
 class _Questions:
     """Questions that the robot side answers to anybody, and a check for telemetry."""
 
-    def __init__(self, sockets: OperatorSockets, way: Way, clock: MonotonicClock, round_trip_s: float) -> None:
+    def __init__(self, sockets: OperatorSockets, way: RobotAddress, clock: MonotonicClock, round_trip_s: float) -> None:
         self._sockets = sockets
         self._way, self._place = way, host_and_port(way.control)
         self._clock = clock
@@ -141,14 +141,14 @@ class _Questions:
         return Talk(tuple(trips_s), self._notices[-1].place, self._notices[-1].waiting)
 
     def expect_telemetry(self) -> None:
-        """Raise WayError unless telemetry arrives."""
+        """Raise PathError unless telemetry arrives."""
         if not self._until(_TELEMETRY_LIMIT_S + 2.0 * self._round_trip_s, lambda: self._telemetry):
             place = host_and_port(self._way.view)
             said = f"{place} is no view port of a robot side, or not of this one: it sends no telemetry"
-            raise WayError("view port", f"the control port works, but {said}", VIEW_CONNECT)
+            raise PathError("view port", f"the control port works, but {said}", VIEW_CONNECT)
 
     def expect_large(self) -> None:
-        """Raise WayError unless a question passes behind packets of full size."""
+        """Raise PathError unless a question passes behind packets of full size."""
         self._until(_PAUSE_S)
         if not self._sockets.send(_LARGE):
             return
@@ -156,25 +156,25 @@ class _Questions:
         if not any(self._ask() and self._answered(_LARGE_LIMIT_S / 2) for _ in range(2)):
             said = f"small packets reach {self._place}, large ones do not: the path drops too long packets"
             remedy = "a smaller MTU here, such as: sudo ip link set DEVICE mtu 1280 (VPNs and tunnels need that)"
-            raise WayError("large packets", said, remedy)
+            raise PathError("large packets", said, remedy)
 
-    def _no_handshake(self) -> WayError:
+    def _no_handshake(self) -> PathError:
         place = self._place
         if self._way.keys is None:
             return self._no_answer()
         if self._sockets.key_refused:
             said = f"the robot side at {place} does not let this key in: it was never allowed there, or was revoked"
-            return WayError(
+            return PathError(
                 "our key", said, f"run there: feelahead keys allow NAME {public_part(self._way.keys.secret)}"
             )
         said = f"the program at {place} has another key than --robot-key says, or is no such port of a robot side"
         remedy = "--robot-key with the key that this shows on the robot's machine: feelahead keys show robot"
-        return WayError("robot key", said, remedy)
+        return PathError("robot key", said, remedy)
 
-    def _no_answer(self) -> WayError:
+    def _no_answer(self) -> PathError:
         said = f"{self._place} speaks ZeroMQ and does not answer: a robot side that is starting or paused, its view"
         remedy = "wait until it listens (its first start compiles for a minute), and give its control port"
-        return WayError("no answer", f"{said} port, or another program", remedy)
+        return PathError("no answer", f"{said} port, or another program", remedy)
 
     def _ask(self) -> bool:
         """Send a command without lease, of an epoch without Hello: it is answered, and moves nothing."""
@@ -202,7 +202,7 @@ class _Questions:
             message = decode(payload)
         except OtherVersionError as error:
             said = f"the robot side speaks {str(error).partition(';')[0]}, this machine {PROTOCOL_VERSION}"
-            raise WayError("version", said, "install the same release of feelahead on both") from error
+            raise PathError("version", said, "install the same release of feelahead on both") from error
         except RemoteProtocolError:
             return
         self._telemetry |= isinstance(message, Telemetry)

@@ -57,8 +57,8 @@ def check_extra(extra: str, failures: Mapping[str, str]) -> Finding:
         return Finding(name, Verdict.OK, f"{', '.join(modules)}: {purpose}")
     absent = [module for module, reason in failures.items() if "No module named" in reason]
     broken = [f"{module} ({reason})" for module, reason in failures.items() if module not in absent]
-    told = {"not installed": absent, "cannot be imported": broken}
-    said = "; ".join(f"{how}: {', '.join(found)}" for how, found in told.items() if found)
+    reasons = {"not installed": absent, "cannot be imported": broken}
+    said = "; ".join(f"{how}: {', '.join(found)}" for how, found in reasons.items() if found)
     remedy = f"pip install {'--force-reinstall ' if broken else ''}'feelahead[{extra}]'"
     return Finding(name, Verdict.MISSING if extra == "robot" else Verdict.NOTE, f"{said} (for {purpose})", remedy)
 

@@ -18,7 +18,7 @@ from common.protocol.view_messages import VIDEO_TOPIC, VideoFrame, VideoStep
 from common.rate.pieces import PIECE, Joining
 from common.sockets.operator import OperatorSockets
 from common.sockets.tcp_figures import TcpFigures, connected_to, tcp_figures
-from feelahead.commands.doctor.port import Way
+from feelahead.commands.doctor.port import RobotAddress
 from operator_side.core import CoreSettings, OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 
@@ -33,7 +33,7 @@ _LEAST_PICTURES_HZ: Final = 4.0
 _OLDEST_PICTURE_MS: Final = 500.0
 
 
-def measure_path_along(way: Way) -> dict[str, Any]:
+def measure_path_along(way: RobotAddress) -> dict[str, Any]:
     """Measure the path to a robot side that answers; return figures by name, None for missing ones."""
     topics = (b"telemetry", VIDEO_TOPIC)
     with OperatorSockets(way.control.address, way.view.address, topics=topics, keys=way.keys) as sockets:

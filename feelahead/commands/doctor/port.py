@@ -19,7 +19,7 @@ _STEPS: Final = "feelahead keys --help has the steps on both machines"
 VIEW_CONNECT: Final = "say --view-connect tcp://HOST:PORT with the port that the robot side names at its start"
 
 
-class WayError(Exception):
+class PathError(Exception):
     """First fault of the path; `wrong` is the kind in a word or two."""
 
     def __init__(self, wrong: str, said: str, remedy: str) -> None:
@@ -28,7 +28,7 @@ class WayError(Exception):
 
 
 @dataclass(frozen=True)
-class Way:
+class RobotAddress:
     """Addresses of a robot side, and the keys for it."""
 
     control: Endpoint
@@ -36,7 +36,7 @@ class Way:
     keys: OperatorKeys | None = None
 
     @classmethod
-    def to(cls, connect: str, view_connect: str | None = None, keys: OperatorKeys | None = None) -> "Way":
+    def to(cls, connect: str, view_connect: str | None = None, keys: OperatorKeys | None = None) -> "RobotAddress":
         """Read the addresses without resolving them; raises ConfigurationError for invalid ones."""
         control = Endpoint(*split_connect(connect, "--connect"), ipv6=False)
         if view_connect is None:
@@ -57,8 +57,8 @@ class Opening:
     """Time until the connection was established."""
 
 
-def judge_port(way: Way, port: Endpoint, opening: Opening, *, loopback: bool = False) -> None:
-    """Raise WayError if it is no robot side's port. loopback: it is on this machine."""
+def judge_port(way: RobotAddress, port: Endpoint, opening: Opening, *, loopback: bool = False) -> None:
+    """Raise PathError if it is no robot side's port. loopback: it is on this machine."""
     place = host_and_port(port)
     if opening.error is not None:
         raise _no_connection(way, port, opening.error, loopback=loopback)
@@ -68,10 +68,10 @@ def judge_port(way: Way, port: Endpoint, opening: Opening, *, loopback: bool = F
             return
         case "CURVE", _:
             said = f"the robot side at {place} asks for keys, and none were given"
-            raise WayError("keys", said, f"--keys FOLDER --robot-key KEY ({_STEPS})")
+            raise PathError("keys", said, f"--keys FOLDER --robot-key KEY ({_STEPS})")
         case "NULL", _:
             remedy = f"start it with --keys FOLDER ({_STEPS}), or leave --keys out if anyone may move the arm"
-            raise WayError("keys", f"the robot side at {place} runs without keys, and --keys was given", remedy)
+            raise PathError("keys", f"the robot side at {place} runs without keys, and --keys was given", remedy)
     if opening.said:
         said = f"at {place} is something that begins with {opening.said[:24]!r}, and no robot side"
     elif opening.hung_up:
@@ -83,26 +83,26 @@ def judge_port(way: Way, port: Endpoint, opening: Opening, *, loopback: bool = F
     else:
         said = f"{place} takes connections and says nothing: no robot side, or a paused one"
         see_who += "; a stopped process continues after: kill -CONT PID"
-    raise WayError("something else", said, see_who)
+    raise PathError("something else", said, see_who)
 
 
-def judge_view(way: Way, opening: Opening, *, loopback: bool = False) -> None:
-    """Raise WayError like `judge_port`, for a view port whose control port works."""
+def judge_view(way: RobotAddress, opening: Opening, *, loopback: bool = False) -> None:
+    """Raise PathError like `judge_port`, for a view port whose control port works."""
     try:
         judge_port(way, way.view, opening, loopback=loopback)
-    except WayError as error:
+    except PathError as error:
         remedy = f"{error.remedy}; or {VIEW_CONNECT}" if error.wrong == "firewall" else VIEW_CONNECT
-        raise WayError("view port", f"the control port works, but not the view port: {error.said}", remedy) from error
+        raise PathError("view port", f"the control port works, but not the view port: {error.said}", remedy) from error
 
 
-def _no_connection(way: Way, port: Endpoint, error: int, *, loopback: bool) -> WayError:
+def _no_connection(way: RobotAddress, port: Endpoint, error: int, *, loopback: bool) -> PathError:
     place = host_and_port(port)
     if error == errno.ECONNREFUSED:
         remedy = f"start feelahead-robot, or say where it is: --connect tcp://ROBOT:{port.port}"
         if not loopback:
             remedy = f"start feelahead-robot there with --bind tcp://0.0.0.0:{port.port} and --keys FOLDER: without"
             remedy += " --bind it listens on its own loopback alone"
-        return WayError("closed port", f"{place} refuses connections: nothing listens there", remedy)
+        return PathError("closed port", f"{place} refuses connections: nothing listens there", remedy)
     if error == errno.ETIMEDOUT:
         ports = list(dict.fromkeys(str(each.port) for each in (way.control, way.view)))
         said = f"{place} gave no answer in {_CONNECT_LIMIT_S:g} s: a firewall drops the packets, or no machine has"
@@ -110,22 +110,22 @@ def _no_connection(way: Way, port: Endpoint, error: int, *, loopback: bool) -> W
             f"let TCP ports {' and '.join(ports)} in on the robot's machine, such as: sudo ufw allow proto tcp from"
         )
         remedy += f" any to any port {','.join(ports)}; whether it is on: ping {port.host}"
-        return WayError("firewall", f"{said} that address", remedy)
+        return PathError("firewall", f"{said} that address", remedy)
     reason = {
         errno.EHOSTUNREACH: "no machine has that address, no router knows a way, or a firewall rejects it",
         errno.ENETUNREACH: "this machine is in no network from which it can be reached",
     }.get(error, "this machine does not send there")
     remedy = f"see that the robot's machine is on, and both are in one network: ip route get {port.host}"
-    return WayError("route", f"no way to {place} ({os.strerror(error)}): {reason}", remedy)
+    return PathError("route", f"no way to {place} ({os.strerror(error)}): {reason}", remedy)
 
 
 def resolved(port: Endpoint, flag: str) -> Endpoint:
-    """Replace the host by its first address; raises WayError if it cannot be resolved."""
+    """Replace the host by its first address; raises PathError if it cannot be resolved."""
     try:
         return replace(port, host=resolve(port.host, port.address, flag)[0])
     except ConfigurationError as error:
         said, _, valid = str(error).partition("; valid: ")
-        raise WayError("name", said, f"say {valid}, in /etc/hosts for example") from error
+        raise PathError("name", said, f"say {valid}, in /etc/hosts for example") from error
 
 
 def host_and_port(port: Endpoint) -> str:

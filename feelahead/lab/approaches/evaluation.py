@@ -17,9 +17,9 @@ from common.arrays import FloatArray
 from common.reaction import REACTION_S
 from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.frozen import PASSED, SITE, frozen_scene
-from feelahead.lab.approaches.judging import false_alarms, stood
+from feelahead.lab.approaches.judging import false_alarms, strength_before_release
 from feelahead.lab.approaches.laws import Law
-from feelahead.lab.approaches.meeting import Collision, first_touch_s, place
+from feelahead.lab.approaches.placements import Collision, first_touch_s, place
 from feelahead.lab.approaches.pulls import PullKind
 from feelahead.lab.approaches.recording import record_approach
 from feelahead.lab.approaches.replay import Replay
@@ -45,7 +45,7 @@ _LEAST_APPROACHES: Final = 10
 
 
 @dataclass(frozen=True)
-class Placed:
+class Placement:
     """One cell: a scene, the errors of camera and encoders, and the objects' speed."""
 
     scene: str
@@ -77,7 +77,7 @@ class Pulls:
     """A key of LINKS."""
     home: str
     """Scene whose home pose starts the approaches."""
-    cells: tuple[Placed, ...]
+    cells: tuple[Placement, ...]
     sizes: tuple[int, int]
     """Number of approaches, and of object placements for each."""
     probabilities: tuple[float, ...]
@@ -121,12 +121,12 @@ class _Staged:
         moves = self.replay.moves_sticks
         return tuple((one, last_s) for one, last_s in self.avoidable if not moves(last_s - REACTION_S, last_s))
 
-    def draw(self, shift_m: FloatArray, cell: Placed, number: int) -> Draw:
+    def draw(self, shift_m: FloatArray, cell: Placement, number: int) -> Draw:
         """Move the objects by shift_m (3,), perceived with the camera's `number`-th error."""
         record, names = self.replay.record, tuple(thing.name for thing in self.posed.scene.objects)
         sd_m = 1e-3 * cell.camera_mm
         errors_m = CameraError(names, 0.0, sd_m, 0.0, seed_of(record.seed, number)).next_frame()
-        self.posed.put(record.joint_positions_rad[0], record.finger_positions[0], shift_m)
+        self.posed.set_pose(record.joint_positions_rad[0], record.finger_positions[0], shift_m)
         return Draw(self.replay, self.posed.perceived(errors_m), sd_m, cell.speed_m_s)
 
 
@@ -161,7 +161,7 @@ def seed_of(*numbers: int) -> int:
     return int(np.random.SeedSequence(numbers).generate_state(1)[0] >> 1)
 
 
-def _stage(cell: Placed, replay: Replay, places: int) -> _Staged:
+def _stage(cell: Placement, replay: Replay, places: int) -> _Staged:
     posed = PosedScene(_scene(cell.scene))
     if cell.scene in PASSED:
         return _Staged(replay, posed, (), 0)
@@ -170,7 +170,7 @@ def _stage(cell: Placed, replay: Replay, places: int) -> _Staged:
     return _Staged(replay, posed, tuple(one for one in found if one is not None), places)
 
 
-def _count_covered(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[_Staged]) -> None:
+def _count_covered(counts: _Counts, law: Judged, cell: Placement, staged: Sequence[_Staged]) -> None:
     """Judge at least 10 / (1 - P) draws, the same number for each approach that has a contact to avoid."""
     useful = [one for one in staged if one.knowable]
     least = math.ceil(draws_needed(law.probability) / max(1, len(useful)))
@@ -181,7 +181,7 @@ def _count_covered(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[
         for number in range(each):
             collision, last_release_s = one.knowable[number % len(one.knowable)]
             draw = one.draw(collision.shift_m, cell, number)
-            covered = stood(law, draw, last_release_s) == MAX_STRENGTH
+            covered = strength_before_release(law, draw, last_release_s) == MAX_STRENGTH
             hits += covered
             if one.replay.knows_aside(last_release_s - REACTION_S):
                 counts.reported += 1
@@ -190,7 +190,7 @@ def _count_covered(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[
         counts.draws.append(each)
 
 
-def _count_alarms(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[_Staged], least_s: float) -> None:
+def _count_alarms(counts: _Counts, law: Judged, cell: Placement, staged: Sequence[_Staged], least_s: float) -> None:
     """Judge a draw of each approach in turn, then of each in its next placement, until `least_s` are judged."""
     places = [(one, found) for one in staged if (found := _places(cell, one))]
     for number in count():
@@ -206,7 +206,7 @@ def _count_alarms(counts: _Counts, law: Judged, cell: Placed, staged: Sequence[_
             break
 
 
-def _places(cell: Placed, one: _Staged) -> list[tuple[FloatArray, float]]:
+def _places(cell: Placement, one: _Staged) -> list[tuple[FloatArray, float]]:
     """Return each placement's shift (3,), and the time of contact or the end of the approach."""
     if cell.scene not in PASSED:
         return [(at.shift_m, at.touch_s) for at in one.collisions]

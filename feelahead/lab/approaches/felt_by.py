@@ -14,7 +14,7 @@ from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
 from feelahead.lab.approaches.replay import Replay
 from operator_side.controller.feel import MAX_STRENGTH, SENSED_TRAVEL, ZONE_COUNT
 from operator_side.feel.commands_under_way import Displacement, Report
-from operator_side.feel.path_ahead import Aside
+from operator_side.feel.path_ahead import CourseOnMap
 from operator_side.feel.rendering import RenderingSettings, TriggerRendering
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
@@ -53,15 +53,15 @@ class Draw:
 
 def _moved(objects: PerceivedObjects, velocity_m_s: FloatArray, after_s: float) -> PerceivedObjects:
     """Move all objects with this velocity (3,); the camera reports it."""
-    way_m = velocity_m_s * after_s
+    displacement_m = velocity_m_s * after_s
     return replace(
         objects,
-        sphere_centers_m=objects.sphere_centers_m + way_m,
-        box_centers_m=objects.box_centers_m + way_m,
-        tetrahedron_vertices_m=objects.tetrahedron_vertices_m + way_m,
-        half_space_offsets_m=objects.half_space_offsets_m + objects.half_space_normals @ way_m,
-        mesh_positions_m=objects.mesh_positions_m + way_m,
-        ellipsoid_centers_m=objects.ellipsoid_centers_m + way_m,
+        sphere_centers_m=objects.sphere_centers_m + displacement_m,
+        box_centers_m=objects.box_centers_m + displacement_m,
+        tetrahedron_vertices_m=objects.tetrahedron_vertices_m + displacement_m,
+        half_space_offsets_m=objects.half_space_offsets_m + objects.half_space_normals @ displacement_m,
+        mesh_positions_m=objects.mesh_positions_m + displacement_m,
+        ellipsoid_centers_m=objects.ellipsoid_centers_m + displacement_m,
         velocities_m_s=np.tile(velocity_m_s, (len(objects.names), 1)),
     )
 
@@ -136,7 +136,7 @@ class Judged:
 
     def _under_way(
         self, replay: Replay, law: RobotLaw, sensed: Sensed, row: int, now_s: float
-    ) -> tuple[Displacement | None, Aside | None]:
+    ) -> tuple[Displacement | None, CourseOnMap | None]:
         """Predict trigger's and sticks' displacement since the pose in `row`; None if the robot side compensates."""
         if compensation_of(self.law) == "robot":
             return None, None
@@ -152,7 +152,7 @@ class Judged:
         course = None if around is None else replay.commands.course(now_s, report, around.changes_s())
         if course is None or around is None:
             return replay.commands.displacement(now_s, report, able.acceleration_m_s2), None
-        return None, Aside(around, sensed.horizon_m, course, replay.commands.sticks_at(now_s))
+        return None, CourseOnMap(around, sensed.horizon_m, course, replay.commands.sticks_at(now_s))
 
 
 @cache

@@ -10,7 +10,7 @@ from scipy.special import ndtri
 from common.arrays import FloatArray
 from common.reaction import REACTION_S
 from feelahead.lab.approaches.felt_by import Draw, Judged
-from feelahead.lab.approaches.meeting import shifted
+from feelahead.lab.approaches.placements import shifted
 from feelahead.lab.approaches.stopping_path import stopping_path
 from operator_side.controller.feel import SENSED_TRAVEL, ZONE_COUNT
 from operator_side.dualsense.simulated.trigger_model import zone_of
@@ -27,7 +27,7 @@ _R2 = 1
 _TRAVEL = TriggerTravel()
 
 
-def stood(law: Judged, draw: Draw, last_release_s: float) -> int:
+def strength_before_release(law: Judged, draw: Draw, last_release_s: float) -> int:
     """Return the strength, 0 to 8, in the farthest zone reached before the last release, 0.25 s before that release.
 
     Full strength covers the draw.
@@ -75,7 +75,7 @@ def false_alarms(law: Judged, draw: Draw, posed: PosedScene, shift_m: FloatArray
             time_s = float(times[number])
             joints, _ = replay.joints_at(time_s)
             there_m = shifted(shift_m, replay, draw.speed_m_s, time_s)
-            posed.put(joints, record.finger_positions[record.pose_row(time_s)], there_m)
+            posed.set_pose(joints, record.finger_positions[record.pose_row(time_s)], there_m)
             margin_m = statistical_distance_m(draw, time_s, law.probability) + CLEAR_M
             alarmed[number] = all(posed.stays_clear(path, margin_m) for path in _paths(draw, time_s, zone))
     starts = int(np.count_nonzero(alarmed & ~np.concatenate([[False], alarmed[:-1]])))

@@ -59,12 +59,12 @@ class ToolPath:
         clear: BoolArray = outside[behind] == outside[first]
         return clear
 
-    def ways_m(self, from_s: FloatArray, to_s: FloatArray) -> FloatArray:
+    def onsets_m(self, from_s: FloatArray, to_s: FloatArray) -> FloatArray:
         """Return the tool's displacements (k,) along its approach axis at each beginning."""
         axes = self._axes(from_s)
         axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), _LEAST_SPEED)
-        ways: FloatArray = np.einsum("ki,ki->k", self._positions_m(to_s) - self._positions_m(from_s), axes)
-        return ways
+        displacements_m: FloatArray = np.einsum("ki,ki->k", self._positions_m(to_s) - self._positions_m(from_s), axes)
+        return displacements_m
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def predicted(
 ) -> tuple[FloatArray, FloatArray]:
     """Predict δ and w (k,) from the operator side's commands and the reports' v, v_max and a (k,); NaN for none."""
     commands, sent = CommandsUnderWay(), 0
-    ways_m, speeds = np.full(len(at), np.nan), np.full(len(at), np.nan)
+    onsets_m, speeds = np.full(len(at), np.nan), np.full(len(at), np.nan)
     for row, now_s in enumerate(at.now_s):
         while sent < len(record.command_time_s) and record.command_time_s[sent] <= now_s:
             commands.sent(float(record.command_time_s[sent]), float(record.command[sent]))
@@ -134,30 +134,31 @@ def predicted(
         numbers = at.echo_sent_s[row], at.echo_held_s[row], speeds_m_s[row], full_speeds_m_s[row]
         found = commands.displacement(float(now_s), Report(*map(float, numbers)), float(accelerations_m_s2[row]))
         if found is not None:
-            ways_m[row], speeds[row] = found
-    return ways_m, speeds
+            onsets_m[row], speeds[row] = found
+    return onsets_m, speeds
 
 
 def judge(record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_speed_m_s: float) -> Row:
     """Compare every prediction with the arm's true displacement; full_speed_m_s is the v_max of the settings.
 
-    Return lists (k,) with an entry for each moment: `loop_age_s`, `within_reach`, `way_m` and the errors.
-    within_reach: False at the edge of the arm's reach, where it cannot follow the command. way_m: true displacement
-    along the direction in which R2 advances. Errors: truth less prediction, by COMPENSATIONS; NaN without a prediction.
+    Return lists (k,) with an entry for each moment: `loop_age_s`, `within_reach`, `displacement_m` and the errors.
+    within_reach: False at the edge of the arm's reach, where it cannot follow the command. displacement_m: true
+    displacement along the direction in which R2 advances. Errors: truth less prediction, by COMPENSATIONS; NaN without
+    a prediction.
     """
     path = ToolPath(record, pose_at, limits, full_speed_m_s)
     at = moments(record)
-    way_m = path.ways_m(at.reported_s, at.arrives_s)
+    displacement_m = path.onsets_m(at.reported_s, at.arrives_s)
     speed_m_s, full_m_s, here_m_s2 = path.ability(at.reported_s).T
     own_m, own_m_s = predicted(record, at, speed_m_s, full_m_s, here_m_s2)
     errors = {
-        "operator": way_m - own_m,
-        "robot": way_m - speed_m_s * at.loop_age_quantile_s,
-        "momentary": way_m - speed_m_s * at.loop_age_s,
+        "operator": displacement_m - own_m,
+        "robot": displacement_m - speed_m_s * at.loop_age_quantile_s,
+        "momentary": displacement_m - speed_m_s * at.loop_age_s,
         "speed at the end": path.ability(at.arrives_s)[:, 0] - own_m_s,
     }
     within = path.within_reach(at.reported_s, at.arrives_s)
-    known = {"loop_age_s": at.loop_age_s, "way_m": way_m, "within_reach": within}
+    known = {"loop_age_s": at.loop_age_s, "displacement_m": displacement_m, "within_reach": within}
     return {name: values.tolist() for name, values in (known | errors).items()}
 
 

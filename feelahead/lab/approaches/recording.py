@@ -20,7 +20,7 @@ from feelahead.lab.approaches.pulls import PullKind, make_pull
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.people.pulling_hands import PullingHands
 from operator_side.settings import OperatorSettings
-from robot_side.drivers.mujoco.posed_scene import let_through
+from robot_side.drivers.mujoco.posed_scene import disable_contacts
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.events import Listener
 from robot_side.settings import RobotSettings
@@ -96,7 +96,7 @@ def record_approach(
     robot = RobotSettings(model=frozen_scene(scene_name), site=SITE, link=link, seed=seed, full_rate=True)
     operator = OperatorSettings(link=link, seed=seed, haptics=False, full_rate=True)
     scene = load_scene(robot.model, robot.site, robot.roles)
-    let_through(scene)
+    disable_contacts(scene)
     device = SimulatedDualSense()
     hands = PullingHands(device, make_pull(pull, seed))
     notes = _Notes(scene)

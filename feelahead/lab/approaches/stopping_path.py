@@ -38,10 +38,10 @@ def stopping_path(replay: Replay, time_s: float, speed_m_s: float, share: float 
     knots_s = [0.0, min(changing_s, HORIZON_S), HORIZON_S, rests_s]
     columns = zip(began, reached, reached, let_go, strict=True)
     twists = np.stack([np.interp(since_s, knots_s, column) for column in columns], axis=1)
-    ways = _STEP_S * (twists[:, :3] + 0.5 * _STEP_S * np.cross(twists[:, 3:], twists[:, :3]))
+    steps_m = _STEP_S * (twists[:, :3] + 0.5 * _STEP_S * np.cross(twists[:, 3:], twists[:, :3]))
     rotations, positions_m = [pose.tool_rotation for pose in poses], [pose.tool_position_m for pose in poses]
-    for turn, way_m in zip(Rotation.from_rotvec(_STEP_S * twists[:, 3:]).as_matrix(), ways, strict=True):
-        positions_m.append(positions_m[-1] + rotations[-1] @ way_m)
+    for turn, step_m in zip(Rotation.from_rotvec(_STEP_S * twists[:, 3:]).as_matrix(), steps_m, strict=True):
+        positions_m.append(positions_m[-1] + rotations[-1] @ step_m)
         rotations.append(rotations[-1] @ turn)
     times_s = [time_s, *record.pose_time_s[between], arrives_s, *(arrives_s + since_s + 0.5 * _STEP_S)]
     return np.array(times_s) - time_s, ToolPath(np.array(positions_m), np.array(rotations))

@@ -15,7 +15,7 @@ from rich.console import RenderableType
 from rich.table import Table as Shown
 
 from feelahead.lab.approaches.approach import compile_kernels
-from feelahead.lab.approaches.evaluation import LINKS, Placed, Pulls, evaluate
+from feelahead.lab.approaches.evaluation import LINKS, Placement, Pulls, evaluate
 from feelahead.lab.approaches.frozen import AHEAD, PASSED, frozen_hash
 from feelahead.lab.approaches.laws import LAWS, Law
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
@@ -68,7 +68,7 @@ class CoverageSettings(Sweep):
 
     def pulls(self) -> list[Pulls]:
         """Return the motions with their chosen cells, most cells first."""
-        found: dict[tuple[PullKind, str, str], list[Placed]] = {}
+        found: dict[tuple[PullKind, str, str], list[Placement]] = {}
         for pull, link, cell in quick_cells() if self.quick else full_cells():
             if not self.only or any(text in cell.key(pull, link) for text in self.only):
                 mine = found.setdefault((pull, link, HOMES.get(cell.scene, "empty")), [])
@@ -104,33 +104,33 @@ def cells(settings: CoverageSettings) -> Iterator[Pulls | Race]:
         yield from (Race(scene, law, count) for scene in RACED for law in settings.laws)
 
 
-def full_cells() -> Iterator[tuple[PullKind, str, Placed]]:
+def full_cells() -> Iterator[tuple[PullKind, str, Placement]]:
     """Yield every scene with a steady pull over four links, every pull over two, then one factor at a time.
 
     Drift and turning come in more scenes, and objects come nearer or go away.
     """
-    yield from (("steady", link, Placed("wall")) for link in LINKS)
+    yield from (("steady", link, Placement("wall")) for link in LINKS)
     still = [name for name in (*AHEAD, *PASSED) if name not in _NOT_STILL]
-    yield from (("steady", link, Placed(name)) for link in ("0 ms", "50 ms", "200 ms", "400 ms") for name in still)
+    yield from (("steady", link, Placement(name)) for link in ("0 ms", "50 ms", "200 ms", "400 ms") for name in still)
     for link in ("50 ms", "200 ms"):
         for pull in PULL_KINDS:
             for name in ("wall", "post", "rod_5mm", "wall_beside", "table_1_box", "cluttered"):
-                yield pull, link, Placed(name)
+                yield pull, link, Placement(name)
         for name in ("plate", "ball", "slot", "u_mesh", "mug"):
-            yield "drift", link, Placed(name)
-            yield "yaw", link, Placed(name)
-        yield "drift", link, Placed("edge")
-        yield "yaw", link, Placed("turn")
-        yield from (("bell", link, Placed(name, speed_m_s=v)) for name in ("wall", "ball") for v in (-0.06, 0.03))
-        yield from (("bell", link, Placed("wall", camera_mm)) for camera_mm in (1.0, 6.0))
-    yield "bell", "200 ms", Placed("wall", encoder_factor=10.0)
+            yield "drift", link, Placement(name)
+            yield "yaw", link, Placement(name)
+        yield "drift", link, Placement("edge")
+        yield "yaw", link, Placement("turn")
+        yield from (("bell", link, Placement(name, speed_m_s=v)) for name in ("wall", "ball") for v in (-0.06, 0.03))
+        yield from (("bell", link, Placement("wall", camera_mm)) for camera_mm in (1.0, 6.0))
+    yield "bell", "200 ms", Placement("wall", encoder_factor=10.0)
 
 
-def quick_cells() -> Iterator[tuple[PullKind, str, Placed]]:
+def quick_cells() -> Iterator[tuple[PullKind, str, Placement]]:
     """Yield a few cells, to see whether anything is wrong."""
     for name in ("wall", "rod_5mm", "wall_beside", "table_1_box"):
-        yield "steady", "50 ms", Placed(name)
-        yield "bell", "200 ms", Placed(name)
+        yield "steady", "50 ms", Placement(name)
+        yield "bell", "200 ms", Placement(name)
 
 
 def run(cell: Pulls | Race, seed: int) -> Iterator[Row]:

@@ -152,7 +152,7 @@ def run(cell: Cell, seed: int) -> Iterator[Row]:
             for name, value in over(found, kind)._asdict().items()
             if name != "moments"
         }
-        yield {"kind": "prediction", "moments": len(judged["way_m"])} | figures | judged
+        yield {"kind": "prediction", "moments": len(judged["displacement_m"])} | figures | judged
 
 
 @cache

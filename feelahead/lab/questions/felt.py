@@ -1,9 +1,9 @@
 """What does a look ahead cost, and how exact is it, by the number of the gripper's spheres?
 
 feelahead bench felt --quick --picture felt.png
-feelahead bench felt --ways
+feelahead bench felt --definition
 feelahead bench felt --cover
-feelahead bench felt --field --picture ways.png
+feelahead bench felt --field --picture onsets.png
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ from common.files.input_file import require_input_file
 from feelahead.lab.approaches.frozen import AHEAD, ASIDE, PASSED, SITE, frozen_hash, frozen_scene, scene_names
 from feelahead.lab.approaches.ticks import DEMO, record
 from feelahead.lab.cover import STANDS_OUT, Gripper, draw_cover, measure_cover
-from feelahead.lab.field import CONVEX, DRAWN, Facing, draw_field, look_ahead, way_name
+from feelahead.lab.field import CONVEX, DRAWN, Facing, draw_field, look_ahead, strength_column
 from feelahead.lab.figures import figure
 from feelahead.lab.goals import Goal
 from feelahead.lab.reference.looks import LATE_M, compare, looks_of
@@ -44,7 +44,7 @@ class FeltSweep(Sweep):
     Each cover gets the same recorded ticks, in turns, and is compared with the finest.
     """
 
-    ways: bool = False
+    definition: bool = False
     """Instead: compare the contact distances of looks in the demo and in all frozen scenes with their definition."""
     cover: bool = False
     """Instead: measure how closely spheres cover grippers: the built-in one, and those of --model."""
@@ -62,11 +62,11 @@ class FeltSweep(Sweep):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        asked = [f"--{name}" for name in ("ways", "cover", "field") if getattr(self, name)]
+        asked = [f"--{name}" for name in ("definition", "cover", "field") if getattr(self, name)]
         if len(asked) > 1:
             raise ValueError(f"{' and '.join(asked)} exclude each other; valid: one of them")
-        if self.ways and self.picture is not None:
-            raise ValueError(f"--picture {self.picture}: --ways has no figure; valid: without --ways")
+        if self.definition and self.picture is not None:
+            raise ValueError(f"--picture {self.picture}: --definition has no figure; valid: without --definition")
         if (self.model or self.site is not None) and not (self.cover or self.field):
             raise ValueError("--model and --site are for --cover and --field; valid: with one of them")
         if self.cover and bool(self.model) != (self.site is not None):
@@ -111,7 +111,7 @@ def cells(settings: FeltSweep) -> Iterator[Run | Looked | Gripper | Facing]:
     elif settings.field:
         for model, name in settings.scenes().items():
             yield Facing(name, model, settings.site or SITE, settings.step_mm)
-    elif settings.ways:
+    elif settings.definition:
         yield Looked(DEMO, 6.0, 200) if settings.quick else Looked(DEMO, 20.0, 2000)
         for scene in ("mug",) if settings.quick else (*AHEAD, *ASIDE, *PASSED):
             yield Looked(scene, 2.0 if settings.quick else 4.0, 40)
@@ -151,14 +151,14 @@ def show(settings: FeltSweep, table: Table) -> Iterator[Shown]:
         return
     if settings.field:
         nearest = [rows.rows[-1] for _, rows in table.groups("scene")]
-        figures = ("free_mm", *map(way_name, DRAWN), "sigma_mm")
+        figures = ("free_mm", *map(strength_column, DRAWN), "sigma_mm")
         rows_of = ((row["scene"], *map(row.get, figures)) for row in nearest)
         yield shown("contact distances, and distances at which R2 begins to resist", ("scene", *figures), rows_of)
         return
-    if settings.ways:
-        figures = ("looks", "ways", "late", "earliest_mm", "latest_mm", "p999_mm", "grazes", "out_of_band")
+    if settings.definition:
+        figures = ("looks", "distances", "late", "earliest_mm", "latest_mm", "p999_mm", "grazes", "out_of_band")
         found = ((" ".join(filter(None, (row["scene"], row["sticks_of"]))), *map(row.get, figures)) for row in table)
-        yield shown("ways beside their definition: later above 0; grazes apart", ("scene", *figures), found)
+        yield shown("onset distances beside their definition: later above 0; grazes apart", ("scene", *figures), found)
         return
     costs = ("cover_mm", "spheres", "looks_per_s", "p50_us", "p99_us", "mean_us")
     for (name,), rows in table.groups("run"):
@@ -177,9 +177,9 @@ def goals(settings: FeltSweep, table: Table) -> Iterator[Goal]:
     for (name,), rows in table.groups("gripper") if settings.cover else ():
         yield Goal(f"{name}: sticks out of its spheres, mm", max(rows.values("sticks_out_mm")), 0.0)
         yield Goal(f"{name}: spheres stand out, mm", max(rows.values("stands_out_mm")), _LIMIT_COVER_MM)
-    if settings.ways:
-        yield Goal(f"ways later than {1e3 * LATE_M:g} mm", sum(table.values("late")), 0)
-        yield Goal("ways of grazes out of their band", sum(table.values("out_of_band")), 0)
+    if settings.definition:
+        yield Goal(f"onset distances later than {1e3 * LATE_M:g} mm", sum(table.values("late")), 0)
+        yield Goal("onset distances of grazes out of their band", sum(table.values("out_of_band")), 0)
         yield Goal("largest D_σ off, mm", max(table.values("sigma_off_mm")), _ROUNDING_MM)
 
 
@@ -195,14 +195,14 @@ def draw(settings: FeltSweep, table: Table, path: Path) -> None:
             for row, size in zip(rows, sizes, strict=True):
                 axes.annotate(f"{row['cover_mm']:g} mm", (row["mean_us"], size), fontsize=5)
         axes.set(xscale="log", yscale="log", xlabel="mean run time of a tick's law, µs")
-        axes.set(ylabel="95 % of |full strength's way - the finest's|, mm")
+        axes.set(ylabel="95 % of |full strength's onset - the finest's|, mm")
         axes.grid(alpha=0.3)
         axes.legend(fontsize=6)
 
 
 def frozen(settings: FeltSweep) -> str:
-    """Hash the frozen scenes of --ways and --field."""
-    if settings.ways:
+    """Hash the frozen scenes of --definition and --field."""
+    if settings.definition:
         return frozen_hash()
     return frozen_hash(tuple(settings.scenes())) if settings.field else ""
 

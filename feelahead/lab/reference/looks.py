@@ -7,7 +7,7 @@ import numpy as np
 
 from common.arrays import BoolArray, FloatArray
 from feelahead.lab.approaches.ticks import Recorded
-from feelahead.lab.reference.ways_by_definition import defined_ways
+from feelahead.lab.reference.onsets_by_definition import defined_onsets
 from robot_side.field.field import Ahead
 from robot_side.laws.swept import Asked
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -28,7 +28,7 @@ def looks_of(recorded: Recorded, most: int) -> tuple[list[tuple[Asked, Perceived
 
 
 @dataclass(frozen=True)
-class Apart:
+class LookErrors:
     """Errors of the contact distances (n,) of looks."""
 
     looks: int
@@ -43,7 +43,7 @@ class Apart:
         plain_m, graze_m = (np.append(self.off_m[which], 0.0) for which in (~self.grazes, self.grazes))
         return {
             "looks": self.looks,
-            "ways": len(self.off_m),
+            "distances": len(self.off_m),
             "late": int((plain_m > LATE_M).sum()),
             "earliest_mm": 1e3 * float(plain_m.min()),
             "latest_mm": 1e3 * float(plain_m.max()),
@@ -54,15 +54,15 @@ class Apart:
         }
 
 
-def compare(looks: Iterable[tuple[Asked, PerceivedObjects]], encoder_sigma_rad: FloatArray) -> Apart:
+def compare(looks: Iterable[tuple[Asked, PerceivedObjects]], encoder_sigma_rad: FloatArray) -> LookErrors:
     """Compare the field's contact distances with the definition's."""
     ahead = Ahead(encoder_sigma_rad)
     off_m, grazes, sigma_off_m = [np.zeros(0)], [np.zeros(0, dtype=np.bool_)], [0.0]
     for (pose, classes, along, widest_m), objects in looks:
         found = ahead.look(pose, scene_table(objects), classes, along, widest_m)
-        defined = defined_ways(pose, objects, classes, along, widest_m, encoder_sigma_rad)
-        judged = defined.judge(found.ways_m, along.reach_m)
+        defined = defined_onsets(pose, objects, classes, along, widest_m, encoder_sigma_rad)
+        judged = defined.judge(found.onsets_m, along.reach_m)
         off_m.append(judged.off_m)
         grazes.append(judged.grazes)
         sigma_off_m.append(abs(found.sigma_m - defined.sigma_m))
-    return Apart(len(off_m) - 1, np.concatenate(off_m), np.concatenate(grazes), max(sigma_off_m))
+    return LookErrors(len(off_m) - 1, np.concatenate(off_m), np.concatenate(grazes), max(sigma_off_m))

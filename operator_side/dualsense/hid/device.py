@@ -92,7 +92,7 @@ class HidDualSense:
         self._sequence = 0
         self._written = False
         self._released = True
-        self._told = Feel()
+        self._commanded = Feel()
 
     @property
     def released(self) -> bool:
@@ -131,8 +131,8 @@ class HidDualSense:
         report = self._packed(feel)
         self._written, self._released = True, False
         _write(self._writing, report)
-        self._told = feel.following(self._told)
-        self._released = self._told.releases
+        self._commanded = feel.following(self._commanded)
+        self._released = self._commanded.releases
 
     def close(self) -> None:
         """Switch off effects, rumble and a warning light if any were written and the controller answers; close it."""
@@ -141,7 +141,7 @@ class HidDualSense:
         self._closed = True
         try:
             if self._written:
-                _write(self._writing, self._packed(self._told.farewell))
+                _write(self._writing, self._packed(self._commanded.farewell))
                 self._released = True
         except DeviceError:
             pass  # it is gone: nothing can be written

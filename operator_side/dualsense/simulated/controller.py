@@ -74,7 +74,7 @@ class SimulatedDualSense:
         self._woke_s: float | None = None
         self._newest_report = -1
         self._unread: bytes | None = None
-        self.told = RELEASED
+        self.commanded = RELEASED
         """All effects in force; None for parts never set."""
         self._apply(RELEASED)
 
@@ -128,7 +128,7 @@ class SimulatedDualSense:
     @property
     def rumble(self) -> Rumble:
         """Present drive of the motors."""
-        return self.told.rumble or Rumble()
+        return self.commanded.rumble or Rumble()
 
     # The port
 
@@ -145,7 +145,7 @@ class SimulatedDualSense:
 
     def close(self) -> None:
         """Switch off effects, rumble and a warning light; `read` and `write` raise DeviceError from then on."""
-        self._apply(self.told.farewell)
+        self._apply(self.commanded.farewell)
         self._closed = True
 
     # The wire, for a system to which this controller is offered
@@ -187,9 +187,9 @@ class SimulatedDualSense:
             raise DeviceError("the simulated controller is closed; open a new one")
 
     def _apply(self, feel: Feel) -> None:
-        self.told = feel.following(self.told)
-        self._l2.set_strengths(self.told.l2 or FREE_TRIGGER)
-        self._r2.set_strengths(self.told.r2 or FREE_TRIGGER)
+        self.commanded = feel.following(self.commanded)
+        self._l2.set_strengths(self.commanded.l2 or FREE_TRIGGER)
+        self._r2.set_strengths(self.commanded.r2 or FREE_TRIGGER)
 
     def _advance(self, now_s: float) -> None:
         """Let time pass until `now_s`, and make the newest input report that has come due."""

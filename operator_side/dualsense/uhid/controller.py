@@ -91,12 +91,12 @@ class UhidCounts:
 class UhidController:
     """Controller on one file of /dev/uhid: each method returns the bytes to write to it."""
 
-    def __init__(self, controller: SimulatedDualSense, told: UhidIdentity) -> None:
+    def __init__(self, controller: SimulatedDualSense, identity: UhidIdentity) -> None:
         self.counts = UhidCounts()
         self.driven = False
         """Whether a driver has taken the device"""
         self._controller = controller
-        self._identity = told
+        self._identity = identity
 
     def plug_in(self) -> bytes:
         """Make the device appear. The kernel asks for its features next, so call `handle` soon."""

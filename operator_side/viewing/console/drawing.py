@@ -172,8 +172,8 @@ class Drawing:
             return
         self._objects[index] = np.frombuffer(state.object_poses, np.float32).reshape(-1, 7)
         roles = np.zeros(len(shapes.objects), np.uint8)
-        told = np.frombuffer(state.roles, np.uint8)[: len(roles)]
-        roles[: len(told)] = np.minimum(told, len(ROLES) - 1)
+        roles_sent = np.frombuffer(state.roles, np.uint8)[: len(roles)]
+        roles[: len(roles_sent)] = np.minimum(roles_sent, len(ROLES) - 1)
         colors = _colors(roles, state)
         with self._server.atomic():
             for batch in self._batches:

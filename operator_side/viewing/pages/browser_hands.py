@@ -8,7 +8,7 @@ from common.status.codes import Doing, Hands
 from operator_side.controller.feel import RELEASED, Feel
 from operator_side.controller.state import ControllerState
 from operator_side.hands.button_map import Action, button_of
-from operator_side.hands.travel_calibration import AS_GIVEN, TravelCalibration
+from operator_side.hands.travel_calibration import IDENTITY, TravelCalibration
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.pages.page_messages import PageHands
 
@@ -34,7 +34,7 @@ class BrowserHands:
         self._was_armed = False
         self._moves = False
         self._state = ControllerState()
-        self._told = RELEASED
+        self._commanded = RELEASED
 
     @property
     def hands(self) -> Hands:
@@ -51,7 +51,7 @@ class BrowserHands:
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """Take the page's hands; the screen reports whether the arm is armed."""
         del delay_s
-        self._calibrate(AS_GIVEN)
+        self._calibrate(IDENTITY)
         hands = self._pages.hands(now_s)
         armed = screen is not None and screen.state == "armed"
         if hands is not None and self._was_armed and not armed:
@@ -76,7 +76,7 @@ class BrowserHands:
     @property
     def released(self) -> bool:
         """Whether the last write neither resists nor rumbles; a page only shows it."""
-        return self._told.releases
+        return self._commanded.releases
 
     def read(self, now_s: float) -> ControllerState | None:
         """Return the state of the last tick."""
@@ -86,11 +86,11 @@ class BrowserHands:
     def write(self, feel: Feel, now_s: float) -> None:
         """Store `feel`."""
         del now_s
-        self._told = feel.following(self._told)
+        self._commanded = feel.following(self._commanded)
 
     def close(self) -> None:
         """Store the release: there is no device to close."""
-        self._told = self._told.farewell
+        self._commanded = self._commanded.farewell
 
     def _held(self, hands: PageHands, pressed: set[Action]) -> ControllerState:
         pressed |= {Action.NEXT_TARGET} if hands.next_target else set()

@@ -8,7 +8,7 @@ from operator_side.controller.feel import Feel
 from operator_side.controller.state import ControllerState
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import TravelCalibration
-from operator_side.people.whoever import Whoever
+from operator_side.people.simulated_hands import SimulatedHands
 from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
 
@@ -28,14 +28,14 @@ class SharedHands(BrowserHands):
         calibrate: Callable[[TravelCalibration], None],
         device: SimulatedDualSense,
         calibration: TravelCalibration,
-        new_person: Callable[[], Whoever],
+        new_person: Callable[[], SimulatedHands],
         *,
         swap_sides: bool = False,
     ) -> None:
         """device: held by the result of `new_person`. calibration: of that device."""
         super().__init__(pages, calibrate, swap_sides=swap_sides)
         self._device, self._calibration, self._new_person = device, calibration, new_person
-        self._person: Whoever | None = new_person()
+        self._person: SimulatedHands | None = new_person()
 
     @property
     def hands(self) -> Hands:

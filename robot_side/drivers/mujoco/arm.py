@@ -186,7 +186,7 @@ class MujocoArm:
 
     def _advance_one_step(self) -> None:
         time_s = self._time_s
-        closing = 0.0 if self._gripper is None else self._gripper.moving(time_s)
+        closing = 0.0 if self._gripper is None else self._gripper.commanded_at(time_s)
         drive(self._addresses, *self._reference.follows(time_s), closing, self._step_s)
         mujoco.mj_step(self._model, self._data)
         self._steps += 1

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.compiled.kernel import NUMBER, compiled, inlined, input_array, output_array
+from robot_side.compiled.kernel import FLOAT64, compiled, inlined, input_array, output_array
 
 
 class Encoder:
@@ -45,7 +45,7 @@ def reading(noise: float, true_position: float, sigma: float, resolution: float)
     return np.rint(read / resolution) * resolution if resolution > 0.0 else read
 
 
-@compiled(output_array(1), input_array(1), NUMBER, NUMBER)
+@compiled(output_array(1), input_array(1), FLOAT64, FLOAT64)
 def _read(readings: FloatArray, true_positions: FloatArray, sigma: float, resolution: float) -> None:
     """Replace the standard normal noise in `readings` with readings."""
     for i in range(readings.size):

@@ -88,7 +88,7 @@ class GripperDrive:
         self._command = closing
         self._valid_until_s = valid_until_s
 
-    def moving(self, time_s: float) -> float:
+    def commanded_at(self, time_s: float) -> float:
         """Return the command at `time_s`: close (+1), hold (0) or open (-1), or a share of it."""
         return self._command if time_s < self._valid_until_s else 0.0
 
@@ -121,7 +121,7 @@ def advance_gripper(
 ) -> None:
     """Advance one gripper's reference by `step_s`, from the drive's measured length and its speed.
 
-    moving: from `GripperDrive.moving`.
+    moving: from `GripperDrive.commanded_at`.
     """
     gripper.closure = (length - gripper.open_length) / gripper.stroke
     gripper.opening_m = _at_closure(samples, gripper.closure, 2)

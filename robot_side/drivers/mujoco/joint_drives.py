@@ -85,5 +85,5 @@ def control(drive: Any, position_error: float, position: float, velocity: float,
     if drive.stiffness == 0.0 and drive.damping != 0.0:
         velocity += _VELOCITY_SERVO_BANDWIDTH_RAD_S * position_error
     servo = drive.gear * (drive.stiffness * position + drive.damping * velocity)
-    told: float = (load / drive.gear - drive.offset + servo) / drive.gain
-    return told
+    force: float = (load / drive.gear - drive.offset + servo) / drive.gain
+    return force

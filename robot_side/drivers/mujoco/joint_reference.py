@@ -10,7 +10,7 @@ from msgspec import Meta
 from common.arrays import FloatArray
 from common.limits import check_limits
 from robot_side.arm.ability import JointLimits
-from robot_side.compiled.kernel import NUMBER, TRUTH, building_block, compiled, input_array, record_array
+from robot_side.compiled.kernel import BOOL, FLOAT64, building_block, compiled, input_array, record_array
 
 REFERENCE: Final = np.dtype(
     [
@@ -105,7 +105,7 @@ class JointReference:
         return self._following, before and not self._following
 
 
-@compiled(record_array(REFERENCE), input_array(1), NUMBER, returns=TRUTH)
+@compiled(record_array(REFERENCE), input_array(1), FLOAT64, returns=BOOL)
 def _command(joints: Any, velocity: FloatArray, fastest: float) -> bool:
     """Store a velocity, scaled by one factor to at most `fastest`; False, and nothing stored, if it is not finite."""
     largest = 0.0

@@ -6,7 +6,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE, INDICES, NUMBERS, Declared, records, rows
-from robot_side.compiled.kernel import NUMBER, TRUTH, compiled, output_array
+from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, output_array
 from robot_side.drivers.mujoco.encoders import reading
 from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GRIPPER_INPUT, advance_gripper
 from robot_side.drivers.mujoco.joint_drives import DRIVE, control, motor_acceleration
@@ -82,7 +82,7 @@ PLANT: Final = Declared(
 _plant_at = PLANT.at
 
 
-@compiled(BUNDLE, TRUTH, TRUTH, NUMBER, NUMBER)
+@compiled(BUNDLE, BOOL, BOOL, FLOAT64, FLOAT64)
 def drive(bundle: IntArray, following: bool, ended: bool, closing: float, step_s: float) -> None:
     """Advance the references by `step_s` and compute the actuators' inputs from them."""
     plant = _plant_at(bundle)
@@ -116,7 +116,7 @@ def drive(bundle: IntArray, following: bool, ended: bool, closing: float, step_s
             plant.ctrl[one.place] = one.open + gripper.reference * (one.closed - one.open)
 
 
-@compiled(BUNDLE, NUMBER, NUMBER, output_array(1), output_array(1), output_array(1))
+@compiled(BUNDLE, FLOAT64, FLOAT64, output_array(1), output_array(1), output_array(1))
 def sense(
     bundle: IntArray,
     sigma: float,

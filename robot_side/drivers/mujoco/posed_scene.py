@@ -9,7 +9,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.drivers.mujoco.ground_truth import least_distance
 from robot_side.drivers.mujoco.scene import Scene
-from robot_side.drivers.mujoco.true_contact import free_way
+from robot_side.drivers.mujoco.true_contact import contact_distance
 from robot_side.surroundings.perceived import PerceivedObjects
 
 
@@ -35,7 +35,7 @@ class PosedScene:
         self._fixed = self._objects[scene.model.body_weldid[bodies] == 0]
         self._at_rest_m: FloatArray = np.zeros((self._gripper.size, 3))
 
-    def put(self, arm_positions_rad: FloatArray, finger_positions: FloatArray, shift_m: FloatArray) -> None:
+    def set_pose(self, arm_positions_rad: FloatArray, finger_positions: FloatArray, shift_m: FloatArray) -> None:
         """Set the joints (n,) and (f,), and move every object by `shift_m` (3,) from its pose in the scene."""
         data, robot = self._data, self.scene.robot
         data.qpos[robot.arm_positions] = arm_positions_rad
@@ -55,12 +55,14 @@ class PosedScene:
         """Return the least distance from the gripper to any object, at most `farthest_m`."""
         return least_distance(self.scene.model, self._data, self._gripper, self._objects, farthest_m)
 
-    def way_m(self, farthest_m: float) -> float:
+    def contact_distance_m(self, farthest_m: float) -> float:
         """Return the distance that the gripper can move along its approach axis until contact, at most `farthest_m`."""
         axis = self.approach_axis()
-        way_m = free_way(self.scene.model, self._data, self._gripper, self._objects, axis, farthest_m)
+        contact_distance_m = contact_distance(
+            self.scene.model, self._data, self._gripper, self._objects, axis, farthest_m
+        )
         self._data.geom_xpos[self._gripper] = self._at_rest_m
-        return way_m
+        return contact_distance_m
 
     def stays_clear(self, path: ToolPath, margin_m: float) -> bool:
         """Return whether the gripper keeps `margin_m` to all objects on a path that begins at the present pose."""
@@ -89,6 +91,6 @@ class PosedScene:
         return scene.primitives.place(0.0, scene.roles, errors_m, data.geom_xpos, data.geom_xmat)
 
 
-def let_through(scene: Scene) -> None:
+def disable_contacts(scene: Scene) -> None:
     """Disable contacts: from now on the gripper passes through objects."""
     scene.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT

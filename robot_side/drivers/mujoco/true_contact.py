@@ -86,12 +86,12 @@ class TrueContact:
         return least_distance(self._model, self._data, mine, theirs, farthest_m)
 
     def way_left_m(self, direction: FloatArray, held: str | None, farthest_m: float = 1.0) -> float:
-        """Return `free_way` of the gripper, with `held`, along the unit vector `direction` (3,)."""
+        """Return `contact_distance` of the gripper, with `held`, along the unit vector `direction` (3,)."""
         model, thought = self._model, self._thought
         thought.qpos[:] = self._data.qpos
         mujoco.mj_kinematics(model, thought)
         mine, theirs = self._parts(held)
-        return free_way(model, thought, mine, theirs, direction, farthest_m)
+        return contact_distance(model, thought, mine, theirs, direction, farthest_m)
 
     def _parts(self, held: str | None) -> tuple[IntArray, IntArray]:
         carried = [geom for geom, name in self._object_of.items() if name == held]
@@ -151,7 +151,7 @@ class TrueContact:
         self._before.qvel[:] = self._data.qvel
 
 
-def free_way(
+def contact_distance(
     model: Any, data: Any, mine: IntArray, theirs: IntArray, direction: FloatArray, farthest_m: float
 ) -> float:
     """Return the distance that geoms `mine` can move along `direction` (3,) until contact with `theirs`.

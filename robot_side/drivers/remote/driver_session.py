@@ -87,7 +87,7 @@ class ArmShape(NamedTuple):
     """Free gap of the open gripper; 0 without a gripper"""
 
 
-class _Told(NamedTuple):
+class _LastCommand(NamedTuple):
     """Last command of the arm."""
 
     velocities: tuple[float, ...]
@@ -110,7 +110,7 @@ class DriverSession:
         self._sequence = -1
         self._clock = DriverClock()
         self._closing = (0.0, -math.inf)
-        self._told = _Told((0.0,) * len(shape.joint_names), -math.inf)
+        self._last_command = _LastCommand((0.0,) * len(shape.joint_names), -math.inf)
         self._sent = self._sent_before = 0
         self._sent_s, self._first_sent_s = -math.inf, math.inf
         self._moves = False
@@ -160,7 +160,7 @@ class DriverSession:
             )
         if not math.isfinite(until_s):
             raise ValueError(f"valid_until_s = {until_s}; valid: finite")
-        self._told = _Told(velocities, until_s)
+        self._last_command = _LastCommand(velocities, until_s)
 
     def command_gripper(self, closing: float, until_s: float) -> None:
         """Store the gripper's command until `until_s`. ValueError as for `Arm.command_gripper`."""
@@ -172,13 +172,13 @@ class DriverSession:
         """Return the messages that must leave now: (peer, payload)."""
         leaving, self._outgoing = self._outgoing, []
         closing = self._closing[0] if self._closing[1] > now_s else 0.0
-        moves = (any(self._told.velocities) and self._told.until_s > now_s) or closing != 0.0
+        moves = (any(self._last_command.velocities) and self._last_command.until_s > now_s) or closing != 0.0
         due = now_s - self._sent_s >= COMMAND_PERIOD_S or (self._moves and not moves)
         if self._peer is not None and due:
             self._sent += 1
             self._sent_s, self._moves = now_s, moves
             self._first_sent_s = min(self._first_sent_s, now_s)
-            velocities, until_s = self._told.velocities, self._clock.drivers_s(self._told.until_s)
+            velocities, until_s = self._last_command.velocities, self._clock.drivers_s(self._last_command.until_s)
             command = DriverCommand(DRIVER_VERSION, self._sent, now_s, velocities, closing, until_s)
             leaving.append((self._peer, encode(command)))
         return leaving

@@ -108,20 +108,20 @@ class RemoteObjects:
         self._known, self._frame, self._taken_s = known, seen, taken_s
         widest = max(frame.objects, key=lambda thing: thing.sd_m, default=None)
         if widest is not None and widest.sd_m > self._sd_m:
-            told = f"sd_m = {widest.sd_m} of {widest.name!r} is more than the {self._sd_m} that the law uses"
-            self._tell("sd", f"objects: {told}; to raise that: --camera.sd-m {widest.sd_m}")
+            text = f"sd_m = {widest.sd_m} of {widest.name!r} is more than the {self._sd_m} that the law uses"
+            self._report_once("sd", f"objects: {text}; to raise that: --camera.sd-m {widest.sd_m}")
 
     def _role(self, thing: SeenObject) -> Role:
         return self._roles.get(thing.name) or thing.role or role_from_name(thing.name)
 
-    def _tell(self, about: str, text: str) -> None:
+    def _report_once(self, about: str, text: str) -> None:
         if about not in self._said:
             self._said.add(about)
             self._note(text)
 
     def _reject(self, why: Why, text: str, peer: bytes, now_s: float) -> None:
         self.rejected[why] += 1
-        self._tell(why, f"objects: refused whole, and counted from now on: {text}")
+        self._report_once(why, f"objects: refused whole, and counted from now on: {text}")
         if now_s - self._refused_s >= _REFUSAL_PERIOD_S:
             self._refused_s = now_s
             self._wire.send(peer, encode(Refusal(FRAME_VERSION, text)))

@@ -42,14 +42,14 @@ def _fill_group(block: FloatArray, count: int, inputs: int) -> None:
 def batch(
     load: Callable[[FloatArray, FloatArray, Any, int, int, FloatArray], None],
     bound: Callable[[FloatArray, int], int],
-    work_out: Callable[[FloatArray, int], None],
+    compute: Callable[[FloatArray, int], None],
     inputs: int,
 ) -> Run:
     """Return the loop over spheres `centers` (p, 3), `radii` (p,) and solids, a tuple of arrays; in kernels only.
 
     A block has `inputs` columns for the pair, then a verdict, the solid's volume, and the result. `load` fills the
     first columns with `count` pairs from `first` on. `bound` fills verdicts and volumes of the first groups of lanes,
-    and returns the sum of weights and doubts. `work_out` fills results.
+    and returns the sum of weights and doubts. `compute` fills results.
 
     The results must hold zeros. Pairs that need precise forms go to the first entries of `rows` (p + 1,); the loop
     returns their number. The last entry is the number n of pairs that lanes computed, or ~n, below 0, if a number may
@@ -83,7 +83,7 @@ def batch(
                 continue
             if left == groups * WIDTH * SOME_PARTIAL:
                 # All lanes are partial: compute in place.
-                work_out(block, groups)
+                compute(block, groups)
                 partial += count
                 for lane in range(count):
                     own[lane] = first + lane
@@ -99,7 +99,7 @@ def batch(
                     pairs[waiting_count] = pair
                     waiting_count += 1
                     if waiting_count == LANES:
-                        work_out(waiting, LANES // WIDTH)
+                        compute(waiting, LANES // WIDTH)
                         partial += LANES
                         unsettled = scatter(waiting, result, pairs, LANES, volumes, gradients, areas, rows, unsettled)
                         waiting_count = 0
@@ -109,7 +109,7 @@ def batch(
                     volumes[pair], areas[pair] = sphere_volume(radii[pair]), sphere_area(radii[pair])
         if waiting_count > 0:
             _fill_group(waiting, waiting_count, inputs)
-            work_out(waiting, lane_groups(waiting_count))
+            compute(waiting, lane_groups(waiting_count))
             partial += waiting_count
             unsettled = scatter(waiting, result, pairs, waiting_count, volumes, gradients, areas, rows, unsettled)
         rows[total] = ~partial if doubtful > 0 else partial

@@ -4,7 +4,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import (
-    COUNT,
+    INT64,
     building_block,
     compiled,
     inlined,
@@ -147,7 +147,7 @@ _run = batch(_load, _bound, _work_out, _INPUTS)
     output_array(2),
     output_array(1),
     output_indices(),
-    returns=COUNT,
+    returns=INT64,
 )
 def overlap_boxes(
     centers: FloatArray,

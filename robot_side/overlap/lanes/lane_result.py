@@ -35,14 +35,14 @@ def settle(
     reference_2: float,
     farthest: float,
     extent: float,
-    strained: bool,
+    imprecise: bool,
 ) -> LaneResult:
     """Return `overlap` within its bounds, and exact values if the solid's surface does not reach the sphere.
 
     `nearest_2` is the squared distance (m²) of the surface from the sphere's centre, `lowest` the least signed distance
     (m) of the centre below the faces' planes, positive inside. `reference_2` is the squared distance (m²) of the
     reference point, `farthest` (m) the distance of the farthest corner, `extent` (m) the length of the longest edge.
-    `strained`: digits were lost.
+    `imprecise`: digits were lost.
     """
     # Every choice is between computed values, so that it compiles to an instruction without a branch.
     volume, gradient, area = overlap
@@ -50,13 +50,13 @@ def settle(
     # `lowest` is at least the radius inside, and at most 0 outside: rounding cannot confuse the two.
     engulfed = (lowest > 0.5 * radius) & (solid_volume > 0.0)
     uncut_volume, uncut_area = whole if engulfed else 0.0, whole_area if engulfed else 0.0
-    clear = WELL_CLEAR if strained else CLEAR
+    clear = WELL_CLEAR if imprecise else CLEAR
     apart = (nearest_2 > clear * (radius * radius)) | (solid_volume == 0.0)
     bounded_volume = min(max(volume, 0.0), whole, solid_volume)
     bounded_area = min(max(area, 0.0), whole_area)
     # The error of a solid smaller than the sphere is smaller, too.
     tiny = TINY * whole * min(extent, radius)
-    doubtful = (reference_2 > FARTHEST_REFERENCE**2 * (radius * radius)) | (bounded_volume * radius < tiny) | strained
+    doubtful = (reference_2 > FARTHEST_REFERENCE**2 * (radius * radius)) | (bounded_volume * radius < tiny) | imprecise
     # After an overflow this is not finite, and the comparison is false.
     number = volume + gradient[0] + gradient[1] + gradient[2]
     sane = (farthest <= FARTHEST_CORNER * radius) & (abs(number) < math.inf)

@@ -71,7 +71,7 @@ def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneRes
     height_d = dot(reference, normal_d) + share_d * (volume_6 * per_area_d)
 
     radius_2 = radius * radius
-    strained = (
+    imprecise = (
         _is_sharp((bc, cd, bd), across_a, height_a, radius_2)
         | _is_sharp((ad, cd, ac), across_b, height_b, radius_2)
         | _is_sharp((ab, bd, ad), across_c, height_c, radius_2)
@@ -90,7 +90,7 @@ def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneRes
     edge_bd = _edge(reference, bd, ab, negative(bc), (share_b, share_d, share_a, share_c), norm_b, norm_d, radius)
     edge_cd = _edge(reference, cd, ac, bc, (share_c, share_d, share_a, share_b), norm_c, norm_d, radius)
 
-    strained |= edge_ab[5] | edge_ac[5] | edge_ad[5] | edge_bc[5] | edge_bd[5] | edge_cd[5]
+    imprecise |= edge_ab[5] | edge_ac[5] | edge_ad[5] | edge_bc[5] | edge_bd[5] | edge_cd[5]
     face_a = _face((edge_bc, edge_cd, edge_bd), (1.0, 1.0, -1.0), normal_a, height_a)
     face_b = _face((edge_ad, edge_cd, edge_ac), (1.0, -1.0, -1.0), normal_b, height_b)
     face_c = _face((edge_ab, edge_bd, edge_ad), (1.0, 1.0, -1.0), normal_c, height_c)
@@ -127,7 +127,7 @@ def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneRes
         sense * moment, scale(sense, push), sense * (covered_a + covered_b + covered_c + covered_d), radius
     )
     sizes = dot(reference, reference), farthest, extent
-    return settle(overlap, radius, abs(volume_6) / 6.0, nearest_2, lowest, *sizes, strained)
+    return settle(overlap, radius, abs(volume_6) / 6.0, nearest_2, lowest, *sizes, imprecise)
 
 
 @inlined
@@ -204,8 +204,8 @@ def _edge(
     terms_2 = shares[2] * shares[2] * dot(from_third, from_third) + shares[3] * shares[3] * dot(
         from_fourth, from_fourth
     )
-    strained = terms_2 > LARGEST_CANCELLATION**2 * max(radius * radius, foot_2)
-    return direction, foot, split, foot_2 + nearest * nearest, length, strained
+    imprecise = terms_2 > LARGEST_CANCELLATION**2 * max(radius * radius, foot_2)
+    return direction, foot, split, foot_2 + nearest * nearest, length, imprecise
 
 
 @inlined

@@ -14,7 +14,7 @@ from robot_side.overlap.meshes.mesh_tables import joined
 
 _FLAT_M = 1e-7
 """Depth of a dent up to which a mesh counts as convex"""
-_TOGETHER = 64
+_BATCH = 64
 """Triangles that are tested together: most meshes with dents show one early."""
 
 
@@ -84,7 +84,7 @@ def _is_convex(corners: FloatArray, normals: FloatArray) -> bool:
     offsets = np.einsum("ti,ti->t", normals, first)
     return all(
         (places @ normals[few].T <= offsets[few] + _FLAT_M).all()
-        for few in np.array_split(np.arange(len(normals)), 1 + len(normals) // _TOGETHER)
+        for few in np.array_split(np.arange(len(normals)), 1 + len(normals) // _BATCH)
     )
 
 

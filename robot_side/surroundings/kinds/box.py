@@ -4,13 +4,13 @@ import math
 from typing import Final
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import NUMBER, building_block, compiled, inlined, power_of_two_below
+from robot_side.compiled.kernel import FLOAT64, building_block, compiled, inlined, power_of_two_below
 from robot_side.compiled.vectors import Vector, add, dot, norm, scale, subtract
 from robot_side.overlap.lanes.box_lane import box_lane
 from robot_side.surroundings.kinds.kind import Array, Check, Kind
 from robot_side.surroundings.kinds.layout import (
     CLOSING,
-    LEAST_WAY_M,
+    LEAST_CONTACT_M,
     MOST_STEPS,
     NEVER,
     OVERLAP,
@@ -18,7 +18,7 @@ from robot_side.surroundings.kinds.layout import (
     Contact,
     Nearest,
     posed,
-    take_over,
+    to_metres,
     write_pose,
 )
 
@@ -99,7 +99,7 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
         if closing <= CLOSING * distance:
             return NEVER
         if gap <= TOUCHING_M:
-            return max(moved, LEAST_WAY_M), closing / distance
+            return max(moved, LEAST_CONTACT_M), closing / distance
         step = gap * distance / closing
         moved += step
         if moved > reach:
@@ -140,7 +140,7 @@ def _reaches_corner(a: float, b: float, c: float) -> bool:
     return max(a, 0.0) ** 2 + max(b, 0.0) ** 2 + max(c, 0.0) ** 2 < 1.0
 
 
-@compiled(*OVERLAP, returns=NUMBER)
+@compiled(*OVERLAP, returns=FLOAT64)
 def overlap_one_box(
     shapes: FloatArray,
     row: int,
@@ -149,7 +149,7 @@ def overlap_one_box(
     z: float,
     radius: float,
     _meshes: IntArray,
-    push: FloatArray,
+    overlap_gradient: FloatArray,
 ) -> float:
     """Return the overlap of a sphere with a box, by inclusion-exclusion over the parts beyond its faces.
 
@@ -164,7 +164,7 @@ def overlap_one_box(
     )
     half, part = (shapes[row, 12], shapes[row, 13], shapes[row, 14]), 1.0 / radius
     u, v, w = dot(axes[0], (a, b, c)), dot(axes[1], (a, b, c)), dot(axes[2], (a, b, c))
-    push[0] = push[1] = push[2] = 0.0
+    overlap_gradient[0] = overlap_gradient[1] = overlap_gradient[2] = 0.0
     gap = max(abs(u) - half[0], 0.0) ** 2 + max(abs(v) - half[1], 0.0) ** 2 + max(abs(w) - half[2], 0.0) ** 2
     if gap >= radius * radius:
         return 0.0
@@ -197,14 +197,14 @@ def overlap_one_box(
         )
     if not corner:
         pushed = add(scale(along[0], axes[0]), add(scale(along[1], axes[1]), scale(along[2], axes[2])))
-        return take_over(max(volume, 0.0), pushed, radius, radius, push)
+        return to_metres(max(volume, 0.0), pushed, radius, radius, overlap_gradient)
     size = power_of_two_below(radius)
     part = 1.0 / size
     found, _ = box_lane(
         *((0.0, 0.0, 0.0), part * radius, (-part * a, -part * b, -part * c), axes),
         (part * half[0], part * half[1], part * half[2]),
     )
-    return take_over(found[0], found[1], size, radius, push)
+    return to_metres(found[0], found[1], size, radius, overlap_gradient)
 
 
 KIND: Final = Kind(

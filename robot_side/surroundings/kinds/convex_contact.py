@@ -6,7 +6,7 @@ from typing import Any
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block
 from robot_side.compiled.vectors import Vector, add, dot, scale
-from robot_side.surroundings.kinds.layout import CLOSING, LEAST_WAY_M, MOST_STEPS, NEVER, TOUCHING_M, Contact
+from robot_side.surroundings.kinds.layout import CLOSING, LEAST_CONTACT_M, MOST_STEPS, NEVER, TOUCHING_M, Contact
 
 
 def convex_contact(nearest: Callable[..., Any]) -> Callable[..., Any]:
@@ -25,7 +25,7 @@ def convex_contact(nearest: Callable[..., Any]) -> Callable[..., Any]:
             if closing <= CLOSING:
                 return NEVER
             if gap <= TOUCHING_M:
-                return max(moved, LEAST_WAY_M), closing
+                return max(moved, LEAST_CONTACT_M), closing
             step = gap / closing
             moved += step
             if moved > reach:

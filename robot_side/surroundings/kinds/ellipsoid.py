@@ -8,7 +8,7 @@ import math
 from typing import Final
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import NUMBER, building_block, compiled, inlined
+from robot_side.compiled.kernel import FLOAT64, building_block, compiled, inlined
 from robot_side.compiled.vectors import Vector, add, dot, norm, scale, subtract
 from robot_side.surroundings.kinds import box
 from robot_side.surroundings.kinds.convex_contact import convex_contact
@@ -17,7 +17,7 @@ from robot_side.surroundings.kinds.kind import Array, Check, Kind
 from robot_side.surroundings.kinds.layout import (
     OVERLAP,
     Nearest,
-    take_over,
+    to_metres,
     write_pose,
 )
 
@@ -116,7 +116,7 @@ def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
 contact = convex_contact(nearest)
 
 
-@compiled(*OVERLAP, returns=NUMBER)
+@compiled(*OVERLAP, returns=FLOAT64)
 def overlap_one_ellipsoid(
     shapes: FloatArray,
     row: int,
@@ -125,17 +125,17 @@ def overlap_one_ellipsoid(
     z: float,
     radius: float,
     _meshes: IntArray,
-    push: FloatArray,
+    overlap_gradient: FloatArray,
 ) -> float:
     """Return the overlap with an ellipsoid, by sections across the axis closest to the nearest normal; in radii."""
     half = scale(1.0 / radius, (shapes[row, 12], shapes[row, 13], shapes[row, 14]))
     center = scale(1.0 / radius, _local(shapes, row, (x, y, z)))
     distance, normal = _surface(half, center)
-    push[0] = push[1] = push[2] = 0.0
+    overlap_gradient[0] = overlap_gradient[1] = overlap_gradient[2] = 0.0
     if distance >= 1.0:
         return 0.0
     if distance <= -1.0:
-        return take_over(4.0 / 3.0 * math.pi, (0.0, 0.0, 0.0), radius, radius, push)
+        return to_metres(4.0 / 3.0 * math.pi, (0.0, 0.0, 0.0), radius, radius, overlap_gradient)
     axis = 0
     for k in (1, 2):
         if abs(normal[k]) > abs(normal[axis]):
@@ -151,7 +151,7 @@ def overlap_one_ellipsoid(
     pushed = (
         (pushed[2], pushed[0], pushed[1]) if axis == 0 else ((pushed[1], pushed[2], pushed[0]) if axis == 1 else pushed)
     )
-    return take_over(max(below + above, 0.0), _turned(shapes, row, pushed), radius, radius, push)
+    return to_metres(max(below + above, 0.0), _turned(shapes, row, pushed), radius, radius, overlap_gradient)
 
 
 KIND: Final = Kind(

@@ -9,7 +9,7 @@ from robot_side.compiled.vectors import Vector, dot, negative
 from robot_side.overlap.closed_forms.half_space import half_space_overlap
 from robot_side.overlap.closed_forms.solid import Overlap
 from robot_side.surroundings.kinds.kind import Array, Check, Kind
-from robot_side.surroundings.kinds.layout import CLOSING, LEAST_WAY_M, NEVER, TOUCHING_M, Contact, Nearest
+from robot_side.surroundings.kinds.layout import CLOSING, LEAST_CONTACT_M, NEVER, TOUCHING_M, Contact, Nearest
 
 
 @inlined
@@ -46,7 +46,7 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
     gap, closing = dot(normal, start) - shapes[row, 3] - radius, -dot(normal, along)
     if gap < -TOUCHING_M:
         return 0.0, 1.0
-    return (max(gap / closing, LEAST_WAY_M), closing) if closing > CLOSING else NEVER
+    return (max(gap / closing, LEAST_CONTACT_M), closing) if closing > CLOSING else NEVER
 
 
 @inlined

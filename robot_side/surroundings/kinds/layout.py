@@ -7,7 +7,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, inlined, input_array, output_array, together
+from robot_side.compiled.kernel import BOOL, FLOAT64, INT64, inlined, input_array, output_array, tuple_type
 from robot_side.compiled.vectors import Vector
 from robot_side.overlap.closed_forms.solid import sphere_volume
 
@@ -43,16 +43,18 @@ def rows(*columns: FloatArray, width: int = SHAPE_NUMBERS) -> FloatArray:
     return np.concatenate([*flat, np.zeros((count, width - used))], axis=1)
 
 
-OVERLAP: Final[tuple[Any, ...]] = (*(input_array(2), COUNT, NUMBER, NUMBER, NUMBER, NUMBER, BUNDLE, output_array(1)),)
+OVERLAP: Final[tuple[Any, ...]] = (
+    *(input_array(2), INT64, FLOAT64, FLOAT64, FLOAT64, FLOAT64, BUNDLE, output_array(1)),
+)
 """Argument types of an overlap kernel: shapes (n, 15), the row, the sphere's centre and radius, the scene's meshes, and
 an output (3,) for dV/dcentre. It returns V."""
-CONTACT: Final[tuple[Any, ...]] = (BUNDLE, COUNT, *(NUMBER,) * 8, TRUTH)
+CONTACT: Final[tuple[Any, ...]] = (BUNDLE, INT64, *(FLOAT64,) * 8, BOOL)
 """Argument types of the contact kernel of meshes (see `placed_meshes`)"""
-MESH_CONTACT: Final[Any] = together(NUMBER, NUMBER)
+MESH_CONTACT: Final[Any] = tuple_type(FLOAT64, FLOAT64)
 """Return type of the contact kernel of meshes: a `Contact`"""
 TOUCHING_M: Final = 1e-7
 """Largest gap and depth at which bodies touch: they do not overlap yet, and may begin to."""
-LEAST_WAY_M: Final = 1e-12
+LEAST_CONTACT_M: Final = 1e-12
 """Contact distance of bodies that touch already; 0 is that of bodies that overlap."""
 CLOSING: Final = 1e-9
 """Least û·n of an approach: below it a surface is beside the path and does not come nearer."""
@@ -87,11 +89,15 @@ def write_pose(position: Vector, turns: FloatArray, k: int, numbers: FloatArray,
 
 
 @inlined
-def take_over(volume: float, gradient: Vector, size: float, radius: float, push: FloatArray) -> float:
+def to_metres(volume: float, gradient: Vector, size: float, radius: float, overlap_gradient: FloatArray) -> float:
     """Convert an overlap from units of `size` to metres; after an overflow, the whole sphere, which warns early."""
     area = size * size
     if not math.isfinite(volume + gradient[0] + gradient[1] + gradient[2]):
-        push[0] = push[1] = push[2] = 0.0
+        overlap_gradient[0] = overlap_gradient[1] = overlap_gradient[2] = 0.0
         return sphere_volume(radius)
-    push[0], push[1], push[2] = gradient[0] * area, gradient[1] * area, gradient[2] * area
+    overlap_gradient[0], overlap_gradient[1], overlap_gradient[2] = (
+        gradient[0] * area,
+        gradient[1] * area,
+        gradient[2] * area,
+    )
     return volume * area * size

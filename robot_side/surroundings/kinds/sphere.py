@@ -9,7 +9,7 @@ from robot_side.compiled.vectors import Vector, dot, norm, subtract, unit
 from robot_side.overlap.closed_forms.ball import sphere_overlap
 from robot_side.overlap.closed_forms.solid import Overlap
 from robot_side.surroundings.kinds.kind import Array, Check, Kind
-from robot_side.surroundings.kinds.layout import ANY_DIRECTION, LEAST_WAY_M, NEVER, TOUCHING_M, Contact, Nearest
+from robot_side.surroundings.kinds.layout import ANY_DIRECTION, LEAST_CONTACT_M, NEVER, TOUCHING_M, Contact, Nearest
 
 
 @inlined
@@ -49,7 +49,7 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
     inside = ahead * ahead - apart
     if ahead <= 0.0 or inside < 0.0:
         return NEVER
-    found = max(apart / (ahead + math.sqrt(inside)), LEAST_WAY_M)
+    found = max(apart / (ahead + math.sqrt(inside)), LEAST_CONTACT_M)
     return found, (ahead - found) / reach
 
 

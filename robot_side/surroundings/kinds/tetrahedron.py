@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import NUMBER, building_block, compiled, inlined, power_of_two_below
+from robot_side.compiled.kernel import FLOAT64, building_block, compiled, inlined, power_of_two_below
 from robot_side.compiled.vectors import Vector, add, cross, dot, negative, norm, scale, subtract
 from robot_side.overlap.lanes.tetrahedron_lane import tetrahedron_lane
 from robot_side.surroundings.kinds.convex_contact import convex_contact
@@ -14,7 +14,7 @@ from robot_side.surroundings.kinds.layout import (
     OVERLAP,
     Nearest,
     posed,
-    take_over,
+    to_metres,
 )
 
 Vertices = tuple[Vector, Vector, Vector, Vector]
@@ -119,7 +119,7 @@ def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
 contact = convex_contact(nearest)
 
 
-@compiled(*OVERLAP, returns=NUMBER)
+@compiled(*OVERLAP, returns=FLOAT64)
 def overlap_one_tetrahedron(
     shapes: FloatArray,
     row: int,
@@ -128,7 +128,7 @@ def overlap_one_tetrahedron(
     z: float,
     radius: float,
     _meshes: IntArray,
-    push: FloatArray,
+    overlap_gradient: FloatArray,
 ) -> float:
     """Return the overlap with a tetrahedron."""
     size, center = power_of_two_below(radius), (x, y, z)
@@ -140,7 +140,7 @@ def overlap_one_tetrahedron(
         scale(part, _corner(shapes, row, 3, center)),
     )
     found, _ = tetrahedron_lane((0.0, 0.0, 0.0), part * radius, corners)
-    return take_over(found[0], found[1], size, radius, push)
+    return to_metres(found[0], found[1], size, radius, overlap_gradient)
 
 
 KIND: Final = Kind(

@@ -11,7 +11,7 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import Watch
 from common.rate.budget import Budget, on_the_wire
 from common.rate.pieces import Joining
-from robot_side.viewing.giving_way import GivingWay
+from robot_side.viewing.picture_rate_control import PictureRateControl
 
 TURN_S = 0.001
 _OTHER_CLOCK_S = 1234.5
@@ -69,7 +69,7 @@ class Ran:
     pictures: list[tuple[float, float]] = field(default_factory=list)
     """(time of complete arrival, age) of each picture, in seconds"""
     budget: Budget[str] = field(default_factory=lambda: Budget(("video", "scene")))
-    giving_way: GivingWay = field(default_factory=lambda: GivingWay(30.0, 75))
+    picture_rate_control: PictureRateControl = field(default_factory=lambda: PictureRateControl(30.0, 75))
 
     def delay_s(self, share: float, since_s: float = 0.0, until_s: float = math.inf) -> float:
         """Return a quantile of the haptics' delay."""
@@ -128,20 +128,20 @@ class _Sides:
         if self._due("haptics", max(_HAPTICS_S, budget.haptic_interval_s), now_s):
             budget.spend("haptics", 200, now_s)
             self._out.push(now_s, ("haptics", Watch(self._robot.stamp(now_s))), 200)
-        if self._due("telemetry", 0.02, now_s) and budget.may_tell(160, now_s):
+        if self._due("telemetry", 0.02, now_s) and budget.may_send_telemetry(160, now_s):
             self._out.push(now_s, ("telemetry", None), 160)
         if self._due("command", 0.01, now_s):
             self._back.push(now_s, Watch(self._operator.stamp(self._there_s(now_s))), 100)
 
     def show(self, now_s: float) -> None:
         """Make pictures and the scene unless they would wait."""
-        budget, giving_way = self.ran.budget, self.ran.giving_way
-        step = giving_way.update(budget.left_bit_s, _VIEWS, now_s, eager=budget.controller.begins)
+        budget, picture_rate_control = self.ran.budget, self.ran.picture_rate_control
+        step = picture_rate_control.update(budget.left_bit_s, _VIEWS, now_s, eager=budget.controller.begins)
         for view in range(_VIEWS):
             self._next_s.setdefault(view, now_s + view * 0.5 / step.rate_hz)
             if budget.waiting_s("video") < _BEHIND_S and self._due(view, 1.0 / step.rate_hz, now_s):
                 size_bytes = int(_FULL_PICTURE_BYTES * step.bytes_share())
-                giving_way.made(size_bytes, step)
+                picture_rate_control.made(size_bytes, step)
                 name = next(self._number).to_bytes(8)
                 self._shown_s[name] = now_s
                 budget.offer("video", name.ljust(size_bytes, b"p"), now_s)

@@ -79,4 +79,4 @@ def test_a_link_that_carries_everything_gets_whole_pictures_at_once() -> None:
 
     late = [age_s for at_s, age_s in ran.pictures if at_s >= 4.0]
     assert sorted(late)[len(late) // 2] <= 0.002
-    assert ran.giving_way.step == (30.0, 75, False)
+    assert ran.picture_rate_control.step == (30.0, 75, False)

@@ -28,7 +28,7 @@ def test_what_is_paced_keeps_to_the_rate_and_arrives_as_it_was(turns: list[tuple
         if stream == "haptics":
             budget.spend(stream, size_bytes, now_s)
         elif stream == "telemetry":
-            budget.may_tell(size_bytes, now_s)
+            budget.may_send_telemetry(size_bytes, now_s)
         else:
             whole = number.to_bytes(4) * (1 + size_bytes // 4)
             offered.add(whole)
@@ -63,7 +63,7 @@ def test_haptics_come_before_telemetry_and_that_before_pictures() -> None:
     told = 0
     for turn in range(400, 800, 20):
         budget.spend("haptics", 9000, 1e-3 * turn)
-        told += budget.may_tell(200, 1e-3 * turn)
+        told += budget.may_send_telemetry(200, 1e-3 * turn)
     # At least five a second keep the screen alive.
     assert told == 2
 

@@ -29,7 +29,7 @@ class Bytes:
         now_s, content = noted
         return now_s, entry(Kind.REPORT, now_s, content)
 
-    def begin_anew(self) -> None:
+    def begin_epoch(self) -> None:
         """Do nothing: no note depends on an earlier one."""
 
 

@@ -13,8 +13,8 @@ from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 
 from common.sockets import robot as robot_sockets
 from common.sockets.admission import EACH_OTHER_PER_TICK, OTHERS_PER_TICK, Admission
-from common.sockets.crowd import Crowd
 from common.sockets.peers import peer_name_of
+from common.sockets.port_connections import PortConnections
 from common.sockets.robot import RobotSockets
 from common.sockets.turns import SILENCE_S, Offered, routing_id
 from tests.helpers.socket_talk import EPHEMERAL
@@ -91,10 +91,10 @@ class Connections(RuleBasedStateMachine):
         return Offered.TAKEN if self.is_open(self.newest[name]) or payload else Offered.GONE
 
     def watch(self) -> None:
-        crowd = self.robot._gates[0].crowd
+        crowd = self.robot._gates[0].connections
         while self.unseen and not self.late:
             event, descriptor = self.unseen.pop(0)
-            crowd.came(descriptor, float(self.second)) if event == "came" else crowd.went(descriptor)
+            crowd.accepted(descriptor, float(self.second)) if event == "came" else crowd.ended(descriptor)
         self.robot._all_seen = not self.unseen
 
     def leave(self, descriptor: int) -> None:
@@ -223,23 +223,23 @@ def test_a_flooding_stranger_takes_nothing_from_the_operator_or_from_other_stran
 
 
 def test_a_crowd_loses_its_oldest_newcomer_and_keeps_introduced_peers() -> None:
-    crowd = Crowd(limit=3, introduced_s=2.0)
+    crowd = PortConnections(limit=3, introduced_s=2.0)
     for descriptor in (0, 1, 2):
-        crowd.came(descriptor, 0.0)
+        crowd.accepted(descriptor, 0.0)
     assert list(crowd.surplus(0.0)) == []
-    crowd.spoke(1)
-    crowd.came(10, 1.9)
+    crowd.introduced(1)
+    crowd.accepted(10, 1.9)
     assert (list(crowd.surplus(1.9)), crowd.hung_up) == ([0], 1)
-    crowd.came(11, 2.1)
+    crowd.accepted(11, 2.1)
     # 2 has been introduced by now, or it would have ended.
     assert list(crowd.surplus(2.1)) == [10]
-    crowd.spoke(11)
-    crowd.came(12, 2.2)
+    crowd.introduced(11)
+    crowd.accepted(12, 2.2)
     assert list(crowd.surplus(2.2)) == [12], "all the others are in"
-    crowd.went(1)
-    crowd.came(1, 2.3)
-    crowd.came(13, 2.4)
+    crowd.ended(1)
+    crowd.accepted(1, 2.3)
+    crowd.accepted(13, 2.4)
     assert list(crowd.surplus(2.4)) == [1], "its number stands for another one"
-    crowd.went(99)
-    crowd.spoke(99)
+    crowd.ended(99)
+    crowd.introduced(99)
     assert list(crowd.surplus(2.4)) == []

@@ -189,7 +189,7 @@ def test_a_peer_back_under_its_name_is_no_stranger(robot: RobotSockets) -> None:
             dealer.connect(robot.control_endpoint)
             dealer.send(b"here")
             assert drain(robot, PATIENT_S) == [b"here"]
-            assert robot._peers.connections[b"same"].descriptor in robot._gates[0].crowd._known
+            assert robot._peers.connections[b"same"].descriptor in robot._gates[0].connections._known
         assert until_descriptors_are(before, robot)
 
 

@@ -27,8 +27,8 @@ from common.sockets.turns import (
     MOST_CONNECTIONS_EACH,
     SILENCE_S,
     Offered,
+    TurnConnection,
     Turns,
-    Way,
     group_of,
     new_group,
     routing_id,
@@ -40,7 +40,7 @@ STIFFNESS = bytes(461)
 
 
 @dataclass(eq=False)
-class Fed(Way):
+class Fed(TurnConnection):
     answer: Offered = Offered.TAKEN
     taken: int = 0
 
@@ -52,19 +52,19 @@ class Fed(Way):
 @given(answers=st.lists(st.sampled_from([Offered.TAKEN, Offered.FULL]), min_size=1, max_size=16))
 def test_connections_take_turns_and_a_full_one_is_passed_over(answers: list[Offered]) -> None:
     turns: Turns[Fed] = Turns(Fed.offered)
-    turns.ways.extend(Fed(answer=answer) for answer in answers)
+    turns.connections.extend(Fed(answer=answer) for answer in answers)
     able = answers.count(Offered.TAKEN)
     assert [turns.send(b"newest", 1.0, everywhere=False) for _ in range(3 * (able or 1))] == [able > 0] * 3 * (
         able or 1
     )
-    assert {way.taken for way in turns.ways if way.answer is Offered.TAKEN} <= {3}
+    assert {way.taken for way in turns.connections if way.answer is Offered.TAKEN} <= {3}
     assert turns.send(b"stop", 1.0, everywhere=True) == (able > 0)
-    assert sum(way.taken for way in turns.ways) == 4 * able
+    assert sum(way.taken for way in turns.connections) == 4 * able
 
 
 def test_a_full_connection_is_tried_again_soon() -> None:
     turns: Turns[Fed] = Turns(Fed.offered)
-    turns.ways.append(only := Fed(answer=Offered.FULL))
+    turns.connections.append(only := Fed(answer=Offered.FULL))
     assert not turns.send(b"newest", 1.0, everywhere=False)
     only.answer = Offered.TAKEN
     assert not turns.send(b"newest", 1.0005, everywhere=False)
@@ -75,7 +75,7 @@ def test_a_silent_connection_gets_a_copy_twice_a_second_and_returns_once_heard()
     """Both ends pass over silent connections: without copies, one that came back late would stay silent on both."""
     turns: Turns[Fed] = Turns(Fed.offered)
     lively, silent = Fed(), Fed()
-    turns.ways.extend((lively, silent))
+    turns.connections.extend((lively, silent))
     for millisecond in range(2000):
         turns.heard(lively, now_s := 10.0 + millisecond / 1e3)
         assert turns.send(b"newest", now_s, everywhere=False)
@@ -91,7 +91,7 @@ def test_a_silent_connection_gets_a_copy_twice_a_second_and_returns_once_heard()
 
 def test_a_long_silent_connection_is_passed_over_until_the_others_are_gone() -> None:
     turns: Turns[Fed] = Turns(Fed.offered)
-    turns.ways.extend([silent := Fed(), heard := Fed()])
+    turns.connections.extend([silent := Fed(), heard := Fed()])
     turns.heard(silent, 1.0)
     turns.heard(heard, 1.0 + SILENCE_S)
     assert all(turns.send(b"newest", 2.0, everywhere=False) for _ in range(4))
@@ -123,7 +123,7 @@ def test_peers_and_their_connections_are_bounded() -> None:
             newest = peers.connection(routing_id(group, index), "a key").peer
     assert len(peers.connections) == 1024
     assert len(peers._peers) == 1024 // MOST_CONNECTIONS_EACH
-    assert len(newest.turns.ways) == MOST_CONNECTIONS_EACH
+    assert len(newest.turns.connections) == MOST_CONNECTIONS_EACH
     assert not newest.turns.send(b"", 0.0, everywhere=True)
     assert peers.get(newest.name) is None, "all that are gone are forgotten"
 
@@ -290,7 +290,7 @@ def test_little_waits_for_a_peer_that_stops_reading_and_others_lose_nothing(
             assert robot.send(owner, b"%d" % number)
             drain_all(operator.receive, operator.wait, [b"%d" % number])
         assert taken + robot.dropped == 2000, "the owner lost nothing"
-        for each in robot._peers.get(observer).turns.ways:  # type: ignore[union-attr]
+        for each in robot._peers.get(observer).turns.connections:  # type: ignore[union-attr]
             assert unsent_bytes(each.descriptor) <= 8 * 1024
         # The receiver's own buffer takes more than twice its size, as the kernel counts it.
         assert taken * len(STIFFNESS) <= 4 * (16 * 1024 + 4 * receive_bytes)
@@ -306,7 +306,7 @@ def test_a_viewer_that_stops_reading_keeps_few_old_pictures_and_others_miss_noth
     with closing(RawConnection.introduced(port_of(robot.view_endpoint), b"SUB", buffer_bytes=4096)) as deaf:
         deaf.send(message(b"\x01video"))
         gate = robot._gates[1]
-        assert any(robot.wait(0.01) or len(gate.crowd._numbers) == 2 for _ in range(ROUNDS) if not robot.receive())
+        assert any(robot.wait(0.01) or len(gate.connections._numbers) == 2 for _ in range(ROUNDS) if not robot.receive())
         operator.receive_view()
         for _ in range(rounds):
             robot.receive()
@@ -317,6 +317,6 @@ def test_a_viewer_that_stops_reading_keeps_few_old_pictures_and_others_miss_noth
                 assert operator.wait(PATIENT_S)
                 seen += [told for told in operator.receive_view() if told[1] != b"probe"]
             assert seen == tick
-        assert max(unsent_bytes(descriptor) for descriptor in gate.crowd._numbers) <= 2 * VIEW_UNSENT_BYTES
+        assert max(unsent_bytes(descriptor) for descriptor in gate.connections._numbers) <= 2 * VIEW_UNSENT_BYTES
         kept = len(deaf.read_all()) / len(picture)
     assert 1 < kept < VIEW_HIGH_WATER_MARK + 3, "the subscription was there, and next to nothing waited"

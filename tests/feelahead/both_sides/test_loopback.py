@@ -177,12 +177,12 @@ def test_a_person_who_is_blind_for_a_moment_lets_go_and_then_goes_on() -> None:
     both = loopback("to_operator: outage 400ms at 3.9s")
     both.run_until(4.08)
     assert not both.device.released
-    assert both.device.told.light is None
+    assert both.device.commanded.light is None
     both.run_until(4.12)
     assert both.device.released
-    assert both.device.told.light == WARNING_LIGHT
+    assert both.device.commanded.light == WARNING_LIGHT
     both.run_until(4.4)
-    assert both.device.told.light == USUAL_LIGHT
+    assert both.device.commanded.light == USUAL_LIGHT
     both.run_until(8.5)
     summary = both.summary()
     assert summary["rendering"]["blind"] == 1

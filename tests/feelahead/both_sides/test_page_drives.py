@@ -8,7 +8,7 @@ import pytest
 from common.status.codes import Doing
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.controller.connection import Connection
-from operator_side.controllers import DEVICES, Given
+from operator_side.controllers import DEVICES, OpeningParts
 from operator_side.settings import OperatorSettings
 from operator_side.viewing.pages.driving_page import DrivingPage
 from robot_side.settings import RobotSettings
@@ -26,7 +26,7 @@ def run_of(does: Does, device: Any = "browser", link: str = "", *, permit_tuning
     pages = DrivingPage(may_drive=device != "hid")
     page = TalkingPage(pages)
     run = Loopback(LoopbackSettings(RobotSettings(link=link, permit_tuning=permit_tuning), operator), pages=pages)
-    opening = DEVICES[operator.device](Given(operator, run.operator, pages))
+    opening = DEVICES[operator.device](OpeningParts(operator, run.operator, pages))
     assert opening.hands is not None
     run.connection = Connection(opening.search, run.operator)
     run.person = AtThePage(page, opening.hands, does)

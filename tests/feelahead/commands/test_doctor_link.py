@@ -22,7 +22,7 @@ from common.sockets.greeting import KNOCK
 from common.sockets.keys import KeyFolder
 from common.sockets.operator import OperatorSockets
 from feelahead.commands.doctor import link, port
-from feelahead.commands.doctor.port import Opening, Way, WayError, judge_port, judge_view
+from feelahead.commands.doctor.port import Opening, PathError, RobotAddress, judge_port, judge_view
 from feelahead.main import command
 from tests.helpers.serving_robot import ServingRobot
 
@@ -34,8 +34,8 @@ def greeting(mechanism: bytes) -> Opening:
 
 
 PLAIN, CURVE = greeting(b"NULL"), greeting(b"CURVE")
-WAY = Way.to("tcp://robot:5555")
-WITH_KEYS = Way(WAY.control, WAY.view, OperatorKeys("ab" * 32, "cd" * 32))
+WAY = RobotAddress.to("tcp://robot:5555")
+WITH_KEYS = RobotAddress(WAY.control, WAY.view, OperatorKeys("ab" * 32, "cd" * 32))
 
 
 @pytest.mark.parametrize(
@@ -53,12 +53,12 @@ WITH_KEYS = Way(WAY.control, WAY.view, OperatorKeys("ab" * 32, "cd" * 32))
         (WITH_KEYS, PLAIN, "keys", "runs without keys", "leave --keys out"),
     ],
 )
-def test_what_is_wrong_with_a_port(way: Way, opening: Opening, wrong: str, said: str, remedy: str) -> None:
-    with pytest.raises(WayError, match=re.escape(said)) as raised:
+def test_what_is_wrong_with_a_port(way: RobotAddress, opening: Opening, wrong: str, said: str, remedy: str) -> None:
+    with pytest.raises(PathError, match=re.escape(said)) as raised:
         judge_port(way, way.control, opening)
     assert (raised.value.wrong, "\n" in str(raised.value)) == (wrong, False)
     assert remedy in raised.value.remedy
-    with pytest.raises(WayError, match=re.escape(said.replace("5555", "5556"))) as raised:
+    with pytest.raises(PathError, match=re.escape(said.replace("5555", "5556"))) as raised:
         judge_view(way, opening)
     assert raised.value.wrong == "view port"
     assert "--view-connect" in raised.value.remedy
@@ -68,7 +68,7 @@ def test_what_is_wrong_with_a_port(way: Way, opening: Opening, wrong: str, said:
 def test_a_robot_side_is_as_it_should_be_and_a_closed_port_of_this_machine_has_another_remedy() -> None:
     judge_port(WAY, WAY.control, PLAIN)
     judge_view(WITH_KEYS, CURVE)
-    with pytest.raises(WayError, match="--connect tcp://ROBOT:5555"):
+    with pytest.raises(PathError, match="--connect tcp://ROBOT:5555"):
         judge_port(WAY, WAY.control, Opening(errno.ECONNREFUSED), loopback=True)
 
 

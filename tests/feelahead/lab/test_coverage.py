@@ -10,17 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from feelahead.lab.approaches.approach import Approach, PullRun
-from feelahead.lab.approaches.evaluation import LINKS, Placed, Pulls, draws_needed, evaluate, interval
+from feelahead.lab.approaches.evaluation import LINKS, Placement, Pulls, draws_needed, evaluate, interval
 from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from feelahead.lab.approaches.judging import (
     false_alarms,
     statistical_distance_m,
-    stood,
+    strength_before_release,
     zone_speed_m_s,
 )
 from feelahead.lab.approaches.laws import Law
-from feelahead.lab.approaches.meeting import first_touch_s, last_release_s
+from feelahead.lab.approaches.placements import first_touch_s, last_release_s
 from feelahead.lab.approaches.pulls import PullKind, make_pull
 from feelahead.lab.approaches.recording import RecordedApproach, record_approach
 from feelahead.lab.approaches.replay import Replay, coasting_s
@@ -49,7 +49,7 @@ def staged(
 ) -> tuple[Replay, PosedScene, Draw]:
     scene = load_scene(frozen_scene(scene_name), SITE)
     posed, replay = PosedScene(scene), Replay(recorded(link, pull), scene, EncoderSettings(), SEED)
-    posed.put(replay.record.joint_positions_rad[0], replay.record.finger_positions[0], ahead_m * replay.axis)
+    posed.set_pose(replay.record.joint_positions_rad[0], replay.record.finger_positions[0], ahead_m * replay.axis)
     errors_m = np.zeros((len(scene.objects), 3))
     return replay, posed, Draw(replay, posed.perceived(errors_m), 0.003)
 
@@ -110,7 +110,7 @@ def test_moving_objects_are_touched_where_they_are_by_then(speed_m_s: float) -> 
 
 def strength(law: Law, link: str = "0 ms", ahead_m: float = 0.0) -> int:
     draw, _, last_s = approaching(link, ahead_m)
-    return stood(Judged(law, 0.99), draw, last_s)
+    return strength_before_release(Judged(law, 0.99), draw, last_s)
 
 
 @pytest.mark.parametrize(("link", "ahead_m"), [("0 ms", 0.0), ("200 ms", -0.15)])
@@ -200,7 +200,7 @@ def test_intervals_are_over_approaches() -> None:
 
 
 def judged(*laws: Law) -> list[Row]:
-    both = (Placed("wall"), Placed("wall_beside"))
+    both = (Placement("wall"), Placement("wall_beside"))
     return list(evaluate(Pulls("bell", "200 ms", "empty", both, (1, 2), (0.5,), laws), 1))
 
 
@@ -229,7 +229,7 @@ def test_strengths_on_the_other_trigger_show(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_placements_whose_stick_moves_after_judgement_are_counted_apart() -> None:
-    (row,) = evaluate(Pulls("drift", "200 ms", "empty", (Placed("rod_5mm"),), (1, 8), (0.5,), ("full",)), 0)
+    (row,) = evaluate(Pulls("drift", "200 ms", "empty", (Placement("rod_5mm"),), (1, 8), (0.5,), ("full",)), 0)
     assert (row["places"], row["unavoidable"], row["unknowable"], row["coverage"]) == (8, 0, 1, 1.0)
     # The same number of draws in each other placement, 20 or more in all.
     assert row["draws"] == 3 * 7

@@ -117,9 +117,9 @@ def recorded(travels: FloatArray, there_ms: int, back_ms: int, quantile_s: float
     # A command sent at s is followed from s + there_ms on; a speed changes in the milliseconds after that.
     newest = (np.arange(len(ticks)) - there_ms) // 4
     followed = np.where(newest >= 0, sent_s[np.clip(newest, 0, None)], np.nan)
-    way_m, speed, ways_m, speeds = 0.0, 0.0, [], []
+    way_m, speed, onsets_m, speeds = 0.0, 0.0, [], []
     for index in newest:
-        ways_m.append(way_m)
+        onsets_m.append(way_m)
         speeds.append(speed)
         target = FULL_M_S * travels[index] if index >= 0 else 0.0
         most = LIMITS.acceleration_rad_s2 * TICK_S
@@ -132,7 +132,7 @@ def recorded(travels: FloatArray, there_ms: int, back_ms: int, quantile_s: float
         seed=0,
         began_s=BEGAN_S,
         pose_time_s=ticks[poses],
-        joint_positions_rad=np.array(ways_m)[poses, None],
+        joint_positions_rad=np.array(onsets_m)[poses, None],
         joint_velocities_rad_s=np.array(speeds)[poses, None],
         finger_positions=np.zeros((count, 0)),
         loop_age_s=np.full(count, quantile_s),
@@ -163,7 +163,7 @@ def test_the_commands_under_way_predict_an_obedient_arm(there_ms: int, back_ms: 
     # An arm of infinite acceleration would be v²/2a = 3.9 mm off.
     assert greatest_m(judge(recorded(lets_go, there_ms, back_ms), pose_at, LIMITS, FULL_M_S), "operator") < 0.6e-3
     judged = judge(recorded(bells(), there_ms, back_ms), pose_at, LIMITS, FULL_M_S)
-    assert len(judged["way_m"]) > 300
+    assert len(judged["displacement_m"]) > 300
     assert all(judged["within_reach"])
     # Poses are 10 ms apart, and speeds between them are interpolated: hence the error.
     assert greatest_m(judged, "operator") < 0.15e-3
@@ -179,7 +179,7 @@ def test_a_constant_speed_is_speed_times_the_delay_and_a_quantile_of_it_too_far(
     record = recorded(np.full(1500, 0.8), 100, 100, quantile_s=0.25)
     judged, at, speed_m_s = judge(record, pose_at, LIMITS, FULL_M_S), moments(record), 0.8 * FULL_M_S
     np.testing.assert_allclose(at.arrives_s - at.reported_s, 0.2, atol=1e-9)
-    np.testing.assert_allclose(judged["way_m"], speed_m_s * 0.2, atol=1e-9)
+    np.testing.assert_allclose(judged["displacement_m"], speed_m_s * 0.2, atol=1e-9)
     np.testing.assert_allclose(judged["robot"], speed_m_s * (0.2 - 0.25), atol=1e-9)
     # The age of the newest command known to the report includes up to a period for which it was held.
     np.testing.assert_allclose(judged["momentary"], -speed_m_s * at.echo_held_s, atol=1e-9)
@@ -192,7 +192,7 @@ def test_ways_are_along_the_axis_at_their_beginning_and_reach_has_an_edge() -> N
         pose = pose_at(joints)
         return replace(pose, tool_rotation=np.array([[1.0, 0.0, 0.6], [0.0, 1.0, 0.8], [0.0, 0.0, 0.0]]))
 
-    way_m = ToolPath(record, oblique, LIMITS, FULL_M_S).ways_m(np.array([3.0]), np.array([3.4]))
+    way_m = ToolPath(record, oblique, LIMITS, FULL_M_S).onsets_m(np.array([3.0]), np.array([3.4]))
     assert way_m[0] == pytest.approx(0.6 * 0.4 * FULL_M_S)
 
     def far(joints: FloatArray) -> GripperPose:

@@ -14,7 +14,7 @@ from feelahead.lab import cover
 from feelahead.lab.approaches.frozen import frozen_hash
 from feelahead.lab.approaches.ticks import DEMO, record, with_cover
 from feelahead.lab.cover import STANDS_OUT, Gripper
-from feelahead.lab.field import way_name
+from feelahead.lab.field import strength_column
 from feelahead.lab.questions.felt import Run, run
 from feelahead.lab.table import Table
 from feelahead.lab.variants import COVER_M, COVERS_M, WAYS, Replayed, errors_mm, replay
@@ -52,10 +52,10 @@ def test_recorded_ticks_go_through_the_law_with_other_covers() -> None:
     own, coarse = replay(recorded, (COVER_M, 0.008), 1)
     assert own.looks_per_s == pytest.approx(200.0, rel=0.02)
     assert (own.spheres, coarse.spheres) == (246, 52)
-    felt = own.ways_m[:, 0] < own.horizon_m
+    felt = own.onsets_m[:, 0] < own.horizon_m
     assert felt.sum() > 100
     # Coarser spheres stand out farther.
-    assert 1e-4 < np.abs(coarse.ways_m - own.ways_m)[felt, 0].max() < 0.01
+    assert 1e-4 < np.abs(coarse.onsets_m - own.onsets_m)[felt, 0].max() < 0.01
     assert (own.took_us > 0.0).all()
     rows = list(run(Run("place_held", 0.6, times=1), 0))
     assert [row["cover_mm"] for row in rows] == [1e3 * cover_m for cover_m in COVERS_M]
@@ -63,16 +63,16 @@ def test_recorded_ticks_go_through_the_law_with_other_covers() -> None:
 
 
 @pytest.mark.long
-def test_ways_are_a_table_goals_and_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_onset_distances_are_a_table_goals_and_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     written = tmp_path / "out.csv"
-    assert feelahead.main.command(["bench", "felt", "--ways", "--quick", f"--csv={written}"]) == 0
+    assert feelahead.main.command(["bench", "felt", "--definition", "--quick", f"--csv={written}"]) == 0
     shown = " ".join(capsys.readouterr().out.split())
-    assert "met ways later than 0.1 mm: 0" in shown
-    assert "met ways of grazes out of their band: 0" in shown
+    assert "met onset distances later than 0.1 mm: 0" in shown
+    assert "met onset distances of grazes out of their band: 0" in shown
     with written.open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["scene"] for row in rows] == [DEMO, "mug"]
-    assert all(int(row["ways"]) > 100 for row in rows)
+    assert all(int(row["distances"]) > 100 for row in rows)
 
 
 def test_the_cover_of_a_gripper_is_a_row_for_each_part_and_a_picture(
@@ -126,7 +126,9 @@ def test_strengths_begin_as_far_before_each_thing_however_far_it_is(
         assert scene in ("wall", "rod_5mm")
         assert rows.values("free_mm") == [0.0, 50.0, 100.0, 150.0]
         far = rows.rows[1:]
-        before_mm = np.array([[row["free_mm"] - row[way_name(strength)] for strength in range(1, 9)] for row in far])
+        before_mm = np.array(
+            [[row["free_mm"] - row[strength_column(strength)] for strength in range(1, 9)] for row in far]
+        )
         np.testing.assert_allclose(before_mm, np.broadcast_to(before_mm[0], before_mm.shape), atol=0.1)
         assert (np.diff(before_mm, axis=1) <= 0.0).all()
         # The eighth at D_σ and the spheres' stand-out, or a little earlier, as strengths are rounded; the first before.

@@ -58,7 +58,7 @@ def test_the_recorded_pose_moves_on_through_the_wall() -> None:
     posed = PosedScene(scene)
     gaps_m = []
     for positions, fingers in zip(one.joint_positions_rad, one.finger_positions, strict=True):
-        posed.put(positions, fingers, np.zeros(3))
+        posed.set_pose(positions, fingers, np.zeros(3))
         gaps_m.append(posed.gap_m())
     resting = one.pose_time_s < one.began_s + DELAY_S
     np.testing.assert_allclose(np.array(gaps_m)[resting], 0.32, atol=1e-3)

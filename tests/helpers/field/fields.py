@@ -7,10 +7,10 @@ import pytest
 
 from common.arrays import FloatArray, IntArray
 from common.roles import Role
-from feelahead.lab.reference.ways_by_definition import Judged, defined_ways
+from feelahead.lab.reference.onsets_by_definition import Judged, defined_onsets
 from robot_side.arm.port import GripperPose
 from robot_side.field.field import Ahead, Along, Field
-from robot_side.field.object_class import OBSTACLE, PASSED_OVER, TARGET
+from robot_side.field.object_class import OBSTACLE, SKIPPED, TARGET
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import scene_table
 from tests.helpers.gripper_poses import free_pose
@@ -21,7 +21,7 @@ RADIUS_M = 0.008
 """Radius of a fingertip's sphere."""
 EQUAL_M = 1e-4
 """Tolerance of contact distances."""
-CLASSES = {Role.TARGET: TARGET, Role.IGNORED: PASSED_OVER}
+CLASSES = {Role.TARGET: TARGET, Role.IGNORED: SKIPPED}
 
 
 def ball_pose(radius_m: float = RADIUS_M, **placed: Any) -> GripperPose:
@@ -70,6 +70,6 @@ def judged(pose: GripperPose, objects: PerceivedObjects, ahead: Along, **how: An
     looking: Ahead = how.setdefault("by", Ahead(np.zeros(pose.tool_jacobian.shape[1])))
     found = look(pose, objects, ahead, **how)
     classes, widest_m = _classes(objects, how.get("classes")), how.get("widest_m", np.inf)
-    defined = defined_ways(pose, objects, classes, ahead, widest_m, looking.encoder_sigma_rad)
+    defined = defined_onsets(pose, objects, classes, ahead, widest_m, looking.encoder_sigma_rad)
     assert found.sigma_m == pytest.approx(defined.sigma_m, abs=1e-12)
-    return defined.judge(found.ways_m, ahead.reach_m)
+    return defined.judge(found.onsets_m, ahead.reach_m)

@@ -6,7 +6,7 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import NUMBER, compiled, input_array
+from robot_side.compiled.kernel import FLOAT64, compiled, input_array
 from robot_side.compiled.vectors import load
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_columns import SCENE, contact_with
@@ -25,7 +25,7 @@ def first_contact_m(
     return found if found <= reach_m else math.inf
 
 
-@compiled(input_array(2), NUMBER, NUMBER, BUNDLE, returns=NUMBER)
+@compiled(input_array(2), FLOAT64, FLOAT64, BUNDLE, returns=FLOAT64)
 def _first_contact(from_and_along: FloatArray, radius: float, reach: float, bundle: IntArray) -> float:
     start, along = load(from_and_along, 0), load(from_and_along, 1)
     found, _ = contact_with(_scene_at(bundle), 0, start, along, radius, reach, False)

@@ -6,7 +6,7 @@ from common.arrays import FloatArray, IntArray
 from robot_side.arm.ability import JointLimits
 from robot_side.arm.port import GripperPose
 from robot_side.compiled.columns import BUNDLE
-from robot_side.compiled.kernel import COUNT, NUMBER, TRUTH, compiled, input_array, output_array
+from robot_side.compiled.kernel import BOOL, FLOAT64, INT64, compiled, input_array, output_array
 from robot_side.compiled.vectors import load
 from robot_side.laws import felt, fingers, path, recent_looks
 from robot_side.laws.memory import Memory, memory_at
@@ -31,7 +31,7 @@ def moved(
 def moments(kept: Memory, pose: GripperPose, until_s: float, ahead_m: float = 0.0) -> tuple[float, ...]:
     """Return the moments after which to look from the gripper's future place."""
     _plan(kept.bundle, pose.tool_position_m, pose.tool_rotation, pose.sphere_centers_m, until_s, ahead_m)
-    return tuple(kept.moments_s[: kept.state["moments"][0]].tolist())
+    return tuple(kept.moments_s[: kept.state["even_places"][0]].tolist())
 
 
 def farthest_m_s(kept: Memory, pose: GripperPose, ahead_m: float) -> float:
@@ -46,7 +46,7 @@ def fingers_m_s(kept: Memory, pose: GripperPose, now_s: float, *, changed: bool 
     return kept.own_m_s.copy()
 
 
-@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), NUMBER, NUMBER)
+@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), FLOAT64, FLOAT64)
 def _move(
     bundle: IntArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray, after: float, ahead: float
 ) -> None:
@@ -54,7 +54,7 @@ def _move(
     path.move(bundle, load(tool.reshape(1, 3), 0), rotation, centers, *velocity, after, ahead)
 
 
-@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), NUMBER, NUMBER)
+@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), FLOAT64, FLOAT64)
 def _plan(
     bundle: IntArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray, until: float, ahead: float
 ) -> None:
@@ -62,30 +62,30 @@ def _plan(
     path.plan_places(bundle, centers, load(tool.reshape(1, 3), 0), approach, until, ahead)
 
 
-@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), NUMBER, returns=NUMBER)
+@compiled(BUNDLE, input_array(1), input_array(2), input_array(2), FLOAT64, returns=FLOAT64)
 def _farthest(bundle: IntArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray, ahead: float) -> float:
     farther = ahead * rotation[0, 2], ahead * rotation[1, 2], ahead * rotation[2, 2]
     return path.fastest_m_s(bundle, centers, load(tool.reshape(1, 3), 0), farther)
 
 
-@compiled(BUNDLE, input_array(2), input_array(1), input_array(2), NUMBER, TRUTH)
+@compiled(BUNDLE, input_array(2), input_array(1), input_array(2), FLOAT64, BOOL)
 def _measure(
     bundle: IntArray, centers: FloatArray, tool: FloatArray, rotation: FloatArray, now: float, changed: bool
 ) -> None:
     fingers.measure_fingers(bundle, centers, load(tool.reshape(1, 3), 0), rotation, now, changed)
 
 
-@compiled(BUNDLE, COUNT, COUNT)
+@compiled(BUNDLE, INT64, INT64)
 def look_from(bundle: IntArray, side: int, places: int) -> None:
     recent_looks.look_from(bundle, side, places)
 
 
-@compiled(BUNDLE, COUNT, COUNT, NUMBER, input_array(1), input_array(2))
+@compiled(BUNDLE, INT64, INT64, FLOAT64, input_array(1), input_array(2))
 def keep(bundle: IntArray, side: int, place: int, now: float, tool: FloatArray, ways: FloatArray) -> None:
     recent_looks.keep(bundle, side, place, now, load(tool.reshape(1, 3), 0), ways)
 
 
-@compiled(BUNDLE, input_array(2), NUMBER, TRUTH, NUMBER, output_array(1))
+@compiled(BUNDLE, input_array(2), FLOAT64, BOOL, FLOAT64, output_array(1))
 def feel(
     bundle: IntArray, where: FloatArray, loop_age: float, is_known: bool, deflection: float, numbers: FloatArray
 ) -> None:

@@ -24,7 +24,7 @@ _COMMAND = (
 
 def test_the_driver_takes_it_its_hands_move_and_it_says_what_it_is_told(tmp_path: Path) -> None:
     transport = Transport.BLUETOOTH
-    told = UhidIdentity(transport, Model.DUALSENSE, SIMULATED_ADDRESS)
+    commanded = UhidIdentity(transport, Model.DUALSENSE, SIMULATED_ADDRESS)
     command = [sys.executable, "-P", "-c", _COMMAND, "--transport", transport.value.lower(), "--hands", "pulling"]
     said = tmp_path / "said"
 
@@ -34,9 +34,9 @@ def test_the_driver_takes_it_its_hands_move_and_it_says_what_it_is_told(tmp_path
     with said.open("w") as output, subprocess.Popen(command, stdout=output, stderr=output) as process:
         try:
             wait_until("a driver takes it", lambda: "a driver has taken it" in lines(), _START_S, instead=lines)
-            view = wait_until("the kernel shows it", lambda: seen_device(told))
+            view = wait_until("the kernel shows it", lambda: seen_device(commanded))
             wait_until("three input devices", lambda: len(view.inputs()) == 3)
-            with InputDevice(view.inputs()[told.name]) as device:
+            with InputDevice(view.inputs()[commanded.name]) as device:
                 wait_until("R2 is pulled", lambda: device.axes(ABS_RZ)[0] > 200)
                 wait_until("R2 is free, and the stick is left", lambda: device.axes(ABS_RZ)[0] == 0 and _left(device))
             hidraw = view.hidraw()
@@ -47,7 +47,7 @@ def test_the_driver_takes_it_its_hands_move_and_it_says_what_it_is_told(tmp_path
             process.send_signal(signal.SIGTERM)
             assert process.wait(30.0) == 0
             assert lines()[-1].startswith("unplugged: ")
-            wait_until("it is gone", lambda: seen_device(told) is None)
+            wait_until("it is gone", lambda: seen_device(commanded) is None)
         finally:
             process.kill()
 

@@ -52,7 +52,7 @@ def test_hid_playstation_takes_it(plugged: Plugged) -> None:
     assert counts.features >= 3
     assert counts.outputs >= 1, "the driver has not set the lights"
     assert counts.refused == 0
-    assert plugged.ask(lambda controller: controller.told.light) is not None
+    assert plugged.ask(lambda controller: controller.commanded.light) is not None
 
 
 def test_the_kernel_sees_the_hands(plugged: Plugged) -> None:

@@ -9,7 +9,7 @@ from common.status.codes import ConnectionState
 from operator_side.controller.connection import (
     BEAT_PERIOD_S,
     LOOK_PERIOD_S,
-    RETELL_AFTER_S,
+    REWRITE_AFTER_S,
     Connection,
 )
 from operator_side.controller.feel import Feel
@@ -169,7 +169,7 @@ def test_after_a_silence_the_triggers_are_told_anew(world: World) -> None:
     world.connection.write(STIFF, world.now_s)
     world.run(1.0)
     world.log.clear()
-    world.now_s += RETELL_AFTER_S
+    world.now_s += REWRITE_AFTER_S
     world.run(PERIOD_S)
     assert world.log == ["beat", "found"]
     assert world.connection.found == 1

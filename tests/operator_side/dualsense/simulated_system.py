@@ -176,7 +176,9 @@ class VirtualWatchdog(ReleaseGuard):
         self._deadline_s: float | None = None
 
     def hold(self, path: bytes, release: bytes) -> None:
-        self._holds, self._deadline_s = (self._system.devices[path], release), None
+        # A controller that was found may be unplugged before it is held.
+        device = self._system.devices.get(path)
+        self._holds, self._deadline_s = None if device is None else (device, release), None
 
     def let_go(self) -> None:
         self._holds = self._deadline_s = None

@@ -179,22 +179,22 @@ def test_it_is_released_when_everything_that_was_written_is_off() -> None:
 
 @TRANSPORTS
 @pytest.mark.parametrize(
-    ("told", "farewell"),
+    ("commanded", "farewell"),
     [
         ([], []),
         ([STIFF], [RELEASED]),
         ([Feel(light=WARNING_LIGHT), STIFF], [Feel(FREE_TRIGGER, FREE_TRIGGER, Rumble(), USUAL_LIGHT)]),
     ],
 )
-def test_close_undoes_what_was_written(transport: Transport, told: list[Feel], farewell: list[Feel]) -> None:
+def test_close_undoes_what_was_written(transport: Transport, commanded: list[Feel], farewell: list[Feel]) -> None:
     handle = FakeHandle(transport)
     device = open_fake(handle)
     device.read(0.0)
-    for output in told:
+    for output in commanded:
         device.write(output, 0.0)
     device.close()
     device.close()
-    assert [parse_output_report(report) for report in handle.written] == told + farewell
+    assert [parse_output_report(report) for report in handle.written] == commanded + farewell
     assert handle.closed == handle.times_opened > 0
     assert device.released
     with pytest.raises(DeviceError, match="closed"):

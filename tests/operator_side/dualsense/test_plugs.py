@@ -77,8 +77,8 @@ class Plugs(RuleBasedStateMachine):
         self.armed = self.armed and now_s - self.commanded_s < 0.1
         session = SessionState.ARMED if self.armed else SessionState.DISARMED
         notice = LeaseNotice(self.robot.stamp(now_s), session=session, why="", token=7, waiting=0)
-        told = felt(self.robot.stamp(now_s), r2=self.strength, state="armed" if self.armed else "disarmed")
-        for message in (notice, told):
+        commanded = felt(self.robot.stamp(now_s), r2=self.strength, state="armed" if self.armed else "disarmed")
+        for message in (notice, commanded):
             self.core.receive(encode(message), now_s)
         self.must_stop = self.must_stop and self.armed
         self.connection.beat(now_s)
@@ -108,11 +108,11 @@ class Plugs(RuleBasedStateMachine):
         controller = self.connection.controller
         connected = None if controller is None else controller.path
         if connected is not None and connected in self.system.devices and not self.must_release:
-            device, told = self.system.devices[connected], self.core.haptics.written
+            device, commanded = self.system.devices[connected], self.core.haptics.written
             writes = controller.device if controller is not None else None
             assert isinstance(writes, StallingWrites)
             if not writes.waits_since(self.now_s):
-                assert device.strengths == (told.l2, told.r2), "it does not do what the core believes"
+                assert device.strengths == (commanded.l2, commanded.r2), "it does not do what the core believes"
             elif writes.waits_since(self.now_s) > STALL_S + SILENCE_S + 0.1 and self.system.failing == 0:
                 assert device.released, "stiff while a write hangs"
         left_stiff = [path for path, one in self.system.devices.items() if not one.released and path != connected]

@@ -165,7 +165,7 @@ def test_output_reports_change_only_what_they_set(transport: Transport) -> None:
             assert device.strengths == (l2, r2)
             assert device.rumble == Rumble(1.0, 0.2)
             assert device.released is (l2 == r2 == FREE_TRIGGER)
-    assert by_wire.told == by_value.told == Feel(FREE_TRIGGER, FREE_TRIGGER, Rumble(1.0, 0.2), (1, 2, 3))
+    assert by_wire.commanded == by_value.commanded == Feel(FREE_TRIGGER, FREE_TRIGGER, Rumble(1.0, 0.2), (1, 2, 3))
 
 
 @TRANSPORTS
@@ -192,7 +192,7 @@ def test_close_releases_puts_a_changed_light_back_and_ends() -> None:
     device.write(Feel(feedback(0, 8), feedback(0, 8), Rumble(1.0, 1.0), WARNING_LIGHT), 0.0)
     device.close()
     device.close()
-    assert device.told == Feel(FREE_TRIGGER, FREE_TRIGGER, Rumble(), USUAL_LIGHT)
+    assert device.commanded == Feel(FREE_TRIGGER, FREE_TRIGGER, Rumble(), USUAL_LIGHT)
     assert device.released
     with pytest.raises(DeviceError, match="closed"):
         device.read(0.1)

@@ -46,15 +46,18 @@ def displacement(
 
 def stepped(travels: list[float], now_s: float, since_s: float, speed_m_s: float, acceleration: float) -> Displacement:
     """Compute the same by time steps, none across a command; command i holds from i periods on."""
-    way_m, commands = 0.0, [index * PERIOD_S for index in range(len(travels)) if since_s < index * PERIOD_S < now_s]
+    displacement_m, commands = (
+        0.0,
+        [index * PERIOD_S for index in range(len(travels)) if since_s < index * PERIOD_S < now_s],
+    )
     for began_s, ended_s in itertools.pairwise([since_s, *commands, now_s]):
         target = FULL_M_S * travels[min(int((began_s + ended_s) / 2.0 / PERIOD_S), len(travels) - 1)]
         step_s = (ended_s - began_s) / STEPS
         for _ in range(STEPS):
             after = speed_m_s + min(max(target - speed_m_s, -acceleration * step_s), acceleration * step_s)
-            way_m += 0.5 * (speed_m_s + after) * step_s
+            displacement_m += 0.5 * (speed_m_s + after) * step_s
             speed_m_s = after
-    return Displacement(way_m, speed_m_s)
+    return Displacement(displacement_m, speed_m_s)
 
 
 @given(COMMANDS, SPEED)
@@ -77,7 +80,7 @@ def test_it_is_what_a_fine_stepping_of_time_gives(
     now_s = (len(travels) - 1) * PERIOD_S + 0.01
     found = displacement(sent_every(travels), now_s, echo_s, held_s, speed, acceleration)
     reference = stepped(travels, now_s, echo_s + held_s, speed, acceleration)
-    assert found.way_m == pytest.approx(reference.way_m, abs=2e-6)
+    assert found.displacement_m == pytest.approx(reference.displacement_m, abs=2e-6)
     assert found.speed_m_s == pytest.approx(reference.speed_m_s, abs=2e-3)
 
 
@@ -106,7 +109,7 @@ def test_a_course_beside_a_stick_that_costs_no_time_goes_the_same_way(
     course = commands.course(now_s, report, np.array([[FULL_M_S / acceleration, 0.0, 0.0, 0.0, 0.0]]))
     assert expected is not None
     assert course is not None
-    assert course.ways_m[-1] == pytest.approx(expected.way_m, abs=5e-4)
+    assert course.displacements_m[-1] == pytest.approx(expected.displacement_m, abs=5e-4)
 
 
 def test_a_command_that_had_not_come_when_it_should_have_is_still_under_way() -> None:
@@ -115,10 +118,10 @@ def test_a_command_that_had_not_come_when_it_should_have_is_still_under_way() ->
     speed = 0.25
     late = displacement(commands, 0.1, 0.0, 0.030, speed)
     assert late == displacement(commands, 0.1, 0.0, 0.004, speed)
-    assert late.way_m == pytest.approx(speed**2 / (2.0 * 3.0))
+    assert late.displacement_m == pytest.approx(speed**2 / (2.0 * 3.0))
     # Without another command after it, `held` is taken as it is.
     alone = sent_every([1.0])
-    assert displacement(alone, 0.1, 0.0, 0.030, speed).way_m == pytest.approx(0.07 * speed)
+    assert displacement(alone, 0.1, 0.0, 0.030, speed).displacement_m == pytest.approx(0.07 * speed)
 
 
 @pytest.mark.parametrize(

@@ -18,11 +18,11 @@ from operator_side.controller.feel import ZONE_COUNT
 from operator_side.feel.blindness import Blindness
 from operator_side.feel.commands_under_way import AT_REST, CommandsUnderWay, Course, Report, Sticks
 from operator_side.feel.haptics import MAP_EXPIRES_S, Haptics
-from operator_side.feel.path_ahead import Aside, _ahead, free_ways_m, traced_zones
+from operator_side.feel.path_ahead import CourseOnMap, _ahead, contact_distances_m, traced_zones
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.feel.zones import zone_travels
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
-from tests.helpers.felt import ways
+from tests.helpers.felt import onsets
 
 FULL_S = 0.8
 FIELD = uniform_field(0)
@@ -38,10 +38,10 @@ HORIZON_M = 0.4
 
 def around(near: dict[int, float], *, advancing: bool = True) -> Around:
     """Return a map with nothing within reach, except from these probes."""
-    ways_m = np.full((LISTS, PROBES), np.inf)
-    for probe, way_m in near.items():
-        ways_m[slice(0, 2) if advancing else slice(2, 4), probe] = way_m
-    return Around.of(FULL_S, ways_m, CHANGES_S)
+    onsets_m = np.full((LISTS, PROBES), np.inf)
+    for probe, displacement_m in near.items():
+        onsets_m[slice(0, 2) if advancing else slice(2, 4), probe] = displacement_m
+    return Around.of(FULL_S, onsets_m, CHANGES_S)
 
 
 def under_way(now_s: float, sticks: Sticks, travel: float = 0.0, since_s: float = 0.0) -> CommandsUnderWay:
@@ -53,12 +53,14 @@ def under_way(now_s: float, sticks: Sticks, travel: float = 0.0, since_s: float 
     return commands
 
 
-def first_zone(told: Around, sticks: Sticks, *, now_s: float = 0.4, travel: float = 0.0, forth: bool = True) -> int:
+def first_zone(
+    commanded: Around, sticks: Sticks, *, now_s: float = 0.4, travel: float = 0.0, forth: bool = True
+) -> int:
     commands = under_way(now_s, sticks, travel)
     course = commands.course(now_s, REPORT, CHANGES_S)
     if course is None:
         return ZONE_COUNT
-    aside = Aside(told, HORIZON_M, course, commands.sticks_at(now_s))
+    aside = CourseOnMap(commanded, HORIZON_M, course, commands.sticks_at(now_s))
     strengths = traced_zones(aside, FIELD, TRAVELS, 0.0, HORIZON_S, forth=forth).strengths
     return sum(strength < 8 for strength in strengths)
 
@@ -74,59 +76,59 @@ def test_sticks_that_rest_are_not_traced() -> None:
 @pytest.mark.parametrize("forth", [True, False])
 def test_what_stands_where_the_stick_leads_makes_the_zones_full_that_get_so_far(forth: bool) -> None:
     """Within 0.4 s of commands under way and what follows, the stick leads past two thirds and on to the end."""
-    told = around(dict.fromkeys(RIGHT_ACROSS, 0.03), advancing=forth)
-    found = first_zone(told, RIGHT, forth=forth)
+    commanded = around(dict.fromkeys(RIGHT_ACROSS, 0.03), advancing=forth)
+    found = first_zone(commanded, RIGHT, forth=forth)
     assert 0 < found < ZONE_COUNT
     # The last zone gets less far, this one farther: u h + u²/2a, from rest less what the start takes.
     for zone, reaches in ((found - 1, False), (found, True)):
         u = TRAVELS[zone] * FIELD.full_speed_m_s
         assert (u * HORIZON_S >= 0.03) is reaches
     for elsewhere in ((-1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0)):
-        assert first_zone(told, elsewhere, forth=forth) == ZONE_COUNT
-    assert first_zone(told, RIGHT, forth=not forth) == ZONE_COUNT
+        assert first_zone(commanded, elsewhere, forth=forth) == ZONE_COUNT
+    assert first_zone(commanded, RIGHT, forth=not forth) == ZONE_COUNT
 
 
 def test_it_does_not_count_that_the_stick_does_not_reach() -> None:
-    told = around({RIGHT_ACROSS[2]: 0.0})
-    assert first_zone(told, RIGHT, now_s=0.0) == ZONE_COUNT
-    assert first_zone(told, RIGHT, now_s=0.5) < ZONE_COUNT
+    commanded = around({RIGHT_ACROSS[2]: 0.0})
+    assert first_zone(commanded, RIGHT, now_s=0.0) == ZONE_COUNT
+    assert first_zone(commanded, RIGHT, now_s=0.5) < ZONE_COUNT
     slowly = (0.3, 0.0, 0.0, 0.0)
-    assert first_zone(told, slowly, now_s=0.5) == ZONE_COUNT
+    assert first_zone(commanded, slowly, now_s=0.5) == ZONE_COUNT
 
 
 def test_what_is_under_way_along_the_trigger_counts() -> None:
-    told = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.09))
-    assert first_zone(told, RIGHT, travel=0.0) > first_zone(told, RIGHT, travel=1.0)
+    commanded = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.09))
+    assert first_zone(commanded, RIGHT, travel=0.0) > first_zone(commanded, RIGHT, travel=1.0)
 
 
 def test_what_lies_straight_ahead_of_a_turn_or_a_drift_is_not_met() -> None:
-    told = around({0: 0.01})
-    assert first_zone(told, AT_REST) == ZONE_COUNT  # not traced
+    commanded = around({0: 0.01})
+    assert first_zone(commanded, AT_REST) == ZONE_COUNT  # not traced
     for sticks in (RIGHT, (0.0, 0.0, 1.0, 0.0)):
-        assert first_zone(told, sticks) == ZONE_COUNT
+        assert first_zone(commanded, sticks) == ZONE_COUNT
         # A stick that has just begun is still before the object.
-        assert first_zone(told, sticks, now_s=0.0) < ZONE_COUNT
+        assert first_zone(commanded, sticks, now_s=0.0) < ZONE_COUNT
 
 
 def test_a_stick_that_is_let_go_now_leads_to_what_it_would_have_passed() -> None:
     """Whether the stick continues is unknown: it has just begun, and the object is at the gripper's place."""
-    told = around({0: 0.05})
-    assert first_zone(told, RIGHT, now_s=0.012) < ZONE_COUNT
+    commanded = around({0: 0.05})
+    assert first_zone(commanded, RIGHT, now_s=0.012) < ZONE_COUNT
     # After two thirds of the distance to the first probe it has led past.
-    assert first_zone(told, RIGHT, now_s=0.2) == ZONE_COUNT
+    assert first_zone(commanded, RIGHT, now_s=0.2) == ZONE_COUNT
 
 
 def test_strength_rises_before_full_as_it_does_straight_ahead_and_no_farther() -> None:
-    rising = ways(*(0.193 + 0.001 * k for k in range(8)))
-    two_things = ways(0.05, 0.06, *(0.195 + 0.001 * k for k in range(6)))
+    rising = onsets(*(0.193 + 0.001 * k for k in range(8)))
+    two_things = onsets(0.05, 0.06, *(0.195 + 0.001 * k for k in range(6)))
     # From rest: braking gives back what the start takes.
     reaches_m = FIELD.full_speed_m_s * TRAVELS[-1] * HORIZON_S
     for field in (rising, two_things):
-        told = around(dict.fromkeys((*RIGHT_ACROSS, 0), reaches_m + 0.003))
+        commanded = around(dict.fromkeys((*RIGHT_ACROSS, 0), reaches_m + 0.003))
         commands = under_way(0.4, RIGHT)
         course = commands.course(0.4, REPORT, CHANGES_S)
         assert course is not None
-        aside = Aside(told, HORIZON_M, course, RIGHT)
+        aside = CourseOnMap(commanded, HORIZON_M, course, RIGHT)
         along = msgspec.structs.replace(FIELD, fast_m=field, slow_m=field)
         strengths = traced_zones(aside, along, TRAVELS, 0.0, HORIZON_S, forth=True).strengths
         assert strengths[0] == 0
@@ -135,11 +137,11 @@ def test_strength_rises_before_full_as_it_does_straight_ahead_and_no_farther() -
 
 
 def test_both_sticks_at_once_take_the_shorter_way() -> None:
-    told = around(dict.fromkeys(RIGHT_TURNED, 0.02))
-    assert first_zone(told, RIGHT) == ZONE_COUNT
-    turned = first_zone(told, (0.0, 0.0, 1.0, 0.0))
+    commanded = around(dict.fromkeys(RIGHT_TURNED, 0.02))
+    assert first_zone(commanded, RIGHT) == ZONE_COUNT
+    turned = first_zone(commanded, (0.0, 0.0, 1.0, 0.0))
     assert turned < ZONE_COUNT
-    assert first_zone(told, (1.0, 0.0, 1.0, 0.0)) == turned
+    assert first_zone(commanded, (1.0, 0.0, 1.0, 0.0)) == turned
     # A stick between two directions meets objects in either.
     assert first_zone(around(dict.fromkeys(RIGHT_ACROSS, 0.02)), (0.7, 0.4, 0.0, 0.0)) < ZONE_COUNT
     assert first_zone(around(dict.fromkeys(UP_ACROSS, 0.02)), (0.9, 0.05, 0.0, 0.0)) == ZONE_COUNT
@@ -157,19 +159,19 @@ def probes_at() -> FloatArray:
 
 
 @given(st.lists(st.floats(0.0, 0.3), min_size=PROBES, max_size=PROBES), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
-def test_ways_are_interpolated_between_probes_and_never_beyond_them(ways: list[float], x: float, y: float) -> None:
-    ways_m, exact = np.array(ways), probes_at()
-    np.testing.assert_allclose(free_ways_m(ways_m[None], exact)[0], ways_m, atol=1e-12)
-    between = free_ways_m(ways_m[None], np.array([[x, y, 0.0, 0.0], [0.0, 0.0, x, y]]))
-    assert (between >= ways_m.min() - 1e-12).all()
-    assert (between <= ways_m.max() + 1e-12).all()
+def test_ways_are_interpolated_between_probes_and_never_beyond_them(onsets: list[float], x: float, y: float) -> None:
+    onsets_m, exact = np.array(onsets), probes_at()
+    np.testing.assert_allclose(contact_distances_m(onsets_m[None], exact)[0], onsets_m, atol=1e-12)
+    between = contact_distances_m(onsets_m[None], np.array([[x, y, 0.0, 0.0], [0.0, 0.0, x, y]]))
+    assert (between >= onsets_m.min() - 1e-12).all()
+    assert (between <= onsets_m.max() + 1e-12).all()
 
 
 @given(st.floats(-0.3, 0.3), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(0.01, 0.25), st.integers(0, 99))
 def test_ways_ahead_are_those_of_the_arms_model(speed: float, was: float, stick: float, zone: float, seed: int) -> None:
     changes_s = np.random.default_rng(seed).uniform(-0.1, 0.1, (6, AXES))
     course = Course(np.array([0.01]), speed, np.zeros((1, 4)), np.array([was, 0.0, 0.0, 0.0]), changes_s)
-    ways_m, aside_s = _ahead(course, np.array([[zone]]), (stick, 0.0, 0.0, 0.0), 0.25, HORIZON_S)
+    onsets_m, aside_s = _ahead(course, np.array([[zone]]), (stick, 0.0, 0.0, 0.0), 0.25, HORIZON_S)
     began, going, rests = (
         np.array([travel, at, 0.0, 0.0, 0.0])
         for travel, at in ((speed / 0.25, was), (zone / 0.25, stick), (0.0, stick))
@@ -181,16 +183,16 @@ def test_ways_ahead_are_those_of_the_arms_model(speed: float, was: float, stick:
         passed = follow_together(began, going, changes_s, min(after_s, HORIZON_S))[0]
         if after_s > HORIZON_S:
             passed = first + follow_together(then, rests, changes_s, after_s - HORIZON_S)[0]
-        assert ways_m[0, k] == pytest.approx(0.01 + 0.25 * passed[0], abs=1e-9)
+        assert onsets_m[0, k] == pytest.approx(0.01 + 0.25 * passed[0], abs=1e-9)
         np.testing.assert_allclose(aside_s[0, k], passed[1:], atol=1e-9)
 
 
 # Within everything that is rendered
 
 
-def message(sent_s: float, told: Around | None, epoch: int = 1, **changes: Any) -> StiffnessUpdate:
+def message(sent_s: float, commanded: Around | None, epoch: int = 1, **changes: Any) -> StiffnessUpdate:
     header = Header(epoch, round(1e3 * sent_s), sent_s, echo_sent_s=0.0, echo_held_s=0.0)
-    update = StiffnessUpdate(header, FIELD, FIELD, 0.0, FAR_M, 0.0, "armed", around=told)
+    update = StiffnessUpdate(header, FIELD, FIELD, 0.0, FAR_M, 0.0, "armed", around=commanded)
     return msgspec.structs.replace(update, **changes)
 
 
@@ -209,13 +211,13 @@ def strengths(made: Haptics, update: StiffnessUpdate, now_s: float = 0.4) -> tup
 
 
 def test_the_newest_map_holds_until_it_is_old_or_another_robot_side_speaks() -> None:
-    told = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03))
+    commanded = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03))
     made = haptics()
-    assert strengths(made, message(0.3, told))[-1] == 8
+    assert strengths(made, message(0.3, commanded))[-1] == 8
     assert made.due(message(0.32, None), (0.0, 0.8), Blindness(), 0.41) is None  # Nothing changes.
     for later in (message(0.3 + MAP_EXPIRES_S + 0.01, None), message(0.35, None, epoch=2)):
         made = haptics()
-        strengths(made, message(0.3, told))
+        strengths(made, message(0.3, commanded))
         report = made.due(later, (0.0, 0.8), Blindness(), 0.6)
         assert report is not None
         assert report.r2 is not None
@@ -232,11 +234,11 @@ def test_without_a_map_or_where_the_robot_side_reckons_nothing_is_traced() -> No
 
 def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> None:
     """An object that the stick reaches is felt 10 ms late at most."""
-    told, free = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03)), around({})
+    commanded, free = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03)), around({})
     made = haptics()
     assert strengths(made, message(0.3, free)) == (0,) * ZONE_COUNT
     assert made.due(message(0.31, None), (0.0, 0.8), Blindness(), 0.405) is None
-    made.take_map(message(0.32, told))
+    made.take_map(message(0.32, commanded))
     report = made.due(message(0.33, None), (0.0, 0.8), Blindness(), 0.406)
     assert report is not None
     assert report.r2 is not None
@@ -245,11 +247,11 @@ def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> Non
 
 def test_what_is_to_be_touched_is_felt_beside_a_stick_in_the_zones_that_touch_it() -> None:
     """A map has distances of full strength only; a target's slow distances rise to strength 4, with full behind."""
-    target = msgspec.structs.replace(FIELD, slow_m=ways(*[0.002] * 4, *[0.3] * 4), fast_m=ways(*[0.002] * 8))
-    slow, fast = around({0: 0.002}).ways_m(FAR_M)[:2], around({}).ways_m(FAR_M)[0]
-    told = Around.of(FULL_S, np.stack([slow[0], fast, fast, fast]), CHANGES_S)
+    target = msgspec.structs.replace(FIELD, slow_m=onsets(*[0.002] * 4, *[0.3] * 4), fast_m=onsets(*[0.002] * 8))
+    slow, fast = around({0: 0.002}).onsets_m(FAR_M)[:2], around({}).onsets_m(FAR_M)[0]
+    commanded = Around.of(FULL_S, np.stack([slow[0], fast, fast, fast]), CHANGES_S)
     made = haptics()
-    update = message(0.3, told, r2=target)
+    update = message(0.3, commanded, r2=target)
     made.take_map(update)
     report = made.due(update, (0.0, 0.1), Blindness(), 0.4)
     assert report is not None
@@ -258,8 +260,8 @@ def test_what_is_to_be_touched_is_felt_beside_a_stick_in_the_zones_that_touch_it
 
 
 def test_a_map_counts_that_came_before_arming_or_was_overtaken() -> None:
-    told = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03))
+    commanded = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03))
     made = haptics()
-    made.take_map(message(0.3, told))
+    made.take_map(message(0.3, commanded))
     made.take_map(message(0.29, around({})))
     assert strengths(made, message(0.32, None))[-1] == 8

@@ -10,13 +10,13 @@ from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel, Rumble
 from operator_side.feel.commands_under_way import Displacement
 from operator_side.feel.rendering import RenderedTrigger, RenderingSettings, TriggerRendering
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
-from tests.helpers.felt import felt, field, ways
+from tests.helpers.felt import felt, field, onsets
 
 USUAL = RenderingSettings()
 STILL = Displacement(0.0, 0.0)
 LET_GO = (0.0, 0.0)
 HEADER = Header(1, 1, 1.0)
-PARTED = field(ways(0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.10))
+PARTED = field(onsets(0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09, 0.10))
 
 
 def rendered(strength: int, trigger: RenderedTrigger, now_s: float) -> tuple[int, ...]:
@@ -88,7 +88,7 @@ def test_the_free_travel_is_the_way_that_is_left() -> None:
     free = []
     for left_m in (0.12, 0.06, 0.03, 0.01, 0.001):
         rendering = TriggerRendering(USUAL, TravelCalibration())
-        ahead = field(ways(left_m))
+        ahead = field(onsets(left_m))
         free.append(zones(rendering.render(update(uniform_field(0), ahead), LET_GO, STILL, 0.0))[1].count(0))
     # A zone of 0.184 m/s needs 0.3 * 0.184 + 0.184²/6 = 61 mm: the sixth.
     assert free == [10, 5, 3, 1, 0]
@@ -129,10 +129,10 @@ def test_the_run_says_which_zones_were_stiff_and_how_many_for_want_of_knowing() 
     rendering = TriggerRendering(USUAL, TravelCalibration())
     free = {"first_stiff": None, "max": 0}
     assert rendering.zones() == {"l2": free, "r2": free}
-    rendering.render(update(uniform_field(0), field(ways(0.06, 0.2)), horizon_m=FAR_M), LET_GO, STILL, 0.0)
+    rendering.render(update(uniform_field(0), field(onsets(0.06, 0.2)), horizon_m=FAR_M), LET_GO, STILL, 0.0)
     assert rendering.zones() == {"l2": free, "r2": {"first_stiff": 5, "max": 1}}
     rendering.render(None, LET_GO, None, 1.0)
-    rendering.render(update(uniform_field(0), field(ways(1.0)), horizon_m=0.08), LET_GO, STILL, 2.0)
+    rendering.render(update(uniform_field(0), field(onsets(1.0)), horizon_m=0.08), LET_GO, STILL, 2.0)
     assert rendering.zones() == {"l2": {"first_stiff": 7, "max": 8}, "r2": {"first_stiff": 5, "max": 8}}
     assert rendering.summary() == {"l2": {"beyond_horizon": 3}, "r2": {"beyond_horizon": 3}}
 
@@ -140,12 +140,12 @@ def test_the_run_says_which_zones_were_stiff_and_how_many_for_want_of_knowing() 
 def test_people_are_told_the_free_way_as_they_are_told_how_far_they_pull() -> None:
     trigger = RenderedTrigger(USUAL, TriggerTravel(0.0, 1.0))
     assert trigger.free_travel == 1.0
-    trigger.render(field(ways(0.06)), 1.0, 0.0, STILL, 0.0)
+    trigger.render(field(onsets(0.06)), 1.0, 0.0, STILL, 0.0)
     assert trigger.free_travel == pytest.approx(0.5 / 0.75)  # Zone 5 begins at 0.5 of the travel, 0.75 of it sensed.
-    trigger.render(field(ways(0.04, 0.045, 0.06)), 1.0, 0.0, STILL, 1.0)
+    trigger.render(field(onsets(0.04, 0.045, 0.06)), 1.0, 0.0, STILL, 1.0)
     assert trigger.free_travel == pytest.approx(0.4 / 0.75)
     trigger.release()
-    assert trigger.render(field(ways(0.0855)), 1.0, 0.0, STILL, 2.0) == FREE_TRIGGER
+    assert trigger.render(field(onsets(0.0855)), 1.0, 0.0, STILL, 2.0) == FREE_TRIGGER
     short = RenderedTrigger(USUAL, TriggerTravel(0.0, 0.88))  # A full pull ends at 0.66.
-    assert short.render(field(ways(0.085)), 1.0, 0.0, STILL, 0.0) == (0,) * 7 + (8,) * 3
+    assert short.render(field(onsets(0.085)), 1.0, 0.0, STILL, 0.0) == (0,) * 7 + (8,) * 3
     assert short.free_travel == 1.0

@@ -6,29 +6,29 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.protocol.messages import Header, StiffnessUpdate, TriggerField, Ways
+from common.protocol.messages import Header, OnsetDistances, StiffnessUpdate, TriggerField
 from common.reaction import HORIZON_S
 from common.touch_speed import touch_speed_m_s
 from operator_side.feel.commands_under_way import Displacement
 from operator_side.feel.zones import moving_along, zone_strengths, zone_travels
 from operator_side.hands.travel_calibration import TriggerTravel
-from tests.helpers.felt import field, ways
+from tests.helpers.felt import field, onsets
 
 USUAL = zone_travels(TriggerTravel())
 STILL = Displacement(0.0, 0.0)
 HORIZON_M = 0.4
 TRAVEL = st.floats(0.0, 1.0)
 WAY = st.floats(-0.1, 0.3)
-WAYS = st.lists(st.floats(-0.1, HORIZON_M), min_size=8, max_size=8).map(lambda metres: ways(*sorted(metres)))
+WAYS = st.lists(st.floats(-0.1, HORIZON_M), min_size=8, max_size=8).map(lambda metres: onsets(*sorted(metres)))
 
 
 @st.composite
 def fields(draw: st.DrawFn) -> TriggerField:
     """Draw fields; slow distances are never the shorter ones."""
-    fast: Ways = draw(WAYS)
-    slow = ways(*(metres + draw(st.floats(0.0, 0.1)) for metres in fast)) if draw(st.booleans()) else fast
+    fast: OnsetDistances = draw(WAYS)
+    slow = onsets(*(metres + draw(st.floats(0.0, 0.1)) for metres in fast)) if draw(st.booleans()) else fast
     full, acceleration = draw(st.floats(0.05, 0.5)), draw(st.floats(1.0, 20.0))
-    return field(fast, ways(*sorted(slow)), full_speed_m_s=full, acceleration_m_s2=acceleration)
+    return field(fast, onsets(*sorted(slow)), full_speed_m_s=full, acceleration_m_s2=acceleration)
 
 
 MOVING = st.builds(Displacement, WAY, st.floats(-0.3, 0.3))
@@ -43,8 +43,8 @@ def test_the_middles_of_the_zones_are_of_the_mechanical_travel() -> None:
 
 def test_an_example_worked_out_by_hand() -> None:
     ahead = field(
-        ways(0.03, 0.045, 0.05, 0.06, 0.07, 0.08, 0.09, 0.12),
-        ways(0.02, 0.2),
+        onsets(0.03, 0.045, 0.05, 0.06, 0.07, 0.08, 0.09, 0.12),
+        onsets(0.02, 0.2),
         full_speed_m_s=0.3,
         acceleration_m_s2=3.0,
     )
@@ -62,7 +62,9 @@ def one_by_one(ahead: TriggerField, travels: tuple[float, ...], other: float, mo
     advancing = [travel for travel in travels if travel > other]
     for travel in travels:
         u, w = (travel - other) * full, moving.speed_m_s
-        needed = moving.way_m + u * HORIZON_S + (u * u + max(0.0, w - u) ** 2) / (2.0 * ahead.acceleration_m_s2)
+        needed = (
+            moving.displacement_m + u * HORIZON_S + (u * u + max(0.0, w - u) ** 2) / (2.0 * ahead.acceleration_m_s2)
+        )
         slow = travel == advancing[0] or u < touch_speed_m_s(full) if advancing else True
         stiff = sum(way <= needed for way in (ahead.slow_m if slow else ahead.fast_m))
         strengths.append(max(strengths[-1], 8 if needed > HORIZON_M else stiff) if u > 0.0 else strengths[-1])
@@ -74,8 +76,8 @@ def test_each_zone_is_what_the_equation_gives(
     ahead: TriggerField, other: float, moving: Displacement, away: float
 ) -> None:
     farther = field(
-        ways(*(min(way + away, HORIZON_M) for way in ahead.fast_m)),
-        ways(*(min(way + away, HORIZON_M) for way in ahead.slow_m)),
+        onsets(*(min(way + away, HORIZON_M) for way in ahead.fast_m)),
+        onsets(*(min(way + away, HORIZON_M) for way in ahead.slow_m)),
         full_speed_m_s=ahead.full_speed_m_s,
         acceleration_m_s2=ahead.acceleration_m_s2,
     )
@@ -84,10 +86,10 @@ def test_each_zone_is_what_the_equation_gives(
 
 
 def test_what_is_beyond_the_horizon_is_full_and_counted_and_no_sooner() -> None:
-    free = field(ways(0.05))
+    free = field(onsets(0.05))
     # u = 0.25 m/s from zone 7 on: 0.3 * 0.25 + 0.25²/6 = 85.4 mm.
     assert zone_strengths(free, 0.0855, USUAL, 0.0, STILL).beyond_horizon == 0
-    beyond = field(ways(10.0))
+    beyond = field(onsets(10.0))
     assert zone_strengths(beyond, 0.0855, USUAL, 0.0, STILL) == ((0,) * 10, 0)
     assert zone_strengths(beyond, 0.0853, USUAL, 0.0, STILL) == ((0,) * 7 + (8,) * 3, 3)
     assert zone_strengths(beyond, 0.0853, USUAL, 1.0, Displacement(1.0, 0.0)) == ((0,) * 10, 0)
@@ -96,13 +98,13 @@ def test_what_is_beyond_the_horizon_is_full_and_counted_and_no_sooner() -> None:
 @pytest.mark.parametrize(("full_speed_m_s", "slow_zones"), [(0.25, 2), (0.1, 2), (0.5, 1), (2.0, 1)])
 def test_slow_zones_take_the_slow_ways(full_speed_m_s: float, slow_zones: int) -> None:
     # Below 45 mm/s, or below 18 % of a slower arm's full speed.
-    touching = field(ways(-1.0), ways(1.0), full_speed_m_s=full_speed_m_s)
+    touching = field(onsets(-1.0), onsets(1.0), full_speed_m_s=full_speed_m_s)
     strengths = zone_strengths(touching, 10.0, USUAL, 0.0, STILL).strengths
     assert strengths == (0,) * slow_zones + (8,) * (10 - slow_zones)
 
 
 def update(**changes: Any) -> StiffnessUpdate:
-    l2, r2 = field(ways(1.0), displacement_m=-0.02), field(ways(1.0), displacement_m=0.03)
+    l2, r2 = field(onsets(1.0), displacement_m=-0.02), field(onsets(1.0), displacement_m=0.03)
     return StiffnessUpdate(Header(1, 1, 0.0), l2, r2, horizon_m=1.0, rumble=0.0, state="armed", **changes)
 
 

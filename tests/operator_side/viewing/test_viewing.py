@@ -126,7 +126,7 @@ class FakeConsole:
         self.notes: list[str] = []
         self.shown: list[OperatorFacts] = []
         self.views: list[tuple[bytes, bool]] = []
-        self.told: list[str] = []
+        self.commanded: list[str] = []
         self.lacks: tuple[int, int] | None = None
         self.words: deque[PageWords] = deque()
 
@@ -142,7 +142,7 @@ class FakeConsole:
         self.views.append((payload, video))
 
     def note(self, text: str) -> None:
-        self.told.append(text)
+        self.commanded.append(text)
 
 
 def surroundings(now_s: float) -> Surroundings:
@@ -244,8 +244,8 @@ def test_overlaps_of_the_trigger_with_more_and_ticks_are_read_from_the_newest_sc
     scene = decode_view(state(0.0))
     assert isinstance(scene, SceneState)
     scene = msgspec.structs.replace(scene, overlaps=((0, 1e-6, 2e-6), (3, 0.5e-6, 0.0)), overruns=3, tick_p50_us=60.0)
-    for told, overlap_mm3 in ((scene, 2000.0), (msgspec.structs.replace(scene, overlaps=()), 0.0)):
-        figures.take(encode(told))
+    for commanded, overlap_mm3 in ((scene, 2000.0), (msgspec.structs.replace(scene, overlaps=()), 0.0)):
+        figures.take(encode(commanded))
         expected = (overlap_mm3, 60.0, 130.0, 3)
         # Shapes and broken payloads change nothing.
         for payload in (None, shapes(), encode(scene)[:-3], b"", b"scene"):

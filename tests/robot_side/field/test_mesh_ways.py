@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from common.arrays import FloatArray, IntArray
 from robot_side.field.look import MARGIN_M
 from robot_side.overlap import Mesh
-from robot_side.surroundings.kinds.layout import LEAST_WAY_M
+from robot_side.surroundings.kinds.layout import LEAST_CONTACT_M
 from tests.helpers.field.fields import AHEAD, EQUAL_M, along, ball_pose, judged
 from tests.helpers.field.first_contact import first_contact_m
 from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, cup, grid_tetrahedra, surface_of
@@ -66,7 +66,7 @@ def test_the_ways_to_a_mesh_are_those_of_the_definition(seed: int) -> None:
 def test_what_is_touched_exactly_is_entered_at_once_and_what_rests_beside_never(gap_m: float) -> None:
     box = Scene().add().mesh(Mesh(CUBE_CORNERS * 0.05, CUBE_TRIANGLES), [0.0, 0.0, 0.0]).objects()
     start = np.array([0.01, 0.012, -0.05 - 0.008 - gap_m])
-    assert LEAST_WAY_M <= first_contact_m(box, start, 0.008, AHEAD, REACH_M + MARGIN_M) <= 1e-7
+    assert LEAST_CONTACT_M <= first_contact_m(box, start, 0.008, AHEAD, REACH_M + MARGIN_M) <= 1e-7
     for away in (-AHEAD, np.array([1.0, 0.0, 0.0])):
         assert np.isinf(first_contact_m(box, start, 0.008, away, REACH_M + MARGIN_M))
 

@@ -88,10 +88,10 @@ def test_ways_shorten_towards_a_capsule_that_is_ahead_alone() -> None:
     for gap_m in (0.05, 0.01, 0.006, 0.0025):
         there = pose.tool_position_m + (front_m + 0.03 + gap_m) * approach
         objects = Scene().add().mesh(capsule, there, turned).objects()
-        ways = ways_of(pose, objects, along(approach, 0.002))
+        onsets = ways_of(pose, objects, along(approach, 0.002))
         free_m = gap_m - 0.002
-        assert free_m - 0.012 < ways[0] < free_m - 0.008
-        assert free_m - 0.003 < ways[7] <= free_m + 2e-4
+        assert free_m - 0.012 < onsets[0] < free_m - 0.008
+        assert free_m - 0.003 < onsets[7] <= free_m + 2e-4
         assert np.isinf(ways_of(pose, objects, along(-approach, 0.002))).all()
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray
 from feelahead.lab.reference.solids import Solids
-from robot_side.field.object_class import PASSED_OVER
+from robot_side.field.object_class import SKIPPED
 from robot_side.field.total_overlap import total_overlap_m3
 from robot_side.overlap import sphere_sphere
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -18,7 +18,7 @@ from tests.helpers.perceived_scenes import Scene, random_scene
 
 def total(spheres: FloatArray, objects: PerceivedObjects, passed_over: frozenset[int] = frozenset()) -> float:
     classes = np.zeros(len(objects.names), dtype=np.int64)
-    classes[list(passed_over)] = PASSED_OVER
+    classes[list(passed_over)] = SKIPPED
     return total_overlap_m3(spheres, scene_table(objects), classes)
 
 
@@ -78,6 +78,6 @@ def test_ways_among_many_objects_are_those_among_the_near_ones(seed: int) -> Non
         scenes.append(scene.objects())
     direction = rng.normal(size=3)
     looked = along(direction / np.linalg.norm(direction), 0.003)
-    ways_m = [ways_of(ball_pose(0.05), objects, looked) for objects in scenes]
-    assert np.isfinite(ways_m[0]).any()
-    np.testing.assert_allclose(ways_m[0], ways_m[1], rtol=1e-12)
+    onsets_m = [ways_of(ball_pose(0.05), objects, looked) for objects in scenes]
+    assert np.isfinite(onsets_m[0]).any()
+    np.testing.assert_allclose(onsets_m[0], onsets_m[1], rtol=1e-12)

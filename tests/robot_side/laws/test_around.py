@@ -9,7 +9,7 @@ import pytest
 from common.arrays import FloatArray
 from common.protocol.around import PERIOD_S, PROBES
 from common.reaction import HORIZON_S
-from feelahead.lab.reference.ways_by_definition import defined_ways
+from feelahead.lab.reference.onsets_by_definition import defined_onsets
 from robot_side.arm.port import GripperPose
 from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.field.field import Along
@@ -64,7 +64,7 @@ class Told(NamedTuple):
 
 def told_by(law: SweptLaw, pose: GripperPose) -> Told | None:
     told = law.around(pose)
-    return None if told is None else Told(told.full_s, *told.ways_m(100.0))
+    return None if told is None else Told(told.full_s, *told.onsets_m(100.0))
 
 
 def post(x_m: float, y_m: float, z_m: float = 0.06) -> PerceivedObjects:
@@ -78,13 +78,13 @@ def test_only_those_who_ask_get_a_map() -> None:
 def test_a_wall_is_as_far_from_every_probe_across_and_nearer_or_farther_in_a_turn(law: SweptLaw) -> None:
     told = around(law, walls(0.08, 0.05))
     assert told.full_s == pytest.approx(FULL_S)
-    for ways_m, ahead_m in ((told.r2_m, 0.08), (told.l2_m, 0.05)):
-        across = np.delete(np.array(ways_m), [*HALF, *TURNED])
+    for onsets_m, ahead_m in ((told.r2_m, 0.08), (told.l2_m, 0.05)):
+        across = np.delete(np.array(onsets_m), [*HALF, *TURNED])
         np.testing.assert_allclose(across, ahead_m - SIGMA_M, atol=3e-3)
         # A ball that turns about itself moves along the chord, half the turn aside: by 1/cos farther, on an arc.
         for probes, half in ((HALF, 0.125 * FULL_S), (TURNED, 0.25 * FULL_S)):
             farther = (ahead_m - SIGMA_M) / np.cos(half) * half / np.sin(half)
-            np.testing.assert_allclose(np.array(ways_m)[probes], farther, atol=3e-3)
+            np.testing.assert_allclose(np.array(onsets_m)[probes], farther, atol=3e-3)
 
 
 def test_each_side_is_where_a_stick_leads_there() -> None:
@@ -113,8 +113,8 @@ def test_ways_are_those_of_the_definition_and_follow_the_gripper(law: SweptLaw) 
         moved_m = np.array([STICK_SPEED_M_S * FULL_S * part / 3, 0.0, 0.0])
         pose = ball_pose(tool_position_m=moved_m)
         along = Along(np.array([0.0, 0.0, 1.0]), 0.0, CAMERA_SD_M**2, SIGMA_M / CAMERA_SD_M, 0.3)
-        defined = defined_ways(pose, objects, np.array([OBSTACLE]), along, np.inf, np.zeros(6))
-        expected_m = min(float(defined.ways_m[0, 0, 7]), 100.0)
+        defined = defined_onsets(pose, objects, np.array([OBSTACLE]), along, np.inf, np.zeros(6))
+        expected_m = min(float(defined.onsets_m[0, 0, 7]), 100.0)
         assert told.r2_m[part] == pytest.approx(expected_m, abs=2.2e-3) or (
             told.r2_m[part] == 100.0 and expected_m > 0.2
         )
@@ -226,14 +226,14 @@ def test_a_map_of_before_is_withheld_and_the_robot_side_follows_the_path_itself(
     drifting = np.array([0.1, 0.0, 0.2, 0.0, 0.0, 0.0])
     looks(law, 300, drifting, 0.0)
     assert law.around(ball_pose()) is not None
-    assert law.memory.state["moments"][0] == 0
+    assert law.memory.state["even_places"][0] == 0
     law.expect(0.5)
     looks(law, 20, drifting, 0.3)
     assert law.around(ball_pose()) is None
-    assert law.memory.state["moments"][0] > 0
+    assert law.memory.state["even_places"][0] > 0
     looks(law, 300, drifting, 0.32)
     assert law.around(ball_pose()) is not None
-    assert law.memory.state["moments"][0] == 0
+    assert law.memory.state["even_places"][0] == 0
     looks(law, 20, drifting, 0.62, compensation="robot")
     assert law.around(ball_pose()) is None
 

@@ -59,21 +59,21 @@ def test_strength_is_0_until_the_margin_before_the_free_way_and_full_from_there_
     pose = gripper_pose((0.0, 0.0, 0.0), rotation) if gripper else ball_pose(tool_rotation=rotation)
     front_m = FRONT_M if gripper else RADIUS_M
     objects = thing(kind, front_m + INFLATED_M + FREE_M, FINGERTIP_X_M if gripper else 0.0, rotation)
-    ways = ways_of(pose, objects, along(rotation[:, 2], INFLATED_M))
-    assert (np.diff(ways) > 0.0).all()
+    onsets = ways_of(pose, objects, along(rotation[:, 2], INFLATED_M))
+    assert (np.diff(onsets) > 0.0).all()
     # Similar for all: a strength's distances differ by less than 4 mm, though the overlaps differ by a factor of 300.
-    assert FREE_M - MARGIN_M < ways[0] < FREE_M - 0.009
+    assert FREE_M - MARGIN_M < onsets[0] < FREE_M - 0.009
     # A thin rod's overlap hardly grows before it is full.
-    assert FREE_M - 0.003 < ways[7] <= FREE_M
-    assert FREE_M - 0.0102 < ways[3] < FREE_M - 0.004
+    assert FREE_M - 0.003 < onsets[7] <= FREE_M
+    assert FREE_M - 0.0102 < onsets[3] < FREE_M - 0.004
 
 
 def test_a_wall_that_is_touched_exactly_without_any_doubt_is_felt() -> None:
     for kind in ("wall", "half-space", "ball"):
         for gap_m in (0.0, 1e-12, 5e-8):
-            ways = ways_of(ball_pose(), thing(kind, RADIUS_M + gap_m), along())
-            assert -MARGIN_M < ways[0] < -0.009
-            assert -0.0027 < ways[7] <= gap_m
+            onsets = ways_of(ball_pose(), thing(kind, RADIUS_M + gap_m), along())
+            assert -MARGIN_M < onsets[0] < -0.009
+            assert -0.0027 < onsets[7] <= gap_m
 
 
 @pytest.mark.parametrize("degrees", [2, 5, 10, 15, 20, 30, 45, 60, 89])
@@ -82,18 +82,18 @@ def test_a_wall_that_leans_into_the_way_is_full_before_it_is_touched(degrees: in
     """The inflated sphere is in it from the start; only the growth counts, and the uninflated sphere."""
     angle = np.radians(degrees)
     wall = Scene().add().half_space([np.cos(angle), 0.0, -np.sin(angle)], -RADIUS_M - gap_m).objects()
-    ways = ways_of(ball_pose(), wall, along(AHEAD, INFLATED_M))
-    assert ways[7] < gap_m / np.sin(angle)
+    onsets = ways_of(ball_pose(), wall, along(AHEAD, INFLATED_M))
+    assert onsets[7] < gap_m / np.sin(angle)
 
 
 def test_a_graze_is_felt_by_its_share_of_the_least_volume() -> None:
     """A hair through a fingertip's sphere is less than a slice of 0.5 mm of it; so is a hair's breadth of an edge."""
     radius_m = RADIUS_M + INFLATED_M
     least_m3 = np.pi * radius_m * LEAST_DEPTH_M**2
-    ways = ways_of(ball_pose(), thing("0.4 mm rod", radius_m + FREE_M), along(AHEAD, INFLATED_M))
+    onsets = ways_of(ball_pose(), thing("0.4 mm rod", radius_m + FREE_M), along(AHEAD, INFLATED_M))
     most_m3 = 0.16e-6 * 2.0 * radius_m
-    assert np.isfinite(ways).sum() == int(8.0 * most_m3 / least_m3 + 0.5) == 3
-    assert FREE_M - MARGIN_M < ways[0] < FREE_M - 0.009
+    assert np.isfinite(onsets).sum() == int(8.0 * most_m3 / least_m3 + 0.5) == 3
+    assert FREE_M - MARGIN_M < onsets[0] < FREE_M - 0.009
     edge = Scene().add().box([radius_m - 0.00005 + 0.05, 0.0, 0.1], [0.05, 0.1, 0.05]).objects()
     assert np.isinf(ways_of(ball_pose(), edge, along(AHEAD, INFLATED_M))).all()
     deeper = Scene().add().box([radius_m - 0.002 + 0.05, 0.0, 0.1], [0.05, 0.1, 0.05]).objects()
@@ -102,17 +102,17 @@ def test_a_graze_is_felt_by_its_share_of_the_least_volume() -> None:
 
 def test_a_small_ball_is_full_though_it_is_less_than_the_least_volume() -> None:
     objects = Scene().add().sphere([0.0, 0.0, RADIUS_M + INFLATED_M + FREE_M + 0.001], 0.001).objects()
-    ways = ways_of(ball_pose(), objects, along(AHEAD, INFLATED_M))
+    onsets = ways_of(ball_pose(), objects, along(AHEAD, INFLATED_M))
     assert 4.0 / 3.0 * np.pi * 0.001**3 < np.pi * (RADIUS_M + INFLATED_M) * LEAST_DEPTH_M**2
-    assert FREE_M - MARGIN_M < ways[0] < ways[7] < FREE_M
+    assert FREE_M - MARGIN_M < onsets[0] < onsets[7] < FREE_M
 
 
 @pytest.mark.parametrize("gap_m", [0.0, 0.002, 0.005])
 def test_a_ball_that_the_inflated_sphere_has_swallowed_is_felt(gap_m: float) -> None:
     inflated_m = gap_m + 2.0 * 0.003 + 0.001
-    ways = ways_of(ball_pose(), thing("pea", RADIUS_M + gap_m), along(AHEAD, inflated_m))
+    onsets = ways_of(ball_pose(), thing("pea", RADIUS_M + gap_m), along(AHEAD, inflated_m))
     free_m = gap_m - inflated_m
-    assert free_m - MARGIN_M < ways[0] < ways[7] < free_m
+    assert free_m - MARGIN_M < onsets[0] < onsets[7] < free_m
     # From behind it is not.
     behind = Scene().add().sphere([0.0, 0.0, -RADIUS_M - gap_m - 0.003], 0.003).objects()
     assert np.isinf(ways_of(ball_pose(), behind, along(AHEAD, inflated_m))).all()

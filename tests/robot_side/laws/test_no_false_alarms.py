@@ -140,10 +140,10 @@ def test_inside_a_u_the_way_is_the_one_to_its_bottom(side_gap_m: float, seamless
         length = 0.5 * (bottom_m + 0.1) + (0.01 if seamless else 0.0)
         scene.box([side * (side_m + 0.02), 0.0, bottom_m + (0.02 if seamless else 0.0) - length], [0.02, 0.1, length])
     scene.box([0.0, 0.0, bottom_m + 0.01], [side_m + (0.0 if seamless else 0.04), 0.1, 0.01])
-    ways = ways_of(ball_pose(), scene.objects(), along(AHEAD, INFLATED_M))
+    onsets = ways_of(ball_pose(), scene.objects(), along(AHEAD, INFLATED_M))
     # A narrow U exposes less of the bottom, so that strengths are due a little earlier.
-    assert free_m - 0.012 < ways[0] <= alone[0] + 1e-5
-    assert free_m - 0.0015 < ways[7] <= free_m
+    assert free_m - 0.012 < onsets[0] <= alone[0] + 1e-5
+    assert free_m - 0.0015 < onsets[7] <= free_m
 
 
 def test_what_is_passed_over_is_not_felt() -> None:
@@ -165,7 +165,9 @@ def test_a_closed_gripper_before_a_wall_has_the_ways_of_an_open_one() -> None:
     fingers = [[0.04, 0.0, 0.0], [-0.04, 0.0, 0.0]]
     wall = Scene().add().box([0.0, 0.0, 0.1], [0.2, 0.2, 0.02]).objects()
     opened, closed = (
-        look(free_pose(np.array(fingers) * [[share], [share]], [0.008] * 2, [True] * 2), wall, looked, widest_m=widest)
-        for share, widest, looked in ((1.0, 0.032, along(AHEAD, 0.01)), (0.2, 0.0, along(AHEAD, 0.01)))
+        look(
+            free_pose(np.array(fingers) * [[share], [share]], [0.008] * 2, [True] * 2), wall, looked, widest_m=half_gap
+        )
+        for share, half_gap, looked in ((1.0, 0.032, along(AHEAD, 0.01)), (0.2, 0.0, along(AHEAD, 0.01)))
     )
     np.testing.assert_allclose(closed.fast_m, opened.fast_m, atol=1e-12)

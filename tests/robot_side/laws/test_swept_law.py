@@ -149,15 +149,15 @@ def test_prediction_errors_are_those_of_the_predicting_side() -> None:
     missed = PredictionErrors({"operator": ((0.2, 0.001, 0.0),), "robot": ((0.2, 0.0, 0.02),)})
     pose, wall = ball_pose(0.1), walls(0.15, front_m=0.1)
 
-    def ways(prediction: PredictionErrors, **changes: Any) -> FloatArray:
+    def onsets(prediction: PredictionErrors, **changes: Any) -> FloatArray:
         return np.array(Senses(swept(prediction=prediction)).sense(pose, wall, loop_age_s=0.2, **changes).r2.fast_m)
 
-    exact = ways(EXACT)
-    np.testing.assert_allclose(exact - ways(missed, compensation="operator"), 0.001, atol=1e-4)
+    exact = onsets(EXACT)
+    np.testing.assert_allclose(exact - onsets(missed, compensation="operator"), 0.001, atol=1e-4)
     robot = 2.3263478740408408 * math.hypot(0.003, 0.02)
-    np.testing.assert_allclose(exact - ways(missed, compensation="robot"), robot - SIGMA_M, atol=6e-4)
+    np.testing.assert_allclose(exact - onsets(missed, compensation="robot"), robot - SIGMA_M, atol=6e-4)
     # Without a table, a fifth of full speed's displacement in the loop age.
-    np.testing.assert_allclose(exact - ways(PredictionErrors()), 0.2 * FULL_SPEED_M_S * 0.2, atol=3e-4)
+    np.testing.assert_allclose(exact - onsets(PredictionErrors()), 0.2 * FULL_SPEED_M_S * 0.2, atol=3e-4)
 
 
 # The figures of the summary

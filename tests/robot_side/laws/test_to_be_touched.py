@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robot_side.field.field import Ahead, Along, Field
-from robot_side.field.object_class import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
+from robot_side.field.object_class import OBSTACLE, SKIPPED, TARGET, TOUCHABLE
 from robot_side.field.scratch import TOUCH_STRENGTH, Count
 from robot_side.surroundings.perceived import PerceivedObjects
 from tests.helpers.field.fields import AHEAD, EQUAL_M, along, ball_pose, look
@@ -71,7 +71,7 @@ def test_what_stands_before_or_behind_it_stays_in_the_slow_list() -> None:
     )
     # Behind an obstacle a target changes nothing; an obstacle behind a target is full in its own place.
     np.testing.assert_allclose(first.slow_m, first.fast_m, atol=EQUAL_M)
-    alone = look(ball_pose(), objects, DOUBTFUL, classes=[PASSED_OVER, OBSTACLE])
+    alone = look(ball_pose(), objects, DOUBTFUL, classes=[SKIPPED, OBSTACLE])
     np.testing.assert_allclose(last.slow_m[4:], alone.slow_m[4:], atol=EQUAL_M)
     assert (last.slow_m[:4] < alone.slow_m[:4]).all()
 

@@ -47,10 +47,10 @@ def assert_same(first: Overlaps, second: Overlaps) -> None:
 @pytest.mark.parametrize("count", [0, 1, 7, 8, 9, LANES - 1, LANES, LANES + 1, 3 * LANES + 5])
 def test_a_pair_does_not_depend_on_its_neighbours(pairs: Pairs, make: Callable[[int], Arrays], count: int) -> None:
     arguments = make(count)
-    together = pairs(*arguments)
+    tuple_type = pairs(*arguments)
     alone = [pairs(*(argument[i : i + 1] for argument in arguments)) for i in range(count)]
-    assert [len(result) for result in together] == [count] * 3
-    for result, parts in zip(together, zip(*alone, strict=True), strict=False):
+    assert [len(result) for result in tuple_type] == [count] * 3
+    for result, parts in zip(tuple_type, zip(*alone, strict=True), strict=False):
         np.testing.assert_array_equal(result, np.concatenate(parts))
 
 

@@ -104,7 +104,7 @@ def test_after_a_gap_only_a_whole_frame_is_taken() -> None:
     packer.pack(one)
     with pytest.raises(ValueError, match="without a frame before"):
         FrameUnpacker(one).unpack(packer.pack(one))
-    packer.begin_anew()
+    packer.begin_epoch()
     assert same(FrameUnpacker(one).unpack(packer.pack(one)), one)
 
 

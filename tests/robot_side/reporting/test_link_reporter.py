@@ -15,7 +15,7 @@ from common.sockets.tcp_figures import TcpFigures
 from common.status.codes import LinkState
 from common.status.statuses import RobotStatus
 from operator_side.core import OperatorSide
-from operator_side.robot_link.standing import REPORT_EXPIRES_S
+from operator_side.robot_link.lease_state import REPORT_EXPIRES_S
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety, SafetySettings
 from robot_side.reporting.link_reporter import PERIOD_S, LinkReporter

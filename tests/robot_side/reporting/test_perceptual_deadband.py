@@ -14,7 +14,7 @@ from common.reaction import WRITE_S
 from common.silence import KEEP_ALIVE_S
 from robot_side.laws.sensed import Sensed
 from robot_side.reporting.perceptual_deadband import StiffnessDeadband, TelemetryDeadband
-from tests.helpers.felt import field, ways
+from tests.helpers.felt import field, onsets
 
 TICK_S = 1e-3
 A_M_S2, FULL_M_S = 3.0, 0.25
@@ -31,8 +31,8 @@ def changed(found: Sensed, **changes: Any) -> Sensed:
 
 def sensed(left_m: float, speed_m_s: float = 0.0, **changes: Any) -> Sensed:
     """Return a wall `left_m` ahead of R2, and nothing behind."""
-    wall = field(ways(*(min(left_m + 1e-3 * k, FAR_M) for k in range(8))), **ABLE)
-    free = field(ways(*[FAR_M] * 8), **ABLE)
+    wall = field(onsets(*(min(left_m + 1e-3 * k, FAR_M) for k in range(8))), **ABLE)
+    free = field(onsets(*[FAR_M] * 8), **ABLE)
     return changed(Sensed.of(free, wall, speed_m_s=speed_m_s, horizon_m=FAR_M), **changes)
 
 
@@ -187,7 +187,7 @@ def test_a_receiver_that_does_not_reckon_is_told_of_the_robot_sides_displacement
 def test_a_horizon_that_shrinks_is_nothing_that_comes_nearer() -> None:
     run = Run(1.0)
     run.tick()
-    shrunken = field(ways(*[0.3] * 8), **ABLE)
+    shrunken = field(onsets(*[0.3] * 8), **ABLE)
     assert not run.tick(now=changed(sensed(1.0), l2=shrunken, r2=shrunken, horizon_m=0.3))
 
 

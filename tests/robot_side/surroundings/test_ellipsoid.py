@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from common.arrays import FloatArray
-from robot_side.compiled.kernel import NUMBER, compiled, input_array, output_array
+from robot_side.compiled.kernel import FLOAT64, compiled, input_array, output_array
 from robot_side.compiled.vectors import load
 from robot_side.overlap import sphere_sphere
 from robot_side.surroundings.kinds import ellipsoid
@@ -16,13 +16,13 @@ from robot_side.surroundings.kinds.layout import rows
 from tests.helpers.perceived_scenes import random_rotation
 
 
-@compiled(input_array(2), input_array(2), output_array(1), returns=NUMBER)
+@compiled(input_array(2), input_array(2), output_array(1), returns=FLOAT64)
 def nearest(shapes: FloatArray, point: FloatArray, towards: FloatArray) -> float:
     distance, (towards[0], towards[1], towards[2]) = ellipsoid.nearest(shapes, 0, load(point, 0))
     return distance
 
 
-@compiled(input_array(2), input_array(2), NUMBER, input_array(2), NUMBER, output_array(1))
+@compiled(input_array(2), input_array(2), FLOAT64, input_array(2), FLOAT64, output_array(1))
 def contact(
     shapes: FloatArray, start: FloatArray, radius: float, along: FloatArray, reach: float, found: FloatArray
 ) -> None:
@@ -38,8 +38,8 @@ def shape(center: FloatArray, rotation: FloatArray, half_axes: FloatArray) -> Fl
 
 def overlap(of: FloatArray, center: FloatArray, radius: float) -> tuple[float, FloatArray]:
     """Return V in m³ and dV/dcentre (3,) in m²."""
-    push = np.empty(3)
-    return ellipsoid.overlap_one_ellipsoid(of, 0, *center, radius, NO_MESHES, push), push
+    overlap_gradient = np.empty(3)
+    return ellipsoid.overlap_one_ellipsoid(of, 0, *center, radius, NO_MESHES, overlap_gradient), overlap_gradient
 
 
 def beside(rng: np.random.Generator, half_axes: FloatArray, depth: float) -> tuple[FloatArray, FloatArray]:
@@ -56,8 +56,8 @@ def test_a_needle_that_pierces_the_balls_pole_pushes(depth: float) -> None:
     """No section between the pole and the outermost node shows where it pierces."""
     of, radius, step = shape(np.zeros(3), np.eye(3), np.array([1e-4, 1e-4, 0.05])), 0.008, 1e-6
     before, after = (overlap(of, np.array([0.0, 0.0, 0.05 - depth + side]), radius)[0] for side in (-step, step))
-    _, push = overlap(of, np.array([0.0, 0.0, 0.05 - depth]), radius)
-    assert push[2] == pytest.approx((after - before) / (2.0 * step), rel=0.01)
+    _, overlap_gradient = overlap(of, np.array([0.0, 0.0, 0.05 - depth]), radius)
+    assert overlap_gradient[2] == pytest.approx((after - before) / (2.0 * step), rel=0.01)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -68,10 +68,10 @@ def test_a_ball_is_a_sphere(seed: int) -> None:
         rotation, at = (np.eye(3) if k % 4 == 0 else random_rotation(rng)), rng.uniform(-1.0, 1.0, 3)
         along = np.eye(3)[k % 3] if k % 4 == 0 else random_rotation(rng)[0]
         center = at + rng.uniform(0.8 * abs(own - radius), own + radius) * along
-        volume, push = overlap(shape(at, rotation, np.full(3, own)), center, radius)
+        volume, overlap_gradient = overlap(shape(at, rotation, np.full(3, own)), center, radius)
         expected, gradient, _ = sphere_sphere(center, radius, at, own, gradient=True)
         assert volume == pytest.approx(float(expected), abs=2e-9 * 4.0 / 3.0 * math.pi * radius**3)
-        np.testing.assert_allclose(push, gradient, atol=2e-4 * radius**2)
+        np.testing.assert_allclose(overlap_gradient, gradient, atol=2e-4 * radius**2)
 
 
 def by_columns(half_axes: FloatArray, center: FloatArray, radius: float) -> float:
@@ -94,7 +94,7 @@ def test_the_overlap_is_that_of_its_columns(seed: int) -> None:
     for _ in range(20):
         half_axes, radius = rng.uniform(0.01, 0.06, 3), float(rng.uniform(0.004, 0.05))
         center, _ = beside(rng, half_axes, float(rng.uniform(-0.9, 1.0)) * radius)
-        volume, push = overlap(shape(np.zeros(3), np.eye(3), half_axes), center, radius)
+        volume, overlap_gradient = overlap(shape(np.zeros(3), np.eye(3), half_axes), center, radius)
         assert volume == pytest.approx(by_columns(half_axes, center, radius), abs=1e-4 * radius**3)
         step = 1e-4 * radius
         for axis in range(3):
@@ -103,10 +103,10 @@ def test_the_overlap_is_that_of_its_columns(seed: int) -> None:
                 overlap(shape(np.zeros(3), np.eye(3), half_axes), center + shift, radius)[0]
                 - overlap(shape(np.zeros(3), np.eye(3), half_axes), center - shift, radius)[0]
             )
-            assert push[axis] == pytest.approx(rise / (2.0 * step), abs=1e-4 * radius**2)
+            assert overlap_gradient[axis] == pytest.approx(rise / (2.0 * step), abs=1e-4 * radius**2)
 
 
-@compiled(input_array(2), input_array(2), NUMBER, NUMBER, returns=NUMBER)
+@compiled(input_array(2), input_array(2), FLOAT64, FLOAT64, returns=FLOAT64)
 def summed(center: FloatArray, half_axes: FloatArray, low: float, high: float) -> float:
     volume, _ = sum_slices(load(center, 0), load(half_axes, 0), low, high)
     return volume

@@ -13,7 +13,7 @@ from robot_side.surroundings.scene_table import scene_table
 from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, cup, grid_tetrahedra, round_mesh, surface_of
 from tests.helpers.perceived_scenes import Scene, random_rotation
 
-COUNT, EQUAL = 300, 1e-12
+INT64, EQUAL = 300, 1e-12
 Surface = tuple[FloatArray, IntArray]
 
 
@@ -39,9 +39,9 @@ SURFACES: dict[str, tuple[Surface, bool]] = {
 def centers_about(mesh: Mesh, rng: np.random.Generator) -> FloatArray:
     """Draw points (n, 3) all about a mesh, some of them right above a corner or an edge of it."""
     size = mesh.highest_m - mesh.lowest_m
-    centers: FloatArray = rng.uniform(mesh.lowest_m - 0.3 * size, mesh.highest_m + 0.3 * size, (COUNT, 3))
-    corners = mesh.tables.triangles[:, :9].reshape(-1, 3)[rng.integers(3 * mesh.triangle_count, size=COUNT)]
-    shared = rng.random((COUNT, 3)) < [[0.0], [0.4], [0.7]][rng.integers(3)][0]
+    centers: FloatArray = rng.uniform(mesh.lowest_m - 0.3 * size, mesh.highest_m + 0.3 * size, (INT64, 3))
+    corners = mesh.tables.triangles[:, :9].reshape(-1, 3)[rng.integers(3 * mesh.triangle_count, size=INT64)]
+    shared = rng.random((INT64, 3)) < [[0.0], [0.4], [0.7]][rng.integers(3)][0]
     return np.where(shared, corners, centers)
 
 
@@ -52,13 +52,13 @@ def test_a_mesh_has_the_overlap_of_the_library(name: str, radius_m: float) -> No
     rng = np.random.default_rng(len(name))
     library, rotation, position = MeshLibrary([Mesh(*SURFACES[name][0])]), random_rotation(rng), rng.normal(size=3)
     mesh = Mesh(*SURFACES[name][0])
-    centers, radii = position + centers_about(mesh, rng) @ rotation.T, np.full(COUNT, radius_m)
+    centers, radii = position + centers_about(mesh, rng) @ rotation.T, np.full(INT64, radius_m)
     table = scene_table(Scene().add().mesh(mesh, position, rotation).objects())
-    volumes, gradients = np.empty(COUNT), np.empty((COUNT, 3))
+    volumes, gradients = np.empty(INT64), np.empty((INT64, 3))
     for k, center in enumerate(centers):
         volumes[k] = overlap_one_mesh(table.shapes, 0, *center.tolist(), radius_m, table.meshes, gradients[k])
-    placed = np.tile(position, (COUNT, 1)), np.tile(rotation, (COUNT, 1, 1))
-    expected = mesh_pairs(centers, radii, library, np.zeros(COUNT, dtype=np.int64), *placed)
+    placed = np.tile(position, (INT64, 1)), np.tile(rotation, (INT64, 1, 1))
+    expected = mesh_pairs(centers, radii, library, np.zeros(INT64, dtype=np.int64), *placed)
     assert (np.abs(volumes - expected[0])).max() <= EQUAL * 4.0 / 3.0 * np.pi * radius_m**3
     # Right on an edge, the gradient is either face's.
     np.testing.assert_allclose(gradients, expected[1], rtol=0.0, atol=1e-9 * np.pi * radius_m**2)

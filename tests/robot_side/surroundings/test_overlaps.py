@@ -11,7 +11,7 @@ from robot_side.surroundings.kinds.layout import rows
 from robot_side.surroundings.kinds.tetrahedron import overlap_one_tetrahedron
 from tests.helpers.perceived_scenes import random_rotation
 
-COUNT, EQUAL = 100, 1e-12
+INT64, EQUAL = 100, 1e-12
 NO_MESHES = np.zeros((1, 2), dtype=np.int64)
 
 
@@ -33,9 +33,9 @@ def assert_equal(found: tuple[FloatArray, ...], expected: tuple[FloatArray, ...]
 def points_of(rng: np.random.Generator, feature: str, half: FloatArray) -> FloatArray:
     """Draw points (n, 3) on the faces, edges or corners of boxes, or within them."""
     at_ends = {"inside": 0, "face": 1, "edge": 2, "corner": 3}[feature]
-    points: FloatArray = rng.uniform(-0.95, 0.95, (COUNT, 3))
-    ends = np.argsort(rng.random((COUNT, 3))) < at_ends
-    return np.where(ends, rng.choice((-1.0, 1.0), (COUNT, 3)), points) * half
+    points: FloatArray = rng.uniform(-0.95, 0.95, (INT64, 3))
+    ends = np.argsort(rng.random((INT64, 3))) < at_ends
+    return np.where(ends, rng.choice((-1.0, 1.0), (INT64, 3)), points) * half
 
 
 @pytest.mark.parametrize("ratio", [0.02, 0.3, 1.0, 3.0, 50.0], ids=lambda ratio: f"R/L {ratio}")
@@ -44,13 +44,13 @@ def points_of(rng: np.random.Generator, feature: str, half: FloatArray) -> Float
 def test_a_box_has_the_overlap_of_the_library(feature: str, thin: int, ratio: float) -> None:
     """Boxes are swallowed if much smaller than the sphere, and swallow it if much larger."""
     rng = np.random.default_rng(len(feature))
-    half = rng.uniform(0.02, 0.05, (COUNT, 3))
+    half = rng.uniform(0.02, 0.05, (INT64, 3))
     half[:, :thin] *= 1e-3
-    radii = ratio * rng.uniform(0.02, 0.05, COUNT)
-    turned = np.array([random_rotation(rng) for _ in range(COUNT)])
-    middles = rng.uniform(-1.0, 1.0, (COUNT, 3))
-    offset = points_of(rng, feature, half) + rng.uniform(-1.1, 1.1, (COUNT, 1)) * radii[:, None] * rng.normal(
-        size=(COUNT, 3)
+    radii = ratio * rng.uniform(0.02, 0.05, INT64)
+    turned = np.array([random_rotation(rng) for _ in range(INT64)])
+    middles = rng.uniform(-1.0, 1.0, (INT64, 3))
+    offset = points_of(rng, feature, half) + rng.uniform(-1.1, 1.1, (INT64, 1)) * radii[:, None] * rng.normal(
+        size=(INT64, 3)
     ) / np.sqrt(3.0)
     centers = middles + np.einsum("nij,nj->ni", turned, offset)
     found = each(overlap_one_box, rows(middles, turned, half), centers, radii)
@@ -62,12 +62,12 @@ def test_a_box_has_the_overlap_of_the_library(feature: str, thin: int, ratio: fl
 @pytest.mark.parametrize("corners", [1, 2, 3, 4], ids=["corner", "edge", "face", "inside"])
 def test_a_tetrahedron_has_the_overlap_of_the_library(corners: int, flat: float, ratio: float) -> None:
     rng = np.random.default_rng(corners)
-    vertices = rng.normal(size=(COUNT, 4, 3)) * 0.03
+    vertices = rng.normal(size=(INT64, 4, 3)) * 0.03
     vertices[:, :, 2] *= flat
-    radii = ratio * rng.uniform(0.02, 0.05, COUNT)
-    shares = np.where(np.arange(4) < corners, rng.dirichlet(np.ones(4), COUNT), 0.0)
+    radii = ratio * rng.uniform(0.02, 0.05, INT64)
+    shares = np.where(np.arange(4) < corners, rng.dirichlet(np.ones(4), INT64), 0.0)
     on_feature = np.einsum("nk,nki->ni", shares / shares.sum(axis=1, keepdims=True), vertices)
-    centers = on_feature + radii[:, None] * rng.uniform(-0.7, 0.7, (COUNT, 3))
+    centers = on_feature + radii[:, None] * rng.uniform(-0.7, 0.7, (INT64, 3))
     found = each(overlap_one_tetrahedron, rows(vertices), centers, radii)
     assert_equal(found, sphere_tetrahedron(centers, radii, vertices, gradient=True), radii)
 

@@ -207,9 +207,9 @@ def test_blocks_bound_their_objects_wherever_these_go(unbounded: int) -> None:
         assert set(blocks.order[:unbounded]) == set(range(unbounded))
         np.testing.assert_array_equal(blocks.bounds, table.object_bounds[blocks.order])
         places = np.arange(len(blocks.order))
-        for bounds, together in ((blocks.blocks, TOGETHER), (blocks.groups, TOGETHER**2)):
-            assert len(bounds) == -(-len(places) // together)
-            around = bounds[places // together]
+        for bounds, tuple_type in ((blocks.blocks, TOGETHER), (blocks.groups, TOGETHER**2)):
+            assert len(bounds) == -(-len(places) // tuple_type)
+            around = bounds[places // tuple_type]
             apart = np.linalg.norm(blocks.bounds[:, :3] - around[:, :3], axis=1) + blocks.bounds[:, 3]
             assert (apart <= around[:, 3] * (1.0 + 1e-12)).all()
         if objects is first:

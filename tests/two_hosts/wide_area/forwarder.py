@@ -23,7 +23,7 @@ import msgspec
 import numpy as np
 
 from common.realtime.priority import raise_priority, schedule_realtime
-from tests.two_hosts.wide_area.way import Counts, Direction, Way, WayWords
+from tests.two_hosts.wide_area.wire_direction import Counts, Direction, DirectionSettings, Wire
 
 DEVICE: Final = "wan0"
 ADDRESSES: Final[dict[str, str]] = {"robot": "10.78.0.1", "operator": "10.78.0.2"}
@@ -42,7 +42,7 @@ _IN_A_ROW: Final = 64
 class Order(msgspec.Struct, frozen=True):
     """Order to the forwarder: the first at its start, others at any time."""
 
-    ways: dict[Direction, WayWords] | None = None
+    ways: dict[Direction, DirectionSettings] | None = None
     """Words by direction; directions without words stay as they are."""
     control: str | None = None
     """TCP congestion control of the hosts, in the first order; None: the machine's."""
@@ -108,7 +108,7 @@ def _delete(namespace: str) -> None:
 class _Forwarder:
     def __init__(self, order: Order, devices: list[int], *, realtime: bool) -> None:
         now_s, given = time.monotonic(), order.ways or {}
-        self._ways = [Way(given.get(name, WayWords()), order.seed, name, now_s) for name in _LEAVING]
+        self._ways = [Wire(given.get(name, DirectionSettings()), order.seed, name, now_s) for name in _LEAVING]
         self._devices = devices
         self._realtime = realtime
         self._due: list[tuple[float, int, int, bytes]] = []

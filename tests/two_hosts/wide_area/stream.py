@@ -20,7 +20,7 @@ from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from tests.two_hosts.wide_area.messages import PAYLOAD_BYTES, ages
 from tests.two_hosts.wide_area.tunnels import WideArea
-from tests.two_hosts.wide_area.way import WayWords
+from tests.two_hosts.wide_area.wire_direction import DirectionSettings
 
 _MODEL: Final = "stream"
 _LAST_S: Final = 3.0
@@ -79,7 +79,7 @@ def run(cell: Cell, seed: int) -> Iterator[Row]:
         sent_s = [number / cell.hz for number in range(int(cell.hz * cell.seconds))]
         yield ages(play(link.profile("to_operator"), sent_s, PAYLOAD_BYTES)[0].arrived_s)
         return
-    words = WayWords(cell.delay / 1e3, cell.loss / 1e2)
+    words = DirectionSettings(cell.delay / 1e3, cell.loss / 1e2)
     with WideArea({"to_operator": words, "to_robot": words}, cell.control, seed) as wide:
         with wide.run("operator", "messages", "receive") as receiver:
             receiver.hear()

@@ -2,35 +2,35 @@
 
 import pytest
 
-from tests.two_hosts.wide_area.way import Way, WayWords
+from tests.two_hosts.wide_area.wire_direction import DirectionSettings, Wire
 
 _PACKET_BYTES = 1250
 _RATE_BIT_S = 1e6
 """Rate in bit/s at which a packet takes 10 ms."""
 
 
-def arrivals(words: WayWords, sent_s: list[float]) -> list[float | None]:
-    way = Way(words, 0, "to_operator", 0.0)
+def arrivals(words: DirectionSettings, sent_s: list[float]) -> list[float | None]:
+    way = Wire(words, 0, "to_operator", 0.0)
     return [way.take(_PACKET_BYTES, one_s) for one_s in sent_s]
 
 
 def test_packets_queue_before_the_rate_and_those_that_would_wait_too_long_are_dropped() -> None:
-    came = arrivals(WayWords(0.1, rate_bit_s=_RATE_BIT_S, queue_s=0.025), [0.0] * 5)
+    came = arrivals(DirectionSettings(0.1, rate_bit_s=_RATE_BIT_S, queue_s=0.025), [0.0] * 5)
     assert came == [pytest.approx(0.11), pytest.approx(0.12), pytest.approx(0.13), None, None]
 
 
 def test_bits_that_wait_go_at_the_new_rate() -> None:
-    way = Way(WayWords(rate_bit_s=_RATE_BIT_S), 0, "to_operator", 0.0)
+    way = Wire(DirectionSettings(rate_bit_s=_RATE_BIT_S), 0, "to_operator", 0.0)
     for _ in range(5):
         way.take(_PACKET_BYTES, 0.0)
-    way.change(WayWords(rate_bit_s=_RATE_BIT_S / 2.0), 0.01)
+    way.change(DirectionSettings(rate_bit_s=_RATE_BIT_S / 2.0), 0.01)
     assert way.take(_PACKET_BYTES, 0.01) == pytest.approx(0.01 + 0.08 + 0.02)
 
 
 def test_losses_are_as_many_as_asked_the_same_for_a_seed_and_bursts_take_all() -> None:
     sent_s = [0.01 * number for number in range(20_000)]
-    came = arrivals(WayWords(loss=0.01), sent_s)
-    assert came == arrivals(WayWords(loss=0.01), sent_s)
+    came = arrivals(DirectionSettings(loss=0.01), sent_s)
+    assert came == arrivals(DirectionSettings(loss=0.01), sent_s)
     assert came.count(None) == pytest.approx(200, abs=60)
-    bursts = arrivals(WayWords(burst_s=0.05), [0.01 * number + 0.005 for number in range(1000)])
+    bursts = arrivals(DirectionSettings(burst_s=0.05), [0.01 * number + 0.005 for number in range(1000)])
     assert [number for number, one_s in enumerate(bursts) if one_s is None] == [*range(495, 500), *range(995, 1000)]

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from common.limits import Limited
-from tests.two_hosts.wide_area.way import Direction, WayWords
+from tests.two_hosts.wide_area.wire_direction import Direction, DirectionSettings
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Trial(Limited):
     observer: Literal["none", "reads", "stops"] = "none"
     seconds: Annotated[float, Meta(ge=2.0, le=3600.0)] = 20.0
 
-    def ways(self) -> dict[Direction, WayWords]:
+    def ways(self) -> dict[Direction, DirectionSettings]:
         """Return the link at the start, in SI units."""
-        words = WayWords(self.delay / 1e3, self.loss / 1e2, self.burst / 1e3, queue_s=self.queue / 1e3)
+        words = DirectionSettings(self.delay / 1e3, self.loss / 1e2, self.burst / 1e3, queue_s=self.queue / 1e3)
         return {"to_operator": replace(words, rate_bit_s=1e6 * self.rate), "to_robot": words}

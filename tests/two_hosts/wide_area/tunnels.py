@@ -13,7 +13,7 @@ import msgspec
 from common.errors import FeelaheadError
 from tests.helpers.repository import ROOT
 from tests.two_hosts.wide_area.forwarder import Order
-from tests.two_hosts.wide_area.way import Direction, WayWords
+from tests.two_hosts.wide_area.wire_direction import Direction, DirectionSettings
 
 Host = Literal["robot", "operator"]
 _PACKAGE: Final = __package__
@@ -83,7 +83,7 @@ class Child:
 class WideArea(Child):
     """Forwarder with its hosts, as a context: nothing of them is left at its end."""
 
-    def __init__(self, ways: dict[Direction, WayWords], control: str | None = None, seed: int = 0) -> None:
+    def __init__(self, ways: dict[Direction, DirectionSettings], control: str | None = None, seed: int = 0) -> None:
         """FeelaheadError without root, `ip`, TUN devices or this congestion control."""
         if (missing := what_is_missing()) is not None:
             raise FeelaheadError(f"wide area: {missing}")
@@ -103,7 +103,7 @@ class WideArea(Child):
         """Run one of this package's programs there."""
         return Child(module, *arguments, before=self.surroundings(host))
 
-    def figures(self, ways: dict[Direction, WayWords] | None = None) -> dict[str, Any]:
+    def figures(self, ways: dict[Direction, DirectionSettings] | None = None) -> dict[str, Any]:
         """Return the counts since the last call; with `ways`, change these directions from now on."""
         self.say(msgspec.json.encode(Order(ways)).decode())
         return self.hear()

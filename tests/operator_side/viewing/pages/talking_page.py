@@ -41,9 +41,9 @@ Does = Callable[[float], dict[str, Any] | None]
 class AtThePage:
     """Person at the controller, and a scripted person at a page, for whole runs."""
 
-    def __init__(self, page: TalkingPage, whoever: BrowserHands, does: Does) -> None:
+    def __init__(self, page: TalkingPage, simulated_hands: BrowserHands, does: Does) -> None:
         self.page = page
-        self.whoever = whoever
+        self.simulated_hands = simulated_hands
         self.does = does
         self._next_s = 0.0
 
@@ -52,4 +52,4 @@ class AtThePage:
             self._next_s += PERIOD_S
             if (hands := self.does(now_s)) is not None:
                 self.page.say(now_s, **hands)
-        self.whoever.tick(now_s, screen, delay_s)
+        self.simulated_hands.tick(now_s, screen, delay_s)

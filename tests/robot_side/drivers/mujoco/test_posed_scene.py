@@ -33,7 +33,7 @@ class Posed:
     def at(self, *shift_m: float, fingers: FloatArray | None = None, turned_rad: float = 0.0) -> PosedScene:
         """Pose the scene; `turned_rad`: of the first joint, which turns the whole arm about the vertical."""
         arm_rad = self.arm_rad + turned_rad * np.eye(6)[0]
-        self.posed.put(arm_rad, self.fingers if fingers is None else fingers, np.array(shift_m or NOWHERE))
+        self.posed.set_pose(arm_rad, self.fingers if fingers is None else fingers, np.array(shift_m or NOWHERE))
         return self.posed
 
 
@@ -92,22 +92,22 @@ def test_a_turn_goes_along_an_arc(wall: Posed, beside: Posed) -> None:
 
 
 def test_a_turned_arm_is_where_kinematics_put_it(wall: Posed) -> None:
-    put = wall.at(turned_rad=0.2)
-    np.testing.assert_allclose(put.approach_axis(), [math.cos(0.2), math.sin(0.2), 0.0], atol=1e-4)
+    set_pose = wall.at(turned_rad=0.2)
+    np.testing.assert_allclose(set_pose.approach_axis(), [math.cos(0.2), math.sin(0.2), 0.0], atol=1e-4)
     # The foremost corner of the fingertips, 565 mm ahead of the base's axis and 54.5 mm beside it.
     corner_m = 0.565 * math.cos(0.2) + 0.0545 * math.sin(0.2)
-    assert put.gap_m() == pytest.approx(0.885 - corner_m, abs=1e-4)
-    assert put.way_m(1.0) == pytest.approx((0.885 - corner_m) / math.cos(0.2), abs=1e-4)
+    assert set_pose.gap_m() == pytest.approx(0.885 - corner_m, abs=1e-4)
+    assert set_pose.contact_distance_m(1.0) == pytest.approx((0.885 - corner_m) / math.cos(0.2), abs=1e-4)
     np.testing.assert_allclose(wall.at().approach_axis(), [1.0, 0.0, 0.0], atol=1e-4)
 
 
 @pytest.mark.parametrize("name", ["wall", "wall_45", "ball", "slot", "u_mesh", "mug", "cluttered"])
 def test_at_home_it_is_what_the_live_scene_says(name: str) -> None:
     scene = Posed(name)
-    truth, put = TrueContact(scene.scene), scene.at()
-    assert put.gap_m() == pytest.approx(truth.gap_m(None), abs=1e-9)
+    truth, set_pose = TrueContact(scene.scene), scene.at()
+    assert set_pose.gap_m() == pytest.approx(truth.gap_m(None), abs=1e-9)
     axis, _ = truth.approach()
-    assert put.way_m(0.5) == pytest.approx(truth.way_left_m(axis, None, 0.5), abs=1e-9)
+    assert set_pose.contact_distance_m(0.5) == pytest.approx(truth.way_left_m(axis, None, 0.5), abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["wall", "cluttered"])
@@ -128,5 +128,5 @@ def test_where_things_may_sleep_they_are_moved_as_well() -> None:
     posed = PosedScene(scene)
     arm_rad, fingers = (scene.data.qpos[place] for place in (scene.robot.arm_positions, scene.robot.finger_positions))
     for shift_m in (0.0, 0.05, 0.05, -0.02):
-        posed.put(arm_rad, fingers, np.array([shift_m, 0.0, 0.0]))
+        posed.set_pose(arm_rad, fingers, np.array([shift_m, 0.0, 0.0]))
         assert posed.gap_m() == pytest.approx(WALL_M + shift_m, abs=1e-4)

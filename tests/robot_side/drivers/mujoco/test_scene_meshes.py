@@ -13,7 +13,7 @@ from robot_side.compiled.kernel import Compiled
 from robot_side.core import RobotSide
 from robot_side.drivers.mujoco.camera import MujocoCamera
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from robot_side.field.object_class import OBSTACLE, PASSED_OVER
+from robot_side.field.object_class import OBSTACLE, SKIPPED
 from robot_side.field.total_overlap import total_overlap_m3
 from robot_side.overlap import sphere_sphere, warm_up
 from robot_side.parts import build_parts
@@ -61,7 +61,7 @@ def placed(scene: Scene, in_body_m: FloatArray, body: str = "round") -> FloatArr
 def overlap_of(objects: PerceivedObjects, name: str, centers_m: FloatArray, radius_m: float) -> FloatArray:
     """Return the overlaps (n,) of spheres with one object, in m³, by the code path of a tick."""
     scene = scene_table(objects)
-    classes = np.full(len(objects.names), PASSED_OVER, dtype=np.int64)
+    classes = np.full(len(objects.names), SKIPPED, dtype=np.int64)
     classes[objects.names.index(name)] = OBSTACLE
     spheres = np.insert(centers_m, 3, radius_m, axis=1)
     return np.array([total_overlap_m3(sphere[None], scene, classes) for sphere in spheres])

@@ -45,7 +45,7 @@ class KernelQueue:
         return taken
 
 
-def compile_beside(kernels: Sequence[Compiled], count: int, done: Callable[[str], None] = lambda _: None) -> None:
+def compile_in_helpers(kernels: Sequence[Compiled], count: int, done: Callable[[str], None] = lambda _: None) -> None:
     """Compile kernels of our modules in `count` processes, at most 4; call `done` with each kernel's name.
 
     A process may be killed, or the disk may be full. Then `prepare` compiles the missing kernels.

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from common.companion.process import Companion
-from robot_side.compiled import beside
+from robot_side.compiled import helper_processes
 from robot_side.compiled import warm_up as warm_up_module
-from robot_side.compiled.beside import KernelQueue, compile_beside
+from robot_side.compiled.helper_processes import KernelQueue, compile_in_helpers
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import code_sizes
 from robot_side.compiled.warm_up import warm_up
@@ -65,7 +65,7 @@ def test_other_processes_leave_machine_code_that_is_loaded_here(
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     told: list[str] = []
     fresh = fresh_kernels()
-    compile_beside(fresh, 2, told.append)
+    compile_in_helpers(fresh, 2, told.append)
     assert sorted(told) == sorted(NAMES)
     for kernel in fresh:
         kernel.prepare()
@@ -76,7 +76,7 @@ def test_other_processes_leave_machine_code_that_is_loaded_here(
 def test_a_process_that_can_keep_nothing_ends_and_claims_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", "/proc/nowhere")
     told: list[str] = []
-    compile_beside(fresh_kernels(), 2, told.append)
+    compile_in_helpers(fresh_kernels(), 2, told.append)
     assert told == []
 
 
@@ -89,7 +89,7 @@ def test_a_process_that_is_killed_leaves_the_rest_to_us(tmp_path: Path, monkeypa
             super().__init__(module)
             os.kill(self.process_id, signal.SIGKILL)
 
-    monkeypatch.setattr(beside, "Companion", Killed)
+    monkeypatch.setattr(helper_processes, "Companion", Killed)
     monkeypatch.setattr(warm_up_module, "_WORTH_A_PROCESS", 0)
     fresh = fresh_kernels()
     warm_up(kernels=fresh)
@@ -102,15 +102,15 @@ def test_nothing_goes_on_compiling_for_a_process_that_has_gone(tmp_path: Path) -
     program = (
         "import os\n"
         "import robot_side.parts\n"
-        "from robot_side.compiled import beside\n"
+        "from robot_side.compiled import helper_processes\n"
         "from robot_side.compiled.kernel import imported_kernels\n"
-        "class Told(beside.Companion):\n"
+        "class Announcing(helper_processes.Companion):\n"
         "    def __init__(self, *arguments):\n"
         "        super().__init__(*arguments)\n"
         "        print(self.process_id, flush=True)\n"
-        "beside.Companion = Told\n"
+        "helper_processes.Companion = Announcing\n"
         "kernels = [kernel for kernel in imported_kernels() if 'precise' in kernel.name]\n"
-        "beside.compile_beside(kernels, 1)\n"
+        "helper_processes.compile_in_helpers(kernels, 1)\n"
     )
     surroundings = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     with subprocess.Popen(
@@ -131,7 +131,7 @@ def test_without_a_place_to_keep_it_no_process_is_started(tmp_path: Path, monkey
     (tmp_path / "file").write_bytes(b"")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "below"))
     monkeypatch.setattr(warm_up_module, "_WORTH_A_PROCESS", 0)
-    monkeypatch.setattr(warm_up_module, "compile_beside", None)
+    monkeypatch.setattr(warm_up_module, "compile_in_helpers", None)
     fresh = fresh_kernels()
     told: list[str] = []
     warm_up(kernels=fresh, done=told.append)

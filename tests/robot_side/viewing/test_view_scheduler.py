@@ -14,7 +14,7 @@ from robot_side.laws.paper import PaperLaw
 from robot_side.laws.swept import SweptLaw
 from robot_side.parts import build_parts
 from robot_side.settings import CameraSettings, RobotSettings
-from tests.robot_side.viewing.looking_table import TABLES, Table
+from tests.robot_side.viewing.view_table import TABLES, Table
 
 ALL = {"overview": True, "first_person": True, "scene": True}
 

@@ -18,7 +18,7 @@ _REFILL_PER_S: Final = MOST_WRITES_PER_S - _BURST - len(_PARTS)
 """Refill rate: a second may begin with a full bucket, and with a paid release for each part."""
 
 
-class WriteBound:
+class WriteBucket:
     """Choice of the parts to write now; a part that goes off never waits."""
 
     def __init__(self) -> None:

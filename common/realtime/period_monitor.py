@@ -6,7 +6,7 @@ from typing import Any, Final
 from common.clock import Clock
 from common.realtime.pacing import Pacer
 from common.realtime.stages import Stages
-from common.realtime.taken import Taken, read_taken
+from common.realtime.stolen_time import StolenTime, read_stolen_time
 
 WINDOW_S: Final = 5.0
 _LEFT_OUT: Final = 0.05
@@ -17,7 +17,7 @@ _UNDISTURBED: Final = 1.25
 """Ratio of wall time to processor time below which turns were undisturbed."""
 
 
-class KeepingUp:
+class PeriodMonitor:
     """Monitor of one loop, in windows of 5 s; the pacer's overruns count as left out."""
 
     def __init__(
@@ -26,19 +26,19 @@ class KeepingUp:
         stages: Stages,
         wall: Clock,
         processor: Clock,
-        helps: Mapping[str, str],
-        taken: Callable[[], Taken] = read_taken,
+        remedies: Mapping[str, str],
+        taken: Callable[[], StolenTime] = read_stolen_time,
     ) -> None:
-        """helps: from a stage's name to its remedy; the name "" is the time outside of all stages."""
+        """remedies: from a stage's name to its remedy; the name "" is the time outside of all stages."""
         self.said: str | None = None
         """The sentence, once there is one."""
         self.stages = stages
-        self._pacer, self._wall, self._processor, self._helps, self._taken = pacer, wall, processor, helps, taken
+        self._pacer, self._wall, self._processor, self._remedies, self._taken = pacer, wall, processor, remedies, taken
         self._began_s = self._computed_s = 0.0
         self._worked_s = [0.0, 0.0]
         """Wall time and processor time in this window, without waiting."""
-        self._first: tuple[float, Taken] | None = None
-        self._window: tuple[float, Taken, int, int, list[float]] | None = None
+        self._first: tuple[float, StolenTime] | None = None
+        self._window: tuple[float, StolenTime, int, int, list[float]] | None = None
 
     def begin(self) -> None:
         """Note that the loop begins to work."""
@@ -74,7 +74,14 @@ class KeepingUp:
         return {"said": self.said, "waited": waited, "stolen": stolen}
 
     def _judge(
-        self, now_s: float, taken: Taken, since_s: float, before: Taken, turns: int, overruns: int, spent_s: list[float]
+        self,
+        now_s: float,
+        taken: StolenTime,
+        since_s: float,
+        before: StolenTime,
+        turns: int,
+        overruns: int,
+        spent_s: list[float],
     ) -> str | None:
         turns, overruns = self._pacer.turns - turns, self._pacer.overruns - overruns
         if turns == 0 or overruns <= _LEFT_OUT * (turns + overruns):
@@ -90,7 +97,7 @@ class KeepingUp:
             most = f", {100.0 * share:.0f} % of it {stage}" if stage else ""
             return (
                 f"this machine is too slow: a turn computes for {1e3 * computed_s:.2g} ms where there are"
-                f" {1e3 * self._pacer.period_s:.2g} ms{most}, and {left_out}; {self._helps[stage]} would help"
+                f" {1e3 * self._pacer.period_s:.2g} ms{most}, and {left_out}; {self._remedies[stage]} would help"
             )
         whose = "closing other programs, or --realtime,"
         if stolen is not None and stolen > max(waited or 0.0, _LEFT_OUT):

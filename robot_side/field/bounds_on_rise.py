@@ -118,10 +118,10 @@ def _most(profile: Profile, at: float, entries: np.ndarray) -> float:
 
 
 @building_block
-def may_count(profile: Profile, floor: float, full: float, distances: FloatArray, entries: np.ndarray) -> bool:
+def may_count(profile: Profile, baseline: float, full: float, distances: FloatArray, entries: np.ndarray) -> bool:
     """Return whether a pair may shorten any onset distance.
 
-    floor: V(0). full: least rise of the overlap at full strength. entries: with their bounds.
+    baseline: V(0). full: least rise of the overlap at full strength. entries: with their bounds.
     """
     pair = profile.pair
     for level in range(STRENGTHS):
@@ -131,6 +131,6 @@ def may_count(profile: Profile, floor: float, full: float, distances: FloatArray
         wanted = (level + 0.5) / STRENGTHS * full
         if _uncovered(at - pair.contact, pair.radius) * (1.0 + 1e-9) < wanted:
             continue
-        if (_most(profile, at, entries) - floor) * (1.0 + 1e-9) >= wanted:
+        if (_most(profile, at, entries) - baseline) * (1.0 + 1e-9) >= wanted:
             return True
     return False

@@ -17,7 +17,7 @@ from feelahead.lab.reference.solids import Solids
 from robot_side.arm.port import GripperPose
 from robot_side.field.field import Along
 from robot_side.field.look import LEAST_DEPTH_M, MARGIN_M
-from robot_side.field.object_class import PASSED_OVER, TARGET, TOUCHABLE
+from robot_side.field.object_class import SKIPPED, TARGET, TOUCHABLE
 from robot_side.field.scratch import STRENGTHS, TOUCH_STRENGTH
 from robot_side.surroundings.perceived import PerceivedObjects
 
@@ -45,7 +45,7 @@ _BESIDE_M: Final = 1e-3
 class Defined:
     """Result that a look should have."""
 
-    ways_m: FloatArray
+    onsets_m: FloatArray
     """(3, 2, 8) fast and slow: as defined, and early and late in the band; up to a millimetre beyond the reach"""
     sigma_m: float
     """Largest D_σ"""
@@ -54,11 +54,11 @@ class Defined:
 
     def judge(self, found_m: FloatArray, reach_m: float) -> "Judged":
         """Judge contact distances (2, 8) found with this reach; those beyond count as at the reach."""
-        found_m, (ways_m, early_m, late_m) = np.minimum(found_m, reach_m), np.minimum(self.ways_m, reach_m)
-        grazes = late_m - early_m > GRAZE_M
-        outside_m = np.maximum(found_m - late_m, 0.0) - np.maximum(early_m - found_m, 0.0)
-        off_m = np.where(grazes, outside_m, found_m - ways_m)
-        known = ~(np.minimum(found_m, ways_m) >= reach_m)
+        found_m, (onsets_m, approach_m, late_m) = np.minimum(found_m, reach_m), np.minimum(self.onsets_m, reach_m)
+        grazes = late_m - approach_m > GRAZE_M
+        outside_m = np.maximum(found_m - late_m, 0.0) - np.maximum(approach_m - found_m, 0.0)
+        off_m = np.where(grazes, outside_m, found_m - onsets_m)
+        known = ~(np.minimum(found_m, onsets_m) >= reach_m)
         return Judged(np.where(np.isnan(off_m), np.inf, off_m)[known], grazes[known])
 
 
@@ -111,7 +111,7 @@ def statistical_m(pose: GripperPose, along: Along, encoder_sigma_rad: FloatArray
     return inflated_m, np.maximum(0.0, along.mean_m + along.mean_along_m + along.quantile * spread)
 
 
-def defined_ways(
+def defined_onsets(
     pose: GripperPose,
     objects: PerceivedObjects,
     classes: IntArray,
@@ -123,15 +123,15 @@ def defined_ways(
     alone_m, sigma_m = statistical_m(pose, along, encoder_sigma_rad)
     along_m, expected_m = max(0.0, (sigma_m - alone_m).max()), max(0.0, along.mean_m + along.mean_along_m)
     solids = Solids(objects)
-    sphere, thing = np.nonzero(np.broadcast_to(classes != PASSED_OVER, (len(sigma_m), len(classes))))
+    sphere, thing = np.nonzero(np.broadcast_to(classes != SKIPPED, (len(sigma_m), len(classes))))
     held_back = pose.sphere_on_finger[sphere] & (classes[thing] == TARGET)
     inflated_m = np.where(held_back, np.minimum(alone_m[sphere], widest_m), alone_m[sphere])
-    early_m = along_m + (np.zeros(len(thing)) if along.early_m is None else along.early_m[thing])
+    approach_m = along_m + (np.zeros(len(thing)) if along.approach_m is None else along.approach_m[thing])
     swollen = _Pairs(
         centers_m=pose.sphere_centers_m[sphere],
         radii_m=pose.sphere_radii_m[sphere] + inflated_m,
         thing=thing,
-        sooner_m=early_m,
+        sooner_m=approach_m,
         later_m=np.maximum(inflated_m + along_m - expected_m, 0.0),
         touchable=np.isin(classes[thing], (TOUCHABLE, TARGET)),
         bound_m=np.zeros(len(thing)),
@@ -146,14 +146,14 @@ def defined_ways(
     bare = bare._replace(radii_m=bare.radii_m - inflated_m[inside], sooner_m=bare.sooner_m + inflated_m[inside])
     bare, _ = look.bounded(bare)
     look.follow(near.and_also(bare))
-    return Defined(look.ways_m, float(sigma_m.max(initial=0.0)), look.things)
+    return Defined(look.onsets_m, float(sigma_m.max(initial=0.0)), look.things)
 
 
 class _Look:
     """Contact distances found so far, (3, 2, 8), and the objects that decide them."""
 
     def __init__(self, solids: Solids, direction: FloatArray, reach_m: float) -> None:
-        self.ways_m: FloatArray = np.full((len(_DUE), 2, STRENGTHS), np.inf)
+        self.onsets_m: FloatArray = np.full((len(_DUE), 2, STRENGTHS), np.inf)
         self.things: IntArray = np.full((2, STRENGTHS), -1, dtype=np.int64)
         self._solids, self._direction, self._reach_m = solids, direction, reach_m
 
@@ -190,22 +190,22 @@ class _Look:
     def _may_shorten(self, pairs: _Pairs, from_m: FloatArray, known: BoolArray | bool = False) -> BoolArray:
         """Return which pairs may shorten a distance beyond `from_m` (p,), unless known (p, 3, 8)."""
         least_m = (from_m - MARGIN_M - pairs.sooner_m)[:, None, None]
-        fast = least_m < self.ways_m[:, 0]
+        fast = least_m < self.onsets_m[:, 0]
         later_m = np.where(pairs.touchable, pairs.later_m, 0.0)[:, None, None]
-        slow = least_m + later_m < self.ways_m[:, 1]
+        slow = least_m + later_m < self.onsets_m[:, 1]
         slow[pairs.touchable, :, TOUCH_STRENGTH:] = False
         within = least_m <= self._reach_m
         shorter: BoolArray = np.any((fast | slow) & within & np.logical_not(known), axis=(1, 2))
         return shorter
 
-    def _overlap(self, pairs: _Pairs, ways_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _overlap(self, pairs: _Pairs, onsets_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return V and dV/dE of pairs at distances (p, k)."""
-        moved = pairs.centers_m[:, None] + ways_m[..., None] * self._direction
-        size = ways_m.shape[1]
+        moved = pairs.centers_m[:, None] + onsets_m[..., None] * self._direction
+        size = onsets_m.shape[1]
         volumes, gradients = self._solids.overlap(
             moved.reshape(-1, 3), np.repeat(pairs.radii_m, size), np.repeat(pairs.thing, size)
         )
-        return volumes.reshape(ways_m.shape), (gradients @ self._direction).reshape(ways_m.shape)
+        return volumes.reshape(onsets_m.shape), (gradients @ self._direction).reshape(onsets_m.shape)
 
     def _shorten(self, pairs: _Pairs, until_m: FloatArray) -> BoolArray:
         """Shorten the distances by overlaps up to `until_m` (p,); return the strengths (p, 3, 8) known by then."""
@@ -236,13 +236,13 @@ class _Look:
             if slow:
                 allowed[pairs.touchable, :, TOUCH_STRENGTH:] = False
             shift_m = np.where(slow, more_m, 0.0) - less_m
-            most_m = np.minimum(np.where(allowed, high_m + shift_m, np.inf).min(axis=0), self.ways_m[:, int(slow)])
+            most_m = np.minimum(np.where(allowed, high_m + shift_m, np.inf).min(axis=0), self.onsets_m[:, int(slow)])
             which = np.nonzero(allowed & (low_m + shift_m < most_m))
             pair, row, level = which
             there_m = self._halve(pairs.rows(pair), low_m[which], high_m[which], pairs.before_m3[pair] + due_m3[which])
             for found_m, k, r, j in zip(there_m + shift_m[pair, 0, 0], pair, row, level, strict=True):
-                if found_m < self.ways_m[r, int(slow), j]:
-                    self.ways_m[r, int(slow), j] = found_m
+                if found_m < self.onsets_m[r, int(slow), j]:
+                    self.onsets_m[r, int(slow), j] = found_m
                     if r == 0:
                         self.things[int(slow), j] = pairs.thing[k]
         return known

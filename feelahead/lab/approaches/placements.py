@@ -47,8 +47,8 @@ def place(
     approach axis as the pull begins; below 0 they come nearer. None if 40 draws found none, or for too short a pull.
     """
     record = replay.record
-    posed.put(*_pose(replay, record.began_s), np.zeros(3))
-    home_way_m = posed.way_m(_FARTHEST_M)
+    posed.set_pose(*_pose(replay, record.began_s), np.zeros(3))
+    home_distance_m = posed.contact_distance_m(_FARTHEST_M)
     farthest_m = float(np.interp(replay.end_s, record.pose_time_s, replay.along_m))
     if farthest_m <= _LEAST_START_GAP_M:
         return None
@@ -56,12 +56,12 @@ def place(
     for _ in range(_TRIES):
         row = int(np.argmax(replay.along_m >= float(generator.uniform(_LEAST_START_GAP_M, farthest_m))))
         aside = generator.uniform(-_ACROSS_M, _ACROSS_M, 2) @ across
-        if home_way_m < _FARTHEST_M:
-            shift_m = replay.moved_m[row] - home_way_m * replay.axis + aside
+        if home_distance_m < _FARTHEST_M:
+            shift_m = replay.moved_m[row] - home_distance_m * replay.axis + aside
         else:
             # Nothing is straight ahead: drift or turning leads to the objects.
             shift_m = generator.uniform(-_ALONG_M, _ALONG_M) * replay.axis + aside
-        posed.put(*_pose(replay, record.began_s), shift_m)
+        posed.set_pose(*_pose(replay, record.began_s), shift_m)
         if posed.gap_m() < _LEAST_START_GAP_M:
             continue
         touch_s = first_touch_s(replay, posed, shift_m, speed_m_s)
@@ -75,7 +75,7 @@ def first_touch_s(replay: Replay, posed: PosedScene, shift_m: FloatArray, speed_
     """Find when the true gripper first touches the objects moved by `shift_m` (3,); None if never in the record."""
     time_s = replay.record.began_s
     while time_s <= replay.end_s:
-        posed.put(*_pose(replay, time_s), shifted(shift_m, replay, speed_m_s, time_s))
+        posed.set_pose(*_pose(replay, time_s), shifted(shift_m, replay, speed_m_s, time_s))
         gap_m = posed.gap_m()
         if gap_m <= 0.0:
             return time_s
@@ -111,7 +111,7 @@ def avoids(
         return False
     arrives_s, rests_s, joints_rad = stopped
     _, fingers = _pose(replay, arrives_s)
-    posed.put(joints_rad, fingers, shifted(shift_m, replay, speed_m_s, rests_s))
+    posed.set_pose(joints_rad, fingers, shifted(shift_m, replay, speed_m_s, rests_s))
     return posed.gap_m() > 0.0
 
 

@@ -18,7 +18,7 @@ _TURN_S: Final = 0.004
 _AWAITED: Final = {"--arm": "an arm's driver", "--objects": "a process that perceives objects"}
 
 
-class Beside:
+class ConnectedDrivers:
     """Connected programs by the settings: the arm's driver and the perception process."""
 
     def __init__(
@@ -69,11 +69,11 @@ class Beside:
             for flag, part in (("--arm", self._arm), ("--objects", self._objects))
             if part is not None
         }
-        told: set[str] = set()
+        reported: set[str] = set()
         while waiting := [flag for flag, first in begin.items() if not first(self._ports[flag].wait(0.0))]:
             for flag in waiting:
-                if flag not in told:
-                    told.add(flag)
+                if flag not in reported:
+                    reported.add(flag)
                     self._note(f"waiting for {_AWAITED[flag]} at {self._ports[flag].endpoint}")
                 # Keys may be allowed meanwhile; the turns that refresh them have not begun.
                 for text in self._ports[flag].refresh_keys():

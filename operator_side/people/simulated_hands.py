@@ -6,17 +6,17 @@ from operator_side.people.person import SimulatedOperator
 from operator_side.people.pulling_hands import PullingHands, constant_force
 from operator_side.people.settings import PersonSettings
 
-Whoever = SimulatedOperator | PullingHands
+SimulatedHands = SimulatedOperator | PullingHands
 
 
-def whoever(
+def simulated_hands(
     device: SimulatedDualSense,
     settings: PersonSettings,
     seed: int,
     calibration: TravelCalibration | None = None,
     *,
     swap_sides: bool = False,
-) -> Whoever:
+) -> SimulatedHands:
     """Make the hands that `settings` select, on `device`."""
     if settings.pull_n is not None:
         return PullingHands(device, constant_force(settings.pull_n))

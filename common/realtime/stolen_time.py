@@ -12,7 +12,7 @@ _STOLEN: Final = 7
 
 
 @dataclass(frozen=True)
-class Taken:
+class StolenTime:
     """Counters since some start; None if the system gives none."""
 
     waited_s: float | None
@@ -22,7 +22,7 @@ class Taken:
     whole: float | None
     """Time of all processors together."""
 
-    def shares_since(self, earlier: "Taken", passed_s: float) -> tuple[float | None, float | None]:
+    def shares_since(self, earlier: "StolenTime", passed_s: float) -> tuple[float | None, float | None]:
         """Return the waited share of `passed_s`, and the stolen share of the processors' time."""
         whole = None if self.whole is None or earlier.whole is None else self.whole - earlier.whole
         return _share(self.waited_s, earlier.waited_s, passed_s), _share(self.stolen, earlier.stolen, whole)
@@ -32,7 +32,7 @@ def _share(now: float | None, earlier: float | None, whole: float | None) -> flo
     return (now - earlier) / whole if now is not None and earlier is not None and whole else None
 
 
-def read_taken() -> Taken:
+def read_stolen_time() -> StolenTime:
     """Read the counters of the calling thread."""
     waited_s = stolen = whole = None
     with contextlib.suppress(OSError, ValueError, IndexError):
@@ -40,4 +40,4 @@ def read_taken() -> Taken:
     with contextlib.suppress(OSError, ValueError, IndexError), _PROCESSORS.open(encoding="ascii") as file:
         times = [float(text) for text in file.readline().split()[1 : _STOLEN + 2]]
         stolen, whole = times[_STOLEN], sum(times)
-    return Taken(waited_s, stolen, whole)
+    return StolenTime(waited_s, stolen, whole)

@@ -3,13 +3,13 @@
 import pytest
 
 from common.clock import VirtualClock
-from common.realtime.keeping_up import WINDOW_S, KeepingUp
 from common.realtime.pacing import Pacer
+from common.realtime.period_monitor import WINDOW_S, PeriodMonitor
 from common.realtime.stages import Stages
-from common.realtime.taken import Taken
+from common.realtime.stolen_time import StolenTime
 
 PERIOD_S = 1e-3
-HELPS = {"physics": "fewer bodies", "sensing": "fewer objects", "": "a faster machine"}
+REMEDIES = {"physics": "fewer bodies", "sensing": "fewer objects", "": "a faster machine"}
 
 
 class Loop:
@@ -21,14 +21,14 @@ class Loop:
         self.pacer = Pacer(PERIOD_S, 100.0)
         stages = Stages(("physics", "sensing"), self.wall, self.processor)
         self._stages = {name: stages.timed(name, self._pass) for name in ("physics", "sensing")}
-        self.keeping_up = KeepingUp(self.pacer, stages, self.wall, self.processor, HELPS, self._taken)
+        self.period_monitor = PeriodMonitor(self.pacer, stages, self.wall, self.processor, REMEDIES, self._taken)
         self.said: list[str] = []
 
-    def _taken(self) -> Taken:
+    def _taken(self) -> StolenTime:
         passed_s = self.wall.now() - 100.0
         waited = None if self._waited is None else self._waited * passed_s
         stolen = None if self._stolen is None else self._stolen * 200.0 * passed_s
-        return Taken(waited, stolen, None if stolen is None else 200.0 * passed_s)
+        return StolenTime(waited, stolen, None if stolen is None else 200.0 * passed_s)
 
     def _pass(self, wall_s: float, processor_s: float) -> None:
         self.wall.advance_to(self.wall.now() + wall_s)
@@ -41,7 +41,7 @@ class Loop:
         end_s, turn = self.wall.now() + for_s, 0
         while self.wall.now() < end_s:
             self.wall.advance_to(max(self.wall.now(), self.pacer.deadline_s))
-            self.keeping_up.begin()
+            self.period_monitor.begin()
             self.pacer.begin(self.wall.now())
             turn += 1
             spent_s = computes_s if turn % every == 0 else 1e-4
@@ -50,7 +50,7 @@ class Loop:
             self._pass((0.9 - physics) * spent_s, (0.9 - physics) * spent_s)
             if lasts_s is not None:
                 self._pass(lasts_s - spent_s, 0.0)
-            if (text := self.keeping_up.end(turned=True)) is not None:
+            if (text := self.period_monitor.end(turned=True)) is not None:
                 self.said.append(text)
 
 
@@ -59,7 +59,7 @@ def test_a_loop_that_keeps_up_is_told_nothing() -> None:
     loop.run(4 * WINDOW_S, 0.4e-3)
     loop.run(4 * WINDOW_S, 2.5e-3, every=100)
     assert loop.said == []
-    assert loop.keeping_up.summary() == {"said": None, "waited": 0.0, "stolen": 0.0}
+    assert loop.period_monitor.summary() == {"said": None, "waited": 0.0, "stolen": 0.0}
 
 
 def test_too_slow_names_what_takes_longest_and_what_would_help_once() -> None:
@@ -70,7 +70,7 @@ def test_too_slow_names_what_takes_longest_and_what_would_help_once() -> None:
         "this machine is too slow: a turn computes for 1.5 ms where there are 1 ms, 70 % of it physics"
     )
     assert text.endswith("33 % of the turns are left out; fewer bodies would help")
-    assert loop.keeping_up.summary()["said"] == text
+    assert loop.period_monitor.summary()["said"] == text
 
 
 def test_turns_that_are_too_long_at_times_are_slow_where_nobody_disturbed_them() -> None:
@@ -85,7 +85,7 @@ def test_too_busy_when_others_have_the_processor() -> None:
     (text,) = loop.said
     assert text.startswith("this machine is too busy: a turn lasts 1.4 ms and computes for 0.3 ms")
     assert "others had the processor for 40 % of the time: closing other programs, or --realtime, would help" in text
-    assert loop.keeping_up.summary()["waited"] == pytest.approx(0.4)
+    assert loop.period_monitor.summary()["waited"] == pytest.approx(0.4)
 
 
 def test_too_busy_when_the_host_takes_the_time() -> None:
@@ -99,4 +99,4 @@ def test_a_system_that_does_not_tell_is_no_obstacle() -> None:
     loop.run(2 * WINDOW_S, 0.3e-3, 1.4e-3)
     assert loop.said[0].startswith("this machine is too busy")
     assert loop.said[0].endswith("; closing other programs, or --realtime, would help")
-    assert loop.keeping_up.summary() == {"said": loop.said[0], "waited": None, "stolen": None}
+    assert loop.period_monitor.summary() == {"said": loop.said[0], "waited": None, "stolen": None}

@@ -14,9 +14,9 @@ from robot_side.parts import build_parts
 from robot_side.reporting.outgoing_messages import Outgoing, OutgoingStream
 from robot_side.settings import RobotSettings
 from robot_side.viewing.exchange import Order
-from robot_side.viewing.looking import Looking
 from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.shapes import SceneModel
+from robot_side.viewing.view_scheduler import ViewScheduler
 from tests.helpers.fake_companion import Desk
 
 TICK_S = 0.001
@@ -45,7 +45,7 @@ class Table:
             for stream in ("haptics", "telemetry", "video", "scene")
         }
         view = SceneView(SceneModel(self.parts.scene), self.parts.kinematics, self.parts.explains)
-        self.looking = Looking(self.robot, view, self.desk.cameras, self, always=self.always)
+        self.looking = ViewScheduler(self.robot, view, self.desk.cameras, self, always=self.always)
         self.end = LinkEnd("operator", 5, "clock")
         self.watching: dict[str, Any] = {}
         self.ticks = 0
@@ -106,7 +106,7 @@ class Table:
                 number, whole = last + 1, order.whole or before != kind
                 self._encoded[order.view] = kind, number
                 size_bytes = int(
-                    (11_000 if whole else 1_000) * self.desk.cameras.giving_way.step.bytes_share(h264=True)
+                    (11_000 if whole else 1_000) * self.desk.cameras.picture_rate_control.step.bytes_share(h264=True)
                 )
             self.desk.companions[-1].picture(order, bytes(size_bytes), number, whole=whole)
 

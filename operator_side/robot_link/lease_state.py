@@ -12,12 +12,12 @@ NOTICE_EXPIRES_S: Final = 0.5
 """Age at which a notice of the lease expires, in seconds."""
 REPORT_EXPIRES_S: Final = 2.0
 """Age at which a report of the link expires, in seconds."""
-_ANEW_PERIOD_S: Final = 5.0
+_NEW_EPOCH_S: Final = 5.0
 """Time after a new epoch in which a notice of an end may still be about the epoch before, in seconds."""
 _REMEMBERED: Final = 100
 
 
-class Standing:
+class LeaseState:
     """Lease and link as last heard."""
 
     def __init__(self) -> None:
@@ -40,9 +40,9 @@ class Standing:
 
     def follow(self, notice: LeaseNotice, now_s: float) -> bool:
         """Take a notice; return whether we must start a new epoch, because the robot side forgot us."""
-        anew = now_s - self._anew_s < _ANEW_PERIOD_S
+        restarted = now_s - self._anew_s < _NEW_EPOCH_S
         known = None if self.lease is None else self.lease.session
-        if anew and notice.session is SessionState.ENDED and known not in (None, SessionState.ENDED):
+        if restarted and notice.session is SessionState.ENDED and known not in (None, SessionState.ENDED):
             return False  # the epoch before, by a slower connection
         standing = "owner" if notice.session in OWNING else str(notice.session)
         if not self.history or self.history[-1] != standing:
@@ -50,7 +50,7 @@ class Standing:
         self.lease, self._heard_s = notice, now_s
         if notice.session in (SessionState.DISARMED, SessionState.STOPPED):
             self.stop_reason = notice.why
-        if notice.session is not SessionState.ENDED or anew:
+        if notice.session is not SessionState.ENDED or restarted:
             return False
         self._anew_s = now_s
         return True

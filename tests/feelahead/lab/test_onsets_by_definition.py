@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray, IntArray
 from feelahead.lab.approaches.ticks import DEMO, record
-from feelahead.lab.reference import ways_by_definition
+from feelahead.lab.reference import onsets_by_definition
 from feelahead.lab.reference.looks import compare, looks_of
+from feelahead.lab.reference.onsets_by_definition import GRAZE_M, Defined, defined_onsets, statistical_m
 from feelahead.lab.reference.solids import Solids
-from feelahead.lab.reference.ways_by_definition import GRAZE_M, Defined, defined_ways, statistical_m
 from robot_side.arm.port import GripperPose
 from robot_side.field.field import Along
-from robot_side.field.object_class import OBSTACLE, PASSED_OVER, TARGET, TOUCHABLE
+from robot_side.field.object_class import OBSTACLE, SKIPPED, TARGET, TOUCHABLE
 from robot_side.overlap import Mesh
 from robot_side.surroundings.perceived import PerceivedObjects
 from tests.helpers.field.fields import AHEAD, RADIUS_M, along, ball_pose
@@ -55,14 +55,14 @@ def on_a_grid(
     """Return the distances (2, 8) with each sphere and object alone, nothing passed over."""
     alone_m, sigma_m = statistical_m(pose, ahead, ENCODER_SIGMA_RAD)
     along_m, expected_m = max(0.0, (sigma_m - alone_m).max()), max(0.0, ahead.mean_m + ahead.mean_along_m)
-    solids, ways_m = Solids(objects), np.full((2, 8), np.inf)
+    solids, onsets_m = Solids(objects), np.full((2, 8), np.inf)
     for thing, object_class in enumerate(classes):
-        early_m = along_m + (0.0 if ahead.early_m is None else ahead.early_m[thing])
-        for i, center in enumerate(pose.sphere_centers_m if object_class != PASSED_OVER else ()):
+        approach_m = along_m + (0.0 if ahead.approach_m is None else ahead.approach_m[thing])
+        for i, center in enumerate(pose.sphere_centers_m if object_class != SKIPPED else ()):
             inflated_m = min(alone_m[i], widest_m if object_class == TARGET and pose.sphere_on_finger[i] else np.inf)
             for radius, sooner_m in (
-                (pose.sphere_radii_m[i] + inflated_m, early_m),
-                (pose.sphere_radii_m[i], early_m + inflated_m),
+                (pose.sphere_radii_m[i] + inflated_m, approach_m),
+                (pose.sphere_radii_m[i], approach_m + inflated_m),
             ):
                 grid_m = np.arange(0.0, REACH_M + 2 * MARGIN_M + sooner_m, STEP_M)
                 many = np.full(len(grid_m), radius), np.full(len(grid_m), thing)
@@ -75,14 +75,14 @@ def on_a_grid(
                     strengths = risen / max(risen[full], MARGIN_M * np.linalg.norm(gradients[0]), least)
                     places = np.searchsorted(strengths, DUE)
                     own_m = np.append(grid_m, np.inf)[places] - MARGIN_M - sooner_m
-                    ways_m[0] = np.minimum(ways_m[0], own_m)
+                    onsets_m[0] = np.minimum(onsets_m[0], own_m)
                     if object_class in (TARGET, TOUCHABLE):
                         own_m = own_m + max(inflated_m + along_m - expected_m, 0.0)
                         own_m[4:] = np.inf
-                    ways_m[1] = np.minimum(ways_m[1], own_m)
+                    onsets_m[1] = np.minimum(onsets_m[1], own_m)
                 if volumes[0] == 0.0:
                     break
-    return ways_m
+    return onsets_m
 
 
 @settings(max_examples=20)
@@ -93,17 +93,17 @@ def test_any_look_is_defined_as_on_a_grid(seed: int) -> None:
     objects, count = any_scene(rng), int(rng.integers(1, 6))
     pose = free_pose(rng.uniform(-0.03, 0.03, (count, 3)), rng.uniform(0.004, 0.02, count), rng.random(count) < 0.5)
     direction, things = AHEAD + 0.4 * rng.normal(size=3), len(objects.names)
-    early_m = rng.uniform(0.0, 0.02, things) if rng.random() < 0.5 else None
+    approach_m = rng.uniform(0.0, 0.02, things) if rng.random() < 0.5 else None
     mean_m, direction = float(rng.uniform(-0.004, 0.006)), direction / np.linalg.norm(direction)
     missed = float(rng.uniform(-0.002, 0.002)), float(rng.uniform(0.0, 0.002)) ** 2
-    ahead = Along(direction, mean_m, 0.002**2, 2.326, REACH_M, *missed, early_m)
-    classes = rng.choice([OBSTACLE, OBSTACLE, TOUCHABLE, TARGET, PASSED_OVER], things).astype(np.int64)
+    ahead = Along(direction, mean_m, 0.002**2, 2.326, REACH_M, *missed, approach_m)
+    classes = rng.choice([OBSTACLE, OBSTACLE, TOUCHABLE, TARGET, SKIPPED], things).astype(np.int64)
     widest_m = float(rng.choice([0.002, 0.01, np.inf]))
     expected_m = on_a_grid(pose, objects, classes, ahead, widest_m)
-    defined = defined_ways(pose, objects, classes, ahead, widest_m, ENCODER_SIGMA_RAD)
+    defined = defined_onsets(pose, objects, classes, ahead, widest_m, ENCODER_SIGMA_RAD)
     judged = defined.judge(expected_m, REACH_M)
     assert np.abs(judged.off_m).max(initial=0.0) < 2.0 * STEP_M
-    assert ((defined.things >= 0) == (defined.ways_m[0] < np.inf)).all()
+    assert ((defined.things >= 0) == (defined.onsets_m[0] < np.inf)).all()
 
 
 @pytest.mark.parametrize("inflated_m", [0.0, 0.007])
@@ -111,24 +111,24 @@ def test_before_a_wall_the_ways_are_those_of_a_cap(inflated_m: float) -> None:
     radius, gap_m = RADIUS_M + inflated_m, 0.03
     wall = Scene().add().half_space(-AHEAD, -RADIUS_M - gap_m).objects()
     none = np.zeros(1, dtype=np.int64)
-    defined = defined_ways(ball_pose(), wall, none, along(AHEAD, inflated_m), np.inf, np.zeros(6))
-    depths = defined.ways_m[0, 0] + MARGIN_M - (gap_m - inflated_m)
+    defined = defined_onsets(ball_pose(), wall, none, along(AHEAD, inflated_m), np.inf, np.zeros(6))
+    depths = defined.onsets_m[0, 0] + MARGIN_M - (gap_m - inflated_m)
 
     def cap(depth: FloatArray | float) -> FloatArray | float:
         return np.pi * depth**2 * (radius - depth / 3.0)
 
     np.testing.assert_allclose(cap(depths) / cap(MARGIN_M), DUE, atol=1e-3)
-    np.testing.assert_array_equal(defined.ways_m[:, 0], defined.ways_m[:, 1])
-    assert (defined.ways_m[1] < defined.ways_m[0]).all()
-    assert (defined.ways_m[0] < defined.ways_m[2]).all()
+    np.testing.assert_array_equal(defined.onsets_m[:, 0], defined.onsets_m[:, 1])
+    assert (defined.onsets_m[1] < defined.onsets_m[0]).all()
+    assert (defined.onsets_m[0] < defined.onsets_m[2]).all()
     assert defined.sigma_m == inflated_m
 
 
 def test_a_way_is_off_by_its_distance_and_in_a_graze_from_its_band() -> None:
-    ways_m = np.full((3, 2, 8), np.inf)
-    ways_m[:, 0, 0], ways_m[:, 0, 1], ways_m[:, 0, 2] = (0.1, 0.0998, 0.1002), (0.1, 0.09, 0.2), (0.3, 0.29, 0.31)
-    defined = Defined(ways_m, 0.0, np.zeros((2, 8), dtype=np.int64))
-    assert ways_m[2, 0, 1] - ways_m[1, 0, 1] > GRAZE_M
+    onsets_m = np.full((3, 2, 8), np.inf)
+    onsets_m[:, 0, 0], onsets_m[:, 0, 1], onsets_m[:, 0, 2] = (0.1, 0.0998, 0.1002), (0.1, 0.09, 0.2), (0.3, 0.29, 0.31)
+    defined = Defined(onsets_m, 0.0, np.zeros((2, 8), dtype=np.int64))
+    assert onsets_m[2, 0, 1] - onsets_m[1, 0, 1] > GRAZE_M
     found_m = np.full((2, 8), np.inf)
     for first, second, off_m in ((0.101, 0.19, (0.001, 0.0)), (0.05, 0.08, (-0.05, -0.01)), (0.1, np.inf, (0.0, 0.05))):
         found_m[0, :2] = first, second
@@ -150,8 +150,8 @@ def test_looks_of_the_demo_are_noted_and_another_law_is_noticed(monkeypatch: pyt
     assert 20 < len(asked) <= 40
     found = compare(asked, encoder_sigma_rad).row()
     assert found["looks"] == len(asked)
-    assert found["ways"] > 200
+    assert found["distances"] > 200
     assert (found["late"], found["out_of_band"]) == (0, 0)
     assert found["sigma_off_mm"] < 1e-9
-    monkeypatch.setattr(ways_by_definition, "MARGIN_M", 0.0125)
+    monkeypatch.setattr(onsets_by_definition, "MARGIN_M", 0.0125)
     assert compare(asked, encoder_sigma_rad).row()["late"] > 100

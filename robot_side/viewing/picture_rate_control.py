@@ -45,7 +45,7 @@ def steps(rate_hz: float, quality: int) -> tuple[Step, ...]:
     return (*made, made[-1]._replace(halved=True))
 
 
-class GivingWay:
+class PictureRateControl:
     """Controller of the step of all views: down at once, up by one step after a second with room for it."""
 
     def __init__(self, rate_hz: float, quality: int) -> None:

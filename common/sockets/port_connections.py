@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 
-class Crowd:
+class PortConnections:
     """Connections of one port by descriptor; without I/O."""
 
     def __init__(self, limit: int, introduced_s: float) -> None:
@@ -18,14 +18,14 @@ class Crowd:
         self._numbers: dict[int, int] = {}
         self._accepted = 0
 
-    def came(self, descriptor: int, now_s: float) -> None:
+    def accepted(self, descriptor: int, now_s: float) -> None:
         """Add an accepted connection."""
-        self.went(descriptor)
+        self.ended(descriptor)
         self._newcomers[descriptor] = now_s
         self._accepted += 1
         self._numbers[descriptor] = self._accepted
 
-    def spoke(self, descriptor: int) -> None:
+    def introduced(self, descriptor: int) -> None:
         """Count the connection as introduced: it carried a message that only introduced peers can send."""
         if self._newcomers.pop(descriptor, None) is not None:
             self._known.add(descriptor)
@@ -34,7 +34,7 @@ class Crowd:
         """Return the number of the descriptor's connection, counted from 1 in order of arrival; 0 for none."""
         return self._numbers.get(descriptor, 0)
 
-    def went(self, descriptor: int) -> None:
+    def ended(self, descriptor: int) -> None:
         """Remove an ended connection; its descriptor may be used again."""
         self._newcomers.pop(descriptor, None)
         self._known.discard(descriptor)
@@ -45,9 +45,9 @@ class Crowd:
         while self._newcomers:
             descriptor, came_s = next(iter(self._newcomers.items()))
             if now_s - came_s >= self._introduced_s:
-                self.spoke(descriptor)
+                self.introduced(descriptor)
             elif len(self._newcomers) + len(self._known) > self.limit:
-                self.went(descriptor)
+                self.ended(descriptor)
                 self.hung_up += 1
                 yield descriptor
             else:

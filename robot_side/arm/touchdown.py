@@ -46,7 +46,7 @@ def carried_n(tool_jacobian: FloatArray, joint_loads_nm: FloatArray | None) -> f
     return float(joint_loads_nm @ joint_velocities(tool_jacobian, _UP, np.full(joint_loads_nm.size, np.inf)))
 
 
-class TouchingDown:
+class Touchdown:
     """Touchdown state of one object, from grip to release."""
 
     def __init__(self) -> None:

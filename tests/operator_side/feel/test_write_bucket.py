@@ -11,7 +11,7 @@ from common.protocol.link_end import LinkEnd
 from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel, Rumble
 from operator_side.core import OperatorSide
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
-from operator_side.feel.write_bound import MOST_WRITES_PER_S, WriteBound
+from operator_side.feel.write_bucket import MOST_WRITES_PER_S, WriteBucket
 from tests.helpers.felt import feedback, felt
 
 Fields = dict[str, Any]
@@ -99,7 +99,7 @@ def test_a_change_after_a_rest_goes_at_once() -> None:
 
 def test_what_is_left_waits_while_a_part_goes_off() -> None:
     stiff, stiffer = feedback(0, 3), feedback(0, 5)
-    bound, written = WriteBound(), RELEASED
+    bound, written = WriteBucket(), RELEASED
     for number in range(100):
         wanted = Feel(l2=stiffer if number % 2 else stiff, r2=FREE_TRIGGER, rumble=Rumble())
         written = bound.next(written, wanted, 1.0) or written
@@ -111,7 +111,7 @@ def test_what_is_left_waits_while_a_part_goes_off() -> None:
 
 
 def test_a_controller_that_nobody_knows_is_released_whatever_is_left() -> None:
-    bound, stiff = WriteBound(), Feel(l2=feedback(0, 3), r2=FREE_TRIGGER, rumble=Rumble())
+    bound, stiff = WriteBucket(), Feel(l2=feedback(0, 3), r2=FREE_TRIGGER, rumble=Rumble())
     assert [bound.next(None, stiff, 1.0) for _ in range(100)] == [RELEASED] * 100
     assert bound.next(RELEASED, stiff, 1.0) is None
     assert bound.next(RELEASED, stiff, 1.05) == stiff

@@ -42,7 +42,7 @@ class Room(Protocol):
         ...
 
 
-class Looking:
+class ViewScheduler:
     """Scheduler of the views in each turn: each at most at its rate, and only while it is watched."""
 
     def __init__(
@@ -110,7 +110,7 @@ class Looking:
         """Present `rate_hz`, `quality` and `size` (share of the width) of pictures; None without cameras"""
         if self._cameras is None:
             return None
-        step = self._cameras.giving_way.step
+        step = self._cameras.picture_rate_control.step
         return {"rate_hz": step.rate_hz, "quality": step.quality, "size": 0.5 if step.halved else 1.0}
 
     def close(self) -> None:
@@ -120,7 +120,7 @@ class Looking:
 
     def _turns(self, name: str, now_s: float) -> int:
         """Return how often `name` has become due since the last call."""
-        rate_hz = None if name == "scene" or self._cameras is None else self._cameras.giving_way.step.rate_hz
+        rate_hz = None if name == "scene" or self._cameras is None else self._cameras.picture_rate_control.step.rate_hz
         period_s = SCENE_PERIOD_S if rate_hz is None else 1.0 / rate_hz
         # The views alternate, so that neither waits for the other.
         next_s = self._next_s.setdefault(name, now_s + (0.5 * period_s if name == VIEW_NAMES[1] else 0.0))
@@ -140,7 +140,7 @@ class Looking:
         # Recorded pictures are JPEG: replay and export begin anywhere.
         lacks = None if self._always else self._core.session.watchers.lacks(now_s)
         h264 = cameras.makes_h264(lacks)
-        cameras.giving_way.update(self._room.left_bit_s, views, now_s, eager=self._room.begins, h264=h264)
+        cameras.picture_rate_control.update(self._room.left_bit_s, views, now_s, eager=self._room.begins, h264=h264)
         wanted: list[ViewName] = []
         full = self._room.backlog_s("video", now_s) > _BACKLOG_S
         # A late view is made as soon as there is room: at its next turn the other one could be first again.

@@ -13,7 +13,7 @@ Direction = Literal["to_operator", "to_robot"]
 
 
 @dataclass(frozen=True)
-class WayWords(Limited):
+class DirectionSettings(Limited):
     """Delay, loss, rate and queue of one direction; the forwarder gets them as JSON."""
 
     delay_s: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
@@ -48,16 +48,16 @@ class Counts:
         return counted | {"queue_p95_ms": p95}
 
 
-class Way:
+class Wire:
     """Drop-tail queue before a rate, and a delay behind it. The order is netem's: lose, drop, delay."""
 
-    def __init__(self, words: WayWords, seed: int, direction: Direction, began_s: float) -> None:
+    def __init__(self, words: DirectionSettings, seed: int, direction: Direction, began_s: float) -> None:
         self.counts = Counts()
         self._words = words
         self._random = random.Random(f"{seed} {direction}")  # noqa: S311  # reproducible, no secret
         self._began_s = self._free_s = began_s
 
-    def change(self, words: WayWords, now_s: float) -> None:
+    def change(self, words: DirectionSettings, now_s: float) -> None:
         """Change the words from now on; waiting bits leave at the new rate."""
         if self._words.rate_bit_s and words.rate_bit_s:
             waiting_s = max(0.0, self._free_s - now_s)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from robot_side.arm.touching_down import TouchingDown, carried_n
+from robot_side.arm.touchdown import Touchdown, carried_n
 
 TICK_S = 1e-3
 STIFFNESS_N_M = 8e3
@@ -17,7 +17,7 @@ class Arm:
     """Tool that follows its commands, with a load in its fingers, above a table at height 0."""
 
     def __init__(self, weight_n: float = 2.0, *, measures: bool = True, noise_n: float = 0.0) -> None:
-        self.touching_down = TouchingDown()
+        self.touchdown = Touchdown()
         self.height_m = self.meant_m = 0.05
         self.now_s = 1.0
         self._weight_n, self._measures, self._noise_n = weight_n, measures, noise_n
@@ -31,7 +31,7 @@ class Arm:
     def go(self, speed_m_s: float, duration_s: float, jolt_n: float = 0.0) -> float | None:
         """Rise or sink at this speed, heeding a contact; return the time of a new contact, None without."""
         for tick in range(round(duration_s / TICK_S)):
-            stands = self.touching_down.stands
+            stands = self.touchdown.stands
             told_m_s = max(0.0, speed_m_s) if stands else speed_m_s
             self.now_s += TICK_S
             self.meant_m += told_m_s * TICK_S
@@ -39,8 +39,8 @@ class Arm:
             borne_n = self._weight_n + self.pressed_n if self.meant_m <= 0.0 else 0.0
             jolt = -jolt_n if tick < 12 else 0.0  # Time that an arm takes to its speed.
             carried = self._weight_n - borne_n + jolt + self._noise_n * self._random.normal()
-            self.touching_down.update(carried if self._measures else None, self.height_m, told_m_s, self.now_s)
-            if self.touching_down.stands and not stands:
+            self.touchdown.update(carried if self._measures else None, self.height_m, told_m_s, self.now_s)
+            if self.touchdown.stands and not stands:
                 return self.now_s
         return None
 
@@ -59,17 +59,17 @@ def test_a_load_that_comes_to_stand_is_noticed_before_it_is_pressed_hard(speed_m
 def test_it_gives_way_for_a_moment() -> None:
     arm = Arm()
     arm.go(-0.025, 5.0)
-    assert arm.touching_down.gives_way
+    assert arm.touchdown.gives_way
     arm.go(-0.025, 0.02)
-    assert (arm.touching_down.stands, arm.touching_down.gives_way) == (True, False)
+    assert (arm.touchdown.stands, arm.touchdown.gives_way) == (True, False)
 
 
 def test_a_contact_lasts_until_the_tool_has_risen_by_3_mm_and_may_come_again() -> None:
     arm = Arm()
     assert arm.go(-0.025, 5.0)
     arm.go(0.01, 0.25)
-    assert arm.touching_down.stands
-    while arm.touching_down.stands:
+    assert arm.touchdown.stands
+    while arm.touchdown.stands:
         arm.go(0.01, TICK_S)
     assert arm.height_m == pytest.approx(3e-3, abs=1e-4)
     assert arm.go(-0.025, 0.1) is None
@@ -102,10 +102,10 @@ def test_a_thing_that_is_gripped_where_it_stands_is_lifted_freely_and_noticed_wh
 
 
 def test_a_state_that_was_seen_already_says_nothing_new() -> None:
-    touching_down = TouchingDown()
+    touchdown = Touchdown()
     for carried in (2.0, -100.0):
-        touching_down.update(carried, 0.1, -0.1, 1.0)
-    assert not touching_down.stands
+        touchdown.update(carried, 0.1, -0.1, 1.0)
+    assert not touchdown.stands
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([6, 7]))

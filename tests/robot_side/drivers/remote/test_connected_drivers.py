@@ -6,7 +6,7 @@ from common.errors import ConfigurationError
 from common.roles import Role
 from robot_side.core import RobotSide
 from robot_side.drivers.mujoco.scene import Scene
-from robot_side.drivers.remote.beside import Beside
+from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
 from robot_side.parts import build_parts
 from robot_side.settings import RobotSettings
 from tests.helpers.socket_talk import EPHEMERAL
@@ -18,7 +18,7 @@ SETTINGS = RobotSettings(arm=EPHEMERAL, objects=EPHEMERAL, roles={"ball": Role.S
 @pytest.mark.processes
 def test_a_robot_side_waits_for_both_and_knows_no_truth(scene: Scene) -> None:
     notes: list[str] = []
-    with Beside(SETTINGS.arm, SETTINGS.objects, notes.append) as beside:
+    with ConnectedDrivers(SETTINGS.arm, SETTINGS.objects, notes.append) as beside:
         parts = build_parts(SETTINGS, 1, "clock", scene, beside=beside)
         assert parts.notes[0].startswith("the driver's joints, in this order: shoulder_pan, shoulder_lift")
         arm_at, objects_at = (port.endpoint for port in beside._ports.values())
@@ -50,9 +50,9 @@ def test_a_robot_side_waits_for_both_and_knows_no_truth(scene: Scene) -> None:
 
 
 def test_an_address_that_is_taken_is_refused_and_none_stays_open() -> None:
-    with Beside(EPHEMERAL, None, print) as first:
+    with ConnectedDrivers(EPHEMERAL, None, print) as first:
         taken = first._ports["--arm"].endpoint
         with pytest.raises(ConfigurationError, match="--objects: cannot bind"):
-            Beside(EPHEMERAL, taken, print)
-    with Beside(taken, None, print):
+            ConnectedDrivers(EPHEMERAL, taken, print)
+    with ConnectedDrivers(taken, None, print):
         pass
