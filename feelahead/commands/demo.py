@@ -34,7 +34,7 @@ from operator_side.viewing.terminal.status import TerminalStatus
 from robot_side.laws.named import LawName
 
 _START_TIMEOUT_S = 600.0
-"""Time limit of a start, in seconds: the first one compiles kernels, which takes minutes on a busy machine."""
+"""Time limit for a side to start, in seconds: the first start compiles kernels, for minutes on a busy machine."""
 _LINK_TIMEOUT_S = 30.0
 _SENT: tuple[tuple[Direction, Stream], ...] = (
     ("to_robot", "haptics"),
@@ -43,7 +43,7 @@ _SENT: tuple[tuple[Direction, Stream], ...] = (
 )
 """Streams between the two sides."""
 _SHARED = ("link", "link_model", "asymmetry", "full_rate", "seed", "realtime")
-"""Flags of both sides."""
+"""Flags that the demo passes to both sides."""
 _ELSEWHERE = "; each side's keys have a separate file: --robot-config FILE.toml, --operator-config FILE.toml"
 
 
@@ -52,55 +52,60 @@ class DemoSettings(RunOptions):
     """Both sides on this machine: a simulated arm, a simulated DualSense, and a scripted person.
 
     The person arms the arm and pulls R2 to advance towards the target. They feel the trigger stiffen near objects.
-    Then they grasp the target, lift it, and set it down again. Nothing is needed but this machine.
+    Then they grasp the target, lift it, and set it down again. Neither a robot nor a controller is needed.
 
-    Try: feelahead demo --link "delay 50ms 10ms distribution normal", and the same with --no-haptics.
+    Try: feelahead demo --link "delay 50ms 10ms distribution normal", then the same with --no-haptics.
     """
 
     scene: Literal["table", "wall", "slot", "shelf"] | None = None
-    """Objects around the built-in arm's target. table: a cluttered table (default). wall: a wall 10 to 60 mm behind it.
-    slot: two posts in front of it, 15 to 40 mm to spare on each side. shelf: a shelf with a raised front edge to reach
-    over. The last three are drawn from the seed."""
+    """Objects around the built-in arm's target. table: a cluttered table (default). wall: a wall 10 to 60 mm behind the
+    target. slot: two posts in front of the target, with 15 to 40 mm to spare on each side. shelf: the target stands on
+    a shelf with a raised front edge. The exact sizes of the last three are drawn from the seed."""
     duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = 30.0
-    """Duration of the run with the link up."""
+    """Duration of the run, counted from when the link is up."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
-    """Share of contacts that a warning must precede, between 0 and 1 (eq. 10)."""
+    """Share of approaches in which the warning must come before the contact, between 0 and 1 (eq. 10)."""
     assist: Literal["none", "speed"] = "none"
     """speed: the robot side caps the speed along the triggers, so that the arm stops where full strength begins."""
     law: LawName = "swept"
-    """Law of the stiffness. swept: early enough to release, along each trigger; paper: the paper's plain law."""
+    """Law of the stiffness. swept: along each trigger, early enough to release it in time. paper: the paper's plain
+    law, for comparison."""
     compensation: Compensation = "operator"
-    """Side that compensates the delay: operator, by the commands under way; robot, by v t_d (eq. 8)."""
+    """Side that compensates the delay. operator: by the commands still under way. robot: by speed times loop age
+    (v t_d, eq. 8)."""
     haptics: bool = True
-    """Whether the triggers are stiffened; without, the same person only sees."""
+    """Whether the triggers are stiffened; with --no-haptics the same person only sees."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
     """MJCF arm with actuators, instead of the built-in one."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Site of the model between the fingertips, with the z axis along the approach."""
     realtime: bool = False
-    """Real-time scheduling and locked memory for both sides, if permitted."""
+    """Ask for real-time scheduling and locked memory for both sides; without the permission they run without."""
     console: bool = True
-    """Browser console, at an address that is shown; from a terminal with a display it opens by itself."""
+    """Serve the console, a page for the browser, at an address that is shown. From a terminal on a machine with a
+    display the page opens by itself."""
     console_port: Annotated[int, Meta(ge=0, le=65535), tyro.conf.arg(metavar="PORT")] = 0
-    """Port of the console's page on this machine; 0: any free one."""
+    """Port of the console's page on this machine; 0: any free port."""
     tui: bool = False
-    """Full-screen terminal instead of a line, for machines without a browser."""
+    """Show the state on the full terminal instead of in one line; for machines without a browser."""
     robot_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """More settings for the robot side: see feelahead-robot --help."""
+    """File with more settings for the robot side; feelahead-robot --help lists them."""
     operator_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """More settings for the operator side: see feelahead-operator --help."""
+    """File with more settings for the operator side; feelahead-operator --help lists them."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_limits(self)
         if self.tui and self.status != "line":
-            raise ValueError(f"--tui with --status {self.status}; valid: one of them")
+            raise ValueError(f"--tui with --status {self.status}; valid: only one of them")
         if self.scene is not None and self.model is not None:
-            raise ValueError(f"--scene {self.scene} with --model: valid: one of them; a model brings its own scene")
+            raise ValueError(
+                f"--scene {self.scene} with --model; valid: only one of them, as a model has its own scene"
+            )
 
 
 def demo(arguments: Sequence[str]) -> int:
-    """Run the demo; exit code 0 also after Ctrl-C, 1 if a side failed during the run."""
+    """Run the demo; return 1 if a side failed during the run, else 0, also after Ctrl-C."""
     settings = parse_settings(DemoSettings, "feelahead demo", arguments, _ELSEWHERE)
     if (complaint := _too_slow(settings)) is not None:
         raise ConfigurationError(complaint)
@@ -118,7 +123,7 @@ def demo(arguments: Sequence[str]) -> int:
                 merged = merge_summaries(read_summary(summaries["robot"]), read_summary(summaries["operator"]), errors)
                 if recorder is not None:
                     merged["recording"] = merged.get("recording", {}) | recorder.finish()
-            # Before the report, which waits for a reader.
+            # Before the report, whose output may block until somebody reads it.
             if settings.summary is not None:
                 write_json("--summary", settings.summary, merged)
         for line in [*_report(merged), *report_lines(merged.get("link", {}))]:
@@ -132,7 +137,7 @@ def demo(arguments: Sequence[str]) -> int:
 def _run_both(
     settings: DemoSettings, given: Collection[str], summaries: Mapping[str, Path], stop: StopSignal, status: Status
 ) -> list[str]:
-    """Start both sides, watch them, and end them; return the errors."""
+    """Start both sides, show their status until the run is over, and end them; return the errors."""
     status.note("starting the robot side")
     with SideProcess("robot_side", "robot", _robot_arguments(settings, given, summaries["robot"])) as robot:
         status.event("started", side="robot", process_id=robot.process_id)
@@ -147,7 +152,7 @@ def _run_both(
             errors: list[str] = []
             with contextlib.suppress(BrokenPipeError):  # the reader of our status has ended
                 errors = _watch(settings, robot, operator, stop, status)
-            # Both at once: neither must take the other's end for a link fault.
+            # Interrupt both at once, so that neither reports the other's end as a fault of the link.
             operator.interrupt()
             robot.interrupt()
             operator.stop()
@@ -162,7 +167,7 @@ def _run_both(
 
 
 def _too_slow(settings: DemoSettings) -> str | None:
-    """Return why the sides cannot find each other in time over the given link; None if they can."""
+    """Return an error text if the delay of the given link is too long for the sides to connect in time, else None."""
     link = settings.link_spec()
     there_s, back_s = (link.profile(direction).mean_delay_s() for direction in ("to_robot", "to_operator"))
     if there_s + back_s < _LINK_TIMEOUT_S:
@@ -174,7 +179,7 @@ def _too_slow(settings: DemoSettings) -> str | None:
 
 
 def _robot_arguments(settings: DemoSettings, given: Collection[str], summary: Path) -> list[str]:
-    # A file decides by itself.
+    # With a file of settings, the file decides whether tuning is permitted.
     config = "--permit-tuning" if settings.robot_config is None else f"--config={settings.robot_config}"
     own = _flags(settings, given, *_SHARED, "scene", "model", "site", "probability", "assist", "law")
     return [*_files(settings, summary), "--bind=tcp://127.0.0.1:0", config, *own]
@@ -194,13 +199,13 @@ def _operator_arguments(
 
 
 def _files(settings: DemoSettings, summary: Path) -> list[str]:
-    """Return the flags of a side's output files; one recorder listens to both."""
+    """Return the flags for a side's output files; both sides' events go to one recorder."""
     recorded = [] if settings.record is None else [f"--record={summary.with_name('recorder')}"]
     return [*recorded, f"--summary={summary}"]
 
 
 def _flags(settings: DemoSettings, given: Collection[str], *names: str) -> Iterator[str]:
-    """Yield the given flags; for all others the sides' files count."""
+    """Yield flags for those of `names` that the user gave; for all others the sides' configuration files decide."""
     for name in names:
         if name in given:
             flag, value = name.replace("_", "-"), getattr(settings, name)
@@ -211,7 +216,7 @@ def _flags(settings: DemoSettings, given: Collection[str], *names: str) -> Itera
 def _watch(
     settings: DemoSettings, robot: SideProcess, operator: SideProcess, stop: StopSignal, status: Status
 ) -> list[str]:
-    """Show both sides' status until the time is over, Ctrl-C, or a side's end; return the errors."""
+    """Show both sides' status until the duration is over, Ctrl-C comes or a side ends; return the errors."""
     waiting_since_s, linked_s = 0.0, None
     said = _Said()
     while not stop.is_set:
@@ -226,7 +231,7 @@ def _watch(
                 return [f"the {side.name} side ended early"]
         if linked_s is None:
             if said.operator is None:
-                # A busy machine may start a process slowly, which is no fault of the link.
+                # Count from the operator side's first status: a slow start of its process is no fault of the link.
                 waiting_since_s = now_s
             elif said.operator.link is LinkState.UP:
                 linked_s = now_s
@@ -271,7 +276,7 @@ def _show_note(side: SideProcess, event: Mapping[str, Any], status: Status) -> N
 
 
 def _report(summary: dict[str, Any]) -> list[str]:
-    """Return a few lines on the run for people."""
+    """Return the lines that report the run to the person at the terminal."""
     if not summary.get("ticks"):
         return ["nothing to report: the robot side left no figures"]
     delays = summary.get("delay_ms", {})
@@ -296,7 +301,7 @@ def _report(summary: dict[str, Any]) -> list[str]:
 
 
 def _placed(placing: Mapping[str, Any]) -> str:
-    """Describe how the target was set down."""
+    """Describe in words how the target was set down."""
     if not placing["placed"]:
         return "not placed"
     felt = "not felt before it was touched"

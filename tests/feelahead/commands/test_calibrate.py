@@ -102,7 +102,7 @@ def test_a_simulated_controller_is_kept_only_where_asked_for(
 
 
 @pytest.mark.parametrize(
-    ("still_s", "error", "said"), [(math.inf, CalibrationError, "Pull L2"), (1.0, DeviceError, "said nothing for 5 s")]
+    ("still_s", "error", "said"), [(math.inf, CalibrationError, "Pull L2"), (1.0, DeviceError, "sent nothing for 5 s")]
 )
 def test_hands_that_do_not_pull_or_a_silent_controller_end_it_and_nothing_is_stored(
     handle: PlayedHandle, own_folder: Path, still_s: float, error: type[Exception], said: str

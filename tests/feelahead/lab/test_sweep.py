@@ -346,8 +346,8 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ("name", "code", "said"),
     [
-        ("json.py", "QUESTION = 3", "named like a module of Python"),
-        ("own_number.py", "QUESTION = 3", "it holds no QUESTION"),
+        ("json.py", "QUESTION = 3", "already has a module of this name"),
+        ("own_number.py", "QUESTION = 3", "the file defines no QUESTION"),
         ("own_import.py", "from feelahead.lab.sweep import Questio", "cannot import name 'Questio'"),
         ("own_syntax.py", "QUESTION =", "invalid syntax"),
     ],
