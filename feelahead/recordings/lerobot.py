@@ -135,9 +135,7 @@ def _vectors(joined: Table) -> dict[str, dict[str, str]]:
     """Return for each feature of the dataset its parts, and the joined table's column for each part."""
     joints = [column for column in joined.columns() if column.startswith("arm.position_rad.")]
     if not joints or "command.r2" not in joined.columns():
-        raise ConfigurationError(
-            "--format lerobot: the recording has no states of the arm or no commands; valid: a recording of the demo"
-        )
+        raise ConfigurationError("--format lerobot: arm states or commands are missing; valid: both sides recorded")
     state = {f"joint_{index}_rad": column for index, column in enumerate(joints)}
     velocity = {f"joint_{index}_rad_s": f"arm.velocity_rad_s.{index}" for index in range(len(joints))}
     vectors = {

@@ -261,7 +261,8 @@ def test_a_worker_that_is_killed_leaves_what_is_finished(tmp_path: Path, capsys:
     assert f"{finished} rows" in said.out
     [line] = said.err.splitlines()
     assert re.fullmatch(
-        r"feelahead try counting: a worker process was ended from outside; \d+ runs are left; with --resume FILE.*",
+        r"feelahead try counting: a worker process ended unexpectedly \(killed, or out of memory\);"
+        r" \d+ runs are left; with --resume FILE.*",
         line,
     )
 
