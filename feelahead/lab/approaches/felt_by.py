@@ -103,7 +103,7 @@ class Judged:
         return strengths
 
     def _look_around(self, law: SweptLaw, draw: Draw, now_s: float) -> None:
-        """Compute the map of the surroundings anew if it is older than its period; half the period counts as its age."""
+        """Compute the map of the surroundings anew if it is older than its period; its age counts as half of that."""
         row = draw.replay.record.pose_row(now_s - 0.5 * PERIOD_S)
         law.forget_around(now_s - PERIOD_S)
         if np.isneginf(law.memory.around["at"]).any():

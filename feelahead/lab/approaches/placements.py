@@ -29,7 +29,7 @@ class Collision:
     touch_s: float
     """Time at which the true gripper touches something if the pull continues"""
     last_release_s: float | None
-    """Last operator-side time at which a release avoids the contact; None if no release does."""
+    """Latest time, at the operator side, of a release that avoids the contact; None if no release does."""
 
 
 def shifted(shift_m: FloatArray, replay: Replay, speed_m_s: float, time_s: float) -> FloatArray:
