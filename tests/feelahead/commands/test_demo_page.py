@@ -1,4 +1,4 @@
-"""The demo's end by its pages or its duration, and the address that outlives a restart; without processes."""
+"""When the demo ends, by its pages or its duration, and that its address survives a restart; without processes."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from feelahead.commands.demo.page import AFTER_PAGES_S, FIRST_PAGE_S, KeptPage, 
 
 
 def ends_at(lifetime: Lifetime, pages: dict[float, int], limit_s: float = 500.0) -> tuple[float, str]:
-    """Return when and why the run ends; pages: their number from each time on, since the link was up."""
+    """Return when and why the run ends. pages: number of open pages, by the time from which on it holds."""
     lifetime.begin(0.0)
     now_s, open_now = 0.0, 0
     while now_s < limit_s:

@@ -1,4 +1,4 @@
-"""Commands on recordings: bad input in one line, and a real demo that is replayed to the same bits."""
+"""Commands on recordings: bad input is reported in one line, and a recorded demo is replayed to the same bits."""
 
 import json
 from collections.abc import Callable, Sequence

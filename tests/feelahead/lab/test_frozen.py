@@ -1,4 +1,4 @@
-"""Frozen inputs do not change: figures measured at different times are compared with each other."""
+"""The frozen inputs do not change, as figures that were measured at different times are compared."""
 
 from pathlib import Path
 

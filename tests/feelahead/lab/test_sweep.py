@@ -1,4 +1,4 @@
-"""The engine: the same table for any workers and after any interruption, and its messages when it cannot continue."""
+"""The engine gives the same table with any workers and after any interruption, and says why it cannot continue."""
 
 import csv
 import json
@@ -219,7 +219,7 @@ def _drive(arguments: Sequence[str]) -> "subprocess.Popen[str]":
 
 @contextmanager
 def _dask(workers: int) -> Iterator[tuple[str, list["subprocess.Popen[str]"]]]:
-    """Start a scheduler and workers on loopback, the scheduler first; end them all."""
+    """Start a dask scheduler and workers on loopback; yield its address and all processes, and end them afterwards."""
     started: list[subprocess.Popen[str]] = []
 
     def start(*arguments: str) -> "subprocess.Popen[str]":
