@@ -75,6 +75,8 @@ class OperatorSettings(SideOptions):
         check_limits(self)
         if self.tui and self.status != "line":
             raise ValueError(f"--tui with --status {self.status}; valid: one of them")
+        if self.device == "browser" and not self.console:
+            raise ValueError("--device browser without --console: no page could drive; valid: both")
         if self.robot_key is not None and self.keys is None:
             raise ValueError("--robot-key without --keys; valid: both (feelahead keys make operator makes ours)")
         if self.swap_sides and self.person.pull_n is not None:

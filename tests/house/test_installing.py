@@ -104,10 +104,10 @@ def test_what_works_without_extras(base: Path, tmp_path: Path, arguments: list[s
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        ("feelahead-robot", "pip install 'feelahead[robot]'"),
-        ("feelahead demo --duration 1", "pip install 'feelahead[robot]'"),
-        ("feelahead bench overlap", "pip install 'feelahead[robot,experiments,bench]'"),
-        ("feelahead try haptics", "pip install 'feelahead[robot,operator]'"),
+        ("feelahead-robot", "pip install '.[robot]'"),
+        ("feelahead demo --duration 1", "pip install '.[robot]'"),
+        ("feelahead bench overlap", "pip install '.[robot,experiments,bench]'"),
+        ("feelahead try haptics", "pip install '.[robot,operator]'"),
         ("feelahead-operator --device hid --duration 0.5", "hidapi"),
     ],
 )

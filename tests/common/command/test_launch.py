@@ -126,7 +126,7 @@ def test_a_machine_without_mujoco_is_told_what_to_install() -> None:
     code, _, complaint = ended("-c", WITHOUT_MUJOCO)
     assert code == 2
     assert complaint == (
-        "feelahead-robot: mujoco is not installed on this machine; valid: pip install 'feelahead[robot]'\n"
+        "feelahead-robot: mujoco is not installed on this machine; valid: pip install '.[robot]' in the clone\n"
     )
 
 

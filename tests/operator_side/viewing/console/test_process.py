@@ -273,7 +273,7 @@ def test_a_port_that_is_taken_is_said() -> None:
     [
         (
             "raise ModuleNotFoundError('No module', name='viser')",
-            "no console: viser is not installed on this machine; valid: pip install 'feelahead[operator]'",
+            "no console: viser is not installed on this machine; valid: pip install '.[operator]' in the clone",
         ),
         (
             # As a viser that opens its server differently would.
