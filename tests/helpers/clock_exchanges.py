@@ -30,7 +30,7 @@ def talk(
     start_s: float = 0.0,
     period_s: float = 0.004,
 ) -> float:
-    """Give `offset` an exchange each `period_s`, in order of the answers' arrivals; return the last one, by our clock."""
+    """Give `offset` an exchange each `period_s`, in the answers' order of arrival; return our time at the last one."""
     sent_s = start_s + period_s * np.arange(there_s.size)
     received_s = sent_s + there_s + 0.001 + back_s
     for k in np.argsort(received_s):

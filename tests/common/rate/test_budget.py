@@ -1,4 +1,4 @@
-"""Budget: urgent messages are never delayed, paced ones keep to the rate, and every whole arrives unchanged."""
+"""Budget: urgent messages are never delayed, paced ones keep to the rate, what is cut in pieces arrives unchanged."""
 
 import numpy as np
 import pytest

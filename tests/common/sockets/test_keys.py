@@ -1,4 +1,4 @@
-"""Folder of keys: its content, its readers, and refusals in one line."""
+"""Folder of keys: its files, who may read them, and refusals in one line."""
 
 import errno
 import os
@@ -26,7 +26,7 @@ def folder(tmp_path: Path) -> KeyFolder:
 
 @pytest.fixture
 def allowed(folder: KeyFolder) -> AllowList:
-    """Return a list that has read anna's key."""
+    """Return an allow-list that has read one key, anna's."""
     folder.allow("anna", KEY)
     found = AllowList(folder)
     found.refresh()

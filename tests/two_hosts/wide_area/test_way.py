@@ -1,4 +1,4 @@
-"""One direction of the wide area against its words, without a clock or a network."""
+"""One direction of the wide area behaves as its settings say; these tests use neither a clock nor a network."""
 
 import pytest
 
