@@ -108,7 +108,7 @@ class HandsAlone:
             self.messages.append(message)
             self.pages.receive(1, message, now_s)
         if self.pages.rejected:
-            raise AssertionError(f"the page sent what is no message: {self.messages[-1]}")
+            raise AssertionError(f"the page sent an invalid message: {self.messages[-1]}")
         if self.pages.stopping(now_s):
             self.state = "stopped"
         screen: Telemetry = msgspec.structs.replace(VIEW, state=self.state)

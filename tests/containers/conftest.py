@@ -31,7 +31,7 @@ def engine() -> Iterator[Engine]:
         yield Engine(_PROJECT)
     except ConfigurationError as missing:
         if os.environ.get("CI") != "true" or os.geteuid() != 0:
-            pytest.skip(f"{missing} (with CI=true, root gets one of Debian's)")
+            pytest.skip(f"{missing} (run as root with CI=true, the tests install Debian's)")
         install(("docker.io", "iptables"), "dockerd")
         install(("docker-compose",), "docker-compose")
         yield from _own_engine(cache_folder("containers"))
@@ -88,7 +88,7 @@ def _own_engine(cache: Path) -> Iterator[Engine]:
         try:
             _wait_for_daemon(daemon, environment, cache / "log")
             yield Engine(_PROJECT, environment)
-            # Layers of older versions of the images.
+            # Remove the layers of older versions of the images.
             _tidy("docker", "image", "prune", "--force", "--filter", "until=168h", environment=environment)
         finally:
             daemon.terminate()

@@ -1,4 +1,4 @@
-"""Grippers of a few spheres or of boxes, on a freely flying tool, for tests of contact distances."""
+"""Grippers of a few spheres or of boxes, on a tool that moves freely, for tests of contact distances."""
 
 from functools import cache
 

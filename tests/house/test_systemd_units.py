@@ -94,7 +94,7 @@ def test_a_side_takes_its_flags(keys: KeyFolder, side: str, given: dict[str, str
     words = command_line(f"feelahead-{side}", **given)
     line = [word.replace(f"{folder}/feelahead/keys", str(keys.path)) for word in words]
     assert line != words
-    # The last of a repeated flag holds.
+    # If a flag is repeated, the last one counts.
     command = [sys.executable, "-P", "-m", f"{side}_side", *line, "--duration", "0.5", "--status", "none"]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")

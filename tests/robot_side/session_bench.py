@@ -90,7 +90,7 @@ class Operator:
             self.notice = message
 
     def command(self, now_s: float, header: Header | None = None, **fields: Any) -> bytes:
-        """Return a motion command with the triggers released and the run button down, except for `fields`."""
+        """Return a motion command with released triggers and pressed hold-to-run; `fields` replace its values."""
         content: dict[str, Any] = {"l2": 0.0, "r2": 0.0, "run": True, "token": self.token} | fields
         return encode(MotionCommand(header or self.link.stamp(now_s), **content))
 

@@ -191,7 +191,7 @@ def test_full_speed_is_reckoned_with_until_the_operator_has_echoed(bench: Bench,
     felt = bench.operators[b"operator"].felt
     assert felt[0].r2.displacement_m == pytest.approx(felt[0].r2.full_speed_m_s, rel=0.05)
     assert listening.heard[-1].loop_age_known
-    # From the worst case it falls slowly.
+    # The assumed loop age falls slowly from the initial one, which is the worst case.
     assert 0.1 < listening.heard[-1].loop_age_s < 0.9
     assert abs(felt[-1].r2.displacement_m) < 0.01
     assert operator.felt == []

@@ -37,7 +37,7 @@ def look_until(viewer: Viewer, enough: Callable[[Seen], bool], **what: Any) -> S
         seen = look([viewer], 1.0, **what)
         if enough(seen):
             return seen
-    return pytest.fail("nothing to be seen")
+    return pytest.fail("the awaited views did not come")
 
 
 def frames(seen: Seen) -> list[VideoFrame]:

@@ -63,7 +63,7 @@ def follow(lan: Lan) -> None:
         lan.robot_host.run(_USUAL_FIREWALL)
     for step in steps():
         _do(lan, hosts[step.where], step)
-    assert lan.doctor, "no line looks at the way"
+    assert lan.doctor, "the guide has no command that checks the path (feelahead doctor --connect)"
     assert lan.starts.keys() == hosts.keys()
 
 
@@ -98,4 +98,4 @@ def _do(lan: Lan, host: Host, step: Step) -> None:
         case [program, *_] if program == f"feelahead-{step.where}":
             lan.starts[step.where] = step.filled_in(lan.words)
         case _:
-            raise AssertionError(f"{step.command}: say here how to check this")
+            raise AssertionError(f"{step.command}: unknown command; add here how to check it")

@@ -250,7 +250,7 @@ class Lan:
                 self.start("operator")
             else:
                 self.restart()
-        raise AssertionError("the person is done each time before anything moves")
+        raise AssertionError("the scripted person finished each time before the arm moved")
 
     def back(self) -> None:
         """Wait until the link is up again; assert that the arm is disarmed then; wait until it is armed again."""

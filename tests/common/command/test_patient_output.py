@@ -51,7 +51,7 @@ def test_a_reader_that_pauses_gets_the_newest_lines_and_every_result() -> None:
         with output:
             for number in range(1000):
                 output.write(f"{number} {9_999 * 'x'}\n")
-        reader.start()  # Later than the context's end waits.
+        reader.start()  # So late that the output has given up to wait for a reader.
         for number in range(12):
             output.write(f"result {number}\n")
     reader.join(600)

@@ -193,7 +193,7 @@ class Connections(RuleBasedStateMachine):
 
 
 TestConnections = Connections.TestCase
-# Shrinking opens sockets by the thousand.
+# Without hypothesis' shrinking of failures, which would open thousands of sockets.
 TestConnections.settings = settings(max_examples=200, stateful_step_count=30, phases=[Phase.explicit, Phase.generate])
 
 

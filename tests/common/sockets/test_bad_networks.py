@@ -43,7 +43,7 @@ def test_an_attempt_that_nobody_answers_is_given_up(deaf_port: int) -> None:
             if len(seen) >= before + 2:
                 return
             operator.wait(0.01)
-    pytest.fail("one attempt all the time: the system tries it ever more rarely, for two minutes")
+    pytest.fail("only one connection attempt: the system repeats it ever more rarely, for two minutes")
 
 
 def test_control_and_view_are_served_by_threads_of_their_own() -> None:

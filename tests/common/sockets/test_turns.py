@@ -202,7 +202,7 @@ def test_a_taken_over_routing_id_gives_another_key_neither_the_group_nor_its_ans
         assert robot.send(claimed, b"ben's")
         assert ben.poll(round(1e3 * PATIENT_S))
         assert ben.recv() == b"ben's", "nothing of anna's came before"
-        # Anna's connection was ended, too, so that she takes her place again.
+        # Anna's connection was ended, too; she connects again and gets her routing id back.
         for _ in range(ROUNDS):
             anna.send(b"anna")
             robot.wait(0.01)

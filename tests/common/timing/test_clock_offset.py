@@ -191,7 +191,7 @@ def test_no_link_looks_like_a_jump_or_breaks_the_bound(kind: str, in_order: bool
         assert bound_s is not None
         assert abs(error_s(offset, clock, now_s)) <= bound_s
     assert (offset.jumps, offset.rejected) == (0, 0)
-    if kind != "wandering":  # Wandering delays have no floor to speak of.
+    if kind != "wandering":  # Wandering delays have no constant minimum.
         assert abs(error_s(offset, clock, now_s)) < 0.5e-3
 
 

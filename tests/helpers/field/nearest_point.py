@@ -19,7 +19,7 @@ Nearest = tuple[FloatArray, FloatArray]
 
 
 def distance_to_object(objects: PerceivedObjects, index: int, point_m: FloatArray) -> float:
-    """Return the signed distance from `point_m` (3,) to an object, negative inside; infinite without primitives."""
+    """Return the signed distance from `point_m` (3,) to an object: negative inside, infinite without primitives."""
     scene = scene_table(objects)
     rows = np.arange(scene.first_rows[index], scene.first_rows[index + 1])
     points = np.broadcast_to(np.asarray(point_m, dtype=np.float64), (len(rows), 3))

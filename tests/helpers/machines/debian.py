@@ -29,7 +29,7 @@ def install(packages: Sequence[str], program: str) -> None:
     if shutil.which(program) is not None:
         return
     if os.environ.get("CI") != "true" or os.geteuid() != 0 or shutil.which("apt-get") is None:
-        pytest.skip(f"no {program} (with CI=true, root gets Debian's)")
+        pytest.skip(f"no {program} (run as root with CI=true, the tests install Debian's)")
     run_or_skip(["apt-get", "update", "-qq"])
     settings = {"DEBIAN_FRONTEND": "noninteractive"}
     run_or_skip(["apt-get", "install", "-qq", "--no-install-recommends", "--yes", *packages], settings)
@@ -64,7 +64,7 @@ class Apt:
             "APT::Update::Error-Mode": "any",
         }
         if os.geteuid() == 0:
-            options["APT::Sandbox::User"] = "root"  # Another user may not write to our folder.
+            options["APT::Sandbox::User"] = "root"  # apt's own user could not write to our folder.
         self._options = [part for name, value in options.items() for part in ("-o", f"{name}={value}")]
         for partial in ("lists/partial", "apt/archives/partial", "archives"):
             (folder / partial).mkdir(parents=True)
@@ -95,11 +95,11 @@ def unpacked(name: str, packages: Callable[[Apt], list[str]], found: Callable[[P
             pytest.skip(f"no {program}: the machine and its kernel come as Debian packages")
     cache = cache_folder(name)
     with (cache / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # Another run may be filling it.
+        fcntl.flock(lock, fcntl.LOCK_EX)  # Another test run may be filling the folder.
         try:
             return found(cache / "root")
         except FileNotFoundError:
-            # The first time, and after changes of the system's libraries.
+            # So it is the first time, and after changes of the system's libraries.
             _download(cache, packages)
             return found(cache / "root")
 

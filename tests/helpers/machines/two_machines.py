@@ -101,7 +101,7 @@ def _delete(namespace: str) -> None:
     _run_ip("netns", "del", namespace)
     for files in Path("/etc/netns").glob(namespace):
         shutil.rmtree(files, ignore_errors=True)
-        with contextlib.suppress(OSError):  # Others may have theirs there.
+        with contextlib.suppress(OSError):  # The folder may hold files of other namespaces.
             files.parent.rmdir()
 
 

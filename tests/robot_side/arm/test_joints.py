@@ -98,7 +98,7 @@ def test_limits_hold_and_keep_the_direction(twist: FloatArray, limits: FloatArra
     jacobian = jacobian_with(np.linspace(0.2, 1.0, 6), seed, 6)
     free, limited = joint_velocities(jacobian, twist, FREE), joint_velocities(jacobian, twist, limits)
     assert (np.abs(limited) <= limits * (1.0 + 1e-12)).all()
-    # Parallel and of the same sense, and no shorter than necessary.
+    # Of the same direction, and no shorter than necessary.
     np.testing.assert_allclose(limited * np.linalg.norm(free), free * np.linalg.norm(limited), atol=1e-9)
     assert limited @ free >= 0.0
     if (np.abs(free) > limits).any():

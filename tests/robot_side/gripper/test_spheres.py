@@ -108,6 +108,6 @@ def test_a_very_large_box_stands_out_as_2000_spheres_require_and_others_as_set()
     assert 1900 <= wall <= 2000
     assert cover.stand_out_m[1] == 0.003
     assert cover.stand_out_m[0] > 0.003
-    # Slightly less is too little: it is not raised farther than needed.
+    # With slightly less, 2000 spheres are too few: the distance is raised again, to the same value.
     less = cover_one((0.05, 5.0, 5.0), float(cover.stand_out_m[0]) * 0.999)
     assert less.stand_out_m[0] == pytest.approx(cover.stand_out_m[0], rel=1e-5)

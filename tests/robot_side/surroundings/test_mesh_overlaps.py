@@ -18,7 +18,7 @@ Surface = tuple[FloatArray, IntArray]
 
 
 def hollow() -> Surface:
-    """Return a cube with a cubic cavity in its middle."""
+    """Return vertices and triangles of a cube with a cubic cavity in its middle."""
     places, tetrahedra = grid_tetrahedra(3)
     middle = (np.floor(places[tetrahedra].mean(axis=1)) == 1.0).all(axis=1)
     used, numbers = np.unique(surface_of(tetrahedra[~middle]), return_inverse=True)
