@@ -20,7 +20,7 @@ from tests.helpers.machines.waiting import wait_until
 _DURATION_S: Final = 20.0
 _PERIOD_S: Final = 0.1
 _DRAWN_S: Final = 0.3
-"""Time in seconds that the scene needs to draw; it cannot be asked whether it has, as it is another site's page"""
+"""Seconds that the scene gets to draw: as another site's page, it cannot be asked whether it has finished"""
 _START_S: Final = 60.0
 _SIZE: Final = (960, 540)
 _QUALITY: Final = 40

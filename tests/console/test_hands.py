@@ -1,4 +1,4 @@
-"""The keyboard drives a real run, releases its trigger, and stops it; test_hands_alone.py tests all other inputs."""
+"""The keyboard drives the arm in a real run, releases R2 and stops the arm; test_hands_alone.py tests all else."""
 
 from typing import Any
 

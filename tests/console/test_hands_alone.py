@@ -16,7 +16,7 @@ _AXES: Final = (0.0, 0.0, 0.0, 0.0)
 
 
 def test_keys_ramp_up_and_let_go_at_once(browser: Browser) -> None:
-    """Space is hold-to-run and arms. W pulls R2 to the set level within 0.6 s; the message after its release has 0."""
+    """Space arms and is hold-to-run. W pulls R2 to the chosen level within 0.6 s; its release frees R2 at once."""
     with hands_alone(browser) as alone:
         alone.run()
         keyboard = alone.page.raw.keyboard
@@ -155,7 +155,7 @@ def test_driving_begins_on_purpose_and_after_a_rest(browser: Browser) -> None:
 
 
 def test_escape_is_sent_until_it_is_confirmed(browser: Browser) -> None:
-    """Esc stops the arm even from a text field and for an observer. The page sends it until the state confirms it."""
+    """Esc works even in a text field and for an observer. The page sends the stop until the arm's state confirms it."""
     with hands_alone(browser) as alone:
         alone.page.raw.focus("#field")
         alone.facts = {"status": {"state": "armed", "link": "up", "owner": "armed"}}

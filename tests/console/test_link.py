@@ -49,7 +49,7 @@ def test_frozen_robot_is_unmistakable(browser: Browser, demo: Run) -> None:
 
 
 def _fresh_view(page: Page) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    """Return the pixels of the overview while it is not stale: on a busy machine it may be, now and then."""
+    """Return the pixels of the overview at a time when it is not stale, as a busy machine may delay it."""
     end_s = time.monotonic() + 60.0
     while time.monotonic() < end_s:
         page.wait("document.querySelector('#overview.old') === null", "a fresh view", 60.0)

@@ -109,7 +109,7 @@ class Desk:
         return seen
 
     def until(self, phase: Doing, screen: Telemetry, at_most_s: float, delay_s: float = 0.0) -> float:
-        """Show `screen` until the person is in `phase`; return the seconds it took, at most `at_most_s`."""
+        """Show `screen` until the person is in `phase`; return the seconds taken. AssertionError after `at_most_s`."""
         start_s, frames = self.now_s, self._frames(screen)
         while self.person.phase != phase:
             assert self.now_s - start_s <= at_most_s, f"still in {self.person.phase} after {at_most_s} s"

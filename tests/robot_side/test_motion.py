@@ -1,4 +1,4 @@
-"""The motion that the robot side reports for a command equals what it commanded to the arm."""
+"""The motion that the robot side reports for an operator's command equals the motion that it commands to the arm."""
 
 import numpy as np
 import pytest

@@ -32,7 +32,7 @@ def guided() -> Iterator[Lan]:
 
 @pytest.fixture
 def lan(guided: Lan, request: pytest.FixtureRequest) -> Lan:
-    """The LAN of `guided`. After a failed test, the next one begins with a restored network and restarted sides."""
+    """The LAN of `guided`. After a failed test, the network is restored and both sides restart before the next test."""
     if request.session.testsfailed > guided.mended:
         guided.mended = request.session.testsfailed
         guided.mend()

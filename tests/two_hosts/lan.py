@@ -266,7 +266,7 @@ class Lan:
     def _first_after_the_loss(self) -> Status | None:
         """Return the operator side's first status with the link up again; None if there is none yet.
 
-        It is found even if it is read late: one second after it the arm may be armed.
+        It is found even if it is read late, when the arm may be armed again: that takes a second.
         """
         self.listen()
         said = self.operator.said

@@ -1,4 +1,4 @@
-"""A second operator; and sides that are killed, started in the other order, or have their wall clock set."""
+"""A second operator; and sides that are killed, started in the other order, or get another wall-clock time."""
 
 import json
 import time

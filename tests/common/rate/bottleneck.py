@@ -39,7 +39,7 @@ class Bottleneck:
     """
 
     def __init__(self, bit_s: Steady, queue_s: float = 0.2, delay_s: float = 0.025) -> None:
-        """queue_s: capacity of the queue, as seconds that it takes to empty at the rate of time 0."""
+        """queue_s: seconds that a full queue takes to empty at the initial rate, which gives its capacity."""
         self._bit_s, self._delay_s = bit_s, delay_s
         self._most_bits = queue_s * bit_s(0.0)
         self._free_s = 0.0
@@ -75,7 +75,7 @@ class Ran:
     picture_rate_control: PictureRateControl = field(default_factory=lambda: PictureRateControl(30.0, 75))
 
     def delay_s(self, share: float, since_s: float = 0.0, until_s: float = math.inf) -> float:
-        """Return a quantile of the delays of haptic messages that were sent in this time."""
+        """Return the quantile `share` of the delays of haptic messages sent between `since_s` and `until_s`."""
         seen = sorted(delay_s for at_s, delay_s in self.delays_s if since_s <= at_s < until_s)
         return seen[min(len(seen) - 1, int(share * len(seen)))]
 

@@ -40,11 +40,11 @@ class Line:
     descriptor: int
     heard_s: float = 0.0
     seen: bool = False
-    """Whether one of its messages was read at a time when the gates had reported all events"""
+    """Whether one of this connection's messages was read at a time when the gates had reported all events"""
     by_another: bool = True
-    """Whether its descriptor differs from that of the connection last heard with the same routing id"""
+    """Whether this connection's descriptor differs from that of the connection heard before with the same routing id"""
     known: bool = False
-    """Whether it could be told from that connection when the gates had reported all events"""
+    """Whether the robot side, when the gates had reported all events, could distinguish these two connections"""
 
     @property
     def peer(self) -> bytes:

@@ -102,7 +102,7 @@ def test_earlier_messages_are_found(pair: tuple["zmq.Socket[bytes]", "zmq.Socket
 def test_a_turn_drains_once_and_asks_each_socket_three_times_at_most(
     robot: RobotSockets, operator: OperatorSockets, asked: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Both ends send and receive one message a turn. EVENTS is asked after sending, before reading, and at its end."""
+    """Both ends send and receive one message a turn. They ask for EVENTS after sending, before reading and after it."""
     peer = greet(robot, operator)
     selects: list[int] = []
     really = select.select

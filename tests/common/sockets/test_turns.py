@@ -1,4 +1,4 @@
-"""Several connections of one peer: messages over one after the other or all; lost, replaced and unread connections."""
+"""Several connections of one peer, used one after the other or all at once: also lost, replaced and unread ones."""
 
 import fcntl
 import socket
@@ -72,7 +72,7 @@ def test_a_full_connection_is_tried_again_soon() -> None:
 
 
 def test_a_silent_connection_gets_a_copy_twice_a_second_and_returns_once_heard() -> None:
-    """Both ends use no silent connection. Without copies, one that works again would stay silent at both ends."""
+    """Neither end uses a silent connection. Without copies, one that works again would stay silent for ever."""
     turns: Turns[Fed] = Turns(Fed.offered)
     lively, silent = Fed(), Fed()
     turns.connections.extend((lively, silent))
@@ -299,7 +299,7 @@ def test_little_waits_for_a_peer_that_stops_reading_and_others_lose_nothing(
 def test_a_viewer_that_stops_reading_keeps_few_old_pictures_and_others_miss_nothing(
     robot: RobotSockets, operator: OperatorSockets
 ) -> None:
-    """The other viewer gets telemetry even if both cameras' pictures and the scene go out just before it."""
+    """Another viewer gets telemetry even if both cameras' pictures and the scene are published just before it."""
     rounds, picture = 100, bytes(100_000)
     tick = [(b"video", picture), (b"video", picture), (b"scene", b"scene"), (b"telemetry", b"state")]
     publish_until_seen(robot, operator, b"telemetry")

@@ -154,7 +154,7 @@ def test_what_we_sent_before_our_own_clock_jumped_says_nothing_after_it() -> Non
 
 
 def delays_of(kind: str, generator: np.random.Generator, count: int) -> np.ndarray:
-    """Draw the delays, in seconds, of `count` messages 4 ms apart on a link of this kind."""
+    """Draw the delays, in seconds, of `count` messages sent 4 ms apart over a link of the type `kind`."""
     exponential_s = generator.exponential(0.001, count)
     if kind == "wireless":
         return 0.002 + exponential_s + (generator.random(count) < 0.02) * generator.exponential(0.030, count)

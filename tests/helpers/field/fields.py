@@ -57,7 +57,7 @@ def look(
 ) -> Field:
     """Compute the field of one look. Without `classes`, the objects' classes follow from their roles.
 
-    by: its encoder errors apply, and its memory is used again; otherwise the encoders have no error.
+    by: gives the encoders' errors and the memory to use; without it, encoders have no errors and the memory is new.
     """
     looking = by or Ahead(np.zeros(pose.tool_jacobian.shape[1]))
     return looking.look(pose, scene_table(objects), _classes(objects, classes), ahead, widest_m)

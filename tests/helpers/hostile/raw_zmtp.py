@@ -85,7 +85,7 @@ class RawConnection:
         return received
 
     def ended(self) -> bool:
-        """Return whether the other side ends the connection; False once 5 s have brought no bytes."""
+        """Wait until the other side ends the connection, then return True; return False after 5 s without bytes."""
         if not self.open:
             return True
         self._socket.settimeout(_TIMEOUT_S)

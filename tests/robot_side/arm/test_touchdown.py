@@ -1,4 +1,4 @@
-"""A held object that is set down: its contact is noticed at once, never in the air, and held until the tool rises."""
+"""A held object that is set down: its contact is noticed at once, never in the air, and counts until the tool rises."""
 
 import numpy as np
 import pytest

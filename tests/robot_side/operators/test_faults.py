@@ -1,4 +1,4 @@
-"""Faults in the stream of commands, and when exactly the arm reacts. Without the guard it tests, each test would fail.
+"""Faults in the stream of commands, and when exactly the arm reacts. Each test fails if its guard is removed.
 
 test_operator_machine.py covers what needs no arm: who commands, which commands count, and stops.
 """

@@ -40,7 +40,7 @@ arrivals = st.builds(
 
 
 class DrawnLink(LinkEnd):
-    """End of a link that tells fresh messages as the real one does, but has ages that the state machine draws."""
+    """End of a link that recognizes fresh messages as the real one does; the state machine draws the ages."""
 
     ages = FRESH
 
@@ -128,7 +128,7 @@ class OperatorMachine(RuleBasedStateMachine):
 
     @rule(duration_s=st.sampled_from([0.001, 0.03, 0.099, 0.101, 0.3, 0.41, 0.6]), ticks=st.integers(0, 3))
     def silence(self, duration_s: float, ticks: int) -> None:
-        """Let time pass with `ticks` ticks; if 0, the product learns of it only by the next message."""
+        """Let `duration_s` pass, with `ticks` ticks. With none, the session notices only by the next message."""
         for _ in range(ticks):
             self.tick(duration_s / ticks)
         self.now_s += 0.0 if ticks else duration_s

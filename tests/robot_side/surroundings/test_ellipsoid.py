@@ -53,7 +53,7 @@ def beside(rng: np.random.Generator, half_axes: FloatArray, depth: float) -> tup
 
 @pytest.mark.parametrize("depth", [0.0, -1e-4, 1e-3])
 def test_a_needle_that_pierces_the_balls_pole_pushes(depth: float) -> None:
-    """The needle enters the ball between its pole and the outermost section that is computed, where none shows it."""
+    """The needle enters the ball between the ball's pole and the outermost computed section, so no section shows it."""
     of, radius, step = shape(np.zeros(3), np.eye(3), np.array([1e-4, 1e-4, 0.05])), 0.008, 1e-6
     before, after = (overlap(of, np.array([0.0, 0.0, 0.05 - depth + side]), radius)[0] for side in (-step, step))
     _, overlap_gradient = overlap(of, np.array([0.0, 0.0, 0.05 - depth]), radius)

@@ -1,4 +1,4 @@
-"""Pictures on a slow link: first their rate is reduced, then quality, then size; these return slowly, in reverse."""
+"""Pictures on a slow link: their rate is reduced, then quality, then size; later all return slowly, in reverse."""
 
 from itertools import pairwise
 

@@ -33,7 +33,7 @@ class WideSweep(Sweep):
     loss: _Numbers = (0.0,)
     """Per cent of packets lost, in each direction."""
     burst: _Numbers = (0.0,)
-    """Duration, in milliseconds, of a burst in which all packets are lost; one every 5 s, in each direction."""
+    """Duration in milliseconds of bursts in which all packets are lost: a burst every 5 s, in each direction."""
     rate: _Numbers = (0.0,)
     """Rate of the robot's uplink in Mbit/s; 0: unlimited."""
     falls_to: _Numbers = (0.0,)
@@ -51,7 +51,7 @@ class WideSweep(Sweep):
     bulk: tuple[bool, ...] = (False,)
     """Whether a TCP transfer fills the robot's uplink."""
     observer: tuple[Literal["none", "reads", "stops"], ...] = ("none",)
-    """A second operator side. none: there is none. reads: it observes. stops: SIGSTOP stops it after a third."""
+    """A second operator side. none: there is none. reads: it observes. stops: SIGSTOP after a third of the time."""
     seconds: float = 20.0
     """Length of each run in seconds, from the operator side's start."""
 
@@ -105,7 +105,7 @@ _COLUMNS: Final[Mapping[str, Sequence[str]]] = {
     "late after fall, s": ("late_after_fall_s",),
     "late, ms": ("late_p99_ms", "late_max_ms"),
 }
-"""Columns of the shown table: each title with the names of its figures in a row.
+"""Columns of the shown table: the names of the figures that each column shows, by the column's title.
 
 Of two directions, the first is to the operator. queueing: by the messages' ages, then in the link's own queue. late:
 p99 and maximum of how late the forwarder delivered packets.
