@@ -1,4 +1,4 @@
-"""Sending: haptics at once, telemetry where there is room, pictures in pieces that are joined again."""
+"""Sending within the budget: haptics at once, telemetry if there is room, pictures in pieces that are joined again."""
 
 from common.emulation.spec import LinkSpec
 from common.rate.outgoing_queue import OutgoingQueue
@@ -10,7 +10,7 @@ PICTURE = bytes(range(256)) * 60
 
 
 class Sockets:
-    """Sockets that keep the sent messages."""
+    """Stand-in for sockets that keeps sent messages."""
 
     def __init__(self) -> None:
         self.sent: list[tuple[bytes, bytes]] = []
