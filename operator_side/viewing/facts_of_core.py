@@ -83,7 +83,10 @@ def operator_facts(
 
 
 def _back(there_s: float | None, both_s: float | None) -> float | None:
-    """Estimate the delay to the robot: the round trip less the delay from it, or half the round trip if that is unknown."""
+    """Estimate the delay to the robot: the round trip less the delay from the robot.
+
+    If the delay from the robot is unknown, half the round trip.
+    """
     if both_s is None:
         return None
     return both_s / 2.0 if there_s is None else max(0.0, both_s - there_s)

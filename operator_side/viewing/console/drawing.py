@@ -42,7 +42,7 @@ _GONE: Final = 1e-6
 
 
 def compose(outer: Floats, inner: Floats) -> Floats:
-    """Compose poses (n, 7): each of `inner` is relative to that of `outer`; return it in the frame of `outer`'s parent."""
+    """Compose poses (n, 7): `inner` is given in the frame `outer`; return it in the frame in which `outer` is given."""
     turn, inner_turn = (Rotation.from_quat(poses[:, 3:], scalar_first=True) for poses in (outer, inner))
     turns = (turn * inner_turn).as_quat(scalar_first=True)
     return np.concatenate([outer[:, :3] + turn.apply(inner[:, :3]), turns], axis=1)

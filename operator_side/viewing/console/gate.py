@@ -51,7 +51,7 @@ class Gate:
         return place if (place in SOCKETS) is upgrade else None
 
     def headers(self, place: str) -> dict[str, str]:
-        """Return the headers of an answer for `place`: no caching, no framing by other sites, no content of other sites.
+        """Return the headers of an answer for `place`: no caching, no framing by other sites, no foreign content.
 
         viser's page is one file that unpacks itself and starts a WebAssembly worker, so its policy permits more. Our
         page embeds it under the other of our two host names (127.0.0.1, localhost), so that the browser treats it as

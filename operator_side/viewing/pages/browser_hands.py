@@ -29,7 +29,7 @@ class BrowserHands:
     def __init__(
         self, pages: DrivingPage, calibrate: Callable[[TravelCalibration], None], *, swap_sides: bool = False
     ) -> None:
-        """calibrate: called with the calibration of the states of `read`: none, as a page's travel has no dead zones."""
+        """calibrate: called with the calibration for the states of `read`: IDENTITY, as a page has no dead zones."""
         self._pages = pages
         self._calibrate = calibrate
         self._swap_sides = swap_sides
@@ -52,7 +52,7 @@ class BrowserHands:
         return Doing.AT_REST_FIRST if self._was_armed else Doing.ARMING
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Make the controller's state from the page's inputs. screen: newest telemetry, which reports whether it is armed."""
+        """Make the controller's state from the page's inputs. screen: telemetry, which has the arm's state."""
         del delay_s
         self._calibrate(IDENTITY)
         hands = self._pages.hands(now_s)

@@ -1,7 +1,7 @@
-"""Terminal view (`--tui`) in place of the status line, drawn by a separate process that never blocks the operator side.
+"""Terminal view (`--tui`) in place of the status line, drawn by a process that never blocks the operator side.
 
-`python -m operator_side.viewing.terminal.status FD` is that process. It may have to wait for a slow terminal; facts that
-arrive meanwhile are skipped. When the operator side closes the channel or ends, it restores the terminal and ends.
+`python -m operator_side.viewing.terminal.status FD` is that process. It may have to wait for a slow terminal; facts
+that arrive meanwhile are skipped. When the operator side closes the channel or ends, it restores the terminal and ends.
 """
 
 import contextlib
@@ -31,7 +31,7 @@ _INPUT, _LOCAL, _LETTERS = 0, 3, 6
 
 
 class TerminalStatus(Status):
-    """Status that fills the terminal while the context is open. Notes after that are the run's results, and are printed."""
+    """Status that fills the terminal while the context is open. Later notes, the run's results, are printed."""
 
     wants_facts: Final = True
     _companion: Companion | None = None
@@ -72,7 +72,7 @@ class TerminalStatus(Status):
 
 
 def _put_back(attributes: list[Any]) -> None:
-    """Restore the normal screen and its cursor, and drop what was typed meanwhile. Ignore a terminal that has closed."""
+    """Restore the normal screen and its cursor, and drop what was typed. Ignore a terminal that has closed."""
     with contextlib.suppress(termios.error, OSError):
         termios.tcsetattr(sys.stdout, termios.TCSAFLUSH, attributes)
         os.write(sys.stdout.fileno(), _LEAVE)
