@@ -27,7 +27,7 @@ class Listener(Protocol):
     """Receiver of events: a controller was found or lost."""
 
     def controller_found(self, now_s: float) -> None:
-        """Note that a controller was found, or that its effects may have been released; its triggers' state is unknown."""
+        """Note that a controller was found, or its effects may have been released: its triggers' state is unknown."""
 
     def controller_lost(self, now_s: float) -> None:
         """Note that the controller was lost."""
@@ -43,7 +43,7 @@ class Guard(Protocol):
         """Cancel `hold`."""
 
     def beat(self) -> None:
-        """Report that an effect is on and this process runs. If no beat or `rest` follows in time, it counts as hanging."""
+        """Report that an effect is on and this process runs; it counts as hanging if no beat or `rest` follows."""
 
     def rest(self) -> None:
         """Report that no effect is on, so that no beat is due."""

@@ -66,7 +66,7 @@ class Feel:
             check_limits(self)
 
     def following(self, before: "Feel") -> "Feel":
-        """Merge with `before`, which was set earlier: this one's parts count, and those of `before` where this has None."""
+        """Return these effects, with the parts of `before`, which was set earlier, where these have None."""
         pairs = zip(_parts(self), _parts(before), strict=True)
         return Feel(*(old if new is None else new for new, old in pairs))
 

@@ -213,7 +213,7 @@ class CommandsUnderWay:
 
 
 def _edges_s(since_s: float, now_s: float) -> tuple[FloatArray, int]:
-    """Return times from the map's computation through `since_s` to `now_s`, and the number of steps before `since_s`."""
+    """Return times from the map's computation over `since_s` to `now_s`, and the number of steps before `since_s`."""
     age_s = 0.5 * PERIOD_S
     before, after = math.ceil(age_s / _STEP_S), max(math.ceil((now_s - since_s) / _STEP_S), 1)
     looked, known = (
