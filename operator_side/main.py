@@ -1,4 +1,4 @@
-"""Process `feelahead-operator`: settings, parts, and `run`."""
+"""Process `feelahead-operator`: reads the settings, makes the parts, and runs them."""
 
 import secrets
 from collections.abc import Sequence
@@ -25,9 +25,9 @@ from operator_side.viewing.viewing import view_topics
 
 
 def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
-    """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released on every exit.
+    """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released however it ends.
 
-    A real controller may be absent or unplugged: the process waits for it. backend: hidapi if None.
+    If a real controller is absent or unplugged, the process waits for it. backend: used instead of hidapi, if given.
     """
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
@@ -48,7 +48,10 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
 
 
 def _desk(settings: OperatorSettings, core: OperatorSide, process: Process, backend: HidBackend | None) -> Devices:
-    """Open the controller, and the console before the priority is raised, which the console would inherit."""
+    """Open the controller and the console.
+
+    This is done before the priority is raised, so that the console's process does not inherit it.
+    """
     pages, stack = DrivingPage(), process.stack
     search, guard, person = DEVICES[settings.device](OpeningParts(settings, core, pages, backend))
     pages.may_drive = person is not None

@@ -1,9 +1,9 @@
 """Driver of any gamepad with rumble on Linux, through evdev: its motors render the triggers' resistance.
 
-The strength of the zone at a trigger's present travel drives a motor: L2's strength the strong motor, R2's the weak one.
-A commanded rumble counts if it is stronger. Layout of events and ioctls: linux/input.h. The kernel erases a file's
-effects when the file is closed, so nothing keeps rumbling after the process is killed. Each effect also ends by itself
-after 0.2 s, in case the process hangs.
+The strength of the zone at a trigger's present travel drives a motor: L2's strength the strong motor, R2's the weak
+motor. A commanded rumble counts if it is stronger. Layout of events and ioctls: linux/input.h. The kernel erases a
+file's effects when the file is closed, so nothing keeps rumbling after the process is killed. Each effect also ends by
+itself after 0.2 s, in case the process hangs.
 """
 
 import contextlib
@@ -47,7 +47,7 @@ BUTTONS: Final = {
     0x13D: Button.L3,
     0x13E: Button.R3,
 }
-"""Buttons by their evdev codes (Linux gamepad specification): the four action buttons, shoulders, triggers, and so on"""
+"""Button for each evdev code of Linux's gamepad specification, which names action buttons by their direction"""
 _HATS: Final = {
     (_HAT_X, -1): Button.LEFT,
     (_HAT_X, 1): Button.RIGHT,

@@ -32,7 +32,7 @@ class ReleaseGuard:
     def __exit__(self, *_: object) -> None:
         if self._process is None:
             return
-        # If the controller could not be released, the watchdog still holds it, and tries once more when its input closes.
+        # If the controller could not be released, the watchdog still holds it, and tries again when its input closes.
         if self._process.stdin is not None:
             self._process.stdin.close()
         try:
