@@ -44,7 +44,7 @@ class Fingers:
         self._now_s = now_s
 
     def resisted_share(self) -> float:
-        """Return the share of the finger's force that a trigger resists beyond its spring, 0 to 1; the greater of both."""
+        """Return the share of the finger's force, 0 to 1, that the stiffer trigger resists beyond its spring."""
         shares = [
             SPRING_RISE_N * (free.travel - travel) / force_n
             for free, travel, force_n in zip(self._free, self._device.travel, self._forces_n, strict=True)

@@ -1,4 +1,4 @@
-"""One table of buttons and actions, with docs and help that agree."""
+"""Button map: docs and help texts agree with it."""
 
 import re
 
