@@ -60,10 +60,16 @@ class OperatorSettings(SideOptions):
     """Serve the console for a browser on this machine, and show its address: views, scene, what is felt and why."""
     console_port: Annotated[int, tyro.conf.arg(metavar="PORT"), Meta(ge=0, le=65535)] = 0
     """Port of the console on 127.0.0.1; 0 for any free port."""
+    console_token: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """File that contains the token of the console's address, for a program that restarts this side while the page stays
+    open. Pages then offer to run again, and --status json has an event for it."""
     tui: bool = False
     """Show the console's facts on the whole terminal instead of one line, for machines without a browser."""
     person: PersonSettings = field(default_factory=PersonSettings)
     """Abilities and errors of the scripted person (only with --device simulated)."""
+    person_waits: Annotated[float, Meta(ge=0.0, le=3600.0), tyro.conf.arg(metavar="SECONDS")] = 0.0
+    """Longest time, in seconds, that the scripted person waits for a console page's first picture, counted from the robot
+    side's first message."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

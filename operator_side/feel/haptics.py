@@ -109,7 +109,7 @@ class Haptics:
         return self._commands.displacement(now_s, _report(felt), felt.r2.acceleration_m_s2)
 
     def take_map(self, felt: StiffnessUpdate) -> None:
-        """Keep `felt` if its map is newer than the known one, even if `felt` arrives late: few messages have maps."""
+        """Keep `felt` if its map is newer than the known one, even if `felt` is late: few messages have maps."""
         known = self._mapped
         newer = known is None or known.header.epoch != felt.header.epoch or known.header.sent_s < felt.header.sent_s
         if felt.around is not None and newer:

@@ -118,6 +118,8 @@ class ShownKind(StrEnum):
     NOTE = "note"
     PLAYER = "player"
     """Position in a recording, its length, speed and pause"""
+    ENDED = "ended"
+    """The run has ended normally"""
     END = "end"
     """End of a batch: the next batch follows once the page has confirmed this one"""
 

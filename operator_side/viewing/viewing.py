@@ -22,6 +22,8 @@ from operator_side.viewing.facts_of_core import Surroundings, operator_facts
 from operator_side.viewing.pages.driving_page import DrivingPage
 
 _WATCH_PERIOD_S: Final = 0.25
+_EXPECT_PERIOD_S: Final = 10.0
+"""Seconds between Watch messages while no page is visible"""
 _TELEMETRY_TOPIC: Final = b"telemetry"
 
 
@@ -51,7 +53,7 @@ class SceneFigures:
 
 
 class Viewing:
-    """Feed of the console, the terminal view and the recording; requests views only while somebody watches."""
+    """Feed of the console, the terminal view and the recording; views are requested only while somebody watches."""
 
     def __init__(
         self,
@@ -75,6 +77,9 @@ class Viewing:
         self._asked = False
         """Whether the newest Watch message reported lacking H.264 pictures, so that whole ones come"""
         self._watch_s = self._facts_s = -math.inf
+        self.has_shown_picture = False
+        """Whether a picture has been sent to a page"""
+        self._open_pages = 0
 
     def note(self, text: str) -> None:
         """Show a line that stays, in the status and on the console."""
@@ -94,19 +99,24 @@ class Viewing:
             self._figures.take(payload)
         if self.console is not None:
             self.console.view(payload, video=topic == VIDEO_TOPIC)
+            self.has_shown_picture |= topic == VIDEO_TOPIC and self.console.pages > 0
         return True
 
     def requests(self, now_s: float) -> list[bytes]:
-        """Return the Watch message if one is due now; none while nobody watches."""
+        """Return the Watch message if one is due now; rarely one is due while nobody watches."""
         if self.console is not None:
             self._hear(self.console, now_s)
         pages = self.console is not None and self.console.pages > 0
         lacks = None if self.console is None else self.console.lacks
         stands_still = lacks is not None and any(lacks) and not self._asked
-        if not (pages or self._status.wants_facts) or (now_s - self._watch_s < _WATCH_PERIOD_S and not stands_still):
+        watches = pages or self._status.wants_facts
+        if not watches and (self.console is None or self.console.address is None):
+            return []
+        # While nobody watches, a Watch only lets the robot side keep its drawing process ready.
+        if now_s - self._watch_s < (_WATCH_PERIOD_S if watches else _EXPECT_PERIOD_S) and not (pages and stands_still):
             return []
         self._watch_s, self._asked = now_s, lacks is not None and any(lacks)
-        watch = Watch(self._core.link.stamp(now_s), overview=pages, first_person=pages, scene=True, lacks=lacks)
+        watch = Watch(self._core.link.stamp(now_s), overview=pages, first_person=pages, scene=watches, lacks=lacks)
         if self._recording is not None:
             self._recording.noted.append((Kind.WATCHED, now_s, b""))
         return [encode(watch)]
@@ -117,6 +127,8 @@ class Viewing:
             page, said = console.words.popleft()
             if said is None:
                 self._pages.close(page, now_s)
+            elif said.pop("again", False):
+                self._status.event("again")
             else:
                 self._pages.receive(page, said, now_s)
 
@@ -128,6 +140,9 @@ class Viewing:
     def _looks_at_console(self, console: Console) -> bool:
         for text in console.take_notes():
             self._status.note(text)
+        if console.pages != self._open_pages:
+            self._open_pages = console.pages
+            self._status.event("pages", count=console.pages)
         if console.address not in (None, self._reported):
             self._reported = console.address
             if not self._status.event("console", address=self._reported):

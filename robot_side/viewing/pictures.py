@@ -73,7 +73,7 @@ def start_beside(done: Callable[[Renders | str], None]) -> None:
 
 
 class Cameras:
-    """Keeps one order of each wanted view under way; starts the companion at the first need."""
+    """Keeps one order of each wanted view under way; starts the companion when a viewer is there or expected."""
 
     def __init__(
         self,
@@ -138,19 +138,27 @@ class Cameras:
         return VideoStep(*place, picture.number, picture.whole, picture.content)
 
     def update(
-        self, now_s: float, captured_s: float, wanted: Collection[ViewName], lacks: tuple[int, int] | None = None
+        self,
+        now_s: float,
+        captured_s: float,
+        wanted: Collection[ViewName],
+        lacks: tuple[int, int] | None = None,
+        *,
+        expected: bool = False,
     ) -> list[Picture]:
         """Order `wanted` views that are not under way, of the present state; return the finished pictures.
 
-        lacks: as for `makes_h264`, the newest of all viewers. captured_s: time of the state. To be called in every turn
-        while `wanted` is not empty, and sometimes otherwise.
+        lacks: as for `makes_h264`, the newest of all viewers. captured_s: time of the state. expected: a viewer may
+        come soon, and the companion starts without an order. To be called in every turn while `wanted` is not empty,
+        and sometimes otherwise.
         """
-        if wanted:
+        expected = expected or bool(wanted)
+        if expected:
             self._wanted_s = now_s
         self._follow_ends(now_s)
         companion = self._companion
         if companion is None:
-            if wanted and not self._hopeless and not self._starting and now_s >= self._not_before_s:
+            if expected and not self._hopeless and not self._starting and now_s >= self._not_before_s:
                 self._starting = True
                 self.starts += 1
                 self._start(self._handed_over.append)

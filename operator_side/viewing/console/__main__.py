@@ -3,11 +3,12 @@
 Each message on the channel begins with a letter:
 
 operator side ──▶ here    f facts, v a view payload as received, n a note, r the constants of a run,
-                          p the position in a recording
+                          p the position in a recording, d the run's normal end
 here ──▶ operator side    a the address, w the number of visible pages, s a page's message, e why there is no console,
                           l the H.264 pictures that are lacking: first once H.264 can be shown, then at each change
 """
 
+import asyncio
 import contextlib
 import logging
 import math
@@ -17,6 +18,7 @@ import socket
 import struct
 import sys
 import threading
+from pathlib import Path
 from typing import Any, Final
 
 import msgspec
@@ -41,10 +43,12 @@ from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts, ShownKind
 
 _NICENESS: Final = 5
-"""Increment of this process's niceness, so that both sides have priority"""
+"""Increment of this process's niceness once it serves, so that both sides have priority"""
 _FRAME: Final = struct.Struct("<Bd")
 """Header of a picture: number of its view, and its capture time on the robot side's clock"""
 _MOST_LISTED: Final = 6
+_LAST_WORDS_S: Final = 0.1
+"""Seconds that pages have to receive the last message before the process ends"""
 _SLOW_PERIOD_S: Final = 0.25
 """Seconds between scene updates if a browser draws without a graphics processor"""
 _LASTING: Final = {b"r": ShownKind.RUN, b"p": ShownKind.PLAYER}
@@ -64,7 +68,7 @@ class _Process:
         self._steps: Any = None
         self._lacks: tuple[int, int] | None = None
 
-    def run(self, port: int) -> None:
+    def run(self, port: int, token: str) -> None:
         """Serve until the channel ends. If serving is impossible, report the reason through the channel."""
         try:
             from operator_side.viewing.console.drawing import Drawing  # noqa: PLC0415  # an extra, and slow to import
@@ -83,7 +87,7 @@ class _Process:
         except OSError as error:
             self._give_up(f"--console-port {port}: {error.strerror}; valid: 0 for any port that is free")
             return
-        token, port = secrets.token_urlsafe(24), part.getsockname()[1]
+        port = part.getsockname()[1]
         gate = Gate(token, port)
         self._pages = Pages(lambda count: self._say("w", b"%d" % count), self._say)
         try:
@@ -106,6 +110,7 @@ class _Process:
 
     def _begin(self, loop: Any, address: str) -> None:
         self._say("a", address.encode())
+        os.nice(_NICENESS)
         loop.add_reader(self._channel.fileno(), self._receive)
 
     def _follow(self, steps: Any) -> None:
@@ -131,7 +136,9 @@ class _Process:
             self._give_up(f"the console failed: {error!r}")
             self._ended.set()
         if self._channel.ended:
-            self._ended.set()
+            loop = asyncio.get_running_loop()
+            loop.remove_reader(self._channel.fileno())
+            loop.call_later(_LAST_WORDS_S, self._ended.set)
 
     def _take(self, kind: bytes, content: bytes) -> SceneState | None:
         """Take one message. Return a scene's state instead of drawing it: the caller draws only the newest."""
@@ -143,6 +150,8 @@ class _Process:
         elif kind == b"n":
             note = {"kind": ShownKind.NOTE, "text": content.decode("utf-8", "replace")}
             self._pages.note(msgspec.json.encode(note).decode())
+        elif kind == b"d":
+            self._pages.show(ShownKind.ENDED, f'{{"kind":"{ShownKind.ENDED}"}}', lasting=True)
         elif kind in _LASTING:
             lasting = {"kind": _LASTING[kind], **msgspec.msgpack.decode(content)}
             self._pages.show(_LASTING[kind], msgspec.json.encode(lasting).decode(), lasting=True)
@@ -216,11 +225,10 @@ def said(facts: OperatorFacts) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Run the console process. Its arguments are the channel's file descriptor and the port."""
-    channel, (port,) = companion_channel(sys.argv[1:])
-    os.nice(_NICENESS)
+    """Run the console process. Arguments: the channel's file descriptor, the port, and optionally a file with a token."""
+    channel, (port, *token) = companion_channel(sys.argv[1:])
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # no line for each refused request
-    _Process(channel).run(int(port))
+    _Process(channel).run(int(port), Path(token[0]).read_text().strip() if token else secrets.token_urlsafe(24))
     os._exit(0)  # does not wait for viser's thread
 
 

@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Final, Self
 
 import msgspec
@@ -20,14 +21,17 @@ _END_LIMIT_S: Final = 0.3
 
 
 PageWords = tuple[int, dict[str, Any] | None]
-"""Number of a page in this run, and its message: any of `hands`, `tune` and `play`; None if the page has closed."""
+"""Number of a page, and its message: any of `hands`, `tune`, `play` and `again`; None if the page has closed."""
 
 
 class Console:
     """Browser console. Without viser no page is served, and a note says so."""
 
-    def __init__(self, title: str, *, port: int = 0, live: bool = True) -> None:
-        """Start the console process on `port` of this machine; 0 for any free port. live: not a replayed recording."""
+    def __init__(self, title: str, *, port: int = 0, live: bool = True, token: Path | None = None) -> None:
+        """Start the console process on `port` of this machine; 0 for any free port. live: not a replayed recording.
+
+        token: file with the token of the page's address; pages then offer to run again. None for a random token.
+        """
         self.address: str | None = None
         """Address of the page, with the token; None until the page is ready, and once the process has ended."""
         self.pages = 0
@@ -43,8 +47,10 @@ class Console:
         self._notes: list[str] = []
         self.gone = False
         """Whether the console process has ended; a note gives the reason."""
-        self._companion = Companion("operator_side.viewing.console", [str(port)])
-        self._companion.channel.send(b"r", msgspec.msgpack.encode({"title": title, "live": live}))
+        given = [] if token is None else [str(token)]
+        self._companion = Companion("operator_side.viewing.console", [str(port), *given])
+        run = {"title": title, "live": live, "may_run_again": token is not None}
+        self._companion.channel.send(b"r", msgspec.msgpack.encode(run))
 
     def __enter__(self) -> Self:
         return self
@@ -117,5 +123,7 @@ class Console:
         return taken
 
     def close(self) -> None:
-        """End the console process; kill it if it takes longer than 0.3 s."""
+        """Tell the pages that the run has ended, and end the console process; kill it if that takes over 0.3 s."""
+        self._companion.channel.send(b"d", b"")
+        self._companion.channel.flush()
         self._companion.close(_END_LIMIT_S)
