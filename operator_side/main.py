@@ -34,7 +34,8 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     status = TerminalStatus("operator") if settings.tui else Status(settings.status, "operator")
     loop = Loop(MOTION_PERIOD_S, REMEDIES, settings.seed)
     with Process(settings, "operator", status, OperatorEncoder(), loop) as process:
-        # The console first, as its process takes longest to start. Before the priority is raised, as it would inherit that.
+        # The console first, as its process takes longest to start, and before the priority is raised, which the process
+        # would inherit.
         console = None
         if settings.console:
             console = Console(settings.connect, port=settings.console_port, token=settings.console_token)

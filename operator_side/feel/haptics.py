@@ -138,7 +138,7 @@ class Haptics:
         return CourseOnMap(mapped.around, mapped.horizon_m, course, self._commands.sticks_at(now_s))
 
     def needed_m(self, felt: StiffnessUpdate, pulled: tuple[float, float], now_s: float) -> tuple[float, float]:
-        """Compute the distance D of `feel/zones.py` at the present travel, for the retreating and the advancing trigger.
+        """Compute D_z of `feel/zones.py` at the present travel, for the retreating and for the advancing trigger.
 
         pulled: calibrated travel of the trigger that retreats, and of the one that advances.
         """

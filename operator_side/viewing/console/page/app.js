@@ -162,8 +162,8 @@ function drawsSlowly() {
   return /swiftshader|llvmpipe|software|basic render/i.test(renderer ?? "software");
 }
 
-// Address of the scene under our other host name (localhost or 127.0.0.1). The browser treats that as another site, in
-// a process of its own, so that drawing the scene does not slow this page.
+// Address of the scene under our other host name (localhost or 127.0.0.1). The browser treats that as another site,
+// in a process of its own, so that drawing the scene does not slow this page.
 function sceneAddress() {
   const address = new URL("scene/", location.href);
   address.hostname = location.hostname === "localhost" ? "127.0.0.1" : "localhost";

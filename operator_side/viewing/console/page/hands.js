@@ -4,8 +4,8 @@
 //     ▲          ▲         │         │
 //     └──────────┴─────────┴─────────┘  on hold-to-run released, a blurred or hidden page, a stop, silence
 //
-// The operator side decides by the same rules (operator_side/viewing/pages/driving_page.py) whether inputs move the arm;
-// the state here is for display.
+// The operator side decides by the same rules whether inputs move the arm (operator_side/viewing/pages/driving_page.py);
+// the state here is only for display.
 import { atRest, both, Grips, Keys, readGamepads, REST } from "./inputs.js";
 import { Doing, MotionState } from "./names.js";
 import { Panel } from "./panel.js";
