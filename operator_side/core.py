@@ -40,7 +40,7 @@ class CoreSettings:
     """Settings of the core: rendering and commands."""
 
     haptics: bool = True
-    """Whether the triggers are stiffened"""
+    """Whether the triggers resist and the motors rumble"""
     calibration: TravelCalibration = field(default_factory=TravelCalibration)
     rendering: RenderingSettings = field(default_factory=RenderingSettings)
     compensation: Compensation = "operator"

@@ -35,7 +35,7 @@ class OperatorSettings(SideOptions):
     """Address of the robot side's view port; by default the port after the control port."""
     keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     """Authenticate with the operator's key in FOLDER, made by: feelahead keys make operator. The robot side admits this
-    key after, on its machine: feelahead keys allow NAME KEY."""
+    key after this command on its machine: feelahead keys allow NAME KEY."""
     robot_key: Annotated[str | None, tyro.conf.arg(metavar="KEY|FILE")] = None
     """With --keys: the robot side's public key, shown on its machine by: feelahead keys show robot."""
     connections: Annotated[int, Meta(ge=1, le=MOST_CONNECTIONS_EACH)] = CONNECTIONS
@@ -68,8 +68,8 @@ class OperatorSettings(SideOptions):
     person: PersonSettings = field(default_factory=PersonSettings)
     """Abilities and errors of the scripted person (only with --device simulated)."""
     person_waits: Annotated[float, Meta(ge=0.0, le=3600.0), tyro.conf.arg(metavar="SECONDS")] = 0.0
-    """Longest time, in seconds, that the scripted person waits for a console page's first picture, counted from the robot
-    side's first message."""
+    """Longest time, in seconds, that the scripted person waits for the first picture on a page of the console, counted
+    from the robot side's first telemetry."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -66,7 +66,7 @@ class Feel:
             check_limits(self)
 
     def following(self, before: "Feel") -> "Feel":
-        """Return these effects, with the parts of `before`, which was set earlier, where these have None."""
+        """Return these effects; where a part is None, take it from `before`, which was set earlier."""
         pairs = zip(_parts(self), _parts(before), strict=True)
         return Feel(*(old if new is None else new for new, old in pairs))
 

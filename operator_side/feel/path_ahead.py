@@ -28,7 +28,7 @@ _LEAST_S: Final = 1e-9
 _ALIKE: Final = 0.1
 """Half width of the band midway between two probes in which both count, as a share of the probes' distance"""
 _ALONE: Final = 0.15
-"""Share of a displacement across along one axis below which only the other axis counts"""
+"""Share of one axis in a displacement across, below which only the other axis counts"""
 _RISES_M: Final = 0.01
 """Distance before full strength within which weaker strengths apply; farther away they are of another object"""
 _LEFT_OUT: Final = 0.02

@@ -6,8 +6,8 @@ trigger one reaction h later:
     u = (x_z - x_other) v_max                                  x_z: calibrated travel at the zone's middle
     D_z = δ + u h + u²/2a + max(0, w - u)²/2a                  δ, w: Displacement along the trigger's direction
 
-A zone's strength is the number of onset distances that are at most D_z, and never less than the zone's before it. So
-the first stiff zone shows how far the trigger may be pulled before the gripper comes too near.
+A zone's strength is the number of onset distances that are at most D_z, and never less than the strength of the zone
+before. So the first stiff zone shows how far the trigger may be pulled before the gripper comes too near.
 """
 
 from bisect import bisect_right
@@ -31,7 +31,7 @@ class Zones(NamedTuple):
     """Number of zones with full strength because D_z exceeds the horizon."""
 
     def at_least(self, others: "Zones", most: int) -> "Zones":
-        """Raise each zone's strength to that in `others`, but by this to no more than `most`."""
+        """Raise each zone's strength to its strength in `others` or to `most`, whichever is lower; never reduce it."""
         strengths = (max(mine, min(other, most)) for mine, other in zip(self.strengths, others.strengths, strict=True))
         return Zones(tuple(strengths), max(self.beyond_horizon, others.beyond_horizon))
 

@@ -1,4 +1,4 @@
-"""Action of each button: the table from which buttons are read, and from which help and docs/controls.md are made."""
+"""Button map: the one table of buttons and their actions, with which help and docs/controls.md must agree."""
 
 from collections.abc import Mapping
 from enum import Enum
@@ -9,7 +9,7 @@ from operator_side.controller.state import Button
 
 
 class Action(Enum):
-    """Action that a button triggers."""
+    """Action of a button."""
 
     RUN = "hold to run"
     ARM = "arm"

@@ -38,7 +38,7 @@ def _finished(report_id: int, content: bytes, transport: Transport) -> bytes:
 def build_calibration(transport: Transport) -> bytes:
     """Make feature report 0x05, for motion sensors without errors; hid-playstation reads it when it starts.
 
-    Gyroscope: bias 0, +-8640 counts at +-540 degrees a second. Accelerometer: 8192 counts for one gravity.
+    Gyroscope: bias 0, ±8640 counts at ±540 degrees a second. Accelerometer: 8192 counts for one gravity.
     """
     gyro, acceleration = (8640, -8640) * 3, (8192, -8192) * 3
     return _finished(CALIBRATION_ID, struct.pack("<17h", 0, 0, 0, *gyro, 540, 540, *acceleration), transport)

@@ -1,4 +1,4 @@
-"""Supported models of controllers, and their USB ids."""
+"""Supported models of controllers, with vendor and product ids."""
 
 from enum import Enum
 from typing import Final

@@ -82,7 +82,7 @@ class Seed(IntEnum):
 _STARTS: Final = {seed: zlib.crc32(bytes([seed])) for seed in Seed}
 """CRC-32 of each Seed byte alone, from which a report's CRC-32 is continued"""
 _RESIDUE: Final = 0x2144DF1C
-"""CRC-32 of any content that is followed by its own CRC-32, always this constant"""
+"""CRC-32 of any content followed by its own CRC-32; it is the same for every content"""
 
 
 def checksum(seed: Seed, content: bytes) -> int:

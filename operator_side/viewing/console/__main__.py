@@ -225,7 +225,7 @@ def said(facts: OperatorFacts) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Run the console process. Arguments: the channel's file descriptor, the port, and optionally a file with a token."""
+    """Run the console process. Arguments: the channel's file descriptor, the port, and a file with a token, if any."""
     channel, (port, *token) = companion_channel(sys.argv[1:])
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # no line for each refused request
     _Process(channel).run(int(port), Path(token[0]).read_text().strip() if token else secrets.token_urlsafe(24))

@@ -24,7 +24,7 @@ class Headers(Protocol):
 
 
 class Gate:
-    """Admits or refuses requests; a refusal has no reason, which would help an attacker."""
+    """Admits or refuses requests; gives no reason for a refusal."""
 
     def __init__(self, token: str, port: int) -> None:
         self.address = f"http://127.0.0.1:{port}/{token}/"

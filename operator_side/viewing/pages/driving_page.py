@@ -4,7 +4,7 @@ A browser may miss that a key was released, which must never move the arm. So th
 
 nobody ─▶ resting ─▶ ready ─▶ running         the first page that asks to drive becomes the driving page
              ▲         │         │            resting: all keys must be up for 1 s; ready: hold-to-run counts
-             └─────────┴─────────┘  on another key before hold-to-run, its release, a stop, a disarmed arm
+             └─────────┴─────────┘  on another key before hold-to-run, hold-to-run released, a stop, a disarmed arm
 
 After 150 ms of silence, or when the driving page stops driving or closes, nobody drives; the next page rests first.
 """
