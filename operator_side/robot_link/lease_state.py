@@ -25,7 +25,7 @@ class LeaseState:
         self.lease: LeaseNotice | None = None
         """Newest LeaseNotice; None before the first and once it has expired."""
         self.stop_reason: str | None = None
-        """Reason in the newest notice that the arm is stopped or disarmed, kept until the next; None before the first."""
+        """Reason in the newest notice that the arm is stopped or disarmed; None before the first such notice."""
         self.history: list[str] = []
         """Latest session states of this operator, oldest first; "owner" while it had the lease"""
         self.other_version: str | None = None
