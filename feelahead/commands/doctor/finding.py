@@ -26,6 +26,6 @@ class Finding:
     """Command or change that mends the fault; None if there is nothing to do"""
 
 
-def fit_for_demo(findings: list[Finding]) -> bool:
-    """Return whether the demo can run, which needs one extra of the package."""
-    return not any(finding.name == "extra robot" and finding.verdict is Verdict.MISSING for finding in findings)
+def can_be(side: str, findings: list[Finding]) -> bool:
+    """Return whether this machine can run `side` ("robot" or "operator"), which needs the extra of that name."""
+    return any(finding.name == f"extra {side}" and finding.verdict is Verdict.OK for finding in findings)

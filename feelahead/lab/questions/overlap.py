@@ -50,8 +50,8 @@ class OverlapSweep(Sweep):
     """Measure run time and error of the overlaps and of their alternatives, on the same pairs in the same run.
 
     The alternatives are the published package `overlap` 0.2.0 from Python and in C++, 29 satellite points, Monte Carlo
-    and more. Those that this machine lacks are named. The package comes with: pip install 'feelahead[bench]'. The C++
-    row needs a compiler, Eigen (apt-get install libeigen3-dev) and the package's header:
+    and more. Those that this machine lacks are named. The package comes with: pip install '.[bench]' in the clone. The
+    C++ row needs a compiler, Eigen (apt-get install libeigen3-dev) and the package's header:
 
         pip download --no-deps --no-binary overlap overlap==0.2.0 && tar xzf overlap-0.2.0.tar.gz
     """
