@@ -131,8 +131,8 @@ class SceneState(Message, frozen=True, tag="scene"):
     spheres: bytes
     """(m, 4) float32: centre and radius of the spheres of the gripper and of the held object"""
     overlaps: tuple[tuple[int, float, float], ...]
-    """(object, by L2, by R2): overlap in m³ with the gripper, inflated by D_σ and moved by the robot side's δ, if
-    any"""
+    """(object index, volume for L2, for R2): overlap of each object, in m³, with the gripper inflated by D_σ and moved
+    by the robot side's δ, if any"""
     l2: EnlargementTerms
     r2: EnlargementTerms
     tick_p50_us: float

@@ -1,4 +1,4 @@
-"""Budget of all messages that a side sends: urgent ones always leave, the others share the remaining rate, in pieces."""
+"""Budget of all messages that a side sends: urgent ones always leave, others share the remaining rate, in pieces."""
 
 import math
 from collections import deque
@@ -63,15 +63,14 @@ class _Stream:
 
 
 class Budget(Generic[Name]):
-    """Token bucket with strict priority: haptics, telemetry, then the `paced` streams. The RateController sets its rate.
+    """Token bucket with strict priority: haptics, telemetry, `paced` streams. A RateController sets the bucket's rate.
 
-    Haptics always leave, even if the bucket's level falls below 0. Messages of paced streams leave while the level allows
-    it. A message of which a piece has left is sent to its end; one that has not begun is dropped for newer ones.
+    Haptics always leave, even if the bucket's level falls below 0. Messages of paced streams leave while the level
+    allows it. A message of which a piece has left is sent to its end; before that it may be dropped for newer ones.
     """
 
     def __init__(self, paced: Sequence[Name] = (), first_number: int = 0) -> None:
-        """paced: streams that are sent in pieces, most urgent first. first_number: 1 less than the first message's number.
-        """
+        """paced: streams sent in pieces, most urgent first. first_number: one less than the first message's number."""
         self.controller = RateController()
         self._streams: dict[Name, _Stream] = {name: _Stream() for name in paced}
         self._number: dict[Name, int] = dict.fromkeys(paced, first_number)
@@ -202,7 +201,7 @@ class Budget(Generic[Name]):
 
     @property
     def haptic_interval_s(self) -> float:
-        """Least time between two haptic messages to a peer: 0 until the link shows a limit, 20 ms while a queue drains."""
+        """Least time between haptic messages to a peer: 0 until the link shows a limit, 20 ms while a queue drains."""
         if self.controller.drains:
             return KEEP_ALIVE_S
         if self.controller.begins:

@@ -135,7 +135,7 @@ class RateController:
             self._judge(echo, min(queue_s for _, queue_s in self._recent), now_s)
 
     def _follow_jitter(self, queue_s: float, before: Urgency) -> None:
-        """Update the jitter, unless our own burst caused the delay. before: highest class of the messages just arrived."""
+        """Update the jitter, unless a burst of ours caused the delay. before: least urgent class just echoed."""
         if before is Urgency.PACED or self._draining is not None:
             self._calm = 0
         elif before is Urgency.MUST:
@@ -200,7 +200,7 @@ class RateController:
         return 8.0 * (last_bytes - first_bytes) / (last_s - first_s) if last_s > first_s else None
 
     def may_send(self, now_s: float) -> bool:
-        """Return whether messages that can wait may leave: no queue of ours drains or begins, and echoes are on time."""
+        """Return whether messages that can wait may leave: no queue of ours drains or begins, echoes are on time."""
         if self._draining is not None or self.queue_s - self._others_s > 2.0 * self._limit_s:
             return False
         if self._newest_sent_s is None:

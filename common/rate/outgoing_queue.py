@@ -44,8 +44,7 @@ class OutgoingQueue:
         self._newest_s = -math.inf
 
     def echoed(self, sent_s: float, arrived_s: float) -> None:
-        """Add the echo of our message of `sent_s`, received at `arrived_s` on the peer's clock; later copies are ignored.
-        """
+        """Add the echo of our message of `sent_s`, which the peer received at `arrived_s`; ignore repeated echoes."""
         if sent_s <= self._newest_s:
             return
         delay_s = arrived_s - sent_s

@@ -19,7 +19,7 @@ _UNDER_WAY: Final = 2
 
 
 def piece_of(whole: bytes, number: int, offset: int, size_bytes: int) -> bytes:
-    """Make the piece of `whole` that begins at `offset` and has `size_bytes`; `number` modulo 2**32 identifies `whole`."""
+    """Make the piece of `size_bytes` of `whole` that begins at `offset`; `number` modulo 2**32 identifies `whole`."""
     return _HEAD.pack(number & 0xFFFFFFFF, offset, len(whole)) + whole[offset : offset + size_bytes]
 
 

@@ -109,6 +109,6 @@ _OPERATORS_OWN: Final = ("link", "state", "owner", "delay_ms", "L2", "R2", "L2_p
 
 
 def joined(robot: RobotStatus | None, operator: OperatorStatus | None) -> dict[str, Any]:
-    """Merge both sides' values. Of keys in both, _OPERATORS_OWN have the operator side's value, others the robot side's."""
+    """Merge both sides' values. Of common keys, _OPERATORS_OWN come from the operator side, others from the robot."""
     ours, theirs = ({} if one is None else msgspec.to_builtins(one) for one in (operator, robot))
     return {**ours, **theirs, **{name: ours[name] for name in _OPERATORS_OWN if name in ours}}
