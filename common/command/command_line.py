@@ -89,7 +89,7 @@ def load_toml(path: Path, settings_type: type[Settings], elsewhere: str = "") ->
 
 
 def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
-    """Run `command(arguments)` and exit. A FeelaheadError becomes one line and exit code 2 for bad input, 1 otherwise."""
+    """Run `command(arguments)` and exit. Print a FeelaheadError as one line; exit code 2 for bad input, otherwise 1."""
     try:
         try:
             code = command(sys.argv[1:])

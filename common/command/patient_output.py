@@ -56,8 +56,7 @@ class PatientOutput(io.TextIOBase):
         return self._stream is not None and self._stream.isatty()
 
     def write(self, text: str) -> int:
-        """Queue a text, which is written as a whole or dropped. After an error, raise it once and drop all further texts.
-        """
+        """Queue a text, which is written whole or dropped. After an error, raise it once; drop all further texts."""
         if self._open:
             if self._waiting.qsize() >= _WAITING:
                 with contextlib.suppress(queue.Empty):

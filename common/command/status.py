@@ -73,11 +73,13 @@ class Status:
         return self._mode == "facts"
 
     def due(self, now_s: float) -> bool:
-        """Return whether `show` would show anything now. If not, the caller need not make a status, which takes time."""
+        """Return whether `show` would show anything now. If not, the caller need not make a status, which is slow."""
         return self._mode != "none" and now_s >= self._next_s
 
     def show(self, now_s: float, *, robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> None:
-        """Show the status: at most five times a second, in the mode "facts" ten. BrokenPipeError, once, if the reader ended.
+        """Show the status, at most five times a second, or ten in the mode "facts".
+
+        Raises BrokenPipeError, once, if the reader of the output has ended.
         """
         if not self.due(now_s):
             return

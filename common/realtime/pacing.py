@@ -42,7 +42,7 @@ class Pacer:
         return now_s >= self.deadline_s
 
     def begin(self, now_s: float) -> None:
-        """Begin a turn at `now_s`; the next is due at the first later deadline. ValueError before the turn's deadline."""
+        """Begin a turn at `now_s`; the next is due at the first later deadline. ValueError if the turn is not due."""
         if not now_s >= self.deadline_s:
             raise ValueError(f"now_s = {now_s} lies before the deadline {self.deadline_s}")
         self.turns += 1

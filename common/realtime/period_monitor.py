@@ -66,7 +66,7 @@ class PeriodMonitor:
         return said
 
     def summary(self) -> dict[str, Any]:
-        """Return `said`, and the shares of the run's time taken by other programs (`waited`) and the host (`stolen`)."""
+        """Return `said`, and the shares of time that other programs (`waited`) and the host (`stolen`) took."""
         waited = stolen = None
         if self._first is not None:
             since_s, taken = self._first

@@ -20,7 +20,7 @@ class Stages:
     """Durations of stages, added up within a turn, with statistics over the turns. Stages may be nested."""
 
     def __init__(self, names: Sequence[str], wall: Clock, processor: Clock, seed: int = 0, every: int = EVERY) -> None:
-        """names: the stages. processor: clock of the loop thread's processor time. every: sampling interval in turns."""
+        """names: of the stages. processor: clock of the loop thread's processor time. every: sampling interval."""
         self.names = tuple(names)
         self.spent_s = [0.0] * (2 * len(self.names))
         """Wall time and processor time of each stage in turn since the start, scaled up from the sampled turns."""

@@ -23,7 +23,7 @@ class StolenTime:
     """Total time of all processors, in the kernel's unit."""
 
     def shares_since(self, earlier: "StolenTime", passed_s: float) -> tuple[float | None, float | None]:
-        """Return the share of `passed_s` that the thread waited, and the share of all processors' time that was stolen."""
+        """Return the share of `passed_s` that the thread waited, and the stolen share of all processors' time."""
         whole = None if self.whole is None or earlier.whole is None else self.whole - earlier.whole
         return _share(self.waited_s, earlier.waited_s, passed_s), _share(self.stolen, earlier.stolen, whole)
 

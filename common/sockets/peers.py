@@ -43,7 +43,7 @@ class Peers:
     """Peers and their connections; does no I/O."""
 
     def __init__(self, offer: Callable[[Connection, bytes], Offered]) -> None:
-        """`offer` sends a payload over a connection without waiting; if it returns GONE, the connection is forgotten."""
+        """`offer` sends a payload over a connection without waiting; after GONE the connection is forgotten."""
         self.connections: dict[bytes, Connection] = {}
         """Connections, keyed by routing id; beyond the limit the one that has been silent longest is forgotten."""
         self._offer = offer

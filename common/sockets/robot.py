@@ -104,8 +104,7 @@ class RobotSockets(SocketShell):
         return 0 if self._authenticator is None else self._authenticator.refused
 
     def news(self) -> list[str]:
-        """Return new lines to show, since the last call: refused keys, faults of the folder of keys, too many connections.
-        """
+        """Return lines to show that are new since the last call: refused keys, faults of keys, too many connections."""
         news: list[str] = []
         wrong = []
         if self.crowded:
@@ -198,7 +197,7 @@ class RobotSockets(SocketShell):
         return Gate(self._context, part, MOST_CONNECTIONS, HANDSHAKE_LIMIT_S, unsent_bytes)
 
     def _listen(self) -> None:
-        """Register the sockets of the gates and the view for polling, by which _watch_connections learns of new events."""
+        """Register the sockets of the gates and the view for polling, which shows when connections begin or end."""
         self._comings = select.poll()
         for part in (self._view, *(gate.events for gate in self._gates)):
             self._comings.register(part.fileno(), select.POLLIN)

@@ -43,7 +43,7 @@ class SocketShell:
     """ZeroMQ context of one side's sockets; no call but `wait_for` blocks."""
 
     def __init__(self, heartbeat_timeout_s: float, handshake_limit_s: float) -> None:
-        """Limits: a connection ends after `heartbeat_timeout_s` of silence, or `handshake_limit_s` without a handshake."""
+        """A connection ends after `heartbeat_timeout_s` of silence, or `handshake_limit_s` without a handshake."""
         if not 0.03 <= heartbeat_timeout_s <= 60.0:
             raise ValueError(f"heartbeat_timeout_s = {heartbeat_timeout_s}; valid: 0.03 to 60 seconds")
         self.dropped = 0
