@@ -140,7 +140,7 @@ class DelayLine(Generic[Item]):
         return len(self._queue)
 
     def summary(self) -> dict[str, Any]:
-        """Return the requested profile (`asked`, in the grammar's words), model and seed, and the figures `achieved`."""
+        """Return the requested profile (`asked`, in the grammar's words), model, seed, and the figures `achieved`."""
         return {
             "asked": self.profile.words,
             "model": self.profile.model,
