@@ -9,7 +9,7 @@ _BETWEEN = "  "
 UNKNOWN = "–"
 _QUEUE_MS = 5.0
 _LOST_PERCENT = 0.05
-"""Least queueing delay and least loss that are shown."""
+"""Least loss that is shown, in per cent; _QUEUE_MS is the least queueing delay that is shown, in milliseconds."""
 _LONGEST_NAME = 12
 """Longest name of an object that is shown, in columns."""
 

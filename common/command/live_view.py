@@ -33,7 +33,8 @@ class LiveView:
         self.phase, self.reason = phase_words(facts, first)
         self.robot, self.operator = robot or RobotStatus(), operator or OperatorStatus()
         self.side, self.scene = first or self.operator, robot or self.operator
-        """Status to prefer: `side` (the operator's) for controller and link, `scene` (the robot's) for objects."""
+        """`side`: for controller and link; the operator side's status, or the robot side's if there is no other.
+        `scene`: for objects; the robot side's status, or the operator side's if there is no other."""
         side, free = self.side, self.side.state not in (None, "armed")
         self.armed = side.state == "armed"
         self.triggers = (

@@ -24,7 +24,7 @@ GRAMMAR = {
     "outage": "outage DURATION at TIME [every TIME]",
     "retransmit": "retransmit TIME",
 }
-"""Form of each clause of a profile. Clauses may be in any order; each may occur once, `outage` more often."""
+"""Form of each clause of a profile. Clauses may be in any order; each may occur at most once, except `outage`."""
 
 _Value = TypeVar("_Value")
 

@@ -115,7 +115,8 @@ class Hello(Message, frozen=True, tag="hello"):
 
     side: Literal["operator", "robot"]
     clock_domain: _Words
-    """Name of the monotonic clock (common.clock.clock_domain): equal and not empty means a shared clock."""
+    """Name of the sender's monotonic clock (common.clock.clock_domain). If both sides' names are equal and not empty,
+    the sides read the same clock."""
 
 
 class MotionCommand(Message, frozen=True, tag="motion"):
@@ -228,7 +229,7 @@ class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
     """Advances from here at which strengths 1 to 8 begin, in ascending order, for fast zones; `horizon_m` for those
     beyond the horizon. Below 0: the gripper is past the onset."""
     slow_m: OnsetDistances
-    """As `fast_m`, for slow zones (commanded speed below 45 mm/s), in which touching the target is allowed."""
+    """As `fast_m`, for slow zones, whose commanded speed is so low that touching the target is allowed."""
     full_speed_m_s: float
     """v_max: speed that a full pull commands in this pose."""
     acceleration_m_s2: float

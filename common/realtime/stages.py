@@ -23,7 +23,7 @@ class Stages:
         """names: of the stages. processor: clock of the loop thread's processor time. every: sampling interval."""
         self.names = tuple(names)
         self.spent_s = [0.0] * (2 * len(self.names))
-        """Wall time and processor time of each stage in turn since the start, scaled up from the sampled turns."""
+        """For each stage its wall time, then its processor time, since the start, scaled up from the sampled turns."""
         self._wall, self._processor = wall, processor
         self._every, self._until_next = every, 0
         self.looks = True

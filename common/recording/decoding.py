@@ -29,7 +29,7 @@ class Decoder:
     """Decoder of one side's entries; it remembers the stamps from which ages are measured.
 
     If both sides are recorded, stiffnesses are taken from the robot side and commands from the operator side, as they
-    were sent. If only one side is recorded, its received messages stand for the other side's.
+    were sent. If only one side is recorded, the messages that it received are used, too.
     """
 
     def __init__(self, side: str) -> None:

@@ -83,7 +83,7 @@ def open_recording(path: Path) -> Recording:
         raise ConfigurationError(f"{path}: its header is damaged; valid: an undamaged file made by --record")
     if not headers:
         raise ConfigurationError(
-            f"{path}: has no recording of feelahead's; valid: a file made by --record, of a second or more"
+            f"{path}: holds nothing that feelahead recorded; valid: a file made by --record, of a second or more"
         )
     return Recording(path, headers, whole, damaged, end_ns)
 

@@ -3,10 +3,11 @@
 from collections.abc import Iterable, Iterator
 
 OTHERS_PER_TICK = 8
-"""Maximum number of payloads a tick from all other peers together: four times the traffic of eight observers at 250 Hz.
-Decoding them takes 80 us."""
+"""Maximum number of payloads a tick from all peers but the operator: four times the traffic of eight observers at 250
+Hz. Decoding them takes 80 us."""
 EACH_OTHER_PER_TICK = 2
-"""Maximum number of payloads a tick from each other peer, so that one that floods leaves room for the rest."""
+"""Maximum number of payloads a tick from each peer but the operator, so that a flood from one leaves room for
+others."""
 
 
 class Admission:

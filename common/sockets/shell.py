@@ -171,7 +171,7 @@ def bind_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> Non
 
 
 def connect_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> None:
-    """Connect the socket `part`; ZeroMQ waits for the other side. ConfigurationError names `flag` if it never can."""
+    """Connect the socket `part`, now or when the other side runs. ConfigurationError names `flag` if it never can."""
     part.setsockopt(zmq.IPV6, endpoint.ipv6)
     try:
         part.connect(endpoint.address)

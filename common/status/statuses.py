@@ -87,7 +87,7 @@ class OperatorStatus(SideStatus, frozen=True, kw_only=True):
     waiting: int | None = None
     """Number of observers"""
     haptics: bool = True
-    """Whether the triggers are stiffened. If not, the status still has their stiffness"""
+    """Whether the triggers are stiffened; if not, L2 and R2 are the stiffnesses that they would have"""
     feel: Sight | None = None
     l2_free: float | None = None
     """Calibrated travel of L2 at which its stiffness begins, 0 to 1"""
