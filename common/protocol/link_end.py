@@ -42,7 +42,8 @@ class LinkEnd:
     """Epoch, sequence numbers, echoes and delay statistics towards one peer.
 
     Latest wins: a message is fresh only if its sequence number in the present epoch exceeds all earlier ones of its
-    kind. An epoch begins with the peer's Hello and ends with the next. Messages of an ended epoch are refused.
+    kind. An epoch begins with the peer's Hello, and ends with a Hello of another epoch. Later messages of an ended
+    epoch are refused.
     """
 
     def __init__(

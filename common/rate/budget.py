@@ -179,7 +179,7 @@ class Budget(Generic[Name]):
         self._must_bit_s *= math.exp(-elapsed_s / _SMOOTHING_S)
 
     def waiting_s(self, stream: Name) -> float:
-        """Return the time until a message offered now would leave; infinite if one of `stream` has not begun to leave.
+        """Return the time until a message offered now begins to leave; infinite if one of `stream` still has not begun.
 
         A sender that offers only at a finite time has no message dropped. Pictures that hold only the changes since
         the previous picture need that.

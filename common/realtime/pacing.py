@@ -26,7 +26,7 @@ class Pacer:
         self.turns = 0
         """Number of turns taken."""
         self.overruns = 0
-        """Number of turns skipped because the next turn's deadline had passed, too."""
+        """Number of skipped turns: an earlier turn began so late that their deadlines had passed, too."""
         self.wake_error = RunningStatistics(seed)
         """Statistics of the times from a turn's deadline to its begin, in seconds."""
         self._latest_s = 0.0

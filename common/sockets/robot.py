@@ -257,9 +257,10 @@ class RobotSockets(SocketShell):
         return self.offer(self._control, connection.name, payload)
 
     def _admitted(self, name: bytes, frame: zmq.Frame) -> Connection | None:
-        """Return the connection of a message; None, and end it, if the key is not allowed or sends too much.
+        """Return the connection of a message; None if its key is not allowed or sends too much.
 
-        frame: a frame of the message, by which ZeroMQ names the key and the descriptor.
+        In that case end all connections of the peer. frame: a frame of the message, by which ZeroMQ names the key and
+        the descriptor.
         """
         key = "" if self._keys is None else user_of(frame)
         descriptor = descriptor_of(frame)

@@ -69,7 +69,8 @@ class RobotStatus(SideStatus, frozen=True, kw_only=True):
     """Distance from the gripper's surface to the nearest object"""
     target_mm: float | None = None
     tick_us: float | None = None
-    """This field and the next four: of the ticks since the previous status; only in a robot side's own process"""
+    """This field and the next four are of the ticks since the previous status. They are known only if the side runs in
+    a process of its own"""
     tick_p99_us: float | None = None
     overruns: int | None = None
     late_us: float | None = None
@@ -96,7 +97,7 @@ class OperatorStatus(SideStatus, frozen=True, kw_only=True):
     """Distance from the point between the fingertips to the target's centre"""
     holding: bool | None = None
     controller: ConnectionState | None = None
-    """This field and those below: only in an operator side's own process"""
+    """This field and those below are known only if the side runs in a process of its own"""
     triggers_released: bool | None = None
     person: Doing | None = None
     """Action of the simulated person or of the page that drives"""
