@@ -27,12 +27,13 @@ from robot_side.laws.sensed import Sensed
 from robot_side.surroundings.surroundings import Surroundings
 
 REFERENCE_SHARE: Final = 0.05
-"""f. The paper names no reference. A smaller one gives full strength earlier, for objects beside and behind, too."""
+"""f, the share of the spheres' volume that must overlap for full strength. The paper gives no value. A smaller f gives
+full strength earlier, but also for objects beside and behind."""
 PERIOD_S: Final = 0.01
 
 
 class PaperLaw:
-    """The paper's law; keeps its result until the next look."""
+    """The paper's law. It computes a result every PERIOD_S and returns this result in between."""
 
     def __init__(
         self,
@@ -52,7 +53,7 @@ class PaperLaw:
         self._sensed: tuple[float, Sensed] | None = None
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Compute one tick; the overlap at most a hundred times a second."""
+        """Return the fields of one tick. The overlap is computed again at most a hundred times a second."""
         if self._sensed is None or now_s - self._sensed[0] >= PERIOD_S - 1e-9:
             self._sensed = now_s, self._look(situation)
         return self._sensed[1]
@@ -67,11 +68,14 @@ class PaperLaw:
         return None
 
     def summary(self) -> dict[str, int]:
-        """Return the number of looks over the run."""
+        """Return how often the overlap was computed during the run."""
         return {"fields": self.looked}
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """Explain D_incr, the same for both triggers and in all directions; |v| t_d is the displacement."""
+        """Return the terms of D_incr and the overlaps with each object; both triggers have the same.
+
+        The terms are those of the sphere with the largest D_incr; its displacement is |v| t_d.
+        """
         del trigger, sensed
         enlargement_m, covariances, velocities = self._enlargements(situation)
         largest = int(enlargement_m.argmax())
@@ -92,7 +96,7 @@ class PaperLaw:
         return TriggerExplained(terms, overlaps_by_object(spheres, table, _classes_of(situation)))
 
     def _enlargements(self, situation: Situation) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return D_incr (m,), covariances (m, 3, 3) and velocities (m, 3) of the spheres."""
+        """Return D_incr (m,), position covariances (m, 3, 3) and velocities (m, 3) of the spheres."""
         jacobians = situation.pose.sphere_jacobians
         covariances = position_covariance(jacobians, self._encoder_sigma_rad)
         velocities_m_s = jacobians @ situation.joint_velocities_rad_s
