@@ -112,4 +112,4 @@ def _refuse(pose: GripperPose, along: Along) -> NoReturn:
         require_finite(f"along.{name}", getattr(along, name))
     if along.approach_m is not None:
         require_finite("along.approach_m", along.approach_m)
-    raise ValueError("encoder_sigma_rad or a sum of the numbers above is not finite; valid: metres and radians")
+    raise ValueError("encoder_sigma_rad or a sum of all numbers is not finite; valid: numbers in metres and radians")
