@@ -12,7 +12,7 @@ NAMES = (
 
 
 def fresh_kernels() -> tuple[Compiled, ...]:
-    """Return the kernels of `NAMES`, not yet compiled, and not registered."""
+    """Return new copies of the kernels `NAMES`: not yet compiled, and not in the list of imported kernels."""
     fresh = tuple(
         Compiled(kernel.function, tuple(kernel.signature.args), kernel.signature.return_type)
         for kernel in imported_kernels()
