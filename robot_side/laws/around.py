@@ -31,7 +31,8 @@ gripper"""
 _SELDOM: Final = 4.0
 """Period of a probe's looks along the trigger against which the gripper moves, in periods of the other trigger's"""
 _HOLDS_S: Final = 1.5
-"""Age at which a probe's look expires while something moves. It is long because slow ticks look from few probes."""
+"""Age at which a probe's look expires while something moves. It is long because looks from probes come late if ticks
+are rare."""
 _SAME_TIME: Final = 0.05
 """Largest relative change of T, the time until the arm stands, after which the probes' looks still count"""
 

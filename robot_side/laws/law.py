@@ -18,7 +18,7 @@ class Situation:
     pose: GripperPose
     """Pose of the gripper, with the spheres of the held object"""
     joint_velocities_rad_s: FloatArray
-    """(n,)"""
+    """Measured rates of the joints (n,)"""
     objects: PerceivedObjects
     loop_age_s: float
     """t_d of eq. 8; the configured worst case while no loop age is known"""

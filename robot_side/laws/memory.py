@@ -73,7 +73,7 @@ AROUND: Final = np.dtype(
 at, direction, began: as in SEEN."""
 NEWEST: Final = np.dtype([(name, np.float64) for name in ("reach", "speed", "acceleration", "sigma", "overlap")])
 """Newest look along one side from the gripper's present pose. reach: distance examined (m). speed, acceleration: the
-arm's v_max (m/s) and a (m/s²). sigma: D_σ (m). overlap: Σ V_ij at δ (m³), 0 if the gripper does not move this way."""
+arm's v_max (m/s) and a (m/s²). sigma: D_σ (m). overlap: Σ V_ij at δ (m³), 0 for the side against the motion."""
 SETTINGS: Final = np.dtype(
     [
         *((name, np.float64) for name in ("trigger_speed", "stick_speed", "turn_speed", "touch_speed")),
@@ -177,7 +177,8 @@ class Memory:
         self.moments_s: FloatArray = np.zeros(EVEN_PLACES)
         """Durations until the gripper is at the even places on its path"""
         self.velocity: FloatArray = np.zeros((2, 3))
-        """Linear velocity of the tool across its approach axis, and angular velocity"""
+        """Linear velocity of the tool across its approach axis, and angular velocity; both are 0 while the operator
+        side traces the path"""
         self.finger_poses_s: FloatArray = np.zeros(FINGER_POSES)
         self.tool_m: FloatArray = np.zeros(3)
         self.rotation: FloatArray = np.zeros((3, 3))

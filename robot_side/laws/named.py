@@ -13,7 +13,7 @@ if TYPE_CHECKING:
         """Interface of a law that a robot side can run: it senses, explains its result, and takes another P."""
 
         def expect(self, probability: float) -> None:
-            """Set P of eq. 10; ConfigurationError outside (0, 1)."""
+            """Set the probability P of eq. 10; ConfigurationError outside (0, 1)."""
 
 
 LawName = Literal["swept", "paper"]

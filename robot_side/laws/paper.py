@@ -1,6 +1,7 @@
-"""The paper's plain law (§4.2), for comparison. Every sphere is enlarged by D_incr in all directions.
+"""The paper's own law (§4.2), for comparison. Every sphere is enlarged by D_incr of eq. 10 in all directions.
 
-s = min(1, Σ_ij V_ij / (f Σ_i V_i)), the same for both triggers and at every travel. The delay is in D_incr (eq. 8).
+The stiffness is s = min(1, Σ_ij V_ij / (f Σ_i V_i)) for both triggers and at every travel. V_ij is the overlap of the
+enlarged sphere i with object j, V_i the sphere's volume. D_incr includes the delay (eq. 8).
 """
 
 import math
@@ -43,7 +44,7 @@ class PaperLaw:
         motion: ToolMotionSettings,
         surroundings: Surroundings | None = None,
     ) -> None:
-        """encoder_sigma_rad (n,): eq. 3. surroundings: owner of the perceived scene; a new one by default."""
+        """encoder_sigma_rad (n,): σ_θ of eq. 3. surroundings: owner of the perceived scene; a new one by default."""
         self.surroundings = surroundings or Surroundings()
         self.looked = 0
         self._uncertainty = uncertainty
@@ -59,7 +60,7 @@ class PaperLaw:
         return self._sensed[1]
 
     def expect(self, probability: float) -> None:
-        """Set P of eq. 10; ConfigurationError outside (0, 1)."""
+        """Set the probability P of eq. 10; ConfigurationError outside (0, 1)."""
         self._uncertainty = replace(self._uncertainty, probability=probability)
 
     def around(self, pose: GripperPose) -> Around | None:

@@ -30,7 +30,7 @@ def stopping_s(speed: float, acceleration: float, loop_age: float) -> float:
 
 
 stopping = inlined(stopping_s)
-"""`stopping_s` in kernels"""
+"""The function `stopping_s` for calls from kernels"""
 
 
 @inlined

@@ -44,12 +44,12 @@ class Sensed:
 
     @cached_property
     def l2(self) -> TriggerField:
-        """Field along L2."""
+        """Field for L2: onset distances along its direction, with displacement, stiffness and speeds"""
         return _trigger_field(self.numbers, L2)
 
     @cached_property
     def r2(self) -> TriggerField:
-        """Field along R2."""
+        """Field for R2: onset distances along its direction, with displacement, stiffness and speeds"""
         return _trigger_field(self.numbers, R2)
 
     def stiffness(self, side: int) -> float:
@@ -78,7 +78,7 @@ class Sensed:
 
     @property
     def overlap_m3(self) -> float:
-        """Σ V_ij of the enlarged gripper (eq. 11-12)"""
+        """Total overlap Σ V_ij of the enlarged gripper with all objects (eq. 11-12)"""
         return float(self.numbers[OVERLAP])
 
     @property

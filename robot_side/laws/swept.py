@@ -123,7 +123,7 @@ class SweptLaw:
         return Sensed(self._felt[:NUMBERS].copy())
 
     def expect(self, probability: float) -> None:
-        """Set P of eq. 10; ConfigurationError outside (0, 1)."""
+        """Set the probability P of eq. 10; ConfigurationError outside (0, 1)."""
         self._uncertainty = replace(self._uncertainty, probability=probability)
         self.memory.settings["quantile"] = self._uncertainty.quantile
         self._discard_probes()

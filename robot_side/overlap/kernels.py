@@ -54,7 +54,7 @@ class DoubtfulNumbersError(ValueError):
 def sphere_pairs(
     centers: FloatArray, radii: FloatArray, other_centers: FloatArray, other_radii: FloatArray, *, trusted: bool = True
 ) -> Overlaps:
-    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with `other_centers` (p, 3), `other_radii` (p,)."""
+    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with the spheres `other_centers`, `other_radii`."""
     return _one_by_one(_sphere_loop, (centers, radii, other_centers, other_radii), trusted)
 
 

@@ -33,7 +33,7 @@ FourLines = tuple[EdgeLine, EdgeLine, EdgeLine, EdgeLine]
 """Edges along an axis at the (upper i, upper j), (upper, lower), (lower, upper) and (lower, lower) sides"""
 
 EdgeInFaces = tuple[SplitEdge, float, float]
-"""(split edge, d in the face across i, d in the face across j)"""
+"""(split edge, d in the face across i, d in the face across j); d is the edge's distance from the face's foot point"""
 
 FourEdges = tuple[EdgeInFaces, EdgeInFaces, EdgeInFaces, EdgeInFaces]
 

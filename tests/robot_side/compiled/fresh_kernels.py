@@ -1,4 +1,4 @@
-"""Kernels that compile quickly, in the state of a new process."""
+"""Kernels that compile quickly, not yet compiled, as in a new process."""
 
 import robot_side.parts  # noqa: F401  (brings the kernels)
 from robot_side.compiled import kernel as compile_module
