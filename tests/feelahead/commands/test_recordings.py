@@ -46,7 +46,7 @@ def test_wrong_content_in_a_right_file_is_one_line(tmp_path: Path) -> None:
     ("name", "told"),
     [
         ("run.txt", "ends in .mcap"),
-        ("missing/run.mcap", "its folder does not exist"),
+        ("missing/run.mcap", "its folder is not there"),
         ("there.mcap", "exists already; valid: a new file's path"),
     ],
 )
