@@ -93,8 +93,7 @@ class GripperPose:
 
     @cached_property
     def sphere_jacobians(self) -> FloatArray:
-        """(m, 3, n) positional Jacobian of each centre, as if all spheres moved with the tool: v + ω × r for each
-        joint."""
+        """(m, 3, n) positional Jacobian of each centre, as if all moved with the tool: v + ω × r for each joint."""
         lever = self.sphere_centers_m - self.tool_position_m
         turned = np.cross(self.tool_jacobian[3:].T, lever[:, None])
         jacobians: FloatArray = self.tool_jacobian[:3] + turned.swapaxes(1, 2)

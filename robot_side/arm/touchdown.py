@@ -40,10 +40,9 @@ _UP: Final = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
 def carried_n(tool_jacobian: FloatArray, joint_loads_nm: FloatArray | None) -> float | None:
-    """Return the upward force in N that drives with these loads (n,) exert at the tool (virtual work); None without
-    loads.
+    """Return the upward force in N that drives with these loads (n,) exert at the tool; None without loads.
 
-    tool_jacobian (6, n), linear rows first.
+    By virtual work. tool_jacobian (6, n), linear rows first.
     """
     if joint_loads_nm is None or not np.isfinite(joint_loads_nm).all():
         return None

@@ -172,8 +172,7 @@ def _fills(hull: Solid, volume_m3: float) -> bool:
 
 
 def _tetrahedra_solids(vertices_m: FloatArray) -> list[Solid]:
-    """Return one solid if the tetrahedra (t, 4, 3) fill a convex shape, else one for each tetrahedron that is not
-    flat."""
+    """Return one solid if the tetrahedra (t, 4, 3) fill a convex shape, else one for each that is not flat."""
     volumes = np.abs(np.linalg.det(vertices_m[:, 1:] - vertices_m[:, :1])) / 6.0
     whole = convex_solid(vertices_m.reshape(-1, 3))
     if whole is None:

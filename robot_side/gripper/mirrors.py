@@ -14,8 +14,7 @@ _SAME_M = 5e-5
 def mirror_images(
     points_m: FloatArray, depth_m: Callable[[FloatArray], FloatArray], frames: Sequence[FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the origin (3,) of the mirror planes, and the maps (g, 3, 3), identity first, that mirror a solid to
-    itself.
+    """Return the origin (3,) of the mirror planes, and maps (g, 3, 3), identity first, that mirror a solid to itself.
 
     points_m (p, 3) are on the surface; `depth_m` returns the depth of points. Candidate planes are normal to the axes
     of each of the `frames` (3, 3), or to the points' principal axes. The frame with the most mirror planes is used.

@@ -69,8 +69,7 @@ def cover_boxes(
 
 @lru_cache(maxsize=256)
 def _cover_box(half_sizes_m: tuple[float, ...], stand_out_m: float) -> tuple[FloatArray, FloatArray, float]:
-    """Return the spheres of one box: centres (m, 3) in its frame, radii (m,), and the distance by which they
-    protrude."""
+    """Return one box's spheres: centres (m, 3) in its frame, radii (m,), and the distance by which they protrude."""
     axes = sorted(range(3), key=lambda axis: half_sizes_m[axis])
     ascending = tuple(half_sizes_m[axis] for axis in axes)
     plan = _fewest(ascending, stand_out_m)

@@ -69,8 +69,8 @@ class _Union:
         return both[:, :3], both[:, 3:]
 
     def outside(self, solid: int, points_m: FloatArray, margin_m: float) -> BoolArray:
-        """Return (n,): whether no other solid contains a point (n, 3) of this solid's surface at least `margin_m`
-        deep."""
+        """Return (n,): whether no other solid contains a point (n, 3) of this solid's surface `margin_m` deep or
+        more."""
         outside = np.ones(len(points_m), dtype=np.bool_)
         for number, other in enumerate(self._solids):
             if number != solid:
@@ -81,8 +81,7 @@ class _Union:
 def cover_surface(
     solids: Sequence[Solid], stand_out_m: float, frames: Sequence[FloatArray] = (), most: int = 2000
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return spheres' centres (m, 3) and radii (m,), and the distance by which they protrude from the union of
-    `solids`.
+    """Return spheres' centres (m, 3), radii (m,), and the distance by which they protrude from the union of `solids`.
 
     The distance is `stand_out_m`, or as much more as is needed for at most `most` spheres. The spheres share the
     union's mirror planes normal to axes of `frames` (3, 3) or to its principal axes. The result depends on nothing

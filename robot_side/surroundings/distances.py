@@ -12,7 +12,7 @@ from robot_side.surroundings.scene_table import SceneTable
 
 
 def nearest_points(points_m: FloatArray, scene: SceneTable, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return signed distance (p,) in m and direction (p, 3) from each point (p, 3) to the primitive in its entry of
+    """Return distances (p,) in m and directions (p, 3) from points (p, 3) to primitives: of each point to its entry of
     `rows`.
 
     Distances are positive outside. A direction is the unit vector along which the distance falls fastest.

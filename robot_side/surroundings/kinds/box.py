@@ -111,8 +111,7 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
 
 @building_block
 def _beyond_edge(a: float, b: float) -> tuple[float, float, float]:
-    """Return the volume of the unit ball's part with x >= a, y >= b, and the areas of its flat sides at x = a and y =
-    b.
+    """Return the volume of the unit ball's part with x >= a, y >= b, and areas of its flat sides at x = a and y = b.
 
     V = (S - a A - b B) / 3. The area S of the spherical side follows from its boundary's curvature (Gauss and Bonnet).
     """

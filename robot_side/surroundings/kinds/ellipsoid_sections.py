@@ -200,8 +200,10 @@ def _section(u: float, v: float, rho: float, alpha: float, beta: float) -> tuple
 
 @building_block
 def _slice(z: float, x: Vector, a: Vector) -> tuple[float, Vector, int]:
-    """Return area, gradient by x, and sort of the section at height z; a: the ellipsoid's half axes, x: the ball's
-    centre."""
+    """Return area, gradient by x, and sort of the section at height z.
+
+    The section is through a unit ball about x and an ellipsoid with half axes a about the origin.
+    """
     up = z - x[2]
     rho, size = math.sqrt(max(1.0 - up * up, 0.0)), math.sqrt(max(1.0 - z * z / (a[2] * a[2]), 0.0))
     if rho == 0.0 or size == 0.0:

@@ -17,8 +17,7 @@ from robot_side.surroundings.kinds.layout import ENLARGED, NEVER, NUMBERS, TOUCH
 
 @inlined
 def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Convert a mesh's numbers to those of the box around it, and write its bounding sphere; return its volume in
-    m³."""
+    """Convert a mesh's numbers to those of the box around it, and write its bounding sphere; return its volume (m³)."""
     x, y, z = numbers[k, 0], numbers[k, 1], numbers[k, 2]
     for axis in range(3):
         first = 3 + 3 * axis
@@ -55,8 +54,10 @@ def of_library(library: Any, index: IntArray) -> FloatArray:
 
 @inlined
 def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, reach: float) -> Contact:
-    """Return where a sphere enters the box around a mesh (enlarged by the radius); it touches the mesh there or
-    later."""
+    """Return where a sphere enters the box around a mesh, enlarged by the radius.
+
+    It touches the mesh there or later.
+    """
     enter, leave, grown = 0.0, reach, radius * ENLARGED + TOUCHING_M
     offset = subtract(start, load(shapes, row))
     for k in range(3):

@@ -49,8 +49,7 @@ def overlaps(tables: MeshTables, mesh: int, sweep: Sweep) -> bool:
 
 @inlined
 def _enters(tables: MeshTables, node: int, sweep: Sweep, reach: float) -> float:
-    """Return where the sphere's centre enters a node's box, enlarged by the radius: a distance, infinite beyond
-    `reach`."""
+    """Return the distance at which the sphere's centre enters a node's box, enlarged by the radius, or infinity."""
     enter, leave = 0.0, reach
     grown = sweep.radius * ENLARGED + TOUCHING_M
     for axis in range(3):

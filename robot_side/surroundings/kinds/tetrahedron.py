@@ -67,8 +67,7 @@ def _edge_foot(start: Vector, end: Vector) -> Vector:
 
 @inlined
 def _face(a: Vector, b: Vector, c: Vector, orientation: float) -> tuple[float, Vector, bool]:
-    """Return the origin's height over the face abc, its outward normal, and whether the origin's foot is in the
-    face."""
+    """Return the origin's height over the face abc, its outward normal, and whether the origin's foot is inside it."""
     raw = cross(subtract(b, a), subtract(c, a))
     area = norm(raw)
     if area == 0.0:
