@@ -1,8 +1,8 @@
 """Robot side without I/O: payloads come in and go out, and every call has the time `now`.
 
 
-    payloads ─▶ receive ─▶ newest command ─▶ safety ─▶ tool motion ─▶ arm
-    arm ─▶ kinematics ─▶ law: contact ahead ─▶ stiffness fields, telemetry ─▶ payloads
+payloads ─▶ receive ─▶ newest command ─▶ safety ─▶ tool motion ─▶ arm
+arm ─▶ kinematics ─▶ law: contact ahead ─▶ stiffness fields, telemetry ─▶ payloads
 """
 
 import math
@@ -167,8 +167,7 @@ class RobotSide:
         return loop_age.update(age_s + late_s, now_s)
 
     def observe(self, now_s: float) -> None:
-        """Read the camera's newest frame, and let listeners work; called after the messages of the tick at `now_s` have
-        left."""
+        """Read the camera's newest frame, and let listeners work; call it after the tick's messages have left."""
         self._heard.on_step("frame")
         self.sight.see(now_s)
         self._heard.on_step("end")

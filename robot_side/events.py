@@ -63,7 +63,7 @@ class Listener:
         """Take the data of a tick, before the tick's messages leave."""
 
     def on_sent(self, now_s: float) -> None:
-        """Take the fact that the messages of the tick at `now_s` have left."""
+        """Receive the event that the messages of the tick at `now_s` have left."""
 
 
 class Listeners(Listener):

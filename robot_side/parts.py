@@ -1,4 +1,4 @@
-"""Make the parts of a robot side from its settings. Arm and camera are simulated or connected drivers."""
+"""Making of the parts of a robot side from its settings. Arm and objects are simulated or come from drivers."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -82,8 +82,7 @@ class SceneParts(RobotParts):
     def kernels(self) -> list[Compiled]:
         """Kernels that ticks may run; the overlap kernel of a kind of primitive that the scene lacks is left out.
 
-        A scene's primitives stay the same during a run. The primitives of ignored objects count, too, as roles may
-        change.
+        A scene's primitives stay the same during a run. The primitives of ignored objects count, too.
         """
         seen = _as_loaded(self.scene, dict.fromkeys(self.scene.roles, Role.OBSTACLE))
         unneeded = {kind.kernel for kind in KINDS if not (self.any_objects or len(getattr(seen, kind.owner)))}
@@ -192,8 +191,7 @@ def _camera(settings: RobotSettings, scene: Scene, seed: int) -> MujocoCamera:
 
 
 def _notes(scene: Scene, settings: RobotSettings) -> tuple[str, ...]:
-    """Return the notes that are shown before the run: start pose, objects and their roles, and shapes that are not
-    exact."""
+    """Return the notes shown before the run: start pose, objects and their roles, and shapes that are not exact."""
     notes = [f"starts at {scene.start_pose}"]
     if settings.arm is not None:
         joints, fingers = (", ".join(names) or "none" for names in _joint_names(scene))

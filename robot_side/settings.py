@@ -28,8 +28,7 @@ _Spread = Annotated[float, Meta(ge=0.0, le=1.0)]
 
 @dataclass(frozen=True)
 class EncoderSettings:
-    """Error of the joint encoders (eq. 3); the defaults are assumed values of a usual class, not one arm's
-    specification."""
+    """Error of the joint encoders (eq. 3); the defaults are assumed for a usual class of encoders, not one arm."""
 
     sigma_rad: _Spread = 2e-4
     """Standard deviation of a reading's noise."""
@@ -110,8 +109,8 @@ class RobotSettings(SideOptions):
     speed in the loop age is added."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
     """Share of approaches in which the warning must come before the contact, between 0 and 1 (eq. 10). With a camera
-    error of 3 mm, 0.9 enlarges the gripper by 4 mm and 0.99 by 7 mm. The larger the value, the farther beside the path
-    may be an edge that makes a trigger stiff."""
+    error of 3 mm, 0.9 enlarges the gripper by 4 mm and 0.99 by 7 mm. An edge that is nearer than this to the gripper's
+    path makes a trigger stiff."""
     permit_tuning: bool = False
     """Let the owner of the lease change the probability and the emulated link of this side during the run."""
     assumed_delay_s: Annotated[float, Meta(ge=0.001, le=60.0)] = 1.0

@@ -75,8 +75,7 @@ class Placed(NamedTuple):
 
 
 def place(tree: LinkTree, arm_readings: FloatArray, finger_readings: FloatArray, link_poses: FloatArray) -> Placed:
-    """Return the tree's tool and points by the readings of the arm's joints (n,) and of the fingers' joints (f,) (eq.
-    4).
+    """Return the tree's tool and points by readings of the arm's joints (n,) and of the fingers' joints (f,) (eq. 4).
 
     link_poses (l, 7): filled with each link's position and quaternion, w first. ValueError unless there is one reading
     for each joint.

@@ -69,8 +69,7 @@ class _Union:
         return both[:, :3], both[:, 3:]
 
     def outside(self, solid: int, points_m: FloatArray, margin_m: float) -> BoolArray:
-        """Return (n,): whether no other solid contains a point (n, 3) of this solid's surface `margin_m` deep or
-        more."""
+        """Return (n,): whether no other solid contains a point (n, 3) of this solid's surface by `margin_m` or more."""
         outside = np.ones(len(points_m), dtype=np.bool_)
         for number, other in enumerate(self._solids):
             if number != solid:

@@ -1,5 +1,4 @@
-"""Messages to operators besides stiffness: Hello, and notices that tell each operator its place in the lease's
-queue."""
+"""Messages to operators besides stiffness: Hello, and notices that tell each operator its place with the lease."""
 
 import itertools
 import math
@@ -50,8 +49,7 @@ class Announcements:
         return (link or self._link).stamp(now_s, next(self._sequence))
 
     def stamp_shown(self, now_s: float) -> Header:
-        """Return the next header of messages made between ticks; their sequence is separate from the core's
-        messages."""
+        """Return the next header of messages made between ticks; their sequence is separate from that of all others."""
         return self._link.stamp(now_s, next(self._shown))
 
     def answer(self, participant: Participant, now_s: float) -> None:

@@ -85,8 +85,7 @@ class Lease:
         return iter(self._participants.values())
 
     def ask(self, participant: Participant, now_s: float) -> bool:
-        """Grant the lease if it is free, else admit the participant as an observer; False if there is no room for
-        another."""
+        """Grant the lease if it is free, else admit the participant as an observer; False without room for another."""
         if self._owner is None:
             participant.session.handle(SessionEvent.ASKED_WHILE_FREE)
             self._own(participant, now_s)
@@ -113,8 +112,7 @@ class Lease:
             self._forget(one, SessionEvent.NEW_EPOCH, now_s)
 
     def expire(self, now_s: float) -> None:
-        """Mark participants as away after `lease_s` of silence; of those away, forget all but the newest
-        `MOST_AWAY`."""
+        """Mark participants as away after `lease_s` of silence; forget those away but the newest `MOST_AWAY`."""
         limit_s = self._safety.settings.lease_s
         for one in self._participants.values():
             if now_s - one.heard_s >= limit_s and one.state is not SessionState.AWAY:

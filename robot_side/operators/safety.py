@@ -127,9 +127,9 @@ class Safety:
         return True
 
     def hear_stop(self, command: MotionCommand, now_s: float) -> None:
-        """Stop if `command` says so, however late; a stop that was obeyed counts only once.
+        """Stop if `command` is an emergency stop, however late; each stop is obeyed only once.
 
-        A late copy of it, over another connection, must not undo an arming since.
+        A late copy of the same stop, over another connection, must not undo an arming since.
         """
         order = command.header.epoch, command.header.sequence
         followed = self._stop_followed

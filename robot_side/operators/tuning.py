@@ -13,8 +13,7 @@ _NOTES: Final = 20
 
 
 class Tuning:
-    """Grants requests to tune if the run permits tuning; stores granted requests with their times, counts the
-    refused."""
+    """Grants requests to tune if the run permits it; stores granted requests with their times, counts the refused."""
 
     def __init__(self, probability: float | None = None, expect: Callable[[float], None] | None = None) -> None:
         """probability: P at the start. expect: called with each new P; None: the run permits no tuning."""

@@ -23,8 +23,7 @@ class Watchers:
         self._watching[epoch] = watch, now_s
 
     def lacks(self, now_s: float) -> tuple[int, int] | None:
-        """Return for both views the newest picture that a watcher lacks; None unless all watchers of pictures show
-        H.264."""
+        """Return for both views the newest picture that a watcher lacks; None unless all their watchers show H.264."""
         looking = [
             watch.lacks
             for watch, heard_s in self._watching.values()

@@ -130,8 +130,7 @@ class FrameUnpacker:
         self._last: PerceivedObjects | None = None
 
     def unpack(self, content: bytes) -> PerceivedObjects:
-        """Decode a frame; ValueError or struct.error for invalid content, or for changes whose previous frame is
-        missing."""
+        """Decode a frame; ValueError or struct.error for invalid content, or for changes without the frame before."""
         time_s, whole = _FRAME.unpack_from(content)
         if not whole and self._last is None:
             raise ValueError("a frame of changes alone, without a frame before it")

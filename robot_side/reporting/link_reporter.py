@@ -25,8 +25,7 @@ class LinkReporter:
         pictures: Callable[[], Mapping[str, float | int] | None],
         tcp: Callable[[bytes], TcpFigures],
     ) -> None:
-        """pictures: returns their rate_hz, quality and size; None without cameras. tcp: returns the TCP figures of a
-        peer."""
+        """pictures: returns rate_hz, quality and size, or None without cameras. tcp: returns a peer's TCP figures."""
         self._session = session
         self._budget = budget
         self._pictures = pictures

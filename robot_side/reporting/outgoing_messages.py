@@ -49,7 +49,7 @@ class MapSchedule:
         self._sent_s = self._looked_s = -math.inf
 
     def due(self, law: Law, pose: GripperPose, now_s: float) -> Around | None:
-        """Return the map of the law's looks around the gripper if one is due."""
+        """Return the map (`Around`) if it is due, else None."""
         if now_s - self._looked_s < _AROUND_S:
             return None
         self._looked_s, around = now_s, law.around(pose)

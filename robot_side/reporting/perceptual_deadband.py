@@ -58,14 +58,13 @@ _BELIEF: Final = np.dtype(
 """What the receiver computes from the last message. sent, now: times of that message and of the last update, in s.
 displacement, speed, target: motion along R2 by commands since that message, in m and m/s. commanded: the arm's
 commanded speed in the message, in m/s. known: whether a message has been sent. state: number of the state of motion,
-plus _STANDS if the held object stands. obeyed: sequence number of the newest command in that message."""
+plus _STANDS if the held object stands. obeyed: sequence number of the newest command when the message was sent."""
 
 _follow = inlined(follow)
 
 
 class StiffnessDeadband:
-    """Deadband for the stiffness messages of one receiver; it keeps what the receiver computes from the last
-    message."""
+    """Deadband for the stiffness messages of one receiver, with what the receiver computes from the last message."""
 
     def __init__(self, *, full_rate: bool = False) -> None:
         """full_rate: send a stiffness message in every tick."""
@@ -220,7 +219,7 @@ class TelemetryDeadband:
         self._looked_s = self._sent_s = -math.inf
 
     def may_be_due(self, words: tuple[Any, ...], now_s: float) -> bool:
-        """Return whether to make a telemetry for `due`: when `words` (its discrete content) change, else 50 times a
+        """Return whether to make a telemetry for `due`: when `words`, its texts and states, change; else 50 times a
         second."""
         changed = words != self._words
         if not changed and now_s - self._looked_s + _HALF_A_TICK_S < _SEEN_PERIOD_S:

@@ -37,8 +37,7 @@ def _corrupted(leaving: _Leaving, flip: BitFlip) -> _Leaving:
 
 
 class Sending:
-    """Sender: haptics leave at once, telemetry if the budget permits, pictures and the scene in pieces between
-    ticks."""
+    """Sender: haptics leave at once, telemetry if the budget permits, pictures and scene in pieces between ticks."""
 
     def __init__(self, link: LinkSpec, sockets: Sockets, first_number: int) -> None:
         """first_number: number of the first message that leaves in pieces; different in each run."""
@@ -63,7 +62,7 @@ class Sending:
     def send(self, queue: OutgoingQueue | None, now_s: float) -> None:
         """Send the messages that are due.
 
-        queue: queueing delay of the link to the owner; None while nobody owns the lease.
+        queue: queueing delays of messages to the owner; None while nobody owns the lease.
         """
         self.budget.hear(queue, now_s)
         for stream, payload, is_piece in self.budget.take(now_s):
