@@ -234,13 +234,13 @@ def _cover_notes(cover: GripperCover, asked_m: float, held: HeldCovers) -> list[
     notes = []
     if cover.stand_out_m > asked_m * (1.0 + 1e-9):
         notes.append(
-            f"the gripper's {len(cover.radii_m)} spheres stand out of it by up to {1e3 * cover.stand_out_m:.1f} mm"
+            f"the gripper's {len(cover.radii_m)} spheres protrude from it by up to {1e3 * cover.stand_out_m:.1f} mm"
             f" instead of {1e3 * asked_m:.1f}: its links are large"
         )
     if held.coarse:
         shown = [f"{name} by {1e3 * stand_out:.0f} mm" for name, stand_out in held.coarse[:_NAMED_OBJECTS]]
         more = [f"and {len(held.coarse) - len(shown)} more"] if len(held.coarse) > len(shown) else []
-        notes.append(f"felt early while held, as spheres stand out: {', '.join([*shown, *more])}")
+        notes.append(f"felt early while held, because their spheres protrude: {', '.join([*shown, *more])}")
     return notes
 
 

@@ -219,8 +219,7 @@ class TelemetryDeadband:
         self._looked_s = self._sent_s = -math.inf
 
     def may_be_due(self, words: tuple[Any, ...], now_s: float) -> bool:
-        """Return whether to make a telemetry for `due`: when `words`, its texts and states, change; else 50 times a
-        second."""
+        """Return whether to make a telemetry for `due`: when its texts and states change, else 50 times a second."""
         changed = words != self._words
         if not changed and now_s - self._looked_s + _HALF_A_TICK_S < _SEEN_PERIOD_S:
             return False

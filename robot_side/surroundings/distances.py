@@ -12,8 +12,7 @@ from robot_side.surroundings.scene_table import SceneTable
 
 
 def nearest_points(points_m: FloatArray, scene: SceneTable, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return distances (p,) in m and directions (p, 3) from points (p, 3) to the primitives in `rows` (p,), pair by
-    pair.
+    """Return distances (p,) in m and directions (p, 3) from points (p, 3) to the primitives `rows` (p,), pair by pair.
 
     Distances are positive outside. A direction is the unit vector along which the distance falls fastest.
     """

@@ -37,8 +37,10 @@ class Movers:
     """Objects of one frame that may be elsewhere in later frames."""
 
     def __init__(self, first: PerceivedObjects, things: IntArray) -> None:
-        """things (m,): indices into the names of `first`, rising. ValueError for other indices, or if `first` is
-        itself a frame of movers."""
+        """things (m,): indices of the objects in the names of `first`, rising.
+
+        ValueError for other indices, or if `first` is itself a frame of movers.
+        """
         if first.since is not None:
             raise ValueError("first is itself a frame of movers; valid: a complete frame")
         beyond = things.size > 0 and (things[0] < 0 or things[-1] >= len(first.names))

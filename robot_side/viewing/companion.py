@@ -92,8 +92,7 @@ class _Drawing:
         self.ready = _tried() if setup.h264 else Ready(h264=False)
 
     def picture(self, order: Order) -> tuple[tuple[int, ...], bytes, int, bool]:
-        """Render a picture; return its shape, bytes, number (0 for JPEG), and whether it can be shown without
-        another."""
+        """Render a picture; return its shape, bytes, number (0 for JPEG), and whether it can be shown by itself."""
         import simplejpeg  # noqa: PLC0415  # may be missing, which `main` reports
 
         from robot_side.viewing.rendering import halved  # noqa: PLC0415  # after the choice of a backend

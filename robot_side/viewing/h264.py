@@ -1,5 +1,4 @@
-"""Pictures in H.264 (ITU-T H.264, by x264 through PyAV): one complete picture, then the changes from each to the
-next."""
+"""Pictures in H.264 (ITU-T H.264, by x264 through PyAV): a complete picture, then the changes from each to the next."""
 
 from fractions import Fraction
 from typing import Final
@@ -31,8 +30,7 @@ class H264:
         """Number of the newest picture; the first is 1"""
 
     def encode(self, rgb: npt.NDArray[np.uint8], quality: int, *, whole: bool = False) -> tuple[bytes, bool]:
-        """Encode the next picture, RGB (height, width, 3) of even sizes; return its bytes, and whether it needs no
-        other.
+        """Encode the next picture, RGB (height, width, 3) of even sizes; return bytes, and whether it needs no other.
 
         quality: on JPEG's scale, 1 to 100. whole: make a picture that needs no other; another quality or size also does
         so.

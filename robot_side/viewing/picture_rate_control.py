@@ -28,8 +28,7 @@ class Step(NamedTuple):
     """Whether pictures have half the width and height"""
 
     def bytes_share(self, *, h264: bool = False) -> float:
-        """Return the bytes of a picture as a share of a picture of quality 75 and full size; measured on rendered
-        scenes.
+        """Return the bytes of a picture as a share of those at quality 75 and full size; measured on rendered scenes.
 
         h264: for an H.264 picture that contains the changes since another.
         """
@@ -48,8 +47,7 @@ def steps(rate_hz: float, quality: int) -> tuple[Step, ...]:
 
 
 class PictureRateControl:
-    """Controller of the step of all views: worse steps at once, one better step after a second in which the link has
-    room."""
+    """Controller of the step of all views: down at once, up by one step after a second in which the link has room."""
 
     def __init__(self, rate_hz: float, quality: int) -> None:
         self._steps = steps(rate_hz, quality)

@@ -75,8 +75,7 @@ def start_beside(done: Callable[[Renders | str], None]) -> None:
 
 
 class Cameras:
-    """Orderer of pictures: keeps one order of each wanted view under way, and starts the companion when it is first
-    needed."""
+    """Keeper of one order of each wanted view under way; starts the companion process when it is first needed."""
 
     def __init__(
         self,
@@ -252,7 +251,7 @@ class Cameras:
     def _failed(self, now_s: float, why: str) -> None:
         self._failures += 1
         if self._failures >= _NEVER_BEGAN and not self._has_worked:
-            self._give_up(f"{why}, {self._failures} times in a row; what is missing says: feelahead doctor")
+            self._give_up(f"{why}, {self._failures} times in a row; feelahead doctor tells what is missing")
         else:
             self._not_before_s = now_s + RETRY_S
             self._note(f"cameras: {why}; it is started again in {RETRY_S:g} s, the arm goes on")

@@ -29,8 +29,7 @@ class Renderer:
             self._renderer.scene.flags[flag] = 0
 
     def picture(self, view: ViewName, positions: bytes, mocap_poses: bytes = b"") -> npt.NDArray[np.uint8]:
-        """Return the picture, RGB (height, width, 3), of the state with qpos `positions`; ValueError for a wrong
-        length."""
+        """Return a picture, RGB (height, width, 3), of the state with qpos `positions`; ValueError for a bad length."""
         model, data = self._model, self._data
         data.qpos[:] = np.frombuffer(positions)
         mocap = np.frombuffer(mocap_poses).reshape(-1, 7)

@@ -61,8 +61,7 @@ class SceneModel:
             yield self._shape(int(geom), owner, True, model.geom_pos[geom], model.geom_quat[geom])
 
     def object_shapes(self, index: int) -> Iterator[Shape]:
-        """Yield the shapes of one object, in the frame of its first geom; joints within it keep their start
-        positions."""
+        """Yield the shapes of one object, in the frame of its first geom; joints inside keep their start positions."""
         positions_m, rotations = self._start
         first = self._geoms[index][0]
         yield self._shape(first, index, False, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))

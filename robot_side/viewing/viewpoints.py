@@ -45,8 +45,7 @@ def _overview(scene: Scene) -> Viewpoint:
 
 
 def _first_person(scene: Scene) -> Viewpoint:
-    """Return the gripper's camera, else a viewpoint behind and beside the palm from which closing fingers hide
-    little."""
+    """Return the gripper's camera, else a viewpoint behind and beside the palm that closing fingers do not hide."""
     model, data, robot = scene.model, scene.data, scene.robot
     tool_m, tool = data.site_xpos[robot.site], data.site_xmat[robot.site].reshape(3, 3)
     carriers = {int(model.site_bodyid[robot.site]), *model.geom_bodyid[robot.gripper_geoms].tolist()}

@@ -35,8 +35,7 @@ def _wall(spec: Any, generator: np.random.Generator) -> None:
 
 
 def _slot(spec: Any, generator: np.random.Generator) -> None:
-    """Shift the target sideways by up to 80 mm; leave 15 to 40 mm between each post and the gripper in front of the
-    target."""
+    """Shift the target sideways by up to 80 mm; leave 15 to 40 mm between gripper and posts on the way to it."""
     target = spec.body("target")
     across_m = generator.uniform(-0.08, 0.08)
     target.pos = [target.pos[0], across_m, target.pos[2]]

@@ -20,8 +20,7 @@ _FRAME_PERIOD_S = 1.0 / 30.0
 
 
 class CameraError:
-    """Error e_c ~ N(μ_c, σ_c²) of each object's position, per axis in the world frame: perceived = true - e_c (eq.
-    1-2).
+    """Error e_c ~ N(μ_c, σ_c²) of each object's position, per axis, world frame: perceived = true - e_c (eq. 1-2).
 
     One part lasts for the whole run, like an error of calibration or segmentation. An optional part with mean 0 is
     drawn anew in each frame. An object's error depends only on the seed and its name, so that other objects do not
@@ -53,8 +52,7 @@ class CameraError:
         return self._frame_standard_deviation_m == 0.0
 
     def next_frame(self) -> FloatArray:
-        """Return the offsets -e_c (k, 3), in m, that are added to the true positions in the next frame, in the order of
-        `names`."""
+        """Return the offsets -e_c (k, 3) in m, by `names`, to be added to the true positions in the next frame."""
         if self.lasts:
             return self._offsets
         offsets: FloatArray = -(self._lasting + self._frame_standard_deviation_m * _draw(self._generators))

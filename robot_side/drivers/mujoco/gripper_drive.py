@@ -71,8 +71,7 @@ class GripperDrive:
         self._valid_until_s = -math.inf
 
     def inputs(self, places: IntArray) -> np.ndarray:
-        """Return records (g,) of GRIPPER_INPUT for the actuators whose inputs are at the indices `places` (g,) in
-        ctrl."""
+        """Return records (g,) of GRIPPER_INPUT for the actuators whose inputs are at `places` (g,), indices in ctrl."""
         inputs = np.zeros(places.shape, GRIPPER_INPUT)
         inputs["place"], inputs["open"], inputs["closed"] = (
             places,

@@ -33,7 +33,7 @@ class GripperSweep:
     fingers: FloatArray
     """(k, f) positions of the fingers' joints"""
     lengths: FloatArray
-    """(k,) position of the first actuator, in its transmission's unit"""
+    """(k,) positions of the first actuator, in the unit of its transmission"""
     gaps_m: FloatArray
     """(k, p) distances between pairs of the gripper's geoms, in m, negative where they overlap"""
 

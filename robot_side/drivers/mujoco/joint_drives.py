@@ -46,10 +46,9 @@ class JointDrives:
     """Greatest torque in N m, or force in N, of each actuator; infinite without a limit in the model"""
 
     def windup_rad(self, least_rad: float) -> FloatArray:
-        """Return the largest lead (n,) of each joint's reference over the joint: where a servo gives an eighth of
-        `strongest`.
+        """Return the largest lead (n,) of each reference over its joint: where a servo gives an eighth of `strongest`.
 
-        The lead is at least least_rad and at most 20 mrad; drives that are no servos have 20 mrad.
+        The lead is at least least_rad and at most 20 mrad; drives without stiffness, or without a limit, have 20 mrad.
         """
         stiffness = self.gear**2 * self.stiffness
         known = (stiffness > 0.0) & np.isfinite(self.strongest)

@@ -109,8 +109,7 @@ class JointReference:
 
 @compiled(record_array(REFERENCE), input_array(1), FLOAT64, returns=BOOL)
 def _command(joints: Any, velocity: FloatArray, fastest: float) -> bool:
-    """Store the velocities, scaled by one factor to at most `fastest`; False, and nothing stored, if one is not
-    finite."""
+    """Store the velocities, scaled by one factor to at most `fastest`; False, and no change, if one is not finite."""
     largest = 0.0
     for j in range(joints.size):
         if not math.isfinite(velocity[j]):

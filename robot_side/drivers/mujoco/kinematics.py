@@ -20,8 +20,7 @@ from robot_side.gripper.near_order import near_order
 
 
 class MujocoKinematics:
-    """Kinematics of the scene's robot, as the port GripperKinematics: from its encoders, without the simulation's
-    truth."""
+    """Kinematics of the scene's robot (port GripperKinematics), from its encoders, never the simulation's truth."""
 
     def __init__(self, scene: Scene, stand_out_m: float = 0.003, searching: Callable[[], None] | None = None) -> None:
         """Cover the gripper's geoms with spheres that protrude by at most `stand_out_m`.
@@ -57,8 +56,7 @@ class MujocoKinematics:
         self._link_poses: FloatArray = np.zeros((1 + own.size, 7))
 
     def body_poses(self, bodies: IntArray) -> FloatArray:
-        """Return positions and quaternions (n, 7), w first, of the robot's `bodies` (n,), as placed by the last call of
-        `pose`."""
+        """Return positions and quaternions (n, 7), w first, of the robot's `bodies` (n,) at the last call of `pose`."""
         poses: FloatArray = self._link_poses[self._link_of[bodies]]
         return poses
 

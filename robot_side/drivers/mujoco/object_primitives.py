@@ -1,4 +1,4 @@
-"""Primitives of a scene's objects: spheres, boxes, tetrahedra, meshes, half-spaces and ellipsoids of geoms, placed."""
+"""Primitives that describe a scene's objects: made from MuJoCo's geoms, and placed in the world for each frame."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -109,8 +109,7 @@ class ObjectPrimitives:
         return seen[self._primitives.owners]
 
     def moving(self, things: IntArray, roles: Mapping[str, Role]) -> "MovingPrimitives":
-        """Return the primitives of the objects `things` (m,), ascending, in the order of `movers`; ignored objects have
-        none."""
+        """Return the primitives of the objects `things` (m,), ascending, in the order of `movers`; no ignored ones."""
         owners = self._primitives.owners
         kept = np.flatnonzero(self._seen(roles) & np.isin(owners, things))
         kept = kept[np.argsort(owners[kept], kind="stable")]
@@ -124,8 +123,7 @@ class ObjectPrimitives:
         geom_positions_m: FloatArray,
         geom_rotations: FloatArray,
     ) -> PerceivedObjects:
-        """Return the objects in the world, each moved by its row of `offsets_m` (k, 3); ignored objects have no
-        primitives.
+        """Return the objects in the world, each moved by its row of `offsets_m` (k, 3); ignored ones lack primitives.
 
         geom_positions_m (g, 3) and geom_rotations (g, 9): poses of the model's geoms in the world frame.
         """
@@ -173,8 +171,7 @@ class MovingPrimitives(NamedTuple):
     """(m,) first geom of each object, whose frame is the object's"""
 
     def numbers(self, offsets_m: FloatArray, geom_positions_m: FloatArray, geom_rotations: FloatArray) -> FloatArray:
-        """Return the movers' numbers (n + m, 20) as in `movers`, with velocities 0; arguments as for
-        `ObjectPrimitives.place`."""
+        """Return the movers' numbers (n + m, 20) as in `movers`, with velocities 0; arguments as for `place`."""
         primitives, things, first_geoms = self
         numbers: FloatArray = np.empty((len(primitives.kinds) + len(things), NUMBERS))
         _place(geom_positions_m, geom_rotations, offsets_m, *primitives, things, first_geoms, numbers)

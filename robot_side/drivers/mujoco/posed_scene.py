@@ -36,8 +36,7 @@ class PosedScene:
         self._at_rest_m: FloatArray = np.zeros((self._gripper.size, 3))
 
     def set_pose(self, arm_positions_rad: FloatArray, finger_positions: FloatArray, shift_m: FloatArray) -> None:
-        """Set the arm's joints (n,) and fingers' joints (f,), and move every object by `shift_m` (3,) from its pose in
-        the scene."""
+        """Set the arm's joints (n,) and the fingers' (f,), and move every object by `shift_m` (3,) from its place."""
         data, robot = self._data, self.scene.robot
         data.qpos[robot.arm_positions] = arm_positions_rad
         data.qpos[robot.finger_positions] = finger_positions
@@ -66,8 +65,7 @@ class PosedScene:
         return contact_distance_m
 
     def stays_clear(self, path: ToolPath, margin_m: float) -> bool:
-        """Return whether the gripper stays `margin_m` away from all objects along a path that begins at the present
-        pose."""
+        """Return whether the gripper stays `margin_m` away from all objects on a path that begins at this pose."""
         data, gripper = self._data, self._gripper
         turns = data.geom_xmat[gripper].reshape(-1, 3, 3).copy()
         turned = path.rotations @ path.rotations[0].T
@@ -88,8 +86,7 @@ class PosedScene:
         return clear
 
     def perceived(self, errors_m: FloatArray) -> PerceivedObjects:
-        """Return the objects in the present pose, as a camera with the errors `errors_m` (k, 3) perceives them (eq.
-        1)."""
+        """Return the objects in the present pose, as a camera with errors `errors_m` (k, 3) perceives them (eq. 1)."""
         scene, data = self.scene, self._data
         return scene.primitives.place(0.0, scene.roles, errors_m, data.geom_xpos, data.geom_xmat)
 

@@ -64,7 +64,7 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
     joints = np.array([joint for body in chain for joint in _joints(model, body)], dtype=np.int64)
     if joints.size == 0:
         raise ConfigurationError(
-            f"site: {site_name!r} hangs on no joint{_moved_by_mocap(model, chain)}; valid: a site that 1 or more joints"
+            f"site: no joint moves {site_name!r}{_moved_by_mocap(model, chain)}; valid: a site that 1 or more joints"
             " move, of " + ", ".join(_site_names(model))
         )
     _require_simple(model, joints)

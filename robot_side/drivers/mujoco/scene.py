@@ -174,8 +174,7 @@ def _start_key(model: Any) -> int | None:
 
 
 def _start_configuration(model: Any, robot: RobotModel) -> tuple[FloatArray, str]:
-    """Return qpos (nq,) of the start keyframe, or of the middle of the joints' ranges; and a description of this
-    pose."""
+    """Return qpos (nq,) of the start keyframe, else of the middle of the joints' ranges; and its description."""
     start: FloatArray
     key = _start_key(model)
     if key is not None:

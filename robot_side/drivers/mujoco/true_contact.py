@@ -52,8 +52,7 @@ class TrueContact:
         self._remember()
 
     def update(self, held: str | None) -> ContactOnset | None:
-        """Return the new contact of the greatest closing speed in the steps since the last call; None without a new
-        contact.
+        """Return the new contact with the greatest closing speed since the last call; None without a new contact.
 
         held: object that the gripper holds, which counts as a part of the gripper.
         """
@@ -70,7 +69,7 @@ class TrueContact:
         return max(found, key=lambda onset: onset.closing_speed_m_s, default=None)
 
     def approach(self) -> tuple[FloatArray, float]:
-        """Return the tool's approach axis, a unit vector (3,) in the world frame, and its true speed along the axis in
+        """Return the tool's approach axis, a unit vector (3,) in the world frame, and its true speed along it in
         m/s."""
         site = self._scene.robot.site
         axis: FloatArray = self._data.site_xmat[site].reshape(3, 3)[:, 2].copy()
@@ -89,8 +88,7 @@ class TrueContact:
         return least_distance(self._model, self._data, mine, theirs, farthest_m)
 
     def way_left_m(self, direction: FloatArray, held: str | None, farthest_m: float = 1.0) -> float:
-        """Return the `contact_distance` of the gripper, with the object `held`, along the unit vector `direction`
-        (3,)."""
+        """Return the `contact_distance` of the gripper, with the object `held`, along the unit vector `direction`."""
         model, thought = self._model, self._thought
         thought.qpos[:] = self._data.qpos
         mujoco.mj_kinematics(model, thought)
@@ -117,8 +115,7 @@ class TrueContact:
         return [pair for row in rows if (pair := self._pair(contacts[row], held)) is not None]
 
     def _pair(self, contact: Any, held: str | None) -> tuple[Any, int, int, float] | None:
-        """Return the contact, our geom, the other geom, and the sign that turns the normal towards the other; None if
-        not ours."""
+        """Return contact, our geom, other geom, and the sign that turns the normal to the other; None if not ours."""
         first, second = (int(geom) for geom in contact.geom)
         for mine, theirs, sign in ((first, second, 1.0), (second, first, -1.0)):
             thing = self._object_of.get(theirs)
@@ -142,8 +139,7 @@ class TrueContact:
         return onsets
 
     def _velocity(self, geom: int, point_m: FloatArray) -> FloatArray:
-        """Return the velocity (3,) of a geom's body at `point_m` (3,) before the last step, in m/s in the world
-        frame."""
+        """Return the velocity (3,) of a geom's body at `point_m` (3,) before the last step, world frame, in m/s."""
         body = int(self._model.geom_bodyid[geom])
         twist: FloatArray = np.zeros(6)
         mujoco.mj_objectVelocity(self._model, self._before, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)

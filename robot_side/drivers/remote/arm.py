@@ -40,8 +40,7 @@ class RemoteArm(Arm):
         self._now_s = 0.0
 
     def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
-        """Follow `joint_velocity_rad_s` (n,) until `valid_until_s`; the command is sent with the gripper's next
-        command.
+        """Follow `joint_velocity_rad_s` (n,) until `valid_until_s`; it is sent with the gripper's next command.
 
         ValueError for a wrong shape or a value that is not finite; nothing of such a command is applied.
         """
@@ -70,8 +69,7 @@ class RemoteArm(Arm):
         return session.state is not None
 
     def begin(self, now_s: float) -> bool:
-        """Take messages before the first tick, and command the arm to stand still; return whether there has been a
-        state."""
+        """Take messages before the first tick, and command to stand still; return whether there has been a state."""
         ready = self.exchange(now_s)
         self._send()
         return ready

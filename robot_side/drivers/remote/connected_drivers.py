@@ -30,8 +30,7 @@ class ConnectedDrivers:
         insecure: bool = False,
         keys: RobotKeys | None = None,
     ) -> None:
-        """Bind the ports at once; ConfigurationError as for DriverPort. note: called with lines for a person to
-        read."""
+        """Bind the ports at once; ConfigurationError as for DriverPort. note: called with lines that people read."""
         self._note = note
         with ExitStack() as opened:
             ports = [

@@ -1,4 +1,4 @@
-"""Session with the arm's driver: states in, commands out, without I/O."""
+"""Session with the arm's driver, without I/O: states come in, commands go out."""
 
 import math
 from collections import Counter
@@ -145,8 +145,7 @@ class DriverSession:
             self._take(peer, said, received_s)
 
     def expire(self, now_s: float) -> None:
-        """Forget a driver that is silent, so that another may connect; call this after `receive` of all arrived
-        messages."""
+        """Forget a silent driver, so that another may connect; call this after `receive` of all arrived messages."""
         if self._peer is not None and now_s - self._heard_s > SILENT_S:
             self._peer = None
         if self.present is not self._told_present and now_s - self._told_s >= _NEWS_PERIOD_S:
@@ -199,8 +198,7 @@ class DriverSession:
         return {"accepted": self.accepted} | {str(why): count for why, count in self.rejected.items()}
 
     def _require_fitting(self, said: DriverState) -> None:
-        """Raise ValueError unless the joints are the model's, and RemoteProtocolError if `measured_s` is after
-        `sent_s`."""
+        """Raise ValueError for joints other than the model's, RemoteProtocolError if `measured_s` is after `sent_s`."""
         for name, values, names in (
             ("joint_positions", said.joint_positions, self._shape.joint_names),
             ("joint_velocities", said.joint_velocities, self._shape.joint_names),
@@ -257,7 +255,7 @@ class DriverSession:
         self.rejected[why] += 1
         if why not in self._said:
             self._said.add(why)
-            self._notes.append(f"driver: refused whole, and counted from now on: {text}")
+            self._notes.append(f"driver: a message was refused as a whole; more of this kind are only counted: {text}")
         if now_s - self._refused_s >= _REFUSAL_PERIOD_S:
             self._refused_s = now_s
             self._outgoing.append((peer, encode(Refusal(DRIVER_VERSION, text))))

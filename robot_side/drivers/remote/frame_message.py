@@ -72,14 +72,13 @@ FRAME_DECODER: Final = msgspec.msgpack.Decoder(ObjectFrame)
 
 
 def require_possible(frame: ObjectFrame) -> None:
-    """Raise ValueError for a repeated name, no or several shapes, an invalid quaternion, or `taken_s` after
-    `sent_s`."""
+    """Raise ValueError for a repeated name, no or several shapes, a wrong quaternion, or `taken_s` after `sent_s`."""
     if frame.taken_s > frame.sent_s:
         raise ValueError(f"taken_s = {frame.taken_s} after sent_s = {frame.sent_s}; valid: before")
     names = [thing.name for thing in frame.objects]
     for thing in frame.objects:
         if names.count(thing.name) > 1:
-            raise ValueError(f"{thing.name!r} is there {names.count(thing.name)} times; valid: once")
+            raise ValueError(f"{thing.name!r} occurs {names.count(thing.name)} times; valid: once")
         shapes = sum(bool(getattr(thing, shape)) for shape in SHAPES)
         if shapes != 1:
             raise ValueError(f"{thing.name!r} has {shapes} shapes; valid: 1 of {', '.join(SHAPES)}")

@@ -64,7 +64,7 @@ class DriverCommand(Struct, frozen=True):
 
 
 class Refusal(Struct, frozen=True):
-    """Reason why the receiver's last message was rejected."""
+    """Reason why the last message of the program that receives this was rejected."""
 
     version: int
     refused: str

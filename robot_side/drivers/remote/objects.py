@@ -34,8 +34,8 @@ class RemoteObjects:
     """Source of perceived objects: the newest valid frame, from one sender at a time."""
 
     def __init__(self, wire: Wire, roles: Mapping[str, Role], sd_m: float, note: Callable[[str], None]) -> None:
-        """roles: by name, before the roles in frames. sd_m: σ_c that the law uses. note: called with a line for each
-        fault."""
+        """roles: by name, before those in frames. sd_m: σ_c that the law uses. note: called with each fault, in a
+        line."""
         self.rejected: Counter[Why] = Counter()
         """Number of rejected frames by reason; a frame is rejected as a whole."""
         self.accepted = 0
@@ -67,7 +67,7 @@ class RemoteObjects:
         if old is not self._is_old:
             self._is_old = old
             age = f"the newest frame is {now_s - self._taken_s:.1f} s old; its objects stay valid"
-            self._note(f"objects: {age if old else 'frames come again'}")
+            self._note(f"objects: {age if old else 'frames arrive again'}")
         return self._frame is not None
 
     def summary(self) -> dict[str, int]:
@@ -123,7 +123,7 @@ class RemoteObjects:
 
     def _reject(self, why: Why, text: str, peer: bytes, now_s: float) -> None:
         self.rejected[why] += 1
-        self._report_once(why, f"objects: refused whole, and counted from now on: {text}")
+        self._report_once(why, f"objects: a frame was refused as a whole; more of this kind are only counted: {text}")
         if now_s - self._refused_s >= _REFUSAL_PERIOD_S:
             self._refused_s = now_s
             self._wire.send(peer, encode(Refusal(FRAME_VERSION, text)))

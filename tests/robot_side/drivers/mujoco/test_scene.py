@@ -222,7 +222,7 @@ REFUSED: list[tuple[dict[str, str] | str, str | None, str]] = [
     ({"arm_actuators": "", "gripper_actuators": ""}, "tcp", "no actuators"),
     ({"arm_actuators": MOTORS.split("/>")[0] + "/>"}, "tcp", "arm's joint 'elbow' has no actuator of its own: nothing"),
     ({"arm_actuators": MUSCLE}, "tcp", "'pull' of joint 'elbow' is of an unsupported kind; valid: position"),
-    ({"world": '<site name="corner"/>'}, "corner", "'corner' hangs on no joint"),
+    ({"world": '<site name="corner"/>'}, "corner", "no joint moves 'corner'"),
     (
         {"world": '<body mocap="true"><geom size="1"/><site name="grip"/></body>'},
         "grip",
