@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from common.errors import ConfigurationError
 from feelahead.commands.bench_and_try import bench, try_out
 from feelahead.commands.calibrate import calibrate
-from feelahead.commands.demo import demo
+from feelahead.commands.demo.command import demo
 from feelahead.commands.doctor.command import doctor
 from feelahead.commands.keys import keys
 from feelahead.commands.recordings import export, plot, replay

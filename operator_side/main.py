@@ -34,6 +34,11 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     status = TerminalStatus("operator") if settings.tui else Status(settings.status, "operator")
     loop = Loop(MOTION_PERIOD_S, REMEDIES, settings.seed)
     with Process(settings, "operator", status, OperatorEncoder(), loop) as process:
+        # First, as its process takes longest; and before the priority is raised, which it would inherit.
+        console = None
+        if settings.console:
+            console = Console(settings.connect, port=settings.console_port, token=settings.console_token)
+            process.stack.enter_context(console)
         topics, connections = view_topics(settings), settings.connections
         sockets = OperatorSockets(
             settings.connect, settings.view_connect, topics=topics, keys=keys, connections=connections
@@ -42,13 +47,19 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
         core = build_recorded(settings, secrets.randbits(53), process.recording)
         for text in unused_clauses(settings.link_spec(), [("to_robot", "haptics")]):
             process.note(text)
-        desk = _desk(settings, core, process, backend)
+        desk = _desk(settings, core, process, backend, console)
         stored_travel = "calibration" not in given_fields(arguments, OperatorSettings)
         return process.run(lambda: OperatorTurns(settings, core, desk, sockets, process, stored_travel=stored_travel))
 
 
-def _desk(settings: OperatorSettings, core: OperatorSide, process: Process, backend: HidBackend | None) -> Devices:
-    """Open the controller, and the console before the priority is raised, which the console would inherit."""
+def _desk(
+    settings: OperatorSettings,
+    core: OperatorSide,
+    process: Process,
+    backend: HidBackend | None,
+    console: Console | None,
+) -> Devices:
+    """Open the controller."""
     pages, stack = DrivingPage(), process.stack
     search, guard, person = DEVICES[settings.device](OpeningParts(settings, core, pages, backend))
     pages.may_drive = person is not None
@@ -56,7 +67,4 @@ def _desk(settings: OperatorSettings, core: OperatorSide, process: Process, back
         stack.enter_context(guard)
     connection = Connection(search, core, guard)
     stack.callback(connection.close)
-    console = None
-    if settings.console:
-        console = stack.enter_context(Console(settings.connect, port=settings.console_port))
     return Devices(connection, guard, person, pages, console)

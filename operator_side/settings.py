@@ -59,10 +59,16 @@ class OperatorSettings(SideOptions):
     """Open the browser console on this machine, at an address that is shown: views, scene, what is felt and why."""
     console_port: Annotated[int, tyro.conf.arg(metavar="PORT"), Meta(ge=0, le=65535)] = 0
     """Port of the console on 127.0.0.1; 0 for any free port."""
+    console_token: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """File that contains the token of the console's address. For a program that restarts this side and keeps the page
+    open: pages offer to run again, and --status json has an event for it."""
     tui: bool = False
     """Show the console's facts on the whole terminal instead of a line, for machines without a browser."""
     person: PersonSettings = field(default_factory=PersonSettings)
     """Limits of the scripted person (simulated device only)."""
+    person_waits: Annotated[float, Meta(ge=0.0, le=3600.0), tyro.conf.arg(metavar="SECONDS")] = 0.0
+    """Longest time that the scripted person waits, once the robot side is heard, until a page of the console shows its
+    first picture."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

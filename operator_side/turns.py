@@ -1,5 +1,6 @@
 """Work of the operator side in each turn of its loop: sockets, controller and people around the core."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
@@ -75,6 +76,9 @@ class OperatorTurns:
         self.turn = timed("hands", self._move)
         self.wait, self.next_due, self.note = sockets.wait, self._sending.line.next_due, self._viewing.note
         self._guard_s = 0.0
+        self._person_waits_s = settings.person_waits if console is not None else 0.0
+        self._person_since_s: float | None = None
+        """Time at which the robot side was heard first"""
 
     @property
     def resting(self) -> bool:
@@ -149,7 +153,8 @@ class OperatorTurns:
         if (words := core.tuner.take_link()) is not None:
             self._sending.tune(words)
         if self._person is not None:
-            self._person.tick(now_s, core.screen, core.link.round_trip.mean or 0.0)
+            screen = core.screen if self._person_sees(now_s) else None
+            self._person.tick(now_s, screen, core.link.round_trip.mean or 0.0)
         connection.update(now_s)
         self._say_what_is_new()
         if self._travel is not None:
@@ -158,6 +163,13 @@ class OperatorTurns:
             core.read_state(state, now_s)
         self._sending.push([*core.motion(now_s), *map(ToRobot, self._viewing.requests(now_s))], now_s)
         self._sending.measure(core.link.outgoing, now_s)
+
+    def _person_sees(self, now_s: float) -> bool:
+        """Return whether the scripted person has a picture before them, or has waited long enough for one."""
+        if self._person_since_s is None and self._core.screen is not None:
+            self._person_since_s = now_s
+        waited_s = -math.inf if self._person_since_s is None else now_s - self._person_since_s
+        return self._viewing.has_shown_picture or waited_s >= self._person_waits_s
 
     def _say_what_is_new(self) -> None:
         for text in self._connection.take_notes():

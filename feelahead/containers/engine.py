@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import subprocess
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -12,6 +13,8 @@ from common.errors import ConfigurationError, FeelaheadError
 
 COMPOSE_FILE: Final = Path(__file__).parents[2] / "docker" / "compose.yaml"
 _LIMIT_S: Final = 60.0
+_READS: Final = 3
+_READ_AGAIN_S: Final = 1.0
 _LAST_WORDS: Final = 3
 """Number of quoted lines: compose ends with a summary, below the reason."""
 
@@ -67,8 +70,21 @@ class Engine:
         return dict(known)
 
     def read_json(self, container: str, path: str) -> dict[str, Any]:
-        """Read a file of JSON from a container, which need not run."""
-        packed = self.docker("cp", f"{container}:{path}", "-")
+        """Read a file of JSON from a container, which need not run.
+
+        A container that has just ended may lack its volumes for a moment. Raises EngineError, with the exit code and
+        the last lines of the log, if the file stays away.
+        """
+        for remaining in reversed(range(_READS)):
+            try:
+                packed = self.docker("cp", f"{container}:{path}", "-")
+                break
+            except EngineError as error:
+                if remaining == 0:
+                    ended = self.inspect(container)["State"]["ExitCode"]
+                    log = self.docker("logs", "--tail", str(_LAST_WORDS), container).strip()
+                    raise EngineError(f"{error}; exit code {ended}; last logged: {log}") from error
+                time.sleep(_READ_AGAIN_S)
         # A tar of one file, whose text reaches from the first brace to the last.
         content: dict[str, Any] = json.loads(packed[packed.index("{") : packed.rindex("}") + 1])
         return content

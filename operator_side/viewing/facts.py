@@ -116,6 +116,8 @@ class ShownKind(StrEnum):
     NOTE = "note"
     PLAYER = "player"
     """Position in a recording"""
+    ENDED = "ended"
+    """Normal end of the run"""
     END = "end"
     """End of a round: the next message follows once the page has taken all up to here"""
 

@@ -22,6 +22,7 @@ from operator_side.viewing.facts_of_core import Surroundings, operator_facts
 from operator_side.viewing.pages.driving_page import DrivingPage
 
 _WATCH_PERIOD_S: Final = 0.25
+_EXPECT_PERIOD_S: Final = 10.0
 _TELEMETRY_TOPIC: Final = b"telemetry"
 
 
@@ -72,6 +73,9 @@ class Viewing:
         self._asked = False
         """Whether the newest Watch requests a whole picture"""
         self._watch_s = self._facts_s = -math.inf
+        self.has_shown_picture = False
+        """Whether a page has been sent a picture"""
+        self._open_pages = 0
 
     def note(self, text: str) -> None:
         """Show a lasting line on the status and on the console."""
@@ -91,6 +95,7 @@ class Viewing:
             self._figures.take(payload)
         if self.console is not None:
             self.console.view(payload, video=topic == VIDEO_TOPIC)
+            self.has_shown_picture |= topic == VIDEO_TOPIC and self.console.pages > 0
         return True
 
     def requests(self, now_s: float) -> list[bytes]:
@@ -100,10 +105,14 @@ class Viewing:
         pages = self.console is not None and self.console.pages > 0
         lacks = None if self.console is None else self.console.lacks
         stands_still = lacks is not None and any(lacks) and not self._asked
-        if not (pages or self._status.wants_facts) or (now_s - self._watch_s < _WATCH_PERIOD_S and not stands_still):
+        watches = pages or self._status.wants_facts
+        if not watches and (self.console is None or self.console.address is None):
+            return []
+        # Without a page, it only lets the robot side have its drawing process ready.
+        if now_s - self._watch_s < (_WATCH_PERIOD_S if watches else _EXPECT_PERIOD_S) and not (pages and stands_still):
             return []
         self._watch_s, self._asked = now_s, lacks is not None and any(lacks)
-        watch = Watch(self._core.link.stamp(now_s), overview=pages, first_person=pages, scene=True, lacks=lacks)
+        watch = Watch(self._core.link.stamp(now_s), overview=pages, first_person=pages, scene=watches, lacks=lacks)
         if self._recording is not None:
             self._recording.noted.append((Kind.WATCHED, now_s, b""))
         return [encode(watch)]
@@ -114,6 +123,8 @@ class Viewing:
             page, said = console.words.popleft()
             if said is None:
                 self._pages.close(page, now_s)
+            elif said.pop("again", False):
+                self._status.event("again")
             else:
                 self._pages.receive(page, said, now_s)
 
@@ -125,6 +136,9 @@ class Viewing:
     def _looks_at_console(self, console: Console) -> bool:
         for text in console.take_notes():
             self._status.note(text)
+        if console.pages != self._open_pages:
+            self._open_pages = console.pages
+            self._status.event("pages", count=console.pages)
         if console.address not in (None, self._reported):
             self._reported = console.address
             if not self._status.event("console", address=self._reported):

@@ -1,5 +1,7 @@
 """Views that operators watch, by their Watch messages: each counts for a second after its arrival."""
 
+import math
+
 from common.protocol.messages import Watch
 
 WATCH_S = 1.0
@@ -13,10 +15,12 @@ class Watchers:
     def __init__(self) -> None:
         self.scene_begun = 0
         """How many times somebody began to watch the scene"""
+        self._newest_s = -math.inf
         self._watching: dict[int, tuple[Watch, float]] = {}
 
     def heard(self, epoch: int, watch: Watch, now_s: float) -> None:
         """Take one Watch message of the operator with this epoch."""
+        self._newest_s = now_s
         before = self._watching.get(epoch)
         looked = before is not None and before[0].scene and now_s - before[1] < WATCH_S
         self.scene_begun += watch.scene and not looked
@@ -42,3 +46,7 @@ class Watchers:
         for epoch in [epoch for epoch, (_, heard_s) in self._watching.items() if now_s - heard_s >= WATCH_S]:
             del self._watching[epoch]
         return frozenset(part for part in _PARTS for watch, _ in self._watching.values() if getattr(watch, part))
+
+    def expected(self, now_s: float) -> bool:
+        """Return whether a viewer may come soon: a Watch, even one without a view, came a moment ago."""
+        return now_s - self._newest_s < WATCH_S

@@ -75,7 +75,7 @@ def start_beside(done: Callable[[Renders | str], None]) -> None:
 
 
 class Cameras:
-    """Keeper of one order of each wanted view under way; starts the companion process when it is first needed."""
+    """Keeper of one order of each wanted view; starts the companion process when a viewer is there or expected."""
 
     def __init__(
         self,
@@ -143,19 +143,27 @@ class Cameras:
         return VideoStep(*place, picture.number, picture.whole, picture.content)
 
     def update(
-        self, now_s: float, captured_s: float, wanted: Collection[ViewName], lacks: tuple[int, int] | None = None
+        self,
+        now_s: float,
+        captured_s: float,
+        wanted: Collection[ViewName],
+        lacks: tuple[int, int] | None = None,
+        *,
+        expected: bool = False,
     ) -> list[Picture]:
         """Order the `wanted` views that have no order under way; return the finished pictures.
 
         lacks: newest pictures that a viewer lacks, as for `makes_h264`. captured_s: time of the present state, which is
-        ordered. To be called in every turn while `wanted` is not empty, and sometimes otherwise.
+        ordered. expected: whether a viewer may come soon; the companion then starts even without an order. To be called
+        in every turn while `wanted` is not empty, and sometimes otherwise.
         """
-        if wanted:
+        expected = expected or bool(wanted)
+        if expected:
             self._wanted_s = now_s
         self._follow_ends(now_s)
         companion = self._companion
         if companion is None:
-            if wanted and not self._hopeless and not self._starting and now_s >= self._not_before_s:
+            if expected and not self._hopeless and not self._starting and now_s >= self._not_before_s:
                 self._starting = True
                 self.starts += 1
                 self._start(self._handed_over.append)

@@ -155,7 +155,8 @@ class ViewScheduler:
                     self._late.discard(name)
                     wanted.append(name)
         outgoing = []
-        for picture in cameras.update(now_s, taken_s, wanted, lacks):
+        expected = self._core.session.watchers.expected(now_s)
+        for picture in cameras.update(now_s, taken_s, wanted, lacks, expected=expected):
             self._counts[picture.view]["sent"] += 1
             self._frame_age.add(now_s - picture.captured_s)
             frame = cameras.message(picture, self._core.session.shown_header(now_s))

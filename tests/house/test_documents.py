@@ -19,7 +19,7 @@ import robot_side.main
 from common.command.command_line import load_toml
 from feelahead.commands import keys
 from feelahead.commands.bench_and_try import bench, try_out
-from feelahead.commands.demo import DemoSettings
+from feelahead.commands.demo.settings import DemoSettings
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 from tests.helpers.repository import DATA, ROOT

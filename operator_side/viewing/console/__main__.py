@@ -1,11 +1,12 @@
 """Process of the console: from the operator side to viser and the pages, and back.
 
 operator side ──▶ here    f facts, v a view payload as received, n a note, r the constants of a run,
-                          p the position in a recording
+                          p the position in a recording, d the run's normal end
 here ──▶ operator side    a the address, w the number of open pages, s a page's words, e the reason for none,
                           l the H.264 pictures that are lacking: once if they can be shown, and at each change
 """
 
+import asyncio
 import contextlib
 import logging
 import math
@@ -15,6 +16,7 @@ import socket
 import struct
 import sys
 import threading
+from pathlib import Path
 from typing import Any, Final
 
 import msgspec
@@ -39,10 +41,12 @@ from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts, ShownKind
 
 _NICENESS: Final = 5
-"""Increment of niceness, so that both sides have priority"""
+"""Increment of niceness once it serves, so that both sides have priority"""
 _FRAME: Final = struct.Struct("<Bd")
 """Header of a picture: its view, and its time on the robot side's clock"""
 _MOST_LISTED: Final = 6
+_LAST_WORDS_S: Final = 0.1
+"""Time for pages to receive the last message, in seconds"""
 _SLOW_PERIOD_S: Final = 0.25
 """Period of drawings for a browser without a graphics processor, in seconds"""
 _LASTING: Final = {b"r": ShownKind.RUN, b"p": ShownKind.PLAYER}
@@ -62,7 +66,7 @@ class _Process:
         self._steps: Any = None
         self._lacks: tuple[int, int] | None = None
 
-    def run(self, port: int) -> None:
+    def run(self, port: int, token: str) -> None:
         """Serve until the channel ends; report through it if that is impossible."""
         try:
             from operator_side.viewing.console.drawing import Drawing  # noqa: PLC0415  # an extra, and slow to import
@@ -81,7 +85,7 @@ class _Process:
         except OSError as error:
             self._give_up(f"--console-port {port}: {error.strerror}; valid: 0 for any port that is free")
             return
-        token, port = secrets.token_urlsafe(24), part.getsockname()[1]
+        port = part.getsockname()[1]
         gate = Gate(token, port)
         self._pages = Pages(lambda count: self._say("w", b"%d" % count), self._say)
         try:
@@ -104,6 +108,7 @@ class _Process:
 
     def _begin(self, loop: Any, address: str) -> None:
         self._say("a", address.encode())
+        os.nice(_NICENESS)
         loop.add_reader(self._channel.fileno(), self._receive)
 
     def _follow(self, steps: Any) -> None:
@@ -129,7 +134,9 @@ class _Process:
             self._give_up(f"the console failed: {error!r}")
             self._ended.set()
         if self._channel.ended:
-            self._ended.set()
+            loop = asyncio.get_running_loop()
+            loop.remove_reader(self._channel.fileno())
+            loop.call_later(_LAST_WORDS_S, self._ended.set)
 
     def _take(self, kind: bytes, content: bytes) -> SceneState | None:
         """Take one message; return a scene's state to the caller, as only the newest counts."""
@@ -141,6 +148,8 @@ class _Process:
         elif kind == b"n":
             note = {"kind": ShownKind.NOTE, "text": content.decode("utf-8", "replace")}
             self._pages.note(msgspec.json.encode(note).decode())
+        elif kind == b"d":
+            self._pages.show(ShownKind.ENDED, f'{{"kind":"{ShownKind.ENDED}"}}', lasting=True)
         elif kind in _LASTING:
             lasting = {"kind": _LASTING[kind], **msgspec.msgpack.decode(content)}
             self._pages.show(_LASTING[kind], msgspec.json.encode(lasting).decode(), lasting=True)
@@ -214,11 +223,10 @@ def said(facts: OperatorFacts) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Run the companion process; its arguments are the channel's number and the port."""
-    channel, (port,) = companion_channel(sys.argv[1:])
-    os.nice(_NICENESS)
+    """Run the companion process. Arguments: the channel's number, the port, and the file with a token, if given."""
+    channel, (port, *token) = companion_channel(sys.argv[1:])
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # no line for each refused request
-    _Process(channel).run(int(port))
+    _Process(channel).run(int(port), Path(token[0]).read_text().strip() if token else secrets.token_urlsafe(24))
     os._exit(0)  # does not wait for viser's thread
 
 

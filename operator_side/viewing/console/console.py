@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Final, Self
 
 import msgspec
@@ -18,14 +19,17 @@ _END_LIMIT_S: Final = 0.3
 
 
 PageWords = tuple[int, dict[str, Any] | None]
-"""Number of a page in this run, and its `hands`, its wish to `tune` or to `play`; None: this page is gone."""
+"""Number of a page in this run, and its `hands`, its wish to `tune`, to `play` or to run `again`; None: it is gone."""
 
 
 class Console:
     """Browser console; without viser there is none, which a note reports."""
 
-    def __init__(self, title: str, *, port: int = 0, live: bool = True) -> None:
-        """Start it on `port` of this machine, 0 for any free one. live: no recording."""
+    def __init__(self, title: str, *, port: int = 0, live: bool = True, token: Path | None = None) -> None:
+        """Start it on `port` of this machine, 0 for any free one. live: no recording.
+
+        token: file with the token of its address, whose owner can run again; None: a new token.
+        """
         self.address: str | None = None
         """Address of its page, with the token; None until it is ready, and when it is gone."""
         self.pages = 0
@@ -41,8 +45,10 @@ class Console:
         self._notes: list[str] = []
         self.gone = False
         """Whether it has ended; a note gives the reason."""
-        self._companion = Companion("operator_side.viewing.console", [str(port)])
-        self._companion.channel.send(b"r", msgspec.msgpack.encode({"title": title, "live": live}))
+        given = [] if token is None else [str(token)]
+        self._companion = Companion("operator_side.viewing.console", [str(port), *given])
+        run = {"title": title, "live": live, "may_run_again": token is not None}
+        self._companion.channel.send(b"r", msgspec.msgpack.encode(run))
 
     def __enter__(self) -> Self:
         return self
@@ -115,5 +121,7 @@ class Console:
         return taken
 
     def close(self) -> None:
-        """End it at once."""
+        """Tell its pages that the run has ended, and end it at once."""
+        self._companion.channel.send(b"d", b"")
+        self._companion.channel.flush()
         self._companion.close(_END_LIMIT_S)

@@ -32,6 +32,8 @@ class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     hands: dict[str, Any] | None = None
     tune: dict[str, Any] | None = None
     play: dict[str, Any] | None = None
+    again: bool | None = None
+    """Wish to run again"""
     slow: bool | None = None
     """Whether its browser draws the scene without a graphics processor"""
     looks: bool | None = None
@@ -142,6 +144,6 @@ class Pages:
             if said.looks is not None and said.looks != page.looks:
                 page.looks = said.looks
                 self._count()
-            words = {"hands": said.hands, "tune": said.tune, "play": said.play}
+            words = {"hands": said.hands, "tune": said.tune, "play": said.play, "again": said.again}
             if words := {name: value for name, value in words.items() if value is not None}:
                 self._heard("s", msgspec.msgpack.encode((number, words)))

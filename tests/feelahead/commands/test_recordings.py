@@ -12,7 +12,7 @@ from common.recording.content import Content
 from common.recording.mcap_file import RecordingFile
 from common.recording.reading import open_recording
 from common.recording.wire import HEADER, as_json
-from feelahead.commands.demo import demo
+from feelahead.commands.demo.command import demo
 from feelahead.commands.recordings import export, plot, replay
 from feelahead.recordings.replay import replay_operator, replay_robot
 from tests.helpers.refusal import refusal

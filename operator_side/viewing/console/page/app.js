@@ -45,6 +45,7 @@ let drawn = true;
 const frame = document.querySelector("#scene iframe");
 const slow = drawsSlowly();
 let run = { title: "", live: true };
+let ended = ""; // why the connection is expected to end
 
 const send = (object) => {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(object));
@@ -73,8 +74,11 @@ function receive(message) {
   else if (message.kind === ShownKind.FACTS) showFacts(message);
   else if (message.kind === ShownKind.SCENE) showScene(message);
   else if (message.kind === ShownKind.NOTE) showNote(message.text);
+  else if (message.kind === ShownKind.ENDED) ended ||= "THE RUN HAS ENDED";
   else if (message.kind === ShownKind.RUN) {
     run = message;
+    ended = "";
+    byId("again").hidden = !run.may_run_again;
     clock.live = run.live;
     document.title = `feelahead: ${run.title}`;
     document.body.classList.toggle("replay", !run.live);
@@ -137,6 +141,11 @@ function showLink(status) {
   text("pictures", `${status.pictures ?? "?"}${held}`);
 }
 
+byId("again").onclick = () => {
+  send({ again: true });
+  ended = "STARTING AGAIN";
+};
+
 byId("drawn").onclick = ({ currentTarget }) => {
   drawn = !drawn;
   currentTarget.textContent = `3-D drawing: ${drawn ? "on" : "off"}`;
@@ -196,9 +205,9 @@ function look() {
   byId("lost").hidden = !lost;
   if (lost) {
     const [word, because] = byId("lost").children;
-    word.textContent = open ? (everHeard ? "NOTHING HEARD" : "WAITING FOR THE OPERATOR SIDE") : "CONNECTION LOST";
+    word.textContent = ended || (open ? (everHeard ? "NOTHING HEARD" : "WAITING FOR THE OPERATOR SIDE") : "CONNECTION LOST");
     const old = everHeard ? `What you see is ${(silentMs / 1000).toFixed(1)} s old. ` : "";
-    because.textContent = old + (open ? "The operator side is silent." : `The console: ${closedBecause || "not reached yet"}.`);
+    because.textContent = ended ? "" : old + (open ? "The operator side is silent." : `The console: ${closedBecause || "not reached yet"}.`);
   }
   for (const view of views) view.look();
 }

@@ -129,7 +129,7 @@ def test_a_silence_is_told_and_what_was_seen_last_holds_on() -> None:
     assert sender.objects.perceive(sender.now_s) is frame
     assert "the newest frame is 0.6 s old" in sender.notes[-1]
     sender.says(CUP, peer=b"restarted", sequence=0)
-    assert "come again" in sender.notes[-1]
+    assert "arrive again" in sender.notes[-1]
 
 
 def test_nothing_is_perceived_before_the_first_frame() -> None:
