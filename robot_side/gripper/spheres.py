@@ -18,7 +18,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 
 _MOST_SPHERES_OF_A_BOX = 2000
-# Unused share of the stand-out in a plan, far above rounding, so that no corner is just outside.
+# Share of the allowed protrusion that a plan leaves unused, far above rounding, so that no corner is just outside.
 _MARGIN = 1e-6
 _FRACTIONS = tuple(0.40 + 0.04 * step for step in range(15))
 

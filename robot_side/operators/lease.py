@@ -136,7 +136,7 @@ class Lease:
         waiting = self.observers()
         self._safety.end(event, now_s)
         self._owner = None
-        # A silent observer would only hold the lease up.
+        # A silent observer would only keep the lease from others.
         alive = self._alive(waiting, now_s)
         if alive:
             alive[0].session.handle(SessionEvent.LEASE_PASSED)

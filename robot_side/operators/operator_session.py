@@ -225,7 +225,7 @@ class OperatorSession:
             self.not_owners += 1
             participant.session.handle(SessionEvent.WRONG_TOKEN)
             if participant is self.lease.owner:
-                # A stop counts under any lease of this owner.
+                # A stop of this owner counts under any lease token.
                 self.safety.hear_stop(command, now_s)
             return
         if not self.safety.receive(command, arrival, now_s):
@@ -250,7 +250,7 @@ class OperatorSession:
             return
         self._token = self.lease.token
         self._owner_link = owner.link
-        # A button held while waiting is no press.
+        # A button that was held before the lease began does not count as pressed.
         owner.hand_over_was_down = owner.next_target_was_down = True
         self.leases_granted += 1
         self._began = True

@@ -57,7 +57,7 @@ def contact_with(
     kind = scene.kinds[row]
     found, closing = contact(kind, scene.shapes, row, start, radius, along, reach)
     if kind == MESH and found <= reach:
-        # The contact found is that with the box around the mesh.
+        # So far the contact is the one with the box around the mesh.
         found, closing = _mesh_contact(scene.kernels[-1], (scene.meshes, row, *start, *along, radius, reach, clear))
     return found, closing
 

@@ -56,7 +56,7 @@ class H264:
             "crf": str(factor),
             "forced-idr": "1",
             "intra-refresh": str(int(self._refresh < _ENDLESS)),
-            # Without detection of cuts, which would make whole pictures unasked.
+            # Without detection of cuts, which would make whole pictures that nobody ordered.
             "sc_threshold": "0",
         }
         return encoder

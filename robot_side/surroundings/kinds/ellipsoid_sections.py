@@ -134,7 +134,7 @@ def _crossings(  # noqa: PLR0912
         one, two = _pair(0.5 * s, 0.5 * f + m - 0.5 * g / s)
         three, four = _pair(-0.5 * s, 0.5 * f + m + 0.5 * g / s)
     else:
-        # Even in y.
+        # The quartic is even in y.
         low, high = _pair(0.5 * f, h)
         one, three = math.sqrt(low) if low >= 0.0 else math.nan, math.sqrt(high) if high >= 0.0 else math.nan
         two, four = -one, -three
@@ -187,7 +187,7 @@ def _section(u: float, v: float, rho: float, alpha: float, beta: float) -> tuple
         else:
             # Arc of the ellipse from the circle's exit to its next entry.
             turn = math.atan2(to_y / beta, to_x / alpha) - math.atan2(from_y / beta, from_x / alpha)
-            # Where rounding makes two crossings of one, both arcs are tiny.
+            # Where rounding turns one crossing into two, both arcs are tiny.
             if turn < 0.0 and (turn < -_HARDLY or end - start > 1.0):
                 turn += 2.0 * math.pi
             area += 0.5 * alpha * beta * turn

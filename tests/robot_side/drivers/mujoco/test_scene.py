@@ -226,7 +226,7 @@ REFUSED: list[tuple[dict[str, str] | str, str | None, str]] = [
     (
         {"world": '<body mocap="true"><geom size="1"/><site name="grip"/></body>'},
         "grip",
-        "no joint: a mocap body carries it",
+        "no joint moves 'grip': a mocap body carries it",
     ),
     ({"wrist": BALL_JOINT}, "end", "joint 'b' is ball: no single motor moves such a joint; valid: hinge or slide"),
     (NO_BASE.format(joint="<freejoint/>", more=""), "end", "of body 'arm' is free: the robot's base must stand fixed"),
