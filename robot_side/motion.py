@@ -21,8 +21,7 @@ class Motion:
         self.commanded_rad_s: FloatArray | None = None
         """(n,) commanded joint velocities; None: the arm is to stand still"""
         self.told_m_s = self.rises_m_s = 0.0
-        """Commanded speeds of the tool: in the direction in which R2 advances; and upwards, 0 unless an
-        object is held"""
+        """Commanded speeds of the tool: in the direction in which R2 advances; and upwards (0 if nothing is held)"""
         self._arm, self._limits, self._settings, self._assists = arm, limits, settings, assists
         self._still: FloatArray = np.zeros(arm.joint_count)
 

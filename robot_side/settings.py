@@ -46,8 +46,7 @@ class CameraSettings:
     mean_m: float | Vector3 = 0.0
     """Mean error μ_c, true minus perceived position: one value for all axes of the world, or three."""
     sd_m: _Spread = 0.003
-    """Standard deviation of an error drawn once for each object. The default of 3 mm is assumed for a depth camera at
-    half a metre."""
+    """Standard deviation of an error drawn once for each object; 3 mm is assumed for a depth camera at half a metre."""
     frame_sd_m: _Spread = 0.0
     """Standard deviation of an additional error, drawn anew in each frame."""
 
@@ -101,8 +100,7 @@ class RobotSettings(SideOptions):
     """Help besides stiffness, which a strong finger can overcome. speed: the robot side limits the speed along the
     triggers, so that the arm stops where full strength is due, however hard the finger pulls."""
     cover_m: Annotated[float, Meta(ge=0.0005, le=0.05)] = 0.003
-    """Largest distance by which the spheres that cover the gripper may protrude; a larger distance needs
-    fewer spheres."""
+    """Largest distance by which spheres that cover the gripper may protrude; a larger distance needs fewer spheres."""
     prediction_errors: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """Errors of the predicted motion by commands under way on this arm, as written by: feelahead bench error --table
     FILE.toml. They are known for the built-in arm. For another arm without this file, a fifth of the distance at full
@@ -118,8 +116,7 @@ class RobotSettings(SideOptions):
     kinematic_mean_m: Vector3 = (0.0, 0.0, 0.0)
     """Mean error μ_ee of the forward kinematics in the world frame, true minus estimated position."""
     roles: Annotated[dict[str, Role], tyro.conf.Suppress] = field(default_factory=dict)
-    """Only in a TOML file: [roles] NAME = "obstacle", "target", "support" or "ignored"; by default names tell the
-    roles."""
+    """Only in a TOML file: [roles] NAME = "obstacle", "target", "support" or "ignored"; by default by the names."""
     encoder: EncoderSettings = field(default_factory=EncoderSettings)
     camera: CameraSettings = field(default_factory=CameraSettings)
     cameras: CamerasSettings = field(default_factory=CamerasSettings)

@@ -46,11 +46,9 @@ class Ability:
     """Speed and acceleration that the tool can reach along one direction."""
 
     full_speed_m_s: float
-    """v_max in this pose: speed at full travel of a trigger, after the joints' limits and the damping near a
-    singularity."""
+    """v_max in this pose: speed at full travel of a trigger, after the joints' limits and damping near a singularity"""
     acceleration_m_s2: float
-    """a in this pose: acceleration along the direction while the joint that needs longest is at its
-    acceleration limit."""
+    """a in this pose: acceleration along the direction when the joint that needs longest accelerates at its limit"""
     within_reach: bool
     """Whether the tool moves as commanded at full travel."""
 

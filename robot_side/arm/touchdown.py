@@ -28,8 +28,8 @@ _SINKS_M_S: Final = 1e-3
 _LEAVES_M: Final = 3e-3
 _PERIOD_S: Final = 0.004
 _GIVES_WAY_S: Final = 0.01
-"""Time, in seconds, for which the arm halts at its measured position: longer than a step of the physics or a
-controller."""
+"""Time, in seconds, for which the arm halts at its measured position: longer than a step of physics or
+of a controller"""
 _NOISE_S: Final = 0.01
 _USUAL_S: Final = 1.0
 """Time constants, in seconds, of the present load (`_NOISE_S`) and of the usual load (`_USUAL_S`). The usual load

@@ -12,8 +12,7 @@ from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 
 _LET_GO_S: Final = 0.1
-"""Time, in seconds, without holding, after which an object counts as released: fingers may move as they
-follow a slip."""
+"""Time, in seconds, without holding after which an object counts as released: fingers may move as they follow a slip"""
 
 
 class Grip:

@@ -45,8 +45,7 @@ class OperatorSession:
         self.refused = 0
         """Number of refused requests to be admitted, because there was no room or the epoch had ended"""
         self.not_owners = 0
-        """Number of commands that were not from the owner, or not under its present lease; such a command is never
-        applied."""
+        """Number of commands that were not the owner's, or not under its present lease; none of them is applied"""
         self.motion_received = 0
         """Number of motion commands, of the owner and of others"""
         self.driving_delay = RunningStatistics(seed)

@@ -18,8 +18,7 @@ from common.protocol.messages import MotionCommand, MotionState
 from common.protocol.session import Session, SessionEvent, SessionState
 
 RELEASED_TRAVEL = 0.02
-"""Largest travel, 0 to 1, that counts as released: a calibrated trigger at rest reads 0, up to a count
-or so of noise."""
+"""Largest travel, 0 to 1, that counts as released: a calibrated trigger at rest reads 0, apart from a count or so"""
 _REMEMBERED_STOPS = 1000
 
 _Limit = Annotated[float, Meta(gt=0.0, lt=60.0)]

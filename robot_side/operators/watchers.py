@@ -48,5 +48,5 @@ class Watchers:
         return frozenset(part for part in _PARTS for watch, _ in self._watching.values() if getattr(watch, part))
 
     def expected(self, now_s: float) -> bool:
-        """Return whether a viewer may come soon: a Watch, even one without a view, came a moment ago."""
+        """Return whether a viewer may come soon: a Watch message, even one for no view, came less than a second ago."""
         return now_s - self._newest_s < WATCH_S

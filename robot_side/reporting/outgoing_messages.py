@@ -17,8 +17,7 @@ from robot_side.operators.operator_session import Receiver
 
 OutgoingStream = Literal["haptics", "telemetry", "video", "scene"]
 TOPICS: Final[dict[OutgoingStream, bytes]] = {"telemetry": b"telemetry", "video": VIDEO_TOPIC, "scene": SCENE_TOPIC}
-"""Topics of the streams to viewers. The scene has a stream of its own, because its large messages would delay
-telemetry."""
+"""Topics of the streams to viewers. The scene has its own stream, because its large messages would delay telemetry."""
 
 SHOWN_NAME = 100
 """Maximum number of characters of an object's name that are sent and shown, as messages are limited"""

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
 
 KINDS: Final = (sphere.KIND, box.KIND, tetrahedron.KIND, half_space.KIND, mesh.KIND, ellipsoid.KIND)
-"""Kinds of primitives, each at the index that is its number in `kinds.layout`. Their arrays are fields of
-PerceivedObjects."""
+"""Kinds of primitives; each has the index that is its number in `kinds.layout`, and its arrays in PerceivedObjects."""
 
 
 @dataclass(frozen=True, eq=False)

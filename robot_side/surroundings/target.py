@@ -14,8 +14,7 @@ from robot_side.surroundings.scene_columns import SCENE
 from robot_side.surroundings.scene_table import SceneTable
 
 _OFF_AXIS_WEIGHT = 3.0
-"""Factor by which a distance across the approach axis counts more than one along it, when objects are ordered by
-nearness"""
+"""Factor by which distances across the approach axis count more than along it, when objects are ordered by nearness"""
 _scene = SCENE.at
 
 

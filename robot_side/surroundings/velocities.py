@@ -8,8 +8,7 @@ from common.arrays import FloatArray
 from robot_side.compiled.kernel import FLOAT64, INT64, compiled, input_array, output_array
 
 WINDOW_S = 0.2
-"""Time in s over which a velocity is measured. The result is half of it late, 0.1 s, and one frame's noise counts
-little."""
+"""Time in s over which a velocity is measured. The result is late by half of it, and a frame's noise counts little."""
 
 
 _FRAMES: Final = 8

@@ -26,8 +26,7 @@ class CamerasSettings:
     """Quality of pictures, 1 to 100. At 75 a picture takes 20 kB as JPEG, or 1 to 2 kB as H.264; above 90, three times
     as much as JPEG."""
     codec: Literal["auto", "jpeg"] = "auto"
-    """Codec of pictures. auto: H.264 if PyAV is installed here and at all viewers, and nothing is recorded here; else
-    JPEG."""
+    """Codec of pictures. auto: H.264 if PyAV is here and at all viewers, and nothing is recorded here; else JPEG."""
 
     def __post_init__(self) -> None:
         check_limits(self)

@@ -17,8 +17,7 @@ SCENE_PERIOD_S: Final = 1.0 / 30.0
 SHAPES_PERIOD_S: Final = 3.0
 _SHAPES_BYTES_PER_S: Final = 400_000.0
 _SHAPES_SHARE: Final = 0.1
-"""Maximum of a link that repeated shapes take, in bytes a second and as a share: large shapes are
-repeated less often"""
+"""Maximum of a link for repeated shapes, in bytes a second and as a share: large shapes are repeated less often"""
 _BACKLOG_S: Final = 0.03
 """Queueing delay, in seconds, above which no view is made, because it would be old on arrival"""
 _SEEN_TO_S: Final = 0.1

@@ -13,8 +13,7 @@ _DOWN_DEG, _ASIDE_DEG = 55.0, 20.0
 hides little."""
 _SHORTEST_REACH_M = 0.3
 _LEAST_ALONG = 0.5
-"""Cosine of the largest angle, 60°, between the approach axis and the line of sight of a camera that
-shows the approach"""
+"""Cosine of the largest angle, 60°, between the approach axis and the line of sight of a camera that shows it"""
 _CLEARANCE_M = 0.05
 _WIDE_DEG = 70.0
 

@@ -142,7 +142,7 @@ def test_what_the_law_finds_is_what_is_sent(bench: Bench, listening: Listening) 
 
 
 def told_m_s(operator: Operator) -> float:
-    """Return the speed given to the newest command, as last heard."""
+    """Return the commanded speed in the newest stiffness message."""
     told = operator.felt[-1].told_m_s
     assert told is not None
     return told

@@ -1,4 +1,4 @@
-"""Reported motion of a command equals the arm's command."""
+"""Motion that is reported for a command equals the motion that the arm is commanded."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""From settings to a robot side: the law and its table, the gripper's cover, and the notes to a person."""
+"""Making of a robot side from settings: the law and its table, the gripper's cover, and the notes for a person."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""First moments of the robot side's process: strangers at its ports, a port in use."""
+"""First second of the robot side's process: strangers at its ports, a port in use."""
 
 import contextlib
 import json

@@ -1,4 +1,4 @@
-"""A core with timed steps acts as a plain one, and counts physics and sensing."""
+"""A core whose steps are timed acts as one without timing; physics and sensing are counted."""
 
 import numpy as np
 import pytest

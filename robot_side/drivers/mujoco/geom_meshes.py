@@ -37,8 +37,7 @@ class GeomMesh:
 
     mesh: Mesh
     volume_error: float
-    """Difference of the mesh's and the shape's volumes, as a share of the shape's; infinite for a shape that encloses
-    none"""
+    """Volume by which the mesh exceeds the shape, as a share of the shape's; infinite for a shape that encloses none"""
     stands_out_m: float
     """Distance, in m, by which the mesh protrudes from the shape; infinite for a shape that encloses nothing"""
 

@@ -62,8 +62,7 @@ class GripperTravel:
     force_lead: float
     """Lead of the reference over a blocked drive that gives the largest allowed force, as a share of the stroke"""
     lag_s: float
-    """Lag of a moving drive behind its reference, in seconds: share of the stroke for each share of the stroke per
-    second"""
+    """Lag of a moving drive behind its reference, in seconds: shares of the stroke for each share per second"""
 
 
 def measure_gripper(scene: Scene) -> GripperTravel | None:

@@ -39,8 +39,8 @@ class MotionLimits:
     """Limits of each joint in the arm's own controller, for any command; in metres for a prismatic joint."""
 
     velocity_rad_s: _Limit = 2.0
-    """Largest velocity; below the 3.14 rad/s of a UR5e and the 2.17 rad/s of a Franka arm's large joints
-    (data sheets)."""
+    """Largest velocity, below the 3.14 rad/s of a UR5e and the 2.17 rad/s of a Franka arm's large joints
+    (data sheets)"""
     acceleration_rad_s2: _Limit = 8.0
     deceleration_rad_s2: _Limit = 12.0
     """Deceleration of the reference after a command has expired."""

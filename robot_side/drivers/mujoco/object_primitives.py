@@ -39,8 +39,7 @@ _SIZES: Final[Mapping[str, Callable[[Any, IntArray], tuple[FloatArray, ...]]]] =
     "half_space": lambda _model, geoms: (np.empty((len(geoms), 0)),),
     "ellipsoid": lambda model, geoms: (model.geom_size[geoms],),
 }
-"""Functions that read the sizes of geoms (k,) in their own frames, as `Kind.placed` takes them, for each kind but
-meshes"""
+"""Functions that read sizes of geoms (k,) in their own frames, as `Kind.placed` takes them, for each kind but meshes"""
 
 
 @dataclass(frozen=True)
@@ -84,8 +83,7 @@ class ObjectPrimitives:
         it is.
         Infinite for a part whose volume is not known, and whose convex hull or bounding box is used."""
         self.stands_out_m: Mapping[str, float] = stands_out_m
-        """Largest distance, in m, by which the perceived shape of each of these objects protrudes from
-        the true shape"""
+        """Largest distance, in m, by which the perceived shape of each such object protrudes from the true shape"""
 
         mesh_index = np.array([meshes[geom][0] for geom, _ in of_kind["mesh"]], dtype=np.int64)
         self._mesh_index: IntArray = mesh_index

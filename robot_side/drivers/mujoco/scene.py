@@ -47,8 +47,7 @@ class Scene:
     start_pose: str
     """Description of the arm's start pose"""
     shared_names: tuple[str, ...]
-    """Names that several elements share, such as a body and a geom of the world; the elements of a name
-    are one object."""
+    """Names that several elements share, such as a body and a geom of the world; each name makes one object."""
     warnings: tuple[str, ...]
     """Warnings that MuJoCo gave about the model"""
 

@@ -25,8 +25,8 @@ class ContactOnset:
     gripper_part: str
     """Name of the geom, of the gripper or of the held object, that touches it"""
     closing_speed_m_s: float
-    """Closing speed of the two touching points along the contact's normal, before the physics step that found the
-    contact"""
+    """Closing speed of the touching points along the contact's normal, before the physics step that
+    found the contact"""
 
 
 class TrueContact:
@@ -69,8 +69,7 @@ class TrueContact:
         return max(found, key=lambda onset: onset.closing_speed_m_s, default=None)
 
     def approach(self) -> tuple[FloatArray, float]:
-        """Return the tool's approach axis, a unit vector (3,) in the world frame, and its true speed along it in
-        m/s."""
+        """Return the tool's approach axis, a unit vector (3,) in the world, and its true speed along it in m/s."""
         site = self._scene.robot.site
         axis: FloatArray = self._data.site_xmat[site].reshape(3, 3)[:, 2].copy()
         twist: FloatArray = np.zeros(6)

@@ -23,8 +23,7 @@ from robot_side.surroundings.roles import role_from_name
 from robot_side.surroundings.validity import require_valid
 
 OLD_S: Final = 0.5
-"""Age of the newest frame, in seconds, above which a note is made. The frame stays valid, so that triggers do not
-become free."""
+"""Age of the newest frame, in seconds, above which a note is made. The frame stays valid, so triggers stay stiff."""
 _REFUSAL_PERIOD_S: Final = 1.0
 
 Why = Literal["second", "version", "malformed", "order"]
@@ -34,8 +33,7 @@ class RemoteObjects:
     """Source of perceived objects: the newest valid frame, from one sender at a time."""
 
     def __init__(self, wire: Wire, roles: Mapping[str, Role], sd_m: float, note: Callable[[str], None]) -> None:
-        """roles: by name, before those in frames. sd_m: σ_c that the law uses. note: called with each fault, in a
-        line."""
+        """roles: by name, before those in frames. sd_m: σ_c that the law uses. note: called with each fault's line."""
         self.rejected: Counter[Why] = Counter()
         """Number of rejected frames by reason; a frame is rejected as a whole."""
         self.accepted = 0

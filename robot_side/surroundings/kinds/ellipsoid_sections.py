@@ -61,8 +61,7 @@ _COARSE: Final = np.array(
         0.41795918367346938,
     ]
 )
-"""Gauss weights of 7 nodes, 0 at the others. `_FINE` has Kronrod's weights of all 15 nodes, `_NODES`
-their positions."""
+"""Gauss weights of 7 nodes, 0 at the others. `_FINE`: Kronrod's weights of all 15 nodes, `_NODES`: their positions."""
 
 
 @inlined

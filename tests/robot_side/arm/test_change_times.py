@@ -1,4 +1,4 @@
-"""Time in which the arm follows trigger and sticks together, against the references of its joints."""
+"""Time in which the arm follows changes of trigger and sticks, against the references of its joints."""
 
 import numpy as np
 from hypothesis import given, settings

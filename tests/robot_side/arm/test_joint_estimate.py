@@ -1,4 +1,4 @@
-"""Estimate of joints and fingers beside the same filters in plain NumPy, and its restarts."""
+"""Estimate of joint and finger positions against the same filters in plain NumPy, and restarts of the estimate."""
 
 from dataclasses import replace
 

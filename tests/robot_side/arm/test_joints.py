@@ -1,4 +1,4 @@
-"""From hands to joints: tool motion, resolved rates, abilities of the arm, each beside the same in plain NumPy."""
+"""From the operator's inputs to joint velocities: each step against the same computation in plain NumPy."""
 
 import dataclasses
 import math

@@ -29,7 +29,7 @@ class Arm:
         return STIFFNESS_N_M * max(0.0, -self.meant_m)
 
     def go(self, speed_m_s: float, duration_s: float, jolt_n: float = 0.0) -> float | None:
-        """Rise or sink at this speed, heeding a contact; return the time of a new contact, None without."""
+        """Move up or down at this speed, heeding a contact; return the time of a new contact, None without one."""
         for tick in range(round(duration_s / TICK_S)):
             stands = self.touchdown.stands
             told_m_s = max(0.0, speed_m_s) if stands else speed_m_s

@@ -1,4 +1,4 @@
-"""Distances for people, from the unenlarged gripper to the perceived objects; spheres in near order."""
+"""Distances for people to read, from the gripper (not enlarged) to perceived objects; and spheres in near order."""
 
 import numpy as np
 import pytest

@@ -23,11 +23,11 @@ def cover_one(half_sizes_m: tuple[float, ...], stand_out_m: float) -> SphereCove
 
 
 def uncovered_cells(half_sizes_m: FloatArray, cover: SphereCover) -> FloatArray:
-    """Return middles of the surface's cells that no one sphere contains, down to the smallest cells.
+    """Return the middles of the surface's cells that no single sphere contains, down to the smallest cells.
 
-    A proof, not a sample: cells tile the faces with their edges and corners. A cell counts as covered only if its
-    farthest point is within TOLERANCE_M of being in a sphere. The others are cut, down to that tolerance. One eighth of
-    the box is enough, as the spheres are mirror-symmetric: the nearest images are those in it.
+    This is a proof, not a sample: cells tile the faces with their edges and corners. A cell counts as covered only if
+    its farthest point is within TOLERANCE_M of being in a sphere. All other cells are cut, down to that tolerance. One
+    eighth of the box is enough, because the spheres are mirror-symmetric.
     """
     spheres = np.unique(np.column_stack([np.abs(cover.centers_m), cover.radii_m + TOLERANCE_M]), axis=0)
     left = []
@@ -49,7 +49,7 @@ def uncovered_cells(half_sizes_m: FloatArray, cover: SphereCover) -> FloatArray:
 
 
 def _contained(middles: FloatArray, halves: FloatArray, spheres: FloatArray) -> BoolArray:
-    """Return whether one of the spheres contains the cell, for each of the cells."""
+    """Return for each cell whether a single sphere contains it."""
     low, high = middles.min(axis=0) - halves, middles.max(axis=0) + halves
     centers, squared_radii = spheres[:, :3], spheres[:, 3] ** 2
     near = ((np.clip(centers, low, high) - centers) ** 2).sum(axis=1) <= squared_radii

@@ -1,4 +1,4 @@
-"""Second implementation of who commands and what moves: the reference of the state machine."""
+"""Second implementation of who commands and what moves: the reference for tests of the state machine."""
 
 from dataclasses import dataclass, field
 
@@ -9,7 +9,7 @@ from robot_side.operators.safety import RELEASED_TRAVEL, SafetySettings
 
 State = SessionState
 ROOM = 2
-"""Most observers, and most departed operators: the machine lowers the product's limits to this."""
+"""Maximum number of observers, and of absent operators: the machine lowers the product's limits to it."""
 
 
 @dataclass(eq=False)
@@ -41,7 +41,7 @@ class ReferenceOperators:
         """(time, beginning of the reason)"""
         self.stopped = self.next_target = self.owner_changed = False
         self.followed: dict[int, int] = {}
-        """Newest followed stop's number, by epoch."""
+        """Number of the newest stop that was obeyed, by epoch."""
         self.loop_began_s: float | None = None
         self.loop_heard_s = 0.0
         """Sending time of the stamp echoed by this lease's newest accepted command."""
@@ -144,7 +144,7 @@ class ReferenceOperators:
             self.owner.state = State.STOPPED if self.stopped else State.DISARMED
 
     def _hear_stop(self, command: MotionCommand, now_s: float) -> None:
-        """Follow a stop however late it comes, except a copy of a followed one, or an older one."""
+        """Obey a stop however late it comes, except a copy of one that was obeyed, or an older one."""
         epoch, sequence = command.header.epoch, command.header.sequence
         if command.emergency_stop and sequence > self.followed.get(epoch, 0):
             self.followed = {epoch: sequence}
@@ -183,7 +183,7 @@ class ReferenceOperators:
         self._listen()
 
     def _settle(self) -> None:
-        """Act on the final state after one message: an owner for an instant is none."""
+        """Act on the final state after one message: an operator that was the owner only within it is none."""
         if self.owner is not None and self.token != self.settled_token:
             self.settled_token = self.token
             self.granted += 1

@@ -1,4 +1,4 @@
-"""Arm without new states, or with old ones only: the session's reaction, in virtual time."""
+"""Reaction of the session to an arm that sends no new states, or only old ones, in virtual time."""
 
 import re
 from dataclasses import replace

@@ -40,7 +40,7 @@ def begins_to_slow_s(bench: Bench, before: int) -> float:
 
 
 def stream_stops() -> None:
-    """Kill -9, a half-open connection and a pulled cable all look like this from within."""
+    """Kill -9, a half-open connection and a pulled cable all look like this to the robot side."""
     bench, operator = cruising()
     accepted_s, before = bench.now_s - 3 * TICK_S, len(bench.watch.speeds_rad_s)
     bench.silence(T_S + 0.3)
@@ -75,7 +75,7 @@ def short_gaps() -> None:
 
 
 def steady_delay() -> None:
-    """A second from the operator to the arm is no fault: the arm moves as fast as without."""
+    """A delay of a second from the operator to the arm is no fault: the arm moves as fast as without it."""
     speeds = [mean_speed_rad_s(delay_s) for delay_s in (0.0, 1.0)]
     assert speeds[1] == pytest.approx(speeds[0], rel=0.02)
 

@@ -1,4 +1,4 @@
-"""Lease, safety and session for any actions of operators, step by step beside a separate reference."""
+"""Lease, safety and session under arbitrary actions of operators, compared step by step with a separate reference."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -49,7 +49,7 @@ class DrawnLink(LinkEnd):
 
 
 class OperatorMachine(RuleBasedStateMachine):
-    """Operators that come, go, replay and press; each step is checked against the reference and the invariants."""
+    """Operators that come, go, replay messages and press buttons; each step is compared with the reference."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -104,7 +104,7 @@ class OperatorMachine(RuleBasedStateMachine):
         content: dict[str, bool],
         travels: tuple[float, float],
     ) -> None:
-        """Send one command; `behind`: age of the token, in leases."""
+        """Send one command; `behind`: number of leases by which its token is too old."""
         waiting = self.reference.observers()
         if whose == "owner" and self.reference.owner is not None:
             epoch = self.reference.owner.epoch

@@ -1,4 +1,4 @@
-"""Changes of P and the link during a run: by the owner, if permitted, whole or not at all."""
+"""Changes of P and of the link during a run: only by the owner, only if permitted, completely or not at all."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Criteria of a placed target, and of a contact felt in advance: with an invented truth of the target."""
+"""Criteria of a placed target and of a contact felt in advance, with invented true poses of the target."""
 
 import math
 

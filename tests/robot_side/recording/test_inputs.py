@@ -1,4 +1,4 @@
-"""Arm states and frames return bit for bit, also as differences."""
+"""Arm states and frames are the same bit for bit after encoding and decoding, also as changes."""
 
 from dataclasses import fields, replace
 from typing import Any

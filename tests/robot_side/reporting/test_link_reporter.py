@@ -1,4 +1,4 @@
-"""Robot side's report of the link: made for the owner alone, twice a second, and shown until it is old."""
+"""Robot side's report of the link: made only for the owner, twice a second, and shown until it is old."""
 
 from collections.abc import Iterator
 

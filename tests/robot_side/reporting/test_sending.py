@@ -1,4 +1,4 @@
-"""Sending: haptics at once, telemetry where there is room, pictures in pieces that are joined again."""
+"""Sending: haptics leave at once, telemetry if the budget permits, and pictures in pieces that are joined again."""
 
 from common.emulation.spec import LinkSpec
 from common.rate.outgoing_queue import OutgoingQueue

@@ -1,4 +1,4 @@
-"""Nearest points against scipy's convex hulls and non-negative least squares, and distances made of them."""
+"""Nearest points against scipy's convex hulls and non-negative least squares, and distances made from these."""
 
 import math
 from collections.abc import Callable
@@ -40,8 +40,8 @@ repeatable = settings(derandomize=True, deadline=None, max_examples=40)
 def _check_against_hull(points: FloatArray, hulls: list[FloatArray], found: Nearest) -> None:
     """Compare with convex hulls, one for each point.
 
-    Outside, the point reached is on the hull (not too near), and no convex combination of the vertices
-    is nearer (not too far). Inside, the distance is that of the nearest facet plane.
+    For a point outside, the nearest point is on the hull (so not too near), and no convex combination of the vertices
+    is nearer (so not too far). For a point inside, the distance is that of the nearest facet's plane.
     """
     distances, directions = found
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Ellipsoids: nearest point, first touch and overlap, against spheres, a fine mesh, and columns of the overlap."""
+"""Ellipsoids: nearest point, first contact and overlap, against spheres, a fine mesh, and the overlap by columns."""
 
 import math
 from itertools import pairwise
@@ -43,7 +43,7 @@ def overlap(of: FloatArray, center: FloatArray, radius: float) -> tuple[float, F
 
 
 def beside(rng: np.random.Generator, half_axes: FloatArray, depth: float) -> tuple[FloatArray, FloatArray]:
-    """Draw a point `depth` below the surface at a random normal, and this normal, in the own frame."""
+    """Draw a point `depth` below the surface at a random normal; return it and the normal, in the ellipsoid's frame."""
     on_surface = rng.normal(size=3)
     on_surface *= half_axes / np.linalg.norm(on_surface)
     normal = on_surface / half_axes**2
@@ -53,7 +53,7 @@ def beside(rng: np.random.Generator, half_axes: FloatArray, depth: float) -> tup
 
 @pytest.mark.parametrize("depth", [0.0, -1e-4, 1e-3])
 def test_a_needle_that_pierces_the_balls_pole_pushes(depth: float) -> None:
-    """No section between the pole and the outermost node shows where it pierces."""
+    """No section between the pole and the outermost node shows where the needle pierces the ball."""
     of, radius, step = shape(np.zeros(3), np.eye(3), np.array([1e-4, 1e-4, 0.05])), 0.008, 1e-6
     before, after = (overlap(of, np.array([0.0, 0.0, 0.05 - depth + side]), radius)[0] for side in (-step, step))
     _, overlap_gradient = overlap(of, np.array([0.0, 0.0, 0.05 - depth]), radius)

@@ -1,4 +1,4 @@
-"""Overlaps with one mesh of a scene, against those of the library; which meshes are convex."""
+"""Overlaps with one mesh of a scene, against those of the overlap library; and which meshes are convex."""
 
 import numpy as np
 import pytest
@@ -48,7 +48,7 @@ def centers_about(mesh: Mesh, rng: np.random.Generator) -> FloatArray:
 @pytest.mark.parametrize("radius_m", [0.0005, 0.004, 0.02, 0.08])
 @pytest.mark.parametrize("name", SURFACES)
 def test_a_mesh_has_the_overlap_of_the_library(name: str, radius_m: float) -> None:
-    """Before its faces, edges and corners, within it, swallowing it, and where it meets only one plane."""
+    """Spheres lie before the mesh's faces, edges and corners, inside it, around it, or meet only one plane."""
     rng = np.random.default_rng(len(name))
     library, rotation, position = MeshLibrary([Mesh(*SURFACES[name][0])]), random_rotation(rng), rng.normal(size=3)
     mesh = Mesh(*SURFACES[name][0])

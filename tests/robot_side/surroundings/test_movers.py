@@ -1,4 +1,4 @@
-"""Frames as differences from an earlier one, against whole frames."""
+"""Frames as differences from a first frame, against complete frames."""
 
 from dataclasses import fields, replace
 
@@ -26,7 +26,7 @@ def whole(rng: np.random.Generator) -> PerceivedObjects:
 
 
 def elsewhere(objects: PerceivedObjects, things: np.ndarray, rng: np.random.Generator) -> PerceivedObjects:
-    """Move some objects: every number of theirs changes."""
+    """Move some objects, so that every number of theirs changes."""
     changed = {}
     for kind in KINDS:
         mine = np.isin(getattr(objects, kind.owner), things)

@@ -1,4 +1,4 @@
-"""Overlaps with one primitive of a scene, against those of the library: volumes and gradients."""
+"""Overlaps with one primitive of a scene, against those of the overlap library: volumes and gradients."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def each(kernel: Compiled, shapes: FloatArray, centers: FloatArray, radii: Float
 
 
 def assert_equal(found: tuple[FloatArray, ...], expected: tuple[FloatArray, ...], radii: FloatArray) -> None:
-    """Assert equality within 1e-12 of the ball, and of its disc."""
+    """Assert that volumes are equal within 1e-12 of the ball's, and gradients within 1e-12 of its disc's area."""
     ball, disc = 4.0 / 3.0 * np.pi * radii**3, np.pi * radii**2
     assert (np.abs(found[0] - expected[0]) / ball).max() <= EQUAL
     assert (np.abs(found[1] - expected[1]) / disc[:, None]).max() <= EQUAL

@@ -1,4 +1,4 @@
-"""Table of a frame: a row for each primitive, grouped by object; made once, and refused if invalid."""
+"""Table of a frame: a row for each primitive, grouped by object; made once, and refused if the frame is invalid."""
 
 import dataclasses
 import weakref
@@ -97,7 +97,7 @@ def moved(objects: PerceivedObjects, rng: np.random.Generator) -> PerceivedObjec
 
 
 def frame_of(movers: Movers, objects: PerceivedObjects) -> PerceivedObjects:
-    """Return a frame with the movers as in `objects`, and all else as in the first frame."""
+    """Return a frame with the movers as in `objects`, and all other objects as in the first frame."""
     return movers.frame(0.0, movers.numbers_in(objects), objects.roles)
 
 

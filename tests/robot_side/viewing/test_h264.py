@@ -17,7 +17,7 @@ HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
 
 
 def moving(number: int, width: int = 160, height: int = 96) -> Image:
-    """Draw a bright disc that crosses a slope of colours."""
+    """Draw a bright disc that moves across a gradient of colours."""
     rows, columns = np.mgrid[0:height, 0:width]
     picture = np.stack([columns % 256, 2 * rows % 256, 128 + 0 * rows], axis=2)
     picture[np.hypot(rows - height // 2, columns - 20 - 3 * number) < 12] = (250, 250, 90)

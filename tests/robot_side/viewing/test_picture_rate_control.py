@@ -1,4 +1,4 @@
-"""Pictures give way: rate, then quality, then size, and come back slowly in reverse."""
+"""Pictures adapt to a narrow link: first their rate, then quality, then size; and slowly back in reverse."""
 
 from itertools import pairwise
 

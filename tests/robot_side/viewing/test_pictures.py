@@ -1,4 +1,4 @@
-"""Robot side's end of rendering in virtual time, with a companion that acts as the test says."""
+"""Robot side's end of rendering, in virtual time, with a fake companion that acts as each test says."""
 
 from collections.abc import Iterator
 from typing import Literal

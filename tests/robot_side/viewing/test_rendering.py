@@ -1,4 +1,4 @@
-"""Real pictures by the real companion: places of objects, by their colour."""
+"""Pictures rendered by the real companion: objects are found in them by colour."""
 
 from pathlib import Path
 

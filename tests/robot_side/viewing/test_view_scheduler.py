@@ -1,4 +1,4 @@
-"""Views for those who look, in virtual time: their amount, time and content."""
+"""Views for viewers, in virtual time: how many are made, when, and with what content."""
 
 from collections import Counter
 from collections.abc import Iterator

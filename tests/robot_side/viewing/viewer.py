@@ -20,7 +20,7 @@ _COMPANION = b"robot_side.viewing.companion"
 
 @dataclass
 class Seen:
-    """Messages of one stretch of time; ages are those on arrival, by the processes' shared clock."""
+    """Messages received in one stretch of time; ages are those on arrival, by the clock that all processes share."""
 
     began_s: float
     ended_s: float = 0.0
@@ -30,7 +30,7 @@ class Seen:
 
 
 class Viewer:
-    """Participant that looks; the first one is the owner, but drives nothing."""
+    """Participant that watches views; the first one becomes the owner, but drives nothing."""
 
     def __init__(self, control: str, view: str, epoch: int) -> None:
         self._sockets = OperatorSockets(control, view, topics=(VIDEO_TOPIC, SCENE_TOPIC))
@@ -38,12 +38,12 @@ class Viewer:
         self._end = LinkEnd("operator", epoch, clock_domain())
 
     def say(self, now_s: float, what: Mapping[str, Any]) -> None:
-        """Ask for some of overview, first_person and scene; the others end."""
+        """Ask for the given ones of overview, first_person and scene; no others are watched any more."""
         self._sockets.send(encode(self._end.hello(now_s)))
         self._sockets.send(encode(Watch(self._end.stamp(now_s), **what)))
 
     def take(self, seen: Seen, now_s: float) -> None:
-        """Receive all that has arrived."""
+        """Receive all messages that have arrived."""
         for payload in self._sockets.receive():
             message: Any = decode(payload)
             if isinstance(message, StiffnessUpdate):
@@ -57,7 +57,7 @@ class Viewer:
                 seen.views.append((now_s, decode_view(whole)))
 
     def wait(self, seconds: float) -> None:
-        """Wait until something comes."""
+        """Wait until a message arrives."""
         self._sockets.wait(seconds)
 
     def close(self) -> None:
@@ -66,7 +66,7 @@ class Viewer:
 
 
 def look(viewers: Sequence[Viewer], seconds: float, **what: Any) -> Seen:
-    """Let all of them look for a while; return what the first one sees."""
+    """Let all viewers watch for a while; return what the first one receives."""
     clock = MonotonicClock()
     next_s = began_s = clock.now()
     seen, others = Seen(began_s), Seen(began_s)

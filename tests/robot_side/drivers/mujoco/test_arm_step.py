@@ -22,7 +22,7 @@ SPRING = '<joint name="elbow" stiffness="3" springref="-40"'
 
 
 class PlainReference:
-    """Reference in array operations."""
+    """References of the arm's joints, by array operations."""
 
     def __init__(self, position: FloatArray, ends: tuple[FloatArray, FloatArray], windup: FloatArray) -> None:
         self.position, (self.lower, self.upper), self.windup = position, ends, windup
@@ -54,7 +54,7 @@ class PlainReference:
 
 
 class PlainGripper:
-    """Gripper's reference, opening and grip, by interpolation in the travel."""
+    """Reference, opening and grip of the gripper, by interpolation in its travel."""
 
     def __init__(self, travel: GripperTravel) -> None:
         self.travel = travel

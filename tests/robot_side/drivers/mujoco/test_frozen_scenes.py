@@ -78,7 +78,7 @@ def split_geoms(scene: Scene) -> tuple[list[int], list[int]]:
 
 
 def first_hit(scene: Scene) -> Hit | None:
-    """Return where the true gripper ends straight ahead, by bisection of the step with the first contact."""
+    """Return where the true gripper ends if it moves straight ahead: bisect the step with the first contact."""
     data = copy.copy(scene.data)
     # MuJoCo's tree of a body's geoms was built for their original places.
     scene.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE

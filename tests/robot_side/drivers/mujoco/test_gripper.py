@@ -21,7 +21,7 @@ from tests.helpers.arm_models import TENDON_GRIPPER, planar_arm
 
 
 def sweep(openings_m: FloatArray, lengths: FloatArray) -> GripperSweep:
-    """Return a sweep of two jaws with a constant other pair; one finger joint."""
+    """Return a sweep in which two pairs of geoms open and close and a third keeps its distance; one finger joint."""
     controls = np.arange(len(lengths), dtype=np.float64)[:, None]
     gaps_m = np.column_stack([openings_m, openings_m + 0.02, np.full(len(lengths), 0.01)])
     return GripperSweep(controls, lengths[:, None], lengths, gaps_m)

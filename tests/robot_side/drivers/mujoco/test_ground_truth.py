@@ -1,4 +1,4 @@
-"""True distances among many objects, against each pair's own."""
+"""True distances among many objects, against the least over all pairs."""
 
 import itertools
 from pathlib import Path

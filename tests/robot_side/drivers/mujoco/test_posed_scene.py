@@ -83,7 +83,7 @@ def test_a_drift_towards_a_wall_beside_is_not_clear_and_one_away_is(beside: Pose
 
 
 def test_a_turn_goes_along_an_arc(wall: Posed, beside: Posed) -> None:
-    """The tool's point moves where it points: towards a wall beside, by half the angle at first."""
+    """The tool's point moves in the direction in which it points: at first towards a wall beside, by half the angle."""
     for turned, clear in ((0.4, False), (-0.4, True), (0.02, True)):
         assert beside.at().stays_clear(path(0.2, 0.0, turned), 0.0) is clear
     before = wall.at().gap_m()
@@ -121,7 +121,7 @@ def test_a_camera_is_off_by_its_errors_and_the_shift(name: str) -> None:
 
 
 def test_where_things_may_sleep_they_are_moved_as_well() -> None:
-    """With sleep enabled, MuJoCo reads the places of fixed geoms only once."""
+    """With sleep enabled, MuJoCo reads the poses of fixed geoms only once."""
     scene = load_scene(DATA / "wall.xml", "tool")
     scene.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     mujoco.mj_step(scene.model, scene.data)

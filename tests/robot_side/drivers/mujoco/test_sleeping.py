@@ -1,4 +1,4 @@
-"""Objects at rest in a built-in scene sleep where they would rest awake."""
+"""Objects at rest in a built-in scene sleep in the same places in which they would rest awake."""
 
 from pathlib import Path
 from typing import get_args

@@ -39,7 +39,7 @@ class Script:
         return Script(load_scene(path if isinstance(path, Path) else DATA / f"{path}.xml", "tool"), held)
 
     def step(self, velocity_m_s: FloatArray, turning_rad_s: FloatArray = STILL, **joints: float) -> ContactOnset | None:
-        """Step the tool with that velocity, linear and angular, in the world frame; `joints` move at theirs."""
+        """Step the tool with this velocity, linear and angular, in the world frame; `joints` move at their speeds."""
         model, data, robot = self.scene.model, self.scene.data, self.scene.robot
         jacobian = np.zeros((6, model.nv))
         mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], robot.site)
@@ -65,7 +65,7 @@ class Script:
         return None
 
     def go(self, way_m: float, direction: FloatArray = AHEAD) -> "Script":
-        """Move there in steps of a millimetre, each correcting the last one's error."""
+        """Move by this distance in steps of a millimetre, each correcting the error of the last."""
         tool = self.scene.data.site_xpos[self.scene.robot.site]
         path = np.linspace(tool, tool + way_m * direction, math.ceil(way_m / 0.001) + 1)
         for place_m in path[1:]:
@@ -76,7 +76,7 @@ class Script:
 def speed_of_coming_nearer(
     script: Script, velocity_m_s: FloatArray, turning_rad_s: FloatArray = STILL, **joints: float
 ) -> float:
-    """Return the speed from the distances, up to the last step before the contact."""
+    """Return the closing speed from the change of the distance, up to the last step before the contact."""
     gaps = [script.truth.gap_m(script.held)]
     while script.step(velocity_m_s, turning_rad_s, **joints) is None:
         gaps.append(script.truth.gap_m(script.held))

@@ -1,4 +1,4 @@
-"""Driver and the robot side's end of it in virtual time, with a delay both ways and a separate driver clock."""
+"""Driver, and the robot side's end of its connection, in virtual time, with a delay both ways and two clocks."""
 
 from collections import deque
 from typing import Any
@@ -17,7 +17,7 @@ AHEAD_S = 1000.0
 
 
 class DriverDesk:
-    """Wire between both, and a driver that follows velocities perfectly."""
+    """Wire between driver and robot side, and a driver whose arm follows velocities perfectly."""
 
     def __init__(self, delay_s: float = 0.0, measuring_s: float = 0.0, period_s: float = 0.01) -> None:
         self.delay_s, self.measuring_s, self.period_s = delay_s, measuring_s, period_s
@@ -51,7 +51,7 @@ class DriverDesk:
 
     @property
     def drivers_s(self) -> float:
-        """Time of the driver's clock, in seconds."""
+        """Return the time of the driver's clock, in seconds."""
         return self.now_s + AHEAD_S
 
     def say(self, peer: bytes | None = None, **fields: Any) -> None:
@@ -100,5 +100,5 @@ class DriverDesk:
             self.arm.command_gripper(0.0, until_s)
 
     def age_s(self) -> float:
-        """Return the age of the newest state as the robot side assumes it."""
+        """Return the age that the robot side assumes for the newest state."""
         return self.now_s - self.arm.state(self.now_s).time_s
