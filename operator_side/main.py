@@ -1,4 +1,4 @@
-"""Process `feelahead-operator`: settings, parts, and `run`."""
+"""Process `feelahead-operator`: reads the settings, makes the parts, and runs them."""
 
 import secrets
 from collections.abc import Sequence
@@ -25,16 +25,17 @@ from operator_side.viewing.viewing import view_topics
 
 
 def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
-    """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released on every exit.
+    """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released however it ends.
 
-    A real controller may be absent or unplugged: the process waits for it. backend: hidapi if None.
+    If a real controller is absent or unplugged, the process waits for it. backend: used instead of hidapi, if given.
     """
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     status = TerminalStatus("operator") if settings.tui else Status(settings.status, "operator")
     loop = Loop(MOTION_PERIOD_S, REMEDIES, settings.seed)
     with Process(settings, "operator", status, OperatorEncoder(), loop) as process:
-        # First, as its process takes longest; and before the priority is raised, which it would inherit.
+        # The console first, as its process takes longest to start, and before the priority is raised, which the process
+        # would inherit.
         console = None
         if settings.console:
             console = Console(settings.connect, port=settings.console_port, token=settings.console_token)
@@ -59,7 +60,7 @@ def _desk(
     backend: HidBackend | None,
     console: Console | None,
 ) -> Devices:
-    """Open the controller."""
+    """Open the controller, and return it with the page and the console."""
     pages, stack = DrivingPage(), process.stack
     search, guard, person = DEVICES[settings.device](OpeningParts(settings, core, pages, backend))
     pages.may_drive = person is not None

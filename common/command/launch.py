@@ -42,8 +42,10 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
         missing = (error.name or "").partition(".")[0]
         if missing in _OURS:
             raise
-        wanted = "feelahead" if extra is None else f"feelahead[{extra}]"
-        sys.stderr.write(f"{program}: {missing} is not installed on this machine; valid: pip install '{wanted}'\n")
+        wanted = "." if extra is None else f".[{extra}]"
+        sys.stderr.write(
+            f"{program}: {missing} is not installed on this machine; valid: pip install '{wanted}' in the clone\n"
+        )
         sys.exit(_BAD_INPUT)
     try:
         for number in () if has_summary else STOP_SIGNALS:

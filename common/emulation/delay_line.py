@@ -49,6 +49,11 @@ class DelayLine(Generic[Item]):
         self._last_due_s = -math.inf
         self._follow(profile)
 
+    def begin(self, now_s: float) -> None:
+        """Count outages from `now_s`, unless they count already: those of a link's streams coincide."""
+        if self._start_s is None:
+            self._start_s = now_s
+
     def change(self, profile: LinkProfile) -> None:
         """Apply `profile` from the next push on; waiting messages keep their due times, and the figures continue."""
         if profile != self.profile:

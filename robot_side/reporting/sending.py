@@ -76,6 +76,8 @@ class Sending:
                     self._sockets.publish(topic, message.payload)
 
     def _enter(self, message: Outgoing, topic: bytes, now_s: float) -> None:
+        for line in self._lines.values():
+            line.begin(now_s)
         self._lines[message.stream].push(now_s, _Leaving(message, topic), len(message.payload))
 
     def tune(self, words: str) -> None:

@@ -41,7 +41,7 @@ def main() -> None:
     try:
         import simplejpeg  # noqa: F401, PLC0415  # may be missing
     except ImportError as error:
-        _refuse(channel, f"{error}; to mend it: pip install 'feelahead[robot]'")
+        _refuse(channel, f"{error}; to mend it: pip install '.[robot]' in the clone")
         return
     _serve(channel)
 

@@ -18,7 +18,7 @@ from rich.text import Text
 from common.command.command_line import parse_settings
 from common.sockets.authentication import OperatorKeys
 from feelahead.commands.doctor import controllers, link, machine
-from feelahead.commands.doctor.finding import Finding, Verdict, fit_for_demo
+from feelahead.commands.doctor.finding import Finding, Verdict, can_be
 from feelahead.commands.doctor.path import measure_path_along, path_line
 from feelahead.commands.doctor.port import RobotAddress
 
@@ -76,13 +76,13 @@ def doctor(arguments: Sequence[str]) -> int:
     if settings.compile:
         return machine.compile_kernels(as_json=settings.json)
     findings = examine()
-    fit = fit_for_demo(findings)
+    robot, operator = can_be("robot", findings), can_be("operator", findings)
     if settings.json:
-        found = {"demo": fit, "findings": [dataclasses.asdict(finding) for finding in findings]}
+        found = {"demo": robot, "operator": operator, "findings": [dataclasses.asdict(finding) for finding in findings]}
         sys.stdout.write(json.dumps(found, indent=2) + "\n")
     else:
         show(findings, Console(width=None if sys.stdout.isatty() else _WIDTH_WITHOUT_TERMINAL))
-    return 0 if fit else 1
+    return 0 if robot or operator else 1
 
 
 def _look_along(settings: DoctorSettings, connect: str) -> int:
@@ -103,6 +103,7 @@ def _look_along(settings: DoctorSettings, connect: str) -> int:
 def examine() -> list[Finding]:
     """Run every check of this machine, in the order of the table."""
     seen = controllers.controllers_seen()
+    absent = machine.failed_imports("robot")
     rules, is_root = controllers.udev_rules(), hasattr(os, "geteuid") and os.geteuid() == 0
     return [
         Finding("Python", Verdict.OK, platform.python_version()),
@@ -110,7 +111,7 @@ def examine() -> list[Finding]:
         controllers.check_permission(is_root=is_root, rules=rules, controllers=seen),
         *seen,
         *machine.check_kernels(machine.kernel_facts()),
-        machine.check_rendering(machine.rendering_troubles()),
+        *([machine.check_rendering(machine.rendering_troubles())] if "mujoco" not in absent else []),
         *machine.check_realtime(machine.realtime_notes()),
     ]
 
@@ -128,5 +129,9 @@ def show(findings: list[Finding], console: Console) -> None:
     for finding in remedies:
         console.print(Text(f"{finding.name}:", _COLOURS[finding.verdict]))
         console.print(finding.remedy, markup=False, highlight=False, soft_wrap=True)
-    fit = fit_for_demo(findings)
-    console.print("The demo can run: feelahead demo" if fit else "The demo cannot run as it is: see what is missing.")
+    if can_be("robot", findings):
+        console.print("The demo can run: feelahead demo")
+    elif can_be("operator", findings):
+        console.print("This machine can be the operator side: feelahead-operator. The demo needs the extra robot, too.")
+    else:
+        console.print("Neither side can run as it is: see what is missing.")

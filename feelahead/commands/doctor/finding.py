@@ -26,6 +26,6 @@ class Finding:
     """Command or change that mends it; None if nothing is to do."""
 
 
-def fit_for_demo(findings: list[Finding]) -> bool:
-    """Return whether the demo can run: it needs one extra."""
-    return not any(finding.name == "extra robot" and finding.verdict is Verdict.MISSING for finding in findings)
+def can_be(side: str, findings: list[Finding]) -> bool:
+    """Return whether this machine can be this side: it needs the extra of that name. The demo needs the robot side."""
+    return any(finding.name == f"extra {side}" and finding.verdict is Verdict.OK for finding in findings)

@@ -59,8 +59,8 @@ def check_extra(extra: str, failures: Mapping[str, str]) -> Finding:
     broken = [f"{module} ({reason})" for module, reason in failures.items() if module not in absent]
     reasons = {"not installed": absent, "cannot be imported": broken}
     said = "; ".join(f"{how}: {', '.join(found)}" for how, found in reasons.items() if found)
-    remedy = f"pip install {'--force-reinstall ' if broken else ''}'feelahead[{extra}]'"
-    return Finding(name, Verdict.MISSING if extra == "robot" else Verdict.NOTE, f"{said} (for {purpose})", remedy)
+    remedy = f"pip install {'--force-reinstall ' if broken else ''}'.[{extra}]'  # in the clone"
+    return Finding(name, Verdict.NOTE, f"{said} (for {purpose})", remedy)
 
 
 def check_kernels(facts: KernelFacts | None) -> list[Finding]:
@@ -158,7 +158,7 @@ def compile_kernels(*, as_json: bool) -> int:
 
         kernels = import_kernels()
     except ImportError as error:
-        raise ConfigurationError(f"--compile: {error}; valid: with pip install 'feelahead[robot]'") from error
+        raise ConfigurationError(f"--compile: {error}; to install it: pip install '.[robot]' in the clone") from error
     missing = {kernel.name for kernel in kernels if not kernel.is_kept}
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("compiling", total=max(len(missing), 1))

@@ -50,7 +50,7 @@ class OverlapSweep(Sweep):
     """Measure run time and error of the overlaps and of their alternatives, on the same pairs in the same run.
 
     The alternatives: the published package `overlap` 0.2.0 from Python and in C++, 29 satellite points and Monte Carlo.
-    Alternatives missing on this machine are named: pip install 'feelahead[bench]' brings the package; the C++ row needs
+    Alternatives missing on this machine are named: pip install '.[bench]' brings the package; the C++ row needs
     a compiler, Eigen (apt-get install libeigen3-dev) and the package's header:
 
         pip download --no-deps --no-binary overlap overlap==0.2.0 && tar xzf overlap-0.2.0.tar.gz

@@ -1,9 +1,11 @@
-"""Process of the console: from the operator side to viser and the pages, and back.
+"""Console process: passes facts from the operator side to viser and the pages, and the pages' messages back.
+
+Each message on the channel begins with a letter:
 
 operator side ──▶ here    f facts, v a view payload as received, n a note, r the constants of a run,
                           p the position in a recording, d the run's normal end
-here ──▶ operator side    a the address, w the number of open pages, s a page's words, e the reason for none,
-                          l the H.264 pictures that are lacking: once if they can be shown, and at each change
+here ──▶ operator side    a the address, w the number of visible pages, s a page's message, e why there is no console,
+                          l the H.264 pictures that are lacking: first once H.264 can be shown, then at each change
 """
 
 import asyncio
@@ -41,19 +43,19 @@ from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts, ShownKind
 
 _NICENESS: Final = 5
-"""Increment of niceness once it serves, so that both sides have priority"""
+"""Increment of this process's niceness once it serves, so that both sides have priority"""
 _FRAME: Final = struct.Struct("<Bd")
-"""Header of a picture: its view, and its time on the robot side's clock"""
+"""Header of a picture: number of its view, and its capture time on the robot side's clock"""
 _MOST_LISTED: Final = 6
 _LAST_WORDS_S: Final = 0.1
-"""Time for pages to receive the last message, in seconds"""
+"""Seconds that pages have to receive the last message before the process ends"""
 _SLOW_PERIOD_S: Final = 0.25
-"""Period of drawings for a browser without a graphics processor, in seconds"""
+"""Seconds between scene updates if a browser draws without a graphics processor"""
 _LASTING: Final = {b"r": ShownKind.RUN, b"p": ShownKind.PLAYER}
 
 
 class _Process:
-    """The process; all but its first and last moment runs in the server's thread."""
+    """Console process. After the start, everything runs in the server's thread."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
@@ -67,7 +69,7 @@ class _Process:
         self._lacks: tuple[int, int] | None = None
 
     def run(self, port: int, token: str) -> None:
-        """Serve until the channel ends; report through it if that is impossible."""
+        """Serve until the channel ends. If serving is impossible, report the reason through the channel."""
         try:
             from operator_side.viewing.console.drawing import Drawing  # noqa: PLC0415  # an extra, and slow to import
             from operator_side.viewing.console.gate import Gate  # noqa: PLC0415
@@ -76,7 +78,7 @@ class _Process:
             from operator_side.viewing.console.server import Server  # noqa: PLC0415
         except ModuleNotFoundError as error:
             missing = (error.name or "").partition(".")[0]
-            self._give_up(f"{missing} is not installed on this machine; valid: pip install 'feelahead[operator]'")
+            self._give_up(f"{missing} is not installed on this machine; valid: pip install '.[operator]' in the clone")
             return
         part = socket.socket()
         part.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -139,7 +141,7 @@ class _Process:
             loop.call_later(_LAST_WORDS_S, self._ended.set)
 
     def _take(self, kind: bytes, content: bytes) -> SceneState | None:
-        """Take one message; return a scene's state to the caller, as only the newest counts."""
+        """Take one message. Return a scene's state instead of drawing it: the caller draws only the newest."""
         if kind == b"f":
             self._facts = facts = msgspec.msgpack.decode(content, type=OperatorFacts)
             at = [None if trigger.raw is None else SENSED_TRAVEL * trigger.raw for trigger in (facts.l2, facts.r2)]
@@ -208,7 +210,7 @@ class _Process:
 
 
 def said(facts: OperatorFacts) -> dict[str, Any]:
-    """Make the words of a page, and its look; None for unknown ones."""
+    """Return the texts that a page shows, and the look (`Look`) of its state; None for what is unknown."""
     status, view = facts.status, LiveView(None, facts.status)
     state = view.phase if view.alarm or view.look is Look.STARTING else words(view.look)
     return {
@@ -223,7 +225,7 @@ def said(facts: OperatorFacts) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Run the companion process. Arguments: the channel's number, the port, and the file with a token, if given."""
+    """Run the console process. Arguments: the channel's file descriptor, the port, and a file with a token, if any."""
     channel, (port, *token) = companion_channel(sys.argv[1:])
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # no line for each refused request
     _Process(channel).run(int(port), Path(token[0]).read_text().strip() if token else secrets.token_urlsafe(24))

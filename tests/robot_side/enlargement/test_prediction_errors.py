@@ -1,4 +1,4 @@
-"""Errors of the predicted displacement, from a table."""
+"""Mean and standard deviation of the predicted displacement's error, by a table over the loop age."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Reaction of the session to an arm that sends no new states, or only old ones, in virtual time."""
+"""An arm that gives no new states, or only old ones, is stopped and disarmed, in virtual time."""
 
 import re
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Changes of P and of the link during a run: only by the owner, only if permitted, completely or not at all."""
+"""Changes of the probability P and the emulated link during a run: only by the owner, if permitted, and whole."""
 
 from dataclasses import replace
 

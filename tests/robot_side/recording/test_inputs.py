@@ -1,4 +1,4 @@
-"""Arm states and frames are the same bit for bit after encoding and decoding, also as changes."""
+"""Recorded arm states and frames of objects are read back bit for bit, also those stored as differences."""
 
 from dataclasses import fields, replace
 from typing import Any

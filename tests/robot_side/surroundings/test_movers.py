@@ -1,4 +1,4 @@
-"""Frames as differences from a first frame, against complete frames."""
+"""Frames of objects that are given as differences from an earlier frame equal whole frames."""
 
 from dataclasses import fields, replace
 
@@ -26,7 +26,7 @@ def whole(rng: np.random.Generator) -> PerceivedObjects:
 
 
 def elsewhere(objects: PerceivedObjects, things: np.ndarray, rng: np.random.Generator) -> PerceivedObjects:
-    """Move some objects, so that every number of theirs changes."""
+    """Return a frame in which all numbers of the objects `things` are different."""
     changed = {}
     for kind in KINDS:
         mine = np.isin(getattr(objects, kind.owner), things)

@@ -1,4 +1,4 @@
-"""Pictures adapt to a narrow link: first their rate, then quality, then size; and slowly back in reverse."""
+"""Pictures on a slow link: their rate is reduced, then quality, then size; later all return slowly, in reverse."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Views for viewers, in virtual time: how many are made, when, and with what content."""
+"""Which pictures and scenes are sent to operators who ask for views, when and how many, in virtual time."""
 
 from collections import Counter
 from collections.abc import Iterator

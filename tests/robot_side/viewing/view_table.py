@@ -1,4 +1,4 @@
-"""Robot side with an operator who watches views, driven in virtual time as its loop drives it."""
+"""Robot side with an operator who watches its views, run in virtual time as the real loop runs it."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -27,7 +27,7 @@ TABLES: list["Table"] = []
 
 @dataclass
 class Table:
-    """Robot side with an operator who watches views; its companion answers after 4 ms."""
+    """Robot side, an operator who watches its views, and a stand-in companion that answers after 4 ms."""
 
     settings: RobotSettings = field(default_factory=RobotSettings)
     link: LinkSpec = field(default_factory=LinkSpec)

@@ -1,4 +1,4 @@
-// The page: shows the console's messages as they arrive.
+// Main script of the page: shows the console's messages as they arrive.
 import { Chart } from "./charts.js";
 import { Hands as PageHands } from "./hands.js";
 import { make } from "./make.js";
@@ -11,7 +11,7 @@ const SILENCE_MS = 400; // facts come 30 times a second
 const RETRY_MS = 500;
 const MOST_NOTES = 50;
 const FIGURES = {
-  // in the bar: element and title
+  // figures in the bar: id of the element, and title
   link: "Link",
   lease: "Lease",
   whose: "Hands",
@@ -89,7 +89,7 @@ function receive(message) {
   }
 }
 
-// Recording of a robot side alone: its pictures and scene exist, and nothing of an operator side.
+// Show a recording made by a robot side alone: it has pictures and a scene, but no facts of an operator side.
 function goWithoutFacts(atS) {
   everHeard = true;
   clock.set(atS, null);
@@ -132,7 +132,7 @@ function showFacts(message) {
   hands.show(facts);
 }
 
-// Rate and queue as measured by the robot side, lost packets, and held-back streams.
+// Show rate and queueing delay as measured by the robot side, lost packets, and streams that are held back.
 function showLink(status) {
   const figure = (value, digits = 0) => (value == null ? "?" : value.toFixed(digits));
   const rate = status.rate_kbit_s == null ? "?" : `${figure(status.rate_kbit_s / 1000, 1)} Mbit/s`;
@@ -154,14 +154,16 @@ byId("drawn").onclick = ({ currentTarget }) => {
   if (!drawn) frame.removeAttribute("src");
 };
 
-// Without a graphics processor the drawing takes processor time from all else: it is drawn less often.
+// Whether the browser draws without a graphics processor: the scene then takes much processor time, so it is updated
+// less often.
 function drawsSlowly() {
   const context = document.createElement("canvas").getContext("webgl");
   const renderer = context?.getParameter(context.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? 0);
   return /swiftshader|llvmpipe|software|basic render/i.test(renderer ?? "software");
 }
 
-// Under our other name the scene is another site, in a separate process: drawing it slows nothing here.
+// Address of the scene under our other host name (localhost or 127.0.0.1). The browser treats that as another site,
+// in a process of its own, so that drawing the scene does not slow this page.
 function sceneAddress() {
   const address = new URL("scene/", location.href);
   address.hostname = location.hostname === "localhost" ? "127.0.0.1" : "localhost";
@@ -170,7 +172,7 @@ function sceneAddress() {
 }
 
 function showScene(scene) {
-  // Earlier, viser has no camera position for the scene.
+  // Only now, as viser has no camera position before the first scene.
   if (drawn && !frame.src) frame.src = sceneAddress();
   frame.hidden = !drawn;
   charts.overlap.add(clock.nowMs, scene.overlap_mm3);

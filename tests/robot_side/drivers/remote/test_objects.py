@@ -1,4 +1,4 @@
-"""Perceived objects from another process, in virtual time."""
+"""Objects that another process perceives and sends, in virtual time."""
 
 import math
 from typing import Any
@@ -17,11 +17,11 @@ from robot_side.viewing.perceived_shapes import PerceivedModel
 CUP: dict[str, Any] = {"name": "cup", "sphere": 0.05, "position_m": [0.5, 0.0, 0.1]}
 CORNERS = [[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]]
 TURNED = [math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
-"""Quaternion of a right angle about z"""
+"""Quaternion of a rotation by a right angle about z"""
 
 
 class Sender:
-    """Perceiving process, and the wire from it."""
+    """Stand-in for the process that perceives objects, and its connection to the robot side."""
 
     def __init__(self) -> None:
         self.now_s, self.sequence = 10.0, 0
@@ -39,7 +39,7 @@ class Sender:
         return bool(peer)
 
     def says(self, *things: dict[str, Any], peer: bytes = b"eyes", **fields: Any) -> PerceivedObjects:
-        """Send this frame; return the perceived objects."""
+        """Send a frame with these objects; return what the robot side perceives. `fields` replace the frame's own."""
         self.sequence += 1
         frame = {"version": 1, "sequence": self.sequence, "sent_s": 3.0, "taken_s": 2.98, "objects": things} | fields
         self._sent.append((peer, msgpack.packb(frame), self.now_s))
