@@ -24,7 +24,7 @@ class ToolMotionSettings:
     """Speeds of the tool at full travel of a trigger and at full deflection of a stick."""
 
     trigger_speed_m_s: _Speed = 0.25
-    """At full travel of a trigger; the default is ISO 10218's reduced speed for an arm near people."""
+    """Speed at full travel of a trigger; the default is ISO 10218's reduced speed for an arm near people."""
     stick_speed_m_s: _Speed = 0.1
     turn_speed_rad_s: _Speed = 0.5
 

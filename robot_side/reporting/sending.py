@@ -19,11 +19,11 @@ class Sockets(Protocol):
     """Sockets for sending."""
 
     def send(self, peer: bytes, payload: bytes, *, everywhere: bool) -> bool:
-        """Send to one peer."""
+        """Send a payload to one peer; everywhere: over each of its connections."""
         ...
 
     def publish(self, topic: bytes, payload: bytes) -> None:
-        """Send to all viewers."""
+        """Send a payload to all viewers, under `topic`."""
         ...
 
 

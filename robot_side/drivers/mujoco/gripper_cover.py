@@ -147,7 +147,7 @@ def _with_rows(part: _Part, stand_out_m: float) -> tuple[FloatArray, FloatArray,
 
 
 def link_solids(model: Any, geoms: Sequence[int]) -> list[Solid]:
-    """Return the true shapes of one link's geoms as polyhedra, in the link's frame; without shapes of no volume."""
+    """Return the true shapes of one link's geoms as polyhedra, in the link's frame, except those without volume."""
     identity, origin, solids = Rotation.identity(), np.zeros(3), []
     for geom in geoms:
         part = _part(model, geom, identity, origin)

@@ -56,9 +56,9 @@ class GripperTravel:
     references: FloatArray
     """(k,) inputs as shares of the way from open (0) to closed (1), rising"""
     lengths: FloatArray
-    """(k,) positions of the first actuator at these inputs, rising or falling"""
+    """(k,) positions of the first actuator at the inputs `references`, rising or falling"""
     openings_m: FloatArray
-    """(k,) free gaps between the fingers at these inputs, in m"""
+    """(k,) free gaps between the fingers at the inputs `references`, in m"""
     force_lead: float
     """Lead of the reference over a blocked drive that gives the largest allowed force, as a share of the stroke"""
     lag_s: float

@@ -107,7 +107,8 @@ class ObjectPrimitives:
         return seen[self._primitives.owners]
 
     def moving(self, things: IntArray, roles: Mapping[str, Role]) -> "MovingPrimitives":
-        """Return the primitives of the objects `things` (m,), ascending, in the order of `movers`; no ignored ones."""
+        """Return the primitives of the objects `things` (m,), ascending, in the order of `movers`, but of none
+        ignored."""
         owners = self._primitives.owners
         kept = np.flatnonzero(self._seen(roles) & np.isin(owners, things))
         kept = kept[np.argsort(owners[kept], kind="stable")]

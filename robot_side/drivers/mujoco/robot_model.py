@@ -42,7 +42,7 @@ class RobotModel:
     gripper_actuators: IntArray
     """(g,) actuators that move the finger joints"""
     gripper_controls: IntArray
-    """(g,) indices of these actuators in ctrl"""
+    """(g,) indices of the gripper's actuators in ctrl"""
     fingerprint: str
     """Twelve hexadecimal digits that identify an arm by its joints, links and limits, wherever its base is"""
     gripper_geoms: IntArray
