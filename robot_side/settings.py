@@ -66,8 +66,8 @@ class RobotSettings(SideOptions):
     """Robot side: a simulated arm that warns of contact ahead and allows for its own measurement errors.
 
     It listens for an operator side, moves while commands keep coming, and answers with the stiffness of the two
-    triggers. Any MJCF arm: --model FILE.xml --site NAME, the site between the fingertips with its z axis along the
-    approach. A model of the arm alone gets the built-in table.
+    triggers. For any MJCF arm give --model FILE.xml --site NAME. The site is between the fingertips, and its z axis is
+    along the approach. A model of the arm alone gets the built-in table.
     """
 
     bind: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT")] = "tcp://127.0.0.1:5555"

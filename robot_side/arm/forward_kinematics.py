@@ -65,13 +65,13 @@ class Placed(NamedTuple):
     """Tool and points in the world frame; every array is new."""
 
     tool_position_m: FloatArray
-    """(3,)"""
+    """(3,) origin of the tool's frame"""
     tool_rotation: FloatArray
     """(3, 3) tool to world"""
     tool_jacobian: FloatArray
-    """(6, n) linear rows first"""
+    """(6, n) Jacobian of the tool, linear rows first"""
     points_m: FloatArray
-    """(m, 3)"""
+    """(m, 3) positions of the points"""
 
 
 def place(tree: LinkTree, arm_readings: FloatArray, finger_readings: FloatArray, link_poses: FloatArray) -> Placed:

@@ -79,13 +79,13 @@ class GripperPose:
     """
 
     tool_position_m: FloatArray
-    """(3,)"""
+    """(3,) origin of the tool's frame"""
     tool_rotation: FloatArray
     """(3, 3) tool to world; the approach axis is the last column."""
     tool_jacobian: FloatArray
     """(6, n) in the world frame, linear rows first."""
     sphere_centers_m: FloatArray
-    """(m, 3)"""
+    """(m, 3) centres of the gripper's spheres"""
     sphere_radii_m: FloatArray
     """(m,) radii before the enlargement"""
     sphere_on_finger: BoolArray
@@ -105,7 +105,7 @@ class GripperKinematics(Protocol):
 
     @property
     def has_fingers(self) -> bool:
-        """Whether any sphere is on a finger."""
+        """Whether any of the gripper's spheres is on a finger."""
         ...
 
     def pose(self, state: ArmState) -> GripperPose:

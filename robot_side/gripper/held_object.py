@@ -20,7 +20,7 @@ class HeldObject:
     """Object and its spheres, which are fixed in the tool frame since the grip."""
 
     index: int
-    """Index among the perceived objects' names."""
+    """Index of the object among the perceived objects."""
     name: str
     centers_in_tool_m: FloatArray
     """(k, 3) centres of the object's spheres in the tool frame, contiguous"""

@@ -31,9 +31,9 @@ class SphereCover:
     """
 
     centers_m: FloatArray
-    """(m, 3) in the frame of the given boxes"""
+    """(m, 3) centres of the spheres, in the frame in which the boxes are given"""
     radii_m: FloatArray
-    """(m,)"""
+    """(m,) radii of the spheres"""
     box: IntArray
     """(m,) index of each sphere's box, ascending"""
     stand_out_m: FloatArray

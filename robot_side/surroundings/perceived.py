@@ -28,28 +28,28 @@ class PerceivedObjects:
     """
 
     time_s: float
-    """Time of the frame"""
+    """Time of the frame, in s"""
     names: tuple[str, ...]
     roles: tuple[Role, ...]
     sphere_centers_m: FloatArray
-    """(s, 3)"""
+    """(s, 3) centres of the spheres"""
     sphere_radii_m: FloatArray
-    """(s,)"""
+    """(s,) radii of the spheres"""
     sphere_object: IntArray
     box_centers_m: FloatArray
     """(b, 3)"""
     box_rotations: FloatArray
-    """(b, 3, 3) box to world"""
+    """(b, 3, 3) rotations of the boxes, box to world"""
     box_half_sizes_m: FloatArray
     """(b, 3)"""
     box_object: IntArray
     tetrahedron_vertices_m: FloatArray
-    """(t, 4, 3)"""
+    """(t, 4, 3) corners of the tetrahedra"""
     tetrahedron_object: IntArray
     half_space_normals: FloatArray
-    """(p, 3) unit; solid where normal·x <= offset"""
+    """(p, 3) unit normals of the half-spaces, which are solid where normal·x <= offset"""
     half_space_offsets_m: FloatArray
-    """(p,)"""
+    """(p,) offsets of the half-spaces"""
     half_space_object: IntArray
     mesh_library: "MeshLibrary | None" = None
     """Shapes of meshes, prepared once for all frames; None without meshes"""
@@ -58,12 +58,12 @@ class PerceivedObjects:
     mesh_positions_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     """(q, 3) origins of the meshes' own frames"""
     mesh_rotations: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
-    """(q, 3, 3) mesh to world"""
+    """(q, 3, 3) rotations of the meshes, mesh to world"""
     mesh_object: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     ellipsoid_centers_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     """(e, 3)"""
     ellipsoid_rotations: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
-    """(e, 3, 3) ellipsoid to world"""
+    """(e, 3, 3) rotations of the ellipsoids, ellipsoid to world"""
     ellipsoid_half_axes_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     """(e, 3)"""
     ellipsoid_object: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))

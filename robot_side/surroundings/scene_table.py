@@ -34,7 +34,7 @@ class MoverRows:
 
 @dataclass(eq=False)
 class SceneTable:
-    """Primitives (n rows) of k objects, in the order of the objects."""
+    """Table of the primitives (n rows) of k objects, in the order of the objects."""
 
     objects: PerceivedObjects
     bounds: FloatArray
@@ -50,7 +50,7 @@ class SceneTable:
     object_bounds: FloatArray
     """(k, 4) centre and radius of a sphere around each object"""
     object_volumes: FloatArray
-    """(k,) in m³"""
+    """(k,) volume of each object, in m³"""
     flat: int
     """Number of primitives left out because they have no volume, so that nothing can overlap them"""
     order: InitVar[IntArray | None] = None

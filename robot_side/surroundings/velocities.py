@@ -12,7 +12,7 @@ WINDOW_S = 0.2
 
 
 _FRAMES: Final = 8
-"""Initial capacity in frames"""
+"""Number of frames for which memory is reserved at first"""
 
 
 class ObjectVelocities:

@@ -29,7 +29,7 @@ class Encoder:
         return readings
 
     def noise(self, count: int) -> FloatArray:
-        """Draw `count` standard normal numbers, the noise of the next readings in `reading`."""
+        """Draw `count` standard normal numbers, which are the noise of the next readings."""
         drawn: FloatArray = self._noise.standard_normal(count)
         return drawn
 

@@ -29,7 +29,7 @@ class GripperCover:
     centers_m: FloatArray
     """(m, 3) centres, each in the frame of the sphere's link"""
     radii_m: FloatArray
-    """(m,)"""
+    """(m,) radii of the spheres"""
     bodies: IntArray
     """(m,) body of each sphere's link"""
     stand_out_m: float

@@ -107,8 +107,10 @@ class ObjectPrimitives:
         return seen[self._primitives.owners]
 
     def moving(self, things: IntArray, roles: Mapping[str, Role]) -> "MovingPrimitives":
-        """Return the primitives of the objects `things` (m,), ascending, in the order of `movers`, but of none
-        ignored."""
+        """Return the primitives of those objects of `things` (m,), ascending, that are not ignored.
+
+        The order is that of `movers`.
+        """
         owners = self._primitives.owners
         kept = np.flatnonzero(self._seen(roles) & np.isin(owners, things))
         kept = kept[np.argsort(owners[kept], kind="stable")]

@@ -1,8 +1,8 @@
 """Contact of a moving sphere with a closed mesh, convex or not.
 
-The overlap rises only by the part of the surface that faces the motion and lies in the ball: dV/dE = -∫ n·û dA. So
-only the triangles in front count, those with n·û < 0: the next rise begins where the sphere next touches one.
-All coordinates are in the mesh's own frame; the trees are walked as in `tree_queries`.
+The overlap rises only by the part of the surface that faces the motion and lies in the ball: dV/dE = -∫ n·û dA. So only
+the triangles in front count, those with n·û < 0: the overlap may next rise where the sphere next touches such a
+triangle. All coordinates are in the mesh's own frame; the trees are walked as in `tree_queries`.
 """
 
 import math
@@ -35,7 +35,7 @@ class Sweep(NamedTuple):
 
 @inlined
 def swept(start: Vector, along: Vector, radius: float, reach: float) -> Sweep:
-    """Make a sweep."""
+    """Return the sweep of a sphere, with `by_axis` computed."""
     return Sweep(start, along, radius, reach, (way_by(along[0]), way_by(along[1]), way_by(along[2])))
 
 
