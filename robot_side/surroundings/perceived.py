@@ -37,11 +37,11 @@ class PerceivedObjects:
     """(s,) radii of the spheres"""
     sphere_object: IntArray
     box_centers_m: FloatArray
-    """(b, 3)"""
+    """(b, 3) centres of the boxes"""
     box_rotations: FloatArray
     """(b, 3, 3) rotations of the boxes, box to world"""
     box_half_sizes_m: FloatArray
-    """(b, 3)"""
+    """(b, 3) half sizes of the boxes"""
     box_object: IntArray
     tetrahedron_vertices_m: FloatArray
     """(t, 4, 3) corners of the tetrahedra"""
@@ -61,11 +61,11 @@ class PerceivedObjects:
     """(q, 3, 3) rotations of the meshes, mesh to world"""
     mesh_object: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     ellipsoid_centers_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
-    """(e, 3)"""
+    """(e, 3) centres of the ellipsoids"""
     ellipsoid_rotations: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
     """(e, 3, 3) rotations of the ellipsoids, ellipsoid to world"""
     ellipsoid_half_axes_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
-    """(e, 3)"""
+    """(e, 3) half axes of the ellipsoids"""
     ellipsoid_object: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     positions_m: FloatArray | None = field(default_factory=lambda: None)
     """(k, 3) origin of each object's own frame (its first primitive's) in the world frame; None if unknown"""
