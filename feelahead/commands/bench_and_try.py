@@ -53,7 +53,8 @@ class Menu:
         except (ImportError, SyntaxError) as error:
             reason = f"{error}; valid: a question's file"
             if name in self.questions and isinstance(error, ModuleNotFoundError):
-                reason = f"{error.name} is not installed; pip install '.[{self.questions[name]}]' in the clone"
+                remedy = f"install it in the clone: pip install '.[{self.questions[name]}]'"
+                reason = f"{error.name} is not installed; {remedy}"
             raise ConfigurationError(f"{self.name} {name}: {reason}") from error
         if name not in self.questions and Path(found.__file__ or "").resolve() != Path(name).resolve():
             raise ConfigurationError(f"{self.name} {name}: named like a module of Python; valid: another name")

@@ -18,7 +18,7 @@ from common.recording.packages import require_packages
 from common.recording.reading import Recording, open_recording
 from feelahead.recordings.playback import require_protocol, require_statuses
 
-_BOTH_SIDES = "pip install '.[robot,operator,record]' in the clone"
+_BOTH_SIDES = "install it in the clone: pip install '.[robot,operator,record]'"
 
 
 @dataclass(frozen=True)

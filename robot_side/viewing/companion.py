@@ -41,7 +41,7 @@ def main() -> None:
     try:
         import simplejpeg  # noqa: F401, PLC0415  # may be missing
     except ImportError as error:
-        _refuse(channel, f"{error}; to mend it: pip install '.[robot]' in the clone")
+        _refuse(channel, f"{error}; install it in the clone: pip install '.[robot]'")
         return
     _serve(channel)
 

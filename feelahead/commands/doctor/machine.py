@@ -158,7 +158,7 @@ def compile_kernels(*, as_json: bool) -> int:
 
         kernels = import_kernels()
     except ImportError as error:
-        raise ConfigurationError(f"--compile: {error}; to install it: pip install '.[robot]' in the clone") from error
+        raise ConfigurationError(f"--compile: {error}; install it in the clone: pip install '.[robot]'") from error
     missing = {kernel.name for kernel in kernels if not kernel.is_kept}
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("compiling", total=max(len(missing), 1))

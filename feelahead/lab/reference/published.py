@@ -46,7 +46,7 @@ class PythonPackage:
 
     def __init__(self) -> None:
         found = importlib.util.find_spec("overlap") is not None
-        self.missing = "" if found else "not installed: pip install '.[bench]' in the clone"
+        self.missing = "" if found else "not installed; in the clone: pip install '.[bench]'"
 
     def volumes(self, pairs: Pairs, *, mend: bool = True) -> FloatArray:
         """Return volumes (p,) with NaN for an exception."""

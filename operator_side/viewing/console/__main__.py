@@ -78,7 +78,7 @@ class _Process:
             from operator_side.viewing.console.server import Server  # noqa: PLC0415
         except ModuleNotFoundError as error:
             missing = (error.name or "").partition(".")[0]
-            self._give_up(f"{missing} is not installed on this machine; valid: pip install '.[operator]' in the clone")
+            self._give_up(f"{missing} is not installed; install it in the clone: pip install '.[operator]'")
             return
         part = socket.socket()
         part.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
