@@ -74,7 +74,7 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class SideOptions(RunOptions):
-    """Options of a side that runs in a process of its own."""
+    """Options of a side that runs in its own process."""
 
     realtime: bool = False
     """Use real-time scheduling and locked memory; if they are not permitted, a note names the command that permits

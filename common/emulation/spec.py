@@ -61,7 +61,7 @@ class LinkSpec:
         return cls(clauses, seed, model)
 
     def profile(self, direction: Direction, stream: Stream = "haptics") -> LinkProfile:
-        """Return the profile of `stream` in `direction`. Each has a seed of its own, so that no two are correlated."""
+        """Return the profile of `stream` in `direction`. Each has its own seed, so that no two are correlated."""
         directions, streams = get_args(Direction), get_args(Stream)
         if direction not in directions:
             raise ValueError(f"direction = {direction!r}; valid: {choices(Direction)}")

@@ -40,7 +40,7 @@ starting."""
 
 @dataclass(eq=False)
 class _Connection(TurnConnection):
-    """Control connection to the robot side, with a socket of its own."""
+    """Control connection to the robot side, with its own socket."""
 
     part: "zmq.Socket[bytes]"
     inbox: Inbox

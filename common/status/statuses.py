@@ -70,7 +70,7 @@ class RobotStatus(SideStatus, frozen=True, kw_only=True):
     target_mm: float | None = None
     tick_us: float | None = None
     """This field and the next four are of the ticks since the previous status. They are known only if the side runs in
-    a process of its own"""
+    its own process"""
     tick_p99_us: float | None = None
     overruns: int | None = None
     late_us: float | None = None
@@ -97,7 +97,7 @@ class OperatorStatus(SideStatus, frozen=True, kw_only=True):
     """Distance from the point between the fingertips to the target's centre"""
     holding: bool | None = None
     controller: ConnectionState | None = None
-    """This field and those below are known only if the side runs in a process of its own"""
+    """This field and those below are known only if the side runs in its own process"""
     triggers_released: bool | None = None
     person: Doing | None = None
     """Action of the simulated person or of the page that drives"""

@@ -9,7 +9,7 @@ from common.command.status import Status
 
 
 def show_address(address: str, status: Status) -> None:
-    """Show the address on a line of its own; on a terminal with a display, also open the page."""
+    """Show the address on its own line; on a terminal with a display, also open the page."""
     if not status.event("console", address=address):
         status.note(f"the console: {address}")
     if sys.stdout.isatty() and has_display():

@@ -30,7 +30,9 @@ class Journal:
         if path is None:
             return
         if path.exists() and not path.is_file():
-            raise ConfigurationError(f"--resume {path}: not a regular file; valid: a file of its own, or a new one")
+            raise ConfigurationError(
+                f"--resume {path}: not a regular file; valid: a new file, or one that --resume wrote"
+            )
         try:
             with ExitStack() as stack:
                 self._file = stack.enter_context(FileIO(path, "a+"))
@@ -38,7 +40,7 @@ class Journal:
                 self._load(path, self._file, json.dumps({"made_by": made_by}).encode())
                 stack.pop_all()
         except BlockingIOError as error:
-            raise ConfigurationError(f"--resume {path}: another run writes to it; valid: a file of its own") from error
+            raise ConfigurationError(f"--resume {path}: another run writes to it; valid: another file") from error
         except OSError as error:
             raise ConfigurationError(f"--resume {path}: cannot be opened and locked: {error.strerror}") from error
 

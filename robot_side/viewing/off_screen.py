@@ -25,7 +25,7 @@ def choose(backend: str) -> None:
 
 
 def trouble_with(backend: str) -> str | None:
-    """Return the fault of `backend`, in one line; None if it works. To be called in a process of its own."""
+    """Return the fault of `backend`, in one line; None if it works. To be called in its own process."""
     choose(backend)
     try:
         with silenced():

@@ -13,7 +13,7 @@ _LOOP_TURNS: Final = 600
 
 
 class Mixed:
-    """The workload: a step of the demo's physics in a scene of its own, a Python loop of 600 turns, six NumPy calls."""
+    """The workload: a step of the demo's physics in its own scene, a Python loop of 600 turns, six NumPy calls."""
 
     def __init__(self) -> None:
         self._scene = load_scene()
