@@ -47,7 +47,7 @@ _NICENESS: Final = 5
 _FRAME: Final = struct.Struct("<Bd")
 """Header of a picture: number of its view, and its capture time on the robot side's clock"""
 _MOST_LISTED: Final = 6
-_LAST_WORDS_S: Final = 0.1
+_LAST_WORDS_S: Final = 0.3
 """Seconds that pages have to receive the last message before the process ends"""
 _SLOW_PERIOD_S: Final = 0.25
 """Seconds between scene updates if a browser draws without a graphics processor"""
