@@ -42,7 +42,7 @@ class VirtualClock:
     def advance_to(self, now_s: float) -> None:
         """Advance to `now_s`; raises ValueError if that is before the present virtual time, or NaN."""
         if not now_s >= self._now_s:
-            raise ValueError(f"now_s = {now_s} does not lie at or after the clock's present time {self._now_s}")
+            raise ValueError(f"now_s = {now_s} lies before the clock's present time; valid: {self._now_s} or later")
         self._now_s = now_s
 
 

@@ -45,7 +45,7 @@ class RunningStatistics:
     def extend(self, values: Sequence[float]) -> None:
         """Add many samples; raises ValueError, and adds none, if one is not finite."""
         if not all(map(math.isfinite, values)):
-            raise ValueError("values; valid: finite numbers")
+            raise ValueError("values holds NaN or infinity; valid: finite numbers")
         self._waiting.extend(values)
         if len(self._waiting) >= BLOCK:
             self._take_in()
@@ -144,7 +144,7 @@ class SlidingQuantile:
 
     def __init__(self, window: int = 500, probability: float = 0.95) -> None:
         if window < 1:
-            raise ValueError(f"window = {window}; valid: 1 sample or more")
+            raise ValueError(f"window = {window}; valid: a window of 1 sample or more")
         if not 0.0 < probability <= 1.0:
             raise ValueError(f"probability = {probability}; valid: above 0, up to 1")
         self._window = window

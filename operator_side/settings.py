@@ -75,13 +75,17 @@ class OperatorSettings(SideOptions):
         super().__post_init__()
         check_limits(self)
         if self.tui and self.status != "line":
-            raise ValueError(f"--tui with --status {self.status}; valid: one of them")
+            raise ValueError(f"--tui and --status {self.status} exclude each other; valid: only one of them")
         if self.device == "browser" and not self.console:
-            raise ValueError("--device browser without --console: no page could drive; valid: both")
+            raise ValueError("--device browser is given without --console, so no page could drive; valid: both")
         if self.robot_key is not None and self.keys is None:
-            raise ValueError("--robot-key without --keys; valid: both (feelahead keys make operator makes ours)")
+            raise ValueError(
+                "--robot-key is given without --keys; valid: both (`feelahead keys make operator` makes our key)"
+            )
         if self.swap_sides and self.person.pull_n is not None:
-            raise ValueError("--swap-sides with --person.pull-n: valid: one of them, as the finger pulls R2 to advance")
+            raise ValueError(
+                "--swap-sides and --person.pull-n exclude each other, as the finger pulls R2; valid: only one of them"
+            )
 
     @property
     def tells_facts(self) -> bool:

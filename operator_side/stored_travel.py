@@ -35,13 +35,13 @@ class StoredTravel:
                 raise
             self._core.calibrate(TravelCalibration())
             self._reported.discard(controller.address)
-            self._note(f"{error}; its travel is read by the defaults")
+            self._note(f"{error}; the controller's travel is read with the default calibration")
             return
         self._core.calibrate(stored or TravelCalibration())
         if controller.address in self._reported:
             return
         self._reported.add(controller.address)
         if stored is None:
-            self._note("its travel has not been calibrated: feelahead calibrate does that")
+            self._note("the controller's travel has not been calibrated; to calibrate it: feelahead calibrate")
         else:
-            self._note(f"its travel calibration: {calibration_path(controller.address)}")
+            self._note(f"the controller's calibration: {calibration_path(controller.address)}")

@@ -174,7 +174,7 @@ class RobotSide:
         self._heard.on_sent(now_s)
 
     def status(self, now_s: float) -> RobotStatus:
-        """Return the status that a person sees, except for the figures of the process."""
+        """Return the status shown to people, without the figures of the link, which `turns.py` adds."""
         lease, safety, command = self.session.lease, self.session.safety, self.session.safety.command
         delay_s = self.session.link.delay.mean
         status = RobotStatus(

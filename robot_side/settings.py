@@ -94,8 +94,8 @@ class RobotSettings(SideOptions):
     slot: two posts on the way, with 15 to 40 mm of clearance on each side. shelf: a shelf with a raised front edge to
     reach over. The last three are drawn from the seed."""
     law: LawName = "swept"
-    """Law from which stiffness follows. swept: stiffness along each trigger, early enough to release it in time. paper:
-    the paper's plain law, for comparison."""
+    """Law from which stiffness follows. swept: stiffness along the direction of each trigger, early enough to release
+    the trigger in time. paper: the paper's plain law, for comparison."""
     assist: Assist = "none"
     """Help besides stiffness, which a strong finger can overcome. speed: the robot side limits the speed along the
     triggers, so that the arm stops where full strength is due, however hard the finger pulls."""

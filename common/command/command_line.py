@@ -172,7 +172,9 @@ def _one_line(box: str, program: str, settings_type: type) -> str:
     # For an option with several values tyro does not name their kind.
     several = re.match(r"(--\S+): Could not find valid parse for arguments: \[(.*)\]$", said)
     if several:
-        return f"{several[1]} {_shortened(several[2])}: valid: a number for each value"
+        return (
+            f"{several[1]} {_shortened(several[2])}: a value is no number or is missing; valid: a number for each value"
+        )
     for kind, valid in (("float", "a number"), ("int()", "a whole number")):
         if kind in said:
             return f"{_shortened(said)}; valid: {valid}"

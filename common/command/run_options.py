@@ -53,12 +53,13 @@ class RunOptions:
         self.link_spec()
         if abs(self.asymmetry_s()) > _LARGEST_ASYMMETRY_S:
             raise ValueError(
-                f"--asymmetry {self.asymmetry}: valid: -{_LARGEST_ASYMMETRY_S:g}s to {_LARGEST_ASYMMETRY_S:g}s"
+                f"--asymmetry {self.asymmetry}: is out of range;"
+                f" valid: -{_LARGEST_ASYMMETRY_S:g}s to {_LARGEST_ASYMMETRY_S:g}s"
             )
         if self.duration is not None and not 0.0 < self.duration < 1e6:
-            raise ValueError(f"--duration {self.duration}: valid: above 0 and below 1000000 seconds")
+            raise ValueError(f"--duration {self.duration}: is out of range; valid: above 0 and below 1000000 seconds")
         if self.seed < 0:
-            raise ValueError(f"--seed {self.seed}: valid: 0 or a larger whole number")
+            raise ValueError(f"--seed {self.seed}: is negative; valid: 0 or a larger whole number")
         require_output_file("--summary", self.summary)
         require_recordable(self.record)
 

@@ -41,7 +41,7 @@ class Channel:
         self.flush()
         length = sum(map(len, parts))
         if length > MESSAGE_LIMIT_BYTES:
-            raise ValueError(f"a message of {length} bytes; valid: up to {MESSAGE_LIMIT_BYTES}")
+            raise ValueError(f"the message has {length} bytes; valid: up to {MESSAGE_LIMIT_BYTES}")
         if self.ended or (self._waiting and self.waiting + length > self._room_bytes):
             return False
         for part in (_LENGTH.pack(length), *parts):

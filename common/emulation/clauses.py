@@ -47,7 +47,7 @@ class Outage:
     def __post_init__(self) -> None:
         check_limits(self)
         if self.every_s is not None and not self.duration_s < self.every_s < math.inf:
-            raise ValueError(f"every {self.every_s} s; valid: longer than the {self.duration_s:g} s that it lasts")
+            raise ValueError(f"every {self.every_s} s; valid: longer than an outage lasts, {self.duration_s:g} s")
 
     def end_s(self, elapsed_s: float) -> float | None:
         """Return the end of the outage that contains the time `elapsed_s`; None outside of an outage.

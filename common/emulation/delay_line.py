@@ -98,13 +98,15 @@ class DelayLine(Generic[Item]):
             if isinstance(item, (bytes, bytearray)):
                 size_bytes = len(item)
             elif self._rate is not None:
-                raise ValueError("size_bytes is missing; valid: the bytes of an item that is not bytes itself")
+                raise ValueError("size_bytes is missing; valid: the size of an item that is not a bytes object")
             else:
                 size_bytes = 0
         elif size_bytes < 0:
             raise ValueError(f"size_bytes = {size_bytes}; valid: 0 or more")
         if self._corruptions is not None and self._corrupt is None and not isinstance(item, (bytes, bytearray)):
-            raise ValueError("item is not bytes, which the profile corrupts; valid: bytes, or a line with `corrupt`")
+            raise ValueError(
+                "item is not bytes, so the profile cannot corrupt it; valid: bytes, or a line made with `corrupt`"
+            )
         if self._start_s is None:
             self._start_s = now_s
         number = self.figures.sent

@@ -58,7 +58,7 @@ class _Words:
     def value(self, read: Callable[[str, str], _Value], clause: str, name: str) -> _Value:
         """Return the next word, parsed by `read`; raises ConfigurationError if there is none."""
         if (word := self.take()) is None:
-            raise self.error(f"{clause!r} without {name}", clause)
+            raise self.error(f"{clause!r} is given without {name}", clause)
         return read(word, f"link {self.spec!r}: {name}")
 
     def shares(self, clause: str, names: list[str]) -> list[float]:
@@ -71,7 +71,7 @@ class _Words:
         return shares
 
     def error(self, what: str, clause: str | None = None) -> ConfigurationError:
-        valid = GRAMMAR[clause] if clause else f"{GRAMMAR['delay']}, and {', '.join([*GRAMMAR][1:])}"
+        valid = GRAMMAR[clause] if clause else f"clauses such as {GRAMMAR['delay']}, and {', '.join([*GRAMMAR][1:])}"
         return ConfigurationError(f"link {self.spec!r}: {what}; valid: {valid}")
 
 
@@ -85,9 +85,9 @@ def read_fields(profile: str, spec: str, model: LinkModel) -> dict[str, Any]:
     seen: set[str] = set()
     while (clause := words.take()) is not None:
         if clause not in _READERS:
-            raise words.error(f"{clause!r} is unknown there")
+            raise words.error(f"the clause {clause!r} is unknown")
         if clause in seen and clause != "outage":
-            raise words.error(f"{clause!r} is there twice", clause)
+            raise words.error(f"the clause {clause!r} is given twice", clause)
         seen.add(clause)
         try:
             _READERS[clause](words, settings)
@@ -98,9 +98,9 @@ def read_fields(profile: str, spec: str, model: LinkModel) -> dict[str, Any]:
     if "trace" in seen and (other := seen & {"delay", "loss", "reorder"}):
         raise words.error(f"'trace' has its own delays and losses, and excludes {min(other)!r}", "trace")
     if "reorder" in seen and settings.get("delay_s", 0.0) == 0.0:
-        raise words.error("'reorder' without a delay to overtake", "delay")
+        raise words.error("'reorder' is given without a delay, so no message can overtake another", "delay")
     if "retransmit" in seen and model != "stream":
-        raise words.error("'retransmit' in the datagram model, which never sends again", "retransmit")
+        raise words.error("'retransmit' is for streams: the datagram model never sends a message again", "retransmit")
     return settings
 
 
@@ -113,7 +113,7 @@ def _read_delay(words: _Words, settings: dict[str, Any]) -> None:
             words.value(parse_share, "delay", "correlation")
     if words.take_if("distribution"):
         if "jitter_s" not in settings:
-            raise words.error("'distribution' without a jitter to shape", "delay")
+            raise words.error("'distribution' is given without a jitter, whose distribution it is", "delay")
         settings["distribution"] = _read_shape(words)
 
 
@@ -162,7 +162,7 @@ def _read_rate(words: _Words, settings: dict[str, Any]) -> None:
 def _read_outage(words: _Words, settings: dict[str, Any]) -> None:
     duration_s = words.value(parse_duration, "outage", "duration")
     if not words.take_if("at"):
-        raise words.error("'outage' without 'at' and a time", "outage")
+        raise words.error("'outage' is given without 'at' and a time", "outage")
     at_s = words.value(parse_duration, "outage", "begin")
     every_s = words.value(parse_duration, "outage", "period") if words.take_if("every") else None
     settings["outages"] = (*settings.get("outages", ()), Outage(duration_s, at_s, every_s))

@@ -65,7 +65,9 @@ class LinkProfile:
         if self.distribution not in get_args(Distribution):
             raise ValueError(f"distribution = {self.distribution!r}; valid: {choices(Distribution)}")
         if self.model == "stream" and self.retransmitted_share() > _MOST_RETRANSMITTED:
-            raise ValueError("loss of all messages; valid in a stream, which sends lost ones again: below 99%")
+            raise ValueError(
+                "too many messages are lost for a stream, which sends lost messages again; valid: less than 99% lost"
+            )
         check_seed_and_model(self.seed, self.model)
 
     @classmethod

@@ -42,8 +42,8 @@ class LinkSpec:
         for clause in filter(str.strip, with_names_spelled_out(spec).split(";")):
             if (word := clause.strip()).replace("-", "").isalpha() and word not in GRAMMAR:
                 raise ConfigurationError(
-                    f"link {spec!r}: {word!r} is unknown there; valid: {', '.join(NAMED_LINKS)}, or netem's words, such"
-                    " as 'delay 50ms 10ms distribution normal loss 1%'"
+                    f"link {spec!r}: {word!r} is neither a link's name nor a clause; valid: {', '.join(NAMED_LINKS)},"
+                    " or netem's words, such as 'delay 50ms 10ms distribution normal loss 1%'"
                 )
             before, colon, after = clause.partition(":")
             # A later colon belongs to a file's name.
@@ -54,7 +54,7 @@ class LinkSpec:
             if name in clauses:
                 what = repr(name) if name else "a profile without a name"
                 raise ConfigurationError(
-                    f"link {spec!r}: {what} is there twice; "
+                    f"link {spec!r}: {what} is given twice; "
                     f"valid: one profile without a name and one for each of {_valid_names()}"
                 )
             clauses[name] = LinkProfile.parse_within(profile, spec, seed, model)
@@ -94,7 +94,8 @@ class LinkSpec:
 def unused_clauses(link: LinkSpec, carried: Iterable[tuple[Direction, Stream]]) -> list[str]:
     """Return a line to show for each clause of `link` that applies to none of `carried`, the pairs that are sent."""
     return [
-        f"link: {f'the clause {name!r}' if name else 'the profile without a name'} applies to nothing that is sent here"
+        f"link: {f'the clause {name!r}' if name else 'the profile without a name'} has no effect, as nothing to which"
+        " it applies is sent here"
         for name in link.unused(carried)
     ]
 

@@ -14,7 +14,9 @@ from common.files.regular_file import read_regular_file
 
 _MOST_ROWS = 1_000_000
 _LARGEST_BYTES = 100 * _MOST_ROWS
-_COLUMNS = "delay_ns, or sent_ns and received_ns, with a heading, and seq where rows are not in order of sending"
+_COLUMNS = (
+    "a heading line and the columns delay_ns, or sent_ns and received_ns; also seq if rows are not in order of sending"
+)
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class Trace:
 
     def __post_init__(self) -> None:
         if all(delay_s is None for delay_s in self.delays_s):
-            raise ValueError("delays_s holds no delay; valid: one message that arrives, or more")
+            raise ValueError("delays_s holds no delay, so no message arrives; valid: one delay or more")
 
     @classmethod
     def read(cls, path: Path, field: str) -> "Trace":
@@ -41,7 +43,9 @@ class Trace:
         try:
             return cls(tuple(row.delay_s for row in rows))
         except ValueError as error:
-            raise ConfigurationError(f"{field}: {path}: no message arrives; valid: one or more that do") from error
+            raise ConfigurationError(
+                f"{field}: {path}: no message in it arrives; valid: one message that arrives, or more"
+            ) from error
 
 
 @dataclass(frozen=True)
@@ -62,13 +66,13 @@ def read_samples(path: Path, field: str) -> list[Sample]:
             text = gzip.decompress(text)
         lines = text.decode("utf-8-sig").splitlines()
     except (OSError, EOFError, ValueError, zlib.error) as error:
-        reason = getattr(error, "strerror", None) or "is no CSV"
+        reason = getattr(error, "strerror", None) or "it is no CSV file"
         raise ConfigurationError(
-            f"{field}: {str(path)!r} cannot be read: {reason}; valid: a CSV with {_COLUMNS}"
+            f"{field}: {str(path)!r} cannot be read: {reason}; valid: a CSV file with {_COLUMNS}"
         ) from error
     if max(map(len, lines), default=0) > csv.field_size_limit():
         raise ConfigurationError(
-            f"{field}: {str(path)!r} has a line of {max(map(len, lines))} characters; valid: a CSV"
+            f"{field}: {str(path)!r} has a line of {max(map(len, lines))} characters; valid: a CSV file with {_COLUMNS}"
         )
     table = csv.DictReader(lines)
     names = set(table.fieldnames or ())
@@ -80,7 +84,7 @@ def read_samples(path: Path, field: str) -> list[Sample]:
     for number, row in enumerate(itertools.islice(table, _MOST_ROWS + 1)):
         where = f"{field}: {path} row {number + 1}"
         if number == _MOST_ROWS:
-            raise ConfigurationError(f"{where}: too many rows; valid: up to {_MOST_ROWS}")
+            raise ConfigurationError(f"{where}: the file has too many rows; valid: up to {_MOST_ROWS} rows")
         values = {
             name: _nanoseconds(row.get(name), name, where) for name in ("seq", "sent_ns", "received_ns", "delay_ns")
         }
@@ -118,7 +122,7 @@ def _sample(values: dict[str, float | None], names: set[str], where: str) -> Sam
     if "delay_ns" not in names and sent_ns is not None and values["received_ns"] is not None:
         delay_ns = values["received_ns"] - sent_ns
     if delay_ns is not None and delay_ns < 0.0:
-        raise ConfigurationError(f"{where}: a delay of {delay_ns:.0f} ns; valid: 0 or more")
+        raise ConfigurationError(f"{where}: the delay is {delay_ns:.0f} ns; valid: 0 ns or more")
     return Sample(
         None if sent_ns is None else 1e-9 * sent_ns,
         None if delay_ns is None else 1e-9 * delay_ns,

@@ -40,8 +40,8 @@ def tunable_profile(words: str) -> LinkProfile:
             raise ConfigurationError(f"link {words!r}: {word!r} cannot be tuned; valid: {_VALID}")
     profile = LinkProfile.parse(words)
     if not (profile.loss is None or type(profile.loss) is RandomLoss):
-        raise ConfigurationError(f"link {words!r}: cannot be tuned; valid: {_VALID}")
+        raise ConfigurationError(f"link {words!r}: this kind of loss cannot be tuned; valid: {_VALID}")
     loss = 0.0 if profile.loss is None else profile.loss.share()
     if profile.delay_s > LONGEST_DELAY_S or profile.jitter_s > LONGEST_JITTER_S or loss > MOST_LOSS:
-        raise ConfigurationError(f"link {words!r}: too much of it to tune; valid: {_VALID}")
+        raise ConfigurationError(f"link {words!r}: a value is too large; valid: {_VALID}")
     return profile

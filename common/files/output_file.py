@@ -21,13 +21,17 @@ def require_output_file(flag: str, path: Path | None, endings: Sequence[str] = (
     if path is None:
         return
     if path.is_dir() or not path.absolute().parent.is_dir():
-        raise ValueError(f"{flag} {path}: is a folder, or its folder is not there; valid: a file's path")
+        raise ValueError(
+            f"{flag} {path}: is a folder, or lies in a folder that does not exist; valid: a file in an existing folder"
+        )
     end = os.path.realpath(path)
     # `realpath` of links in a circle is one of them.
     if os.path.lexists(end) and not os.access(end, os.W_OK):
-        raise ValueError(f"{flag} {path}: cannot be written to; valid: a file's path")
+        raise ValueError(f"{flag} {path}: this user may not write to it; valid: a file that this user may write")
     if endings and path.suffix.lower() not in endings:
-        raise ValueError(f"{flag} {path}: valid: a file's path that ends in {', '.join(endings)}")
+        raise ValueError(
+            f"{flag} {path}: its ending is unknown; valid: a file's path that ends in {', '.join(endings)}"
+        )
 
 
 @contextmanager
@@ -53,7 +57,7 @@ def output_file(flag: str, path: Path) -> Iterator[TextIO]:
         if replaced:
             new.replace(end)
     except OSError as error:
-        reason = f"{error.strerror}; valid: a place that can be written to, with room for it"
+        reason = f"{error.strerror}; valid: a folder that this user may write to, with enough room"
         raise ConfigurationError(f"{flag} {path}: cannot be written: {reason}") from error
     finally:
         if replaced:

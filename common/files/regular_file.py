@@ -20,11 +20,11 @@ def read_regular_file(path: Path, largest_bytes: int) -> bytes:
         if stat.S_ISDIR(mode):
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
         if not stat.S_ISREG(mode):
-            raise ValueError("is no regular file; valid: a file's path")
+            raise ValueError("is no regular file; valid: the path of a regular file")
         with os.fdopen(descriptor, "rb", closefd=False) as file:
             data = file.read(largest_bytes + 1)
     finally:
         os.close(descriptor)
     if len(data) > largest_bytes:
-        raise ValueError(f"has more than {largest_bytes} bytes")
+        raise ValueError(f"is too large; valid: up to {largest_bytes} bytes")
     return data

@@ -11,7 +11,7 @@ _LARGEST_INTEGER: Final = 2**63
 _DEEPEST: Final = 50
 """Maximum number of nested levels: settings need a few, and later code may recurse into them."""
 _LONGEST_COMPLAINT: Final = 400
-_TOO_DEEP: Final = f"is nested too deeply; valid: {_DEEPEST} levels"
+_TOO_DEEP: Final = f"is nested too deeply; valid: up to {_DEEPEST} levels"
 _TOO_LARGE: Final = "has a whole number of more than 64 bits, which is no valid TOML"
 
 

@@ -49,7 +49,7 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
         if not (0.0 < self.full_s <= LONGEST_S):
             raise ValueError(f"full_s = {self.full_s}; valid: above 0 to {LONGEST_S}")
         if len(self.steps) != LISTS * PROBES:
-            raise ValueError(f"steps has {len(self.steps)} bytes; valid: {LISTS * PROBES}")
+            raise ValueError(f"steps has {len(self.steps)} bytes; valid: {LISTS * PROBES} bytes")
         if not self.changes or len(self.changes) % _OF_A_JOINT or len(self.changes) > MOST_JOINTS * _OF_A_JOINT:
             raise ValueError(
                 f"changes has {len(self.changes)} bytes; valid: {_OF_A_JOINT} for each of 1 to {MOST_JOINTS} joints"

@@ -134,7 +134,7 @@ def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
     speed_m_s, told_m_s, horizon, rumble, bits = content[40:]
     state = bits % _STANDS
     if state >= len(_STATES) or bits >= 2 * _STANDS:
-        raise ValueError(f"bits = {bits}; valid: a state of 0 to {len(_STATES) - 1}, and one more bit")
+        raise ValueError(f"bits = {bits}; valid: a state from 0 to {len(_STATES) - 1}, and one flag above it")
     horizon_m = horizon * STEP_M
     return StiffnessUpdate(
         message.header,
@@ -175,7 +175,7 @@ def _onset_distances(steps: tuple[int, ...], horizon_m: float) -> OnsetDistances
     onsets = tuple(map(_IN_METRES, steps))
     if steps[0] == _PAST or steps[-1] == _BEYOND:
         if steps != tuple(sorted(steps)):
-            raise ValueError(f"distances = {steps}; valid: none shorter than the one before")
+            raise ValueError(f"distances = {steps}; valid: each at least as long as the one before")
         past, within = steps.count(_PAST), len(steps) - steps.count(_BEYOND)
         onsets = (_PAST_M,) * past + onsets[past:within] + (horizon_m,) * (len(steps) - within)
     if onsets[-1] > horizon_m:
@@ -203,7 +203,7 @@ def _unpack_telemetry(message: TelemetryOnWire) -> Telemetry:
     *numbers, bits = _TELEMETRY.unpack(message.field)
     state = bits % 4
     if state >= len(_STATES) or bits >= 4 << len(_BITS):
-        raise ValueError(f"bits = {bits}; valid: a state of 0 to {len(_STATES) - 1}, and {len(_BITS)} more bits")
+        raise ValueError(f"bits = {bits}; valid: a state from 0 to {len(_STATES) - 1}, and {len(_BITS)} flags above it")
     fields: dict[str, Any] = {name: bool(bits & _BITS[name]) for name in _TRUE}
     first = 0
     for name, count in _NUMBERS.items():

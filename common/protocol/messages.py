@@ -61,13 +61,13 @@ def _rising(name: str, onsets: OnsetDistances) -> None:
     if -_FARTHEST_M <= a <= b <= c <= d <= e <= f <= g <= h <= _FARTHEST_M:  # fast path: two in each tick
         return
     _all_in_range(name, -_FARTHEST_M, _FARTHEST_M, onsets)
-    raise ValueError(f"{name} = {onsets}; valid: eight distances, none shorter than the one before")
+    raise ValueError(f"{name} = {onsets}; valid: eight distances, each at least as long as the one before")
 
 
 def _both_or_neither(name: str, sent_s: float | None, held_s: float | None) -> None:
     if sent_s is None or held_s is None:
         if sent_s is not held_s:
-            raise ValueError(f"{name}_sent_s and {name}_held_s; valid: both or neither")
+            raise ValueError(f"only one of {name}_sent_s and {name}_held_s is given; valid: both or neither")
         return
     _finite(f"{name}_sent_s", sent_s)
     _in_range(f"{name}_held_s", 0.0, 1e9, held_s)

@@ -43,13 +43,13 @@ class SessionEvent(Enum):
     HEALTHY = "healthy second with released triggers"
     ARM = "arming button pressed"
     TRIGGER_PULLED = "trigger pulled"
-    GAP = "no command for the gap limit"
+    GAP = "no command for longer than the gap limit"
     OLD_LOOP = "loop age over the limit"
     ARM_LOST = "arm's newest state too old"
     EMERGENCY_STOP = "emergency stop"
     WRONG_TOKEN = "command with another token"  # noqa: S105  # no password
     HAND_OVER = "hand-over button, somebody waits"
-    SILENT = "nothing heard for the lease limit"
+    SILENT = "nothing heard for longer than the lease limit"
     NEW_EPOCH = "another epoch on its connection"
     FORGOTTEN = "room needed"
 
@@ -101,8 +101,8 @@ def _build() -> tuple[Transition, ...]:
         *_rows([state.READY, state.STOPPED_READY], event.ARM, state.ARMED, "armed on purpose"),
         *_rows([state.READY], event.TRIGGER_PULLED, state.DISARMED, "arming needs released triggers"),
         *_rows([state.STOPPED_READY], event.TRIGGER_PULLED, state.STOPPED, "arming needs released triggers"),
-        *_rows([state.READY, state.ARMED], event.GAP, state.DISARMED, "no command for the gap limit"),
-        *_rows([state.STOPPED_READY], event.GAP, state.STOPPED, "no command for the gap limit"),
+        *_rows([state.READY, state.ARMED], event.GAP, state.DISARMED, "no command for longer than the gap limit"),
+        *_rows([state.STOPPED_READY], event.GAP, state.STOPPED, "no command for longer than the gap limit"),
         *_rows([state.READY, state.ARMED], event.OLD_LOOP, state.DISARMED, "loop age over the limit"),
         *_rows([state.STOPPED_READY], event.OLD_LOOP, state.STOPPED, "loop age over the limit"),
         *_rows([state.DISARMED], event.ARM_LOST, None, _ARM_LOST),
@@ -111,7 +111,7 @@ def _build() -> tuple[Transition, ...]:
         *_rows(OWNING, event.EMERGENCY_STOP, state.STOPPED, "emergency stop"),
         *_rows(known, event.WRONG_TOKEN, None, "counted, never applied"),
         *_rows(OWNING, event.HAND_OVER, state.OBSERVING, "the owner handed the lease over"),
-        *_rows(known, event.SILENT, state.AWAY, "nothing heard for the lease limit"),
+        *_rows(known, event.SILENT, state.AWAY, "nothing heard for longer than the lease limit"),
         *_rows((*known, state.AWAY), event.NEW_EPOCH, state.ENDED, "the operator side began a new epoch"),
         *_rows([state.AWAY], event.FORGOTTEN, state.ENDED, "too many are remembered"),
     )

@@ -88,7 +88,9 @@ class SceneShapes(Message, frozen=True, tag="shapes"):
 
     def __post_init__(self) -> None:
         if len(self.object_poses) not in (0, _POSE_BYTES * len(self.objects)):
-            raise ValueError("object_poses; valid: a row for each of objects, or none")
+            raise ValueError(
+                f"object_poses has {len(self.object_poses)} bytes; valid: {_POSE_BYTES} for each of objects, or 0"
+            )
 
 
 class EnlargementTerms(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -141,9 +143,13 @@ class SceneState(Message, frozen=True, tag="scene"):
 
     def __post_init__(self) -> None:
         if len(self.link_poses) % _POSE_BYTES or len(self.spheres) % _SPHERE_BYTES:
-            raise ValueError("link_poses, spheres; valid: whole rows")
+            raise ValueError(
+                f"link_poses or spheres ends within a row; valid: whole rows of {_POSE_BYTES} and {_SPHERE_BYTES} bytes"
+            )
         if len(self.object_poses) != _POSE_BYTES * (len(self.object_index) // 4):
-            raise ValueError("object_poses; valid: a row for each of object_index")
+            raise ValueError(
+                f"object_poses has {len(self.object_poses)} bytes; valid: {_POSE_BYTES} for each entry of object_index"
+            )
 
 
 AnyViewMessage = VideoFrame | VideoStep | SceneShapes | SceneState

@@ -44,7 +44,7 @@ class Pacer:
     def begin(self, now_s: float) -> None:
         """Begin a turn at `now_s`; the next is due at the first later deadline. ValueError if the turn is not due."""
         if not now_s >= self.deadline_s:
-            raise ValueError(f"now_s = {now_s} lies before the deadline {self.deadline_s}")
+            raise ValueError(f"now_s = {now_s} lies before the deadline; valid: {self.deadline_s} or later")
         self.turns += 1
         self.wake_error.add(now_s - self.deadline_s)
         self._latest_s = max(self._latest_s, now_s - self.deadline_s)

@@ -49,13 +49,13 @@ class Content:
         elif kind == NOTE:
             self._drawing.log(side, now_s, content.decode(errors="replace"))
         else:
-            raise ValueError(f"a message of kind {kind!r}")
+            raise ValueError(f"the message has the unknown kind {kind!r}")
 
     def _begin(self, source: int, content: bytes) -> None:
         header = json.loads(content)
         side = header["side"]
         if side not in _OTHER or side in self._decoders:
-            raise ValueError(f"side {side!r}; valid: robot and operator, once each")
+            raise ValueError(f"side = {side!r}; valid: robot or operator, each once in a recording")
         self._sides[source] = side
         self._decoders[side] = Decoder(side)
         for decoder in self._decoders.values():
@@ -69,7 +69,9 @@ class Content:
         lost = block.dropped - self._dropped.get(side, 0)
         if lost > 0:
             self._dropped[side] = block.dropped
-            self._drawing.log(side, block.first_s, f"{lost} blocks of inputs were dropped before this", warning=True)
+            self._drawing.log(
+                side, block.first_s, f"{lost} blocks of inputs before this time were not recorded", warning=True
+            )
         self._write(self._decoders[side].shown(block))
 
     def _view(self, side: str, now_s: float, payload: bytes) -> None:

@@ -66,7 +66,7 @@ class Kind(IntEnum):
 
 
 class Entry(NamedTuple):
-    """One recorded input or output of a core."""
+    """One input or output of a side's core, as recorded: its kind, time and bytes."""
 
     kind: int
     now_s: float
@@ -113,7 +113,7 @@ def pack_block(number: int, dropped: int, first_s: float, last_s: float, entries
 def unpack_block(content: bytes) -> Block:
     """Unpack what `pack_block` packed; raises ValueError if `content` is invalid."""
     if len(content) < _BLOCK.size:
-        raise ValueError(f"a block of {len(content)} bytes; valid: {_BLOCK.size} or more")
+        raise ValueError(f"the block has {len(content)} bytes; valid: {_BLOCK.size} or more")
     number, dropped, first_s, last_s = _BLOCK.unpack_from(content)
     return Block(number, dropped, first_s, last_s, content[_BLOCK.size :])
 
@@ -126,5 +126,5 @@ def text(value: bytes) -> bytes:
 def split_text(content: bytes) -> tuple[bytes, bytes]:
     """Return a text packed by `text`, and the bytes after it; raises ValueError if the text is cut off."""
     if not content or len(content) < 1 + content[0]:
-        raise ValueError("a text that ends within itself")
+        raise ValueError("the text is cut off before its stated length")
     return content[1 : 1 + content[0]], content[1 + content[0] :]

@@ -18,7 +18,7 @@ def read_image(content: bytes) -> Image:
     """Decode a CompressedImage in protobuf's encoding; raises ValueError if it is invalid."""
     fields = _fields(content)
     if _DATA not in fields:
-        raise ValueError("a picture without its data")
+        raise ValueError("the picture's message holds no picture")
     return Image(fields.get(_FRAME_ID, b"").decode(), fields[_DATA])
 
 
@@ -29,10 +29,10 @@ def _fields(content: bytes) -> dict[int, bytes]:
     while position < len(content):
         key, position = _number(content, position)
         if key & 7 != _BYTES:
-            raise ValueError(f"a field of kind {key & 7}; valid: {_BYTES}")
+            raise ValueError(f"a field of the message has the wire type {key & 7}; valid: {_BYTES}, bytes")
         length, position = _number(content, position)
         if position + length > len(content):
-            raise ValueError("a field that ends beyond its message")
+            raise ValueError("the message is cut off within a field")
         found[key >> 3] = content[position : position + length]
         position += length
     return found
@@ -47,4 +47,4 @@ def _number(content: bytes, position: int) -> tuple[int, int]:
         if byte < 0x80:
             return value, position
         shift += 7
-    raise ValueError("a number that ends beyond its message")
+    raise ValueError("the message is cut off within a number")

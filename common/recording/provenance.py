@@ -39,7 +39,7 @@ def settings_from(values: Mapping[str, Any], kind: type[Settings]) -> Settings:
     try:
         return msgspec.convert(dict(values), kind, dec_hook=lambda want, value: want(value))
     except (msgspec.ValidationError, ValueError) as error:
-        raise ConfigurationError(f"the recorded settings are not this version's: {error}") from error
+        raise ConfigurationError(f"this version cannot read the recorded settings: {error}") from error
 
 
 def _plain(value: object) -> object:

@@ -80,17 +80,19 @@ def open_recording(path: Path) -> Recording:
             end_ns = max(end_ns, record.message_end_time)
         whole |= isinstance(record, DataEnd)
     if not headers and damaged:
-        raise ConfigurationError(f"{path}: its header is damaged; valid: an undamaged file made by --record")
+        raise ConfigurationError(f"{path}: its header is damaged; valid: an undamaged file that --record made")
     if not headers:
         raise ConfigurationError(
-            f"{path}: holds nothing that feelahead recorded; valid: a file made by --record, of a second or more"
+            f"{path}: holds nothing that feelahead recorded; valid: a file that --record made in a second or longer"
         )
     return Recording(path, headers, whole, damaged, end_ns)
 
 
 def _header(path: Path, values: Mapping[str, str]) -> dict[str, Any]:
     if values.get("format") != str(FORMAT):
-        raise ConfigurationError(f"{path}: recorded in format {values.get('format')}; valid: {FORMAT}")
+        raise ConfigurationError(
+            f"{path}: has the format {values.get('format')} of recordings; valid: format {FORMAT}, of this version"
+        )
     return {name: _value(text) for name, text in values.items()}
 
 
@@ -109,14 +111,16 @@ def _records(path: Path) -> Iterator[tuple[Any, list[Any]]]:
 
     try:
         if path.is_fifo():
-            raise ConfigurationError(f"{path}: cannot be read: it is a pipe; valid: a recording's file")
+            raise ConfigurationError(f"{path}: cannot be read: it is a pipe; valid: a file that --record made")
         with path.open("rb") as file:
             for record in StreamReader(file, emit_chunks=True, record_size_limit=path.stat().st_size).records:
                 yield record, breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else []
                 if isinstance(record, DataEnd):
                     return  # the rest repeats
     except OSError as error:
-        raise ConfigurationError(f"{path}: cannot be read: {error.strerror}; valid: a recording") from error
+        raise ConfigurationError(
+            f"{path}: cannot be read: {error.strerror}; valid: a file that --record made"
+        ) from error
     except InvalidMagic as error:
         raise ConfigurationError(f"{path}: is no MCAP file; valid: a file that --record made") from error
     except (EndOfFile, RecordLengthLimitExceeded):

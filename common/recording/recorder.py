@@ -92,7 +92,9 @@ class _Recorder:
                 self._content.take(id(channel), message)
             except (ValueError, KeyError, TypeError, struct.error) as error:
                 # One side's invalid messages must not lose the other's.
-                print(f"feelahead recorder: passed over: {error!r}", file=sys.stderr)
+                print(
+                    f"feelahead recorder: an invalid message is left out of the recording: {error!r}", file=sys.stderr
+                )
 
     def _tell(self) -> None:
         figures = self._file.figures()

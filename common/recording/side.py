@@ -51,11 +51,11 @@ def require_recordable(path: Path | None) -> None:
     if path is None or path.is_socket():
         return
     if path.suffix != ".mcap":
-        raise ValueError(f"--record {path}: valid: a file's path that ends in .mcap")
+        raise ValueError(f"--record {path}: does not end in .mcap; valid: a file's path that ends in .mcap")
     if not path.absolute().parent.is_dir():
-        raise ValueError(f"--record {path}: its folder is not there; valid: a file in an existing folder")
+        raise ValueError(f"--record {path}: its folder does not exist; valid: a new file in an existing folder")
     if path.exists() or path.is_symlink():
-        raise ValueError(f"--record {path}: exists already; valid: a new file's path")
+        raise ValueError(f"--record {path}: exists already; valid: the path of a new file")
     require_packages("--record", "foxglove", "mcap")
 
 
@@ -131,7 +131,7 @@ class SideRecording:
             self._gone = True
             if self._said["error"] is None:
                 self._said["error"] = KILLED
-                self._notes.append(f"the recorder is gone, and nothing more is recorded; {self._kept()}")
+                self._notes.append(f"the recorder has ended, and nothing more is recorded; {self._kept()}")
 
     def _kept(self) -> str:
         return f"kept: {self._said['kept_s']:.1f} s, {self._said['bytes'] / 1e6:.1f} MB"
@@ -182,7 +182,9 @@ class Recorder:
         said = {"error": "the recorder did not start"} if answer is None else json.loads(answer)
         if said.get("error"):
             self._companion.close()
-            raise ConfigurationError(f"--record {path}: {said['error']}; valid: a place that can be written to")
+            raise ConfigurationError(
+                f"--record {path}: {said['error']}; valid: a new file in a folder that this user may write to"
+            )
 
     @property
     def process_id(self) -> int:

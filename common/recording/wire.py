@@ -34,7 +34,7 @@ def stamped(now_s: float) -> bytes:
 def unstamped(content: bytes) -> tuple[float, bytes]:
     """Split `content` into the time and the rest; raises ValueError for too few bytes."""
     if len(content) < _NOW.size:
-        raise ValueError("a message without its stamp")
+        raise ValueError("the message is too short to hold its time")
     return _NOW.unpack_from(content)[0], content[_NOW.size :]
 
 

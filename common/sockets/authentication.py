@@ -58,7 +58,7 @@ class RobotKeys:
         """Return a line with the names of the admitted peers, to be shown at the start."""
         folder, names = self.allowed.folder, ", ".join(sorted(self.allowed.names.values()))
         change = folder.command("allow NAME KEY")
-        who = f"lets in {names}" if names else f"nobody is let in yet; to change that: {change}"
+        who = f"lets in {names}" if names else f"lets nobody in yet; to let an operator in: {change}"
         return [f"keys: {who}"]
 
     def secure(self, part: "zmq.Socket[bytes]") -> None:
@@ -82,7 +82,7 @@ class OperatorKeys:
         secret = KeyFolder(folder).secret("operator")
         if robot_key is None:
             raise ConfigurationError(
-                f"--keys {folder}: the robot side's public key is needed, too; valid: --robot-key KEY, "
+                f"--keys {folder}: the robot side's public key is not given; valid: also --robot-key KEY, "
                 "where KEY is what `feelahead keys show robot` prints on the robot's machine"
             )
         return cls(secret, read_public_key(robot_key, "--robot-key"))
@@ -185,11 +185,11 @@ class HandshakeWatch:
 
     def _reason(self, event: int) -> str:
         if self._keys is None:
-            return "the robot side asks for keys; valid: --keys FOLDER --robot-key KEY (feelahead keys --help)"
+            return "the robot side asks for keys; valid: with --keys FOLDER --robot-key KEY (feelahead keys --help)"
         if event == zmq.EVENT_HANDSHAKE_FAILED_AUTH:
             key = public_part(self._keys.secret)
-            return f"the robot side does not let this key in; to be run there: feelahead keys allow NAME {key}"
+            return f"the robot side does not let this key in; to let it in, run there: feelahead keys allow NAME {key}"
         return (
-            "the robot side is still starting, has no keys, or another key than --robot-key; "
-            "its own is shown there by: feelahead keys show robot"
+            "the robot side is still starting, has no keys, or has another key than --robot-key; "
+            "to see its key, run there: feelahead keys show robot"
         )

@@ -23,7 +23,7 @@ from common.files.user_folders import configuration_folder
 Side = Literal["robot", "operator"]
 
 PEER_LIMIT = 256
-"""Maximum number of peers in one folder: far more than one robot has operators, yet read in a few milliseconds."""
+"""Maximum number of peers in one folder: far more operators than one robot has, and read in a few milliseconds."""
 _FILE_LIMIT_BYTES = 4096
 SHORTAGES = (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
 """Errors that are no fault of the file or folder: this process or the machine lacks descriptors or memory."""
@@ -48,7 +48,7 @@ def checked_name(name: str) -> str:
     """Return `name` if it is a valid name of a peer, and hence of a file; else raise ConfigurationError."""
     if _NAME.fullmatch(name) is None:
         raise ConfigurationError(
-            f"name {name[:80]!r}: valid: 1 to 32 letters, digits, - and _, the first a letter or digit"
+            f"name {name[:80]!r}: is no peer's name; valid: 1 to 32 letters, digits, - and _; first a letter or digit"
         )
     return name
 
@@ -60,7 +60,7 @@ def read_public_key(key_or_file: str, what: str) -> str:
     path = Path(key_or_file).expanduser()
     if path.suffix == ".secret":
         raise ConfigurationError(
-            f"{what}: {path} is a secret key, which stays where it was made; valid: the .public file"
+            f"{what}: {path} is a secret key, which must not leave its machine; valid: the .public file beside it"
         )
     if not path.is_file():
         raise ConfigurationError(
@@ -106,8 +106,8 @@ class KeyFolder:
         path = self.secret_path(side)
         if path.exists() and not replace:
             raise ConfigurationError(
-                f"{path}: there is a key already; valid: `{self.command(f'show {side}')}` for its public part, "
-                "or --replace, after which every peer needs the new one"
+                f"{path}: there is a key already; valid: `{self.command(f'show {side}')}` to see its public part, "
+                "or --replace to make a new key, which every peer then needs"
             )
         self._make_folder(self.path)
         whose = f"this {side} side"
@@ -124,13 +124,13 @@ class KeyFolder:
         path = self.secret_path(side)
         if not path.is_file():
             raise ConfigurationError(
-                f"--keys {self.path}: there is no {path.name}; valid: a folder with one, "
+                f"--keys {self.path}: the folder has no {path.name}; valid: a folder with this file, "
                 f"made by `{self.command(f'make {side}')}`"
             )
         mode = stat.S_IMODE(path.stat().st_mode)
         if mode & 0o077:
             raise ConfigurationError(
-                f"--keys {self.path}: others may read {path.name} (mode {mode:04o}); valid: mode 0600, "
+                f"--keys {self.path}: other users may read {path.name} (mode {mode:04o}); valid: mode 0600, "
                 f"set by `chmod 600 {path}`"
             )
         return _read_key(path, "--keys")
@@ -139,14 +139,18 @@ class KeyFolder:
         """Admit a peer; raises ConfigurationError if the name or key is taken, or the folder is full."""
         peers = self.allowed()
         if peers.get(public, name) != name:
-            raise ConfigurationError(f"this key is allowed already, as {peers[public]!r}")
+            raise ConfigurationError(
+                f"name {name!r}: its key is allowed already, as {peers[public]!r}; valid: a key that has no name yet"
+            )
         if name in peers.values() and public not in peers:
             raise ConfigurationError(
                 f"name {name!r}: belongs to another key; valid: another name, "
                 f"or `{self.command(f'revoke {name}')}` first"
             )
         if len(peers) >= PEER_LIMIT:
-            raise ConfigurationError(f"{len(peers)} peers are allowed already; valid: up to {PEER_LIMIT}")
+            raise ConfigurationError(
+                f"name {name!r}: {len(peers)} peers are allowed already; valid: up to {PEER_LIMIT} peers"
+            )
         self._make_folder(self.path)
         self._make_folder(self.allowed_path)
         _write(self.peer_path(name), f"# A peer that is let in as {name}; deleting this file revokes it.\n{public}\n")
@@ -155,14 +159,14 @@ class KeyFolder:
         """Revoke a peer; raises ConfigurationError if there is none of that name, or another name has the same key."""
         path = self.peer_path(name)
         if not path.is_file():
-            names = ", ".join(sorted(self.allowed().values())) or "none is allowed"
+            names = ", ".join(sorted(self.allowed().values())) or "none, as no peer is allowed yet"
             raise ConfigurationError(f"name {name!r}: no such peer in {self.allowed_path}; valid: {names}")
         key = _read_key(path, "allowed")
         path.unlink()
         if (other := self.allowed().get(key)) is not None:
             raise ConfigurationError(
-                f"{name} is gone, but the same key is still let in as {other}; "
-                f"valid: `{self.command(f'revoke {other}')}`, too"
+                f"{name} is revoked, but the same key is still let in as {other}; "
+                f"to revoke it as well: `{self.command(f'revoke {other}')}`"
             )
 
     def allowed(self) -> dict[str, str]:
@@ -181,7 +185,7 @@ class KeyFolder:
             try:
                 if _NAME.fullmatch(path.stem) is None:
                     raise ConfigurationError(
-                        f"allowed: {path}: its name is no peer's; valid: letters, digits, - and _, then .public"
+                        f"allowed: {path}: its name is no peer's name; valid: letters, digits, - and _, then .public"
                     )
                 key = _read_key(path, "allowed")
             except ConfigurationError as error:
@@ -216,12 +220,15 @@ class KeyFolder:
             if error.errno in SHORTAGES:
                 raise
             raise ConfigurationError(
-                f"{self.allowed_path}: cannot be read: {error.strerror}; valid: a folder of this user's, mode 0700"
+                f"{self.allowed_path}: cannot be read: {error.strerror}; valid: a folder that belongs to this user,"
+                " with mode 0700"
             ) from error
         _refuse_writable(self.allowed_path)
         files = [path for path in paths if path.suffix == ".public" and not path.name.startswith(".")]
         if len(files) > PEER_LIMIT:
-            raise ConfigurationError(f"{self.allowed_path}: {len(files)} peers; valid: up to {PEER_LIMIT}")
+            raise ConfigurationError(
+                f"{self.allowed_path}: the folder holds {len(files)} peers; valid: up to {PEER_LIMIT}"
+            )
         return files
 
     @staticmethod
@@ -229,18 +236,24 @@ class KeyFolder:
         try:
             path.mkdir(mode=0o700, parents=True, exist_ok=True)
         except OSError as error:
-            raise ConfigurationError(f"--folder {path}: cannot be made: {error.strerror}") from error
+            raise ConfigurationError(
+                f"--folder {path}: cannot be made: {error.strerror}; valid: a folder that this user may make"
+            ) from error
 
 
 def _read_key(path: Path, what: str) -> str:
     try:
         content = read_regular_file(path, _FILE_LIMIT_BYTES).decode("ascii")
     except UnicodeDecodeError as error:
-        raise ConfigurationError(f"{what}: {path} cannot be read: no ASCII text; valid: a key file") from error
+        raise ConfigurationError(
+            f"{what}: {path} cannot be read: it is no ASCII text; valid: a .public file"
+        ) from error
     except OSError as error:
         if error.errno in SHORTAGES:
             raise
-        raise ConfigurationError(f"{what}: {path} cannot be read: {error.strerror}; valid: a key file") from error
+        raise ConfigurationError(
+            f"{what}: {path} cannot be read: {error.strerror}; valid: a key file that this user may read"
+        ) from error
     except ValueError as error:
         raise ConfigurationError(f"{what}: {path} {error}") from error
     lines = [line for line in content.splitlines() if line.strip() and not line.startswith("#")]
@@ -262,7 +275,7 @@ def _refuse_writable(path: Path) -> None:
     mode = stat.S_IMODE(path.stat().st_mode)
     if mode & 0o022:
         raise ConfigurationError(
-            f"{path}: others may write there (mode {mode:04o}) and let anyone in; valid: mode 0700, "
+            f"{path}: other users may write there (mode {mode:04o}) and so let anyone in; valid: mode 0700, "
             f"set by `chmod 700 {path}`"
         )
 

@@ -109,7 +109,9 @@ class RobotSockets(SocketShell):
         wrong = []
         if self.crowded:
             limit = self._gates[0].connections.limit
-            wrong.append(f"more than {limit} connections at once: new strangers are cut off, admitted peers stay")
+            wrong.append(
+                f"more than {limit} connections at once: new connections of strangers are closed, admitted peers stay"
+            )
         if self._keys is not None and self._authenticator is not None:
             allowed = self._keys.allowed
             news = self._authenticator.news()

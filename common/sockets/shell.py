@@ -153,7 +153,7 @@ class SocketShell:
 def check_size(payload: bytes, limit_bytes: int) -> None:
     """Raise ValueError if the payload is too long to send."""
     if len(payload) > limit_bytes:
-        raise ValueError(f"payload of {len(payload)} bytes; valid: up to {limit_bytes} bytes")
+        raise ValueError(f"the payload has {len(payload)} bytes; valid: up to {limit_bytes} bytes")
 
 
 def bind_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> None:
@@ -164,7 +164,7 @@ def bind_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> Non
     except zmq.ZMQError as error:
         if error.errno == zmq.EADDRINUSE:
             other = Endpoint(endpoint.host, endpoint.port + 2 if endpoint.port < 65000 else 5555, endpoint.ipv6)
-            advice = f"the port is in use; valid: another one such as {other.address}"
+            advice = f"the port is in use; valid: another address, such as {other.address}"
         else:
             advice = f"{os.strerror(error.errno or 0)}; valid: an address of this machine such as tcp://127.0.0.1:5555"
         raise ConfigurationError(f"{flag}: cannot bind {endpoint.address}: {advice}") from error

@@ -102,7 +102,7 @@ class StartedSide:
                 if remaining_s > 0.0:
                     continue
                 self.check()
-                raise SideFailedError(f"the {self.name} side reported nothing for {timeout_s:g} s") from None
+                raise SideFailedError(f"the {self.name} side did not report for {timeout_s:g} s") from None
             remaining_s = timeout_s
             if event["event"] == kind:
                 return event
@@ -124,7 +124,7 @@ class StartedSide:
         if code not in (None, 0):
             self._errors.seek(0)
             said = self._errors.read().strip().splitlines()
-            reason = said[-1] if said else "it gave no reason"
+            reason = said[-1] if said else "no reason was printed"
             if code == _BAD_INPUT:
                 # The user's arguments were passed on to the side, so the fault is in them.
                 raise ConfigurationError(reason.partition(": ")[2] or reason)

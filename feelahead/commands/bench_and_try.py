@@ -45,7 +45,9 @@ class Menu:
             valid = f"{', '.join(self.questions)}, or a question's file"
             raise ConfigurationError(f"{self.name} {name!r}: no such question; valid: {valid}")
         if not Path(name).is_file():
-            raise ConfigurationError(f"{self.name} {name}: there is no such file; valid: a question's file")
+            raise ConfigurationError(
+                f"{self.name} {name}: there is no such file; valid: a Python file that defines QUESTION"
+            )
         sys.path.insert(0, str(Path(name).absolute().parent))  # worker processes get the same path
         return self._ask(Path(name).stem, name, rest)
 
@@ -54,14 +56,14 @@ class Menu:
             sweep = import_module("feelahead.lab.sweep")
             found = import_module(module)
         except (ImportError, SyntaxError) as error:
-            reason = f"{error}; valid: a question's file"
+            reason = f"{error}; valid: a Python file that defines QUESTION"
             if name in self.questions and isinstance(error, ModuleNotFoundError):
                 remedy = f"install it in the clone: pip install '.[{self.questions[name]}]'"
                 reason = f"{error.name} is not installed; {remedy}"
             raise ConfigurationError(f"{self.name} {name}: {reason}") from error
         if name not in self.questions and Path(found.__file__ or "").resolve() != Path(name).resolve():
             raise ConfigurationError(
-                f"{self.name} {name}: Python already has a module of this name; valid: another name"
+                f"{self.name} {name}: Python already has a module of this name; valid: a file with another name"
             )
         question = getattr(found, "QUESTION", None)
         if not isinstance(question, sweep.Question):

@@ -74,8 +74,8 @@ def calibrate(arguments: Sequence[str]) -> int:
         try:
             if controller.address is None:
                 raise ConfigurationError(
-                    f"{controller.name} does not report its address, by which a calibration is stored; valid: a"
-                    " controller that does"
+                    f"{controller.name} does not report its address, under which a calibration is stored; valid: a"
+                    " controller that reports its address"
                 )
             console.print(f"Calibrating {controller.name}", markup=False, highlight=False, soft_wrap=True)
             with _Screen(console) as show:
@@ -92,7 +92,7 @@ def calibrate(arguments: Sequence[str]) -> int:
     write_calibration(kept_at, controller.address, procedure.result)
     used = "feelahead-operator uses it from now on"
     if settings.out is not None:
-        used = f"feelahead-operator looks for it at {calibration_path(controller.address)}"
+        used = f"feelahead-operator uses it if it is copied to {calibration_path(controller.address)}"
     sys.stdout.write(f"stored: {kept_at}; {used}\n")
     return 0
 
@@ -127,7 +127,7 @@ def _measure(
             show(procedure, state, now_s)
         elif now_s - heard_s > _SILENT_S:
             raise DeviceError(
-                f"the controller has sent nothing for {_SILENT_S:.0f} s: plug it in again and start again"
+                f"the controller has sent nothing for {_SILENT_S:.0f} s: plug it in, then start the calibration again"
             )
         if isinstance(clock, VirtualClock):
             clock.advance_to(now_s + _POLL_S)
@@ -197,8 +197,8 @@ def calibration_lines(calibration: TravelCalibration) -> list[str]:
 
 def _trigger_line(name: str, trigger: TriggerTravel) -> str:
     return (
-        f"{name:<12} released to {trigger.dead_zone:.3f}, full from {trigger.saturation:.3f}; a full pull reaches"
-        f" {trigger.reachable_zones} of 10 zones"
+        f"{name:<12} released up to {trigger.dead_zone:.3f}, fully pulled from {trigger.saturation:.3f};"
+        f" a full pull reaches {trigger.reachable_zones} of 10 zones"
     )
 
 

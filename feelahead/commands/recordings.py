@@ -75,7 +75,7 @@ def _open(path: Path | None) -> Recording:
     recording = open_recording(path)
     if recording.damaged or not recording.whole:
         why = "is damaged" if recording.damaged else "was cut off"
-        sys.stderr.write(f"feelahead: {path}: {why}; what can be read of it: {recording.length_s():.1f} s\n")
+        sys.stderr.write(f"feelahead: {path}: {why}; {recording.length_s():.1f} s of it can be read\n")
     return recording
 
 
@@ -89,7 +89,9 @@ def _recording(path: Path | None) -> Iterator[Recording]:
         raise
     except (ArithmeticError, AttributeError, LookupError, MemoryError, TypeError, ValueError, struct.error) as error:
         what = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise ConfigurationError(f"{path}: is no valid recording ({what:.200})") from error
+        raise ConfigurationError(
+            f"{path}: is no valid recording ({what:.200}); valid: a file that --record made"
+        ) from error
 
 
 def replay(arguments: Sequence[str]) -> int:
@@ -117,10 +119,10 @@ def _check(recording: Recording) -> int:
     said = [line for one in compared for line in one.lines()]
     within = all(one.within for one in compared)
     if not sum(one.made for one in compared):
-        said.append("nothing was compared: the recording holds nothing to recompute")
+        said.append("nothing was compared: the recording has no messages that can be computed again")
         within = False
     else:
-        said.append("the same, within what is promised" if within else "NOT the same")
+        said.append("the same, within the promised tolerance" if within else "NOT the same")
     sys.stdout.write("\n".join(said) + "\n")
     return 0 if within else 1
 
@@ -166,7 +168,9 @@ def plot(arguments: Sequence[str]) -> int:
     with _recording(settings.file) as recording:
         out = recording.path.with_suffix(".png") if settings.out is None else settings.out
         if out.suffix not in (".png", ".svg", ".pdf"):
-            raise ConfigurationError(f"--out {out}: valid: a file that ends in .png, .svg or .pdf")
+            raise ConfigurationError(
+                f"--out {out}: its ending is unknown; valid: a file that ends in .png, .svg or .pdf"
+            )
         if not out.absolute().parent.is_dir():
             raise ConfigurationError(f"--out {out}: its folder does not exist; valid: a file in an existing folder")
         require_packages("plot", "matplotlib", extra="experiments")

@@ -57,7 +57,7 @@ def looks_before(cell: Facing, free_mm: Iterable[float]) -> Iterator[Look]:
     if contact_distance_m >= _FARTHEST_M:
         raise ConfigurationError(
             f"--model {cell.model}: nothing is ahead of the gripper within {_FARTHEST_M:g} m; valid: a scene with"
-            " something on its way"
+            " an object ahead of the gripper"
         )
     encoder = EncoderSettings()
     sigma_rad = Encoder(encoder.sigma_rad, encoder.resolution_rad).standard_deviation_rad()

@@ -31,7 +31,7 @@ class Journal:
             return
         if path.exists() and not path.is_file():
             raise ConfigurationError(
-                f"--resume {path}: not a regular file; valid: a new file, or one that --resume wrote"
+                f"--resume {path}: this is no regular file; valid: a new file, or one that --resume wrote"
             )
         try:
             with ExitStack() as stack:
@@ -70,9 +70,13 @@ class Journal:
             other = [name for name, value in asked.items() if made_by.get(name) != value]
             self.done = {entry["key"]: entry["rows"] for entry in map(json.loads, lines[1:])}
         except (ValueError, LookupError, TypeError, AttributeError) as error:
-            raise ConfigurationError(f"--resume {path}: it holds no journal of a sweep; valid: a new file") from error
+            raise ConfigurationError(
+                f"--resume {path}: it holds no journal of a sweep; valid: a new file, or one that --resume wrote"
+            ) from error
         if other:
-            raise ConfigurationError(f"--resume {path}: made by another {' and '.join(other)}; valid: a new file")
+            raise ConfigurationError(
+                f"--resume {path}: it was written by another {' and '.join(other)}; valid: a new file"
+            )
         file.truncate(len(text) - len(torn))
 
     def _write(self, line: bytes) -> None:

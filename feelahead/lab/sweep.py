@@ -77,7 +77,9 @@ class Sweep:
         require_output_file("--picture", self.picture, PICTURES)
         self._require_files_of_their_own()
         if self.scheduler is not None and not _SCHEDULER.fullmatch(self.scheduler):
-            raise ValueError(f"--scheduler {self.scheduler!r}: valid: as tcp://127.0.0.1:8786")
+            raise ValueError(
+                f"--scheduler {self.scheduler!r}: is no address; valid: an address such as tcp://127.0.0.1:8786"
+            )
 
     def _require_files_of_their_own(self) -> None:
         taken: dict[Path, str] = {}
@@ -86,9 +88,9 @@ class Sweep:
             beside = () if path is None or name not in ("csv", "parquet") else (path.with_name(path.name + ".json"),)
             for own in () if path is None else (path, *beside):
                 if (other := taken.setdefault(own.resolve(), name)) != name:
-                    raise ValueError(f"--{name} {path}: --{other} writes to {own}; valid: a file for each")
+                    raise ValueError(f"--{name} {path}: --{other} writes to {own}, too; valid: another file for each")
             if path is not None and name in ("resume", "parquet", "picture") and path.exists() and not path.is_file():
-                raise ValueError(f"--{name} {path}: not a regular file; valid: a file's path")
+                raise ValueError(f"--{name} {path}: this is no regular file; valid: the path of a regular or new file")
 
 
 S = TypeVar("S", bound=Sweep)
@@ -139,16 +141,18 @@ def ask(question: Question[Any, Any], arguments: Sequence[str]) -> int:
     """Run a question with the arguments of its command; return 0 if all cells succeeded, 130 after Ctrl-C, else 1."""
     settings = parse_settings(question.settings, f"feelahead {question.name}", arguments)
     if settings.picture is not None and question.draw is None:
-        raise ConfigurationError(f"--picture {settings.picture}: {question.name} has no figure")
+        raise ConfigurationError(
+            f"--picture {settings.picture}: {question.name} has no figure; valid: without --picture"
+        )
     done = sweep(question, settings)
     try:
         _write(question, settings, done.table)  # before printing, which fails if the reader ends early, as `head` does
     finally:
         _show(question, settings, done)
     if done.ended is not None:
-        goes_on = f"the same command with --resume {settings.resume} goes on"
+        goes_on = f"to continue, run the same command with --resume {settings.resume}"
         if settings.resume is None:
-            goes_on = "with --resume FILE.jsonl from the start, the same command goes on"
+            goes_on = "a run that is started with --resume FILE.jsonl can be continued"
         sys.stderr.write(f"feelahead {question.name}: {done.ended}; {done.left} runs are left; {goes_on}\n")
     if done.interrupted:
         return _INTERRUPTED

@@ -78,7 +78,7 @@ class Comparison:
         """Return the lines that report the comparison."""
         difference = "none"
         if not math.isfinite(self.worst_eighths):
-            difference = "missing or different messages"
+            difference = "some messages are missing or of another kind"
         elif self.worst_eighths or self.worst_m or self.equal < self.made:
             difference = f"{self.worst_eighths:g} of 8 in strength, {self.worst_m:.3g} m in distances"
         lines = [
@@ -102,14 +102,14 @@ def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Itera
         if block.number != expected:
             notes.append(
                 f"{block.number - expected} blocks of inputs are missing after {block.first_s - began_s:.1f} s, as the"
-                " recorder did not keep up: compared up to there"
+                " recorder did not keep up: the comparison ends there"
             )
             return
         yield from block.unpacked()
     if recording.damaged:
-        notes.append("the file is damaged: compared up to there")
+        notes.append("the file is damaged: the comparison ends at the damage")
     elif not recording.whole:
-        notes.append("the file was cut off: compared up to its last complete second")
+        notes.append("the file was cut off: the comparison ends at its last complete second")
 
 
 def differing_origin(recorded: Mapping[str, object], present: Mapping[str, object]) -> list[str]:
@@ -119,9 +119,15 @@ def differing_origin(recorded: Mapping[str, object], present: Mapping[str, objec
         there = recorded.get(name)
         if isinstance(there, Mapping) and isinstance(here, Mapping):
             others = [key for key in there if there[key] != here.get(key)]
-            notes += [f"recorded with other {name}: {', '.join(others)[:100]}: bits may differ"] if others else []
+            notes += (
+                [f"recorded with other {name} ({', '.join(others)[:100]}): the results may differ in their last bits"]
+                if others
+                else []
+            )
         elif there != here:
-            notes.append(f"recorded with {name} {str(there)[:60]}, here {str(here)[:60]}: bits may differ")
+            notes.append(
+                f"recorded with {name} {str(there)[:60]}, here {str(here)[:60]}: the results may differ in their last bits"
+            )
     return notes
 
 
@@ -129,11 +135,13 @@ def require_side(recording: Recording, side: str) -> Mapping[str, Any]:
     """Return the header of `side`; raises ConfigurationError if it is missing or incomplete."""
     if side not in recording.headers:
         raise ConfigurationError(
-            f"{recording.path}: the {side} side was not recorded; valid: {', '.join(recording.headers)}"
+            f"{recording.path}: the {side} side was not recorded; valid: a recorded side: {', '.join(recording.headers)}"
         )
     header = dict(recording.headers[side])
     if missing := [name for name in _NEEDED if name not in header]:
-        raise ConfigurationError(f"{recording.path}: does not say the {side} side's {missing[0]}; valid: a whole file")
+        raise ConfigurationError(
+            f"{recording.path}: the header lacks the {side} side's {missing[0]}; valid: a recording with whole headers"
+        )
     return header
 
 

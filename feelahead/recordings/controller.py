@@ -32,7 +32,7 @@ def _read(content: bytes, kind: type[_Value]) -> _Value:
     try:
         return msgspec.msgpack.decode(content, type=kind)
     except msgspec.MsgspecError as error:
-        raise RemoteProtocolError(f"a recorded {kind.__name__}: {error}") from error
+        raise RemoteProtocolError(f"a recorded {kind.__name__} is invalid: {error}") from error
 
 
 def as_recorded(kind: int, feel: Feel) -> bytes:

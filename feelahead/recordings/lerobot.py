@@ -135,7 +135,9 @@ def _vectors(joined: Table) -> dict[str, dict[str, str]]:
     """Return for each feature of the dataset its parts, and the joined table's column for each part."""
     joints = [column for column in joined.columns() if column.startswith("arm.position_rad.")]
     if not joints or "command.r2" not in joined.columns():
-        raise ConfigurationError("--format lerobot: arm states or commands are missing; valid: both sides recorded")
+        raise ConfigurationError(
+            "--format lerobot: arm states or commands are missing; valid: a recording of both sides"
+        )
     state = {f"joint_{index}_rad": column for index, column in enumerate(joints)}
     velocity = {f"joint_{index}_rad_s": f"arm.velocity_rad_s.{index}" for index in range(len(joints))}
     vectors = {
@@ -167,7 +169,9 @@ def _first_whole_row(vectors: Mapping[str, Mapping[str, str]], seen: Mapping[str
     begins += [int(np.searchsorted(np.array(joined.times_s), found[0].time_s)) for found in seen.values()]
     first = max(begins)
     if first >= len(joined.times_s):
-        raise ConfigurationError("--format lerobot: the recording ends before every required value has come")
+        raise ConfigurationError(
+            "--format lerobot: the recording ends before it has every required value; valid: a longer one"
+        )
     return first
 
 

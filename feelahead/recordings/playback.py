@@ -55,7 +55,7 @@ def require_statuses(recording: Recording) -> None:
             try:
                 msgspec.json.decode(message.content, type=struct)
             except msgspec.ValidationError as error:
-                why = f"{topic} of another release ({error}); valid: feelahead export, or replay --check"
+                why = f"{topic} is of another release ({error}); what works: feelahead export, or replay --check"
                 raise ConfigurationError(f"{recording.path}: {why}") from error
             break
 

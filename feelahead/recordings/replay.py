@@ -49,13 +49,17 @@ class _Given(Arm):
     def state(self, now_s: float) -> ArmState:
         """Return the newest recorded state of the arm; ConfigurationError before the first."""
         if self.newest_state is None:
-            raise ConfigurationError(f"no state of the arm is recorded before {now_s} s; valid: a whole recording")
+            raise ConfigurationError(
+                f"no state of the arm is recorded before {now_s} s; valid: a recording with its beginning"
+            )
         return self.newest_state
 
     def perceive(self, now_s: float) -> PerceivedObjects:
         """Return the newest recorded frame; ConfigurationError before the first."""
         if self.newest_frame is None:
-            raise ConfigurationError(f"no frame of objects is recorded before {now_s} s; valid: a whole recording")
+            raise ConfigurationError(
+                f"no frame of objects is recorded before {now_s} s; valid: a recording with its beginning"
+            )
         return self.newest_frame
 
     def set_role(self, name: str, role: Role) -> None:
@@ -78,8 +82,8 @@ def replay_robot(recording: Recording) -> Comparison:
     here = _by_last_names(kernel_digests())
     if gone := [name for name in recorded if name not in here]:
         raise ConfigurationError(
-            f"recorded by an older version, with {len(gone)} kernels that are gone, such as {gone[0]}: its robot side"
-            " cannot be replayed; valid: feelahead replay without --check, export and plot"
+            f"recorded by another version, with {len(gone)} kernels that this version lacks, such as {gone[0]}: its robot"
+            " side cannot be replayed; what works: feelahead replay without --check, export and plot"
         )
     kernels = {name: here.get(name) for name in recorded}
     origin = {"processor": processor_name(), "kernels": kernels}

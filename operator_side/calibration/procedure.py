@@ -147,7 +147,7 @@ class CalibrationProcedure:
             self._feed_pull(state, now_s)
         if self._since_s is not None and now_s - self._since_s > _LONGEST_WAIT_S:
             why = f" ({self.complaint})" if self.complaint is not None else ""
-            raise CalibrationError(f"after {_LONGEST_WAIT_S:.0f} s this was not done: {self.step.value}{why}")
+            raise CalibrationError(f"after {_LONGEST_WAIT_S:.0f} s this step was not done: {self.step.value!r}{why}")
 
     def _feed_rest(self, state: ControllerState, now_s: float) -> None:
         self.complaint = self._rest.feed(state, now_s)
@@ -157,8 +157,8 @@ class CalibrationProcedure:
         for name, highest in (("L2", rest.l2), ("R2", rest.r2)):
             if highest > _LARGEST_TRIGGER_REST:
                 raise CalibrationError(
-                    f"{name} rests at {highest:.2f} of its travel; valid: up to {_LARGEST_TRIGGER_REST}: it is held, "
-                    "stuck or broken"
+                    f"{name} rests at {highest:.2f} of its travel, so it is held, stuck or broken; "
+                    f"valid: up to {_LARGEST_TRIGGER_REST}"
                 )
         self._rests.append(rest)
         if self.step is Step.REST_AGAIN:
@@ -171,7 +171,7 @@ class CalibrationProcedure:
         raw, other = (state.l2, state.r2) if left else (state.r2, state.l2)
         resting = self._rests[0].l2 if left else self._rests[0].r2
         if other > _PULLED:
-            self.complaint = f"that is {other_name}; release it and pull {name}"
+            self.complaint = f"{other_name} is pulled; release it and pull {name}"
         if self._pull is None:
             self._pull = raw if raw > max(_PULLED, resting + _RELEASED_ABOVE_REST) else None
         elif raw > resting + _RELEASED_ABOVE_REST:
@@ -188,7 +188,7 @@ class CalibrationProcedure:
         ends = ", ".join(f"{peak:.2f}" for peak in peaks)
         why = None
         if min(peaks) < _LEAST_PULL:
-            why = f"the pulls of {name} ended at {ends}; valid: {_LEAST_PULL} and more"
+            why = f"the pulls of {name} ended at {ends}; valid: {_LEAST_PULL} or more"
         elif max(peaks) - min(peaks) > _LARGEST_SPREAD:
             why = f"the pulls of {name} ended at {ends}; valid: within {_LARGEST_SPREAD} of each other"
         if why is None:
@@ -196,9 +196,9 @@ class CalibrationProcedure:
             return
         self._attempts += 1
         if self._attempts == _ATTEMPTS:
-            raise CalibrationError(f"{why}; {_ATTEMPTS} times they did not agree")
+            raise CalibrationError(f"{why}; {_ATTEMPTS} attempts failed")
         peaks.clear()
-        self.complaint = f"{why}: pull it all the way, three times again"
+        self.complaint = f"{why}: pull {name} all the way again, three times"
 
     def _feed_sticks(self, state: ControllerState, now_s: float) -> None:
         for (x, y), sectors in zip((state.left_stick, state.right_stick), self._sectors, strict=True):
@@ -230,7 +230,7 @@ def _trigger(name: str, highest_rest: float, peaks: list[float]) -> TriggerTrave
         return TriggerTravel(dead_zone, saturation)
     except ValueError as error:
         raise CalibrationError(
-            f"{name} rests at {highest_rest:.2f} and ends at {min(peaks):.2f}: there is too little travel"
+            f"{name} rests at {highest_rest:.2f} and ends at {min(peaks):.2f}: its travel is too short"
         ) from error
 
 
@@ -239,14 +239,14 @@ def _stick(name: str, before: tuple[tuple[float, float], float], after: tuple[tu
     x, y = 0.5 * (first[0] + second[0]), 0.5 * (first[1] + second[1])
     if math.hypot(x, y) > LARGEST_REST:
         raise CalibrationError(
-            f"the {name} stick rests at ({x:.2f}, {y:.2f}); valid: within {LARGEST_REST} of the centre: it is held or"
-            " broken"
+            f"the {name} stick rests at ({x:.2f}, {y:.2f}), so it is held or broken; valid: at most {LARGEST_REST} from"
+            " the centre"
         )
     apart = 0.5 * math.dist(first, second)
     dead_zone = max(apart + max(first_noise, second_noise) + _STICK_MARGIN, _LEAST_STICK_DEAD_ZONE)
     if dead_zone > LARGEST_REST:
         raise CalibrationError(
             f"the {name} stick rested at ({first[0]:.2f}, {first[1]:.2f}) and then at ({second[0]:.2f},"
-            f" {second[1]:.2f}); valid: within {2 * LARGEST_REST:.1f} of each other: it is held or worn out"
+            f" {second[1]:.2f}), so it is held or worn out; valid: at most {2 * LARGEST_REST:.1f} apart"
         )
     return StickRest(round(x, 4), round(y, 4), round(dead_zone, 4))

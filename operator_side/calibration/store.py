@@ -20,7 +20,7 @@ from operator_side.controller.port import checked_address
 from operator_side.hands.travel_calibration import StickRest, TravelCalibration, TriggerTravel
 
 _LARGEST_BYTES: Final = 10_000
-_MEND: Final = "measure it again with: feelahead calibrate; or delete the file for the defaults"
+_MEND: Final = "to measure again: feelahead calibrate; to use the defaults: delete the file"
 
 
 @dataclasses.dataclass(frozen=True)

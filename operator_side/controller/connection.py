@@ -84,11 +84,11 @@ class Connection:
             raise found
         if isinstance(found, NoDeviceError):
             if self.state is not ConnectionState.LOST:  # the loss has been reported
-                self._say_once(f"{found}; waiting for one")
+                self._say_once(f"{found}; waiting for a controller")
         elif found is not None:
             # The system grants permission a moment after a controller appears, so a single failure is not reported.
             if str(found) == self._refused:
-                self._say_once(f"{found}; trying again until it works")
+                self._say_once(f"{found}; opening it is tried again until it works")
             self._refused = str(found)
         if self._next_look_s is None or now_s >= self._next_look_s:
             self._next_look_s = now_s + LOOK_PERIOD_S
@@ -113,7 +113,9 @@ class Connection:
         silent = silence_s > REWRITE_AFTER_S
         if self.controller.stalls(now_s):
             if silent:
-                self._say_once("a write to the controller does not return; until it does, its triggers are released")
+                self._say_once(
+                    "the controller accepts no data: a write hangs; until it returns, the triggers are released"
+                )
             return
         self._beat_s = now_s
         self._guard.beat()
@@ -178,8 +180,8 @@ class Connection:
         self.state = ConnectionState.LOST
         self._next_look_s = now_s + LOOK_PERIOD_S
         self._say_once(
-            f"{error}; until it is back nothing is sent to move the robot, which stops: then release the triggers and"
-            " arm it again"
+            f"{error}; the robot stops, and no commands are sent until the controller is back: then release the"
+            " triggers and arm the robot again"
         )
         self._listener.controller_lost(now_s)
         self._let_go()

@@ -87,4 +87,4 @@ class ControllerState(Struct, frozen=True):
         for opposites in _OPPOSITES if self.pressed else ():
             if opposites <= self.pressed:
                 one, other = sorted(button.value for button in opposites)
-                raise ValueError(f"pressed has {one} and {other}; valid: one of the two")
+                raise ValueError(f"pressed holds the opposites {one} and {other}; valid: at most one of them")

@@ -250,9 +250,7 @@ def find_pad(preferred: str | None) -> OpenController:
         if pair is not chosen:
             pair[1].close()
     if chosen is None:
-        hidden = (
-            f"; not permitted to look at {', '.join(denied)}: a seat at this machine, or the group input, permits it"
-        )
+        hidden = f"; this user may not open {', '.join(denied)}: log in at this machine, or join the group input"
         raise NoDeviceError(f"no gamepad with two sticks, two triggers and rumble in {NODES}{hidden if denied else ''}")
     path, pad = chosen
     return OpenController(pad, f"{pad.name} at {path}, rumble in place of stiffness", pad.address)

@@ -131,7 +131,7 @@ class CommandsUnderWay:
             raise ValueError(f"travel = {travel}; valid: -1 to 1")
         last_s = self._sent[-1].sent_s if self._sent else -math.inf
         if not (math.isfinite(now_s) and now_s >= last_s):
-            raise ValueError(f"now_s = {now_s}; valid: a finite time, not before the last command's, {last_s}")
+            raise ValueError(f"now_s = {now_s}; valid: a finite time, {last_s} (that of the last command) or later")
         # The newest command before the window stays: it held when the window began.
         while len(self._sent) > 1 and self._sent[1].sent_s <= now_s - self._window_s:
             self._sent.popleft()

@@ -21,16 +21,16 @@ class TriggerTravel:
     """Part of one trigger's raw travel that is used: from dead zone to saturation."""
 
     dead_zone: float = 0.05
-    """Raw travel up to which a trigger is released."""
+    """Raw travel up to which a trigger counts as released."""
     saturation: float = 0.98
-    """Raw travel from which a trigger is fully pulled."""
+    """Raw travel from which on a trigger counts as fully pulled."""
 
     def __post_init__(self) -> None:
         # The second comparison is false for NaN, too.
         if not (self.dead_zone >= 0.0 and self.dead_zone + LEAST_SPAN <= self.saturation <= 1.0):
             raise ValueError(
-                f"dead_zone = {self.dead_zone}, saturation = {self.saturation}; valid: 0 <= dead_zone, at least"
-                f" {LEAST_SPAN} below saturation, <= 1"
+                f"dead_zone = {self.dead_zone}, saturation = {self.saturation}; valid: dead_zone of 0 or more,"
+                f" saturation of at most 1, and at least {LEAST_SPAN} between them"
             )
 
     def travel(self, raw: float) -> float:
@@ -60,9 +60,9 @@ class StickRest:
 
     def __post_init__(self) -> None:
         if not math.hypot(self.x, self.y) <= LARGEST_REST:  # false for NaN, too
-            raise ValueError(f"x = {self.x}, y = {self.y}; valid: within {LARGEST_REST} of the centre")
+            raise ValueError(f"x = {self.x}, y = {self.y}; valid: at most {LARGEST_REST} from the centre")
         if not 0.0 <= self.dead_zone < 1.0 - math.hypot(self.x, self.y):
-            raise ValueError(f"dead_zone = {self.dead_zone}; valid: 0 to below 1 minus the distance of its rest")
+            raise ValueError(f"dead_zone = {self.dead_zone}; valid: 0 to below {1.0 - math.hypot(self.x, self.y):.3g}")
 
     def deflection(self, raw: Stick) -> Stick:
         """Return the deflection from rest: 0 in the dead zone, then growing to length 1 in every direction."""

@@ -41,7 +41,11 @@ class Tuner:
         lease = standing.lease
         try:
             if lease is None or not standing.owns or not lease.may_tune:
-                why = "the run does not permit it (--permit-tuning)" if standing.owns else "only the owner may"
+                why = (
+                    "the robot side permits it with --permit-tuning only"
+                    if standing.owns
+                    else "only the owner of the robot may tune"
+                )
                 raise ConfigurationError(f"tuning refused: {why}")
             if probability is not None and not 0.0 < probability < 1.0:
                 raise ConfigurationError(f"probability = {probability}; valid: above 0 to below 1")

@@ -83,7 +83,7 @@ class GripperPose:
     tool_rotation: FloatArray
     """(3, 3) tool to world; the approach axis is the last column."""
     tool_jacobian: FloatArray
-    """(6, n) in the world frame, linear rows first."""
+    """(6, n) Jacobian of the tool in the world frame: three linear rows, then three angular ones"""
     sphere_centers_m: FloatArray
     """(m, 3) centres of the gripper's spheres"""
     sphere_radii_m: FloatArray

@@ -56,10 +56,13 @@ class Declared(Generic[_Columns]):
     """Declaration of a bundle: a named tuple type whose fields are arrays, and the form of each array."""
 
     def __init__(self, columns: type[_Columns], *forms: Form) -> None:
-        """columns: the named tuple type. forms: one for each of its fields, in order; TypeError for another number."""
+        """columns: the named tuple type. forms: the form of each of its fields, in order.
+
+        TypeError unless there are as many forms as fields.
+        """
         self._fields: tuple[str, ...] = cast(Any, columns)._fields
         if len(forms) != len(self._fields):
-            raise TypeError(f"{columns.__name__} has {len(self._fields)} columns, not {len(forms)}")
+            raise TypeError(f"{columns.__name__} has {len(self._fields)} columns; {len(forms)} forms are given")
         self._forms = forms
         self.at: Callable[[IntArray], _Columns] = _view(columns, forms)
         """Function that returns the named tuple of arrays for a bundle; in kernels only"""

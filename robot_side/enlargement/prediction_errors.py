@@ -65,7 +65,7 @@ def load_prediction_errors(path: Path) -> PredictionErrors:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         reason = (isinstance(error, OSError) and error.strerror) or error
         raise ConfigurationError(
-            f"--prediction-errors {path}: {reason}; valid: a file that feelahead bench error --table wrote"
+            f"--prediction-errors {path}: {reason}; valid: a file written by `feelahead bench error --table`"
         ) from None
     rows = {kind: _rows(path, kind, content.get(kind, [])) for kind in get_args(Compensation)}
     arm = content.get("arm")
@@ -80,7 +80,7 @@ def _rows(path: Path, kind: str, tables: Any) -> Rows:
     valid = all(np.isfinite(row).all() and row[0] > 0.0 and row[2] >= 0.0 for row in rows)
     if not (rows and valid and list(rows) == sorted(rows)):
         raise ConfigurationError(
-            f"--prediction-errors {path}: [[{kind}]] is missing or invalid; valid: tables with"
-            f" {', '.join(_KEYS)}, loop ages rising"
+            f"--prediction-errors {path}: [[{kind}]] is missing or invalid; valid: one table or more"
+            f" with {', '.join(_KEYS)}, in the order of rising loop ages"
         )
     return rows  # type: ignore[return-value]

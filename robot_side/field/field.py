@@ -41,9 +41,10 @@ class Field:
     """Result of one look."""
 
     onsets_m: FloatArray
-    """(2, 8) onset distances of strengths 1 to 8, ascending, infinite beyond the examined distance. Row 0 is the fast
-    list, row 1 the slow list. In the slow list an object that is to be touched has strength 4 at most, and its expected
-    position counts: the spread D_σ(P) - D_σ(0.5) is left out."""
+    """(2, 8) onset distances of strengths 1 to 8: row 0 is the fast list, row 1 the slow list. Each list ascends. A
+    strength that begins beyond the examined distance has the distance infinity. In the slow list, an object that is to
+    be touched has strength 4 at most. Its onset distances are those of its expected position, without the spread
+    D_σ(P) - D_σ(0.5)."""
     sigma_m: float
     """Largest D_σ of the gripper's spheres"""
     counts: IntArray

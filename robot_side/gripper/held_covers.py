@@ -87,7 +87,8 @@ class HeldCovers:
                 coarse[name] = max(stand_outs)
         self._plan_boxes(objects, fixed)
         self.coarse: tuple[tuple[str, float], ...] = tuple(coarse.items())
-        """(name, distance in m) of the objects whose spheres protrude by more than `stand_out_m`, despite a search"""
+        """(name, distance in m) of each object whose spheres protrude from it by more than `stand_out_m`, namely by the
+        distance"""
 
     def _plan_boxes(self, objects: PerceivedObjects, fixed: Collection[str]) -> None:
         """Cover a box of each size once, to fill the cache: the first cover of a size takes several ticks."""

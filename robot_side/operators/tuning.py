@@ -40,7 +40,11 @@ class Tuning:
     def take(self, tune: Tune, now_s: float, *, owns: bool) -> bool:
         """Grant a request as a whole, or refuse it; return whether it was granted. owns: whether the owner sent it."""
         if self._expect is None or not owns:
-            why = "only the owner may" if self.permitted else "the robot side permits it with --permit-tuning"
+            why = (
+                "only the owner of the robot may tune"
+                if self.permitted
+                else "the robot side permits it with --permit-tuning only"
+            )
             return self._refuse(why)
         try:
             if tune.link is not None:

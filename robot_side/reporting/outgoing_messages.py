@@ -20,7 +20,7 @@ TOPICS: Final[dict[OutgoingStream, bytes]] = {"telemetry": b"telemetry", "video"
 """Topics of the streams to viewers. The scene has its own stream, because its large messages would delay telemetry."""
 
 SHOWN_NAME = 100
-"""Maximum number of characters of an object's name that are sent and shown, as messages are limited"""
+"""Number of characters to which an object's name is cut before it is sent or shown, as messages have a limited size"""
 _AROUND_S: Final = 0.1
 _AROUND_AGAIN_S: Final = 0.4
 """Seconds after which an unchanged map is sent again, so that a lost one is replaced"""

@@ -42,7 +42,7 @@ class Movers:
         ValueError for other indices, or if `first` is itself a frame of movers.
         """
         if first.since is not None:
-            raise ValueError("first is itself a frame of movers; valid: a complete frame")
+            raise ValueError("first is a frame of changes; valid: a complete frame, with since = None")
         beyond = things.size > 0 and (things[0] < 0 or things[-1] >= len(first.names))
         if beyond or (np.diff(things) <= 0).any():
             raise ValueError(f"things holds {things}; valid: rising indices below {len(first.names)}")

@@ -338,17 +338,17 @@ REFUSED: tuple[tuple[Any, dict[str, Any], str], ...] = (
     (VALID[2], {"speed_m_s": math.nan}, "speed_m_s = nan"),
     (VALID[2], {"horizon_m": -0.1}, "horizon_m = -0.1"),
     (VALID[2], {"told_m_s": math.inf}, "told_m_s = inf"),
-    (field(onsets(0.1)), {"fast_m": onsets(0.2, 0.1)}, "fast_m = .* none shorter than the one before"),
+    (field(onsets(0.1)), {"fast_m": onsets(0.2, 0.1)}, "fast_m = .* each at least as long as the one before"),
     (field(onsets(0.1)), {"slow_m": onsets(0.0, math.nan)}, "slow_m = nan"),
     (field(onsets(0.1)), {"slow_m": onsets(0.0, math.inf)}, "slow_m = inf"),
     (field(onsets(0.1)), {"full_speed_m_s": 0.0}, "full_speed_m_s = 0"),
     (field(onsets(0.1)), {"acceleration_m_s2": math.inf}, "acceleration_m_s2 = inf"),
     (field(onsets(0.1)), {"displacement_m": math.nan}, "displacement_m = nan"),
     (field(onsets(0.1)), {"stiffness": 1.1}, "stiffness = 1.1"),
-    (SCENE, {"link_poses": b"123"}, "link_poses, spheres; valid: whole rows"),
-    (SCENE, {"spheres": b"123"}, "link_poses, spheres; valid: whole rows"),
-    (SCENE, {"object_poses": b""}, "object_poses; valid: a row for each"),
-    (VIEWS[1], {"object_poses": ROW + ROW}, "object_poses; valid: a row for each"),
+    (SCENE, {"link_poses": b"123"}, "link_poses or spheres ends within a row; valid: whole rows"),
+    (SCENE, {"spheres": b"123"}, "link_poses or spheres ends within a row; valid: whole rows"),
+    (SCENE, {"object_poses": b""}, "object_poses has .* bytes; valid: "),
+    (VIEWS[1], {"object_poses": ROW + ROW}, "object_poses has .* bytes; valid: "),
 )
 
 

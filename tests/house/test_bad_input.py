@@ -75,7 +75,7 @@ def complaint(command: str) -> str:
         ("feelahead bench felt --definition --picture out.png", "--definition has no figure", "valid"),
         ("feelahead bench felt --definition --field", "--definition and --field exclude each other", "one of them"),
         (f"feelahead bench felt --model {WALL}", "--model and --site", "--cover and --field"),
-        ("feelahead bench felt --cover --site tcp", "--cover takes --model and --site together", "valid"),
+        ("feelahead bench felt --cover --site tcp", "--cover is given with only one of --model and --site", "valid"),
         ("feelahead bench felt --field --step-mm nan", "--step-mm = nan", "1 to 150"),
         ("feelahead bench felt --field --model no_such.xml", "no_such.xml: there is no such file", "MJCF"),
         (f"feelahead bench felt --field --model {WALL} --site hand", "'hand'", "tool"),

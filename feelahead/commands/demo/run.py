@@ -73,7 +73,7 @@ def too_slow(settings: DemoSettings) -> str | None:
         return None
     return (
         f"--link {settings.link!r}: a message and its answer take {there_s + back_s:g} s;"
-        f" valid: below {_LINK_TIMEOUT_S:g} s, within which the two sides must find each other"
+        f" valid: below {_LINK_TIMEOUT_S:g} s, the time in which the two sides must find each other"
     )
 
 
@@ -155,9 +155,7 @@ def _watch(
             elif said.listens and said.operator is not None:
                 waiting_since_s = now_s if waiting_since_s is None else waiting_since_s
                 if now_s - waiting_since_s > _LINK_TIMEOUT_S:
-                    asked = (
-                        f"; the link that was asked for may be why: --link {settings.link!r}" if settings.link else ""
-                    )
+                    asked = f"; the reason may be --link {settings.link!r}" if settings.link else ""
                     return [f"the sides did not find each other within {_LINK_TIMEOUT_S:g} s{asked}"]
             elif now_s - starting_s > _START_TIMEOUT_S:
                 return [f"the sides did not start within {_START_TIMEOUT_S:g} s"]

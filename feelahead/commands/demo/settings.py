@@ -36,8 +36,8 @@ class DemoSettings(RunOptions):
     assist: Literal["none", "speed"] = "none"
     """speed: the robot side caps the speed along the triggers, so that the arm stops where full strength begins."""
     law: LawName = "swept"
-    """Law of the stiffness. swept: along each trigger, early enough to release it in time. paper: the paper's plain
-    law, for comparison."""
+    """Law of the stiffness. swept: stiffness along the direction of each trigger, early enough to release the trigger
+    in time. paper: the paper's plain law, for comparison."""
     compensation: Compensation = "operator"
     """Side that compensates the delay. operator: by the commands still under way. robot: by speed times loop age
     (v t_d, eq. 8)."""
@@ -65,9 +65,11 @@ class DemoSettings(RunOptions):
         super().__post_init__()
         check_limits(self)
         if self.tui and self.status != "line":
-            raise ValueError(f"--tui with --status {self.status}; valid: only one of them")
+            raise ValueError(f"--tui and --status {self.status} exclude each other; valid: only one of them")
         if self.scene is not None and self.model is not None:
-            raise ValueError(f"--scene {self.scene} with --model; valid: one of them, as a model has its own scene")
+            raise ValueError(
+                f"--scene {self.scene} and --model exclude each other, as a model has its own scene; valid: one of them"
+            )
 
     @property
     def has_pages(self) -> bool:

@@ -62,11 +62,11 @@ class DoctorSettings:
     def __post_init__(self) -> None:
         for name in ("view_connect", "keys", "robot_key"):
             if getattr(self, name) is not None and self.connect is None:
-                raise ValueError(f"--{name.replace('_', '-')} without --connect; valid: both")
+                raise ValueError(f"--{name.replace('_', '-')} is given without --connect; valid: both, or neither")
         if self.compile and self.connect is not None:
-            raise ValueError("--compile with --connect; valid: only one of them")
+            raise ValueError("--compile and --connect exclude each other; valid: only one of them")
         if self.robot_key is not None and self.keys is None:
-            raise ValueError("--robot-key without --keys; valid: both")
+            raise ValueError("--robot-key is given without --keys; valid: both, or neither")
 
 
 def doctor(arguments: Sequence[str]) -> int:

@@ -122,7 +122,10 @@ class PullRun(Listener):
         """Run until the pull begins, and return the time of that; FeelaheadError if the robot is not armed in time."""
         began_s = wait_for_pull(self.loopback, self.hands, self.approach.link)
         if self.truth.touched:
-            raise FeelaheadError(f"the gripper touches {', '.join(sorted(self.truth.touched))} before the pull begins")
+            raise FeelaheadError(
+                f"the gripper touches {', '.join(sorted(self.truth.touched))} before the pull begins; valid: a scene in"
+                " which it touches nothing at first"
+            )
         return began_s
 
     def go_on(self, until_s: float) -> Iterator[float]:

@@ -84,12 +84,12 @@ class Pulls:
     probabilities: tuple[float, ...]
     laws: tuple[Law, ...]
     judged_s: float = 60.0
-    """Minimum time with R2 pulled, in seconds, that is judged for the false alarms of each cell."""
+    """Seconds with R2 pulled, at least, in which false alarms are counted for each cell."""
 
 
 @dataclass
 class _Counts:
-    """Counts of one law at one P. `hits` (covered draws) and `draws` have one entry for each approach."""
+    """Counts of one law at one probability P. `draws` and `hits` (covered draws) have one entry for each approach."""
 
     hits: list[int] = field(default_factory=list)
     draws: list[int] = field(default_factory=list)

@@ -49,8 +49,12 @@ def frozen_scene(name: str) -> Path:
     """Return the MJCF file of a frozen scene; ConfigurationError if it is missing, as in an installed wheel."""
     path = SCENES / f"{name}.xml"
     if not path.is_file():
-        names = ", ".join((*AHEAD, *ASIDE, *PASSED)) if SCENES.is_dir() else "to run in a clone of the repository"
-        raise ConfigurationError(f"scene {name!r}: {path} is not there; valid: {names}")
+        names = (
+            ", ".join((*AHEAD, *ASIDE, *PASSED))
+            if SCENES.is_dir()
+            else "none here, as scenes are in a clone of the repository: run it there"
+        )
+        raise ConfigurationError(f"scene {name!r}: {path} does not exist; valid: {names}")
     return path
 
 

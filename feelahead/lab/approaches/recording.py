@@ -40,11 +40,11 @@ class RecordedApproach:
     pose_time_s: FloatArray
     """(k,) times of the poses: every 10 ms, from a second before the pull"""
     joint_positions_rad: FloatArray
-    """(k, n) true"""
+    """(k, n) true positions of the arm's joints"""
     joint_velocities_rad_s: FloatArray
-    """(k, n) true"""
+    """(k, n) true velocities of the arm's joints"""
     finger_positions: FloatArray
-    """(k, f) true"""
+    """(k, f) true positions of the fingers' joints"""
     loop_age_s: FloatArray
     """(k,) t_d of eq. 8 at the robot side"""
     tick_time_s: FloatArray

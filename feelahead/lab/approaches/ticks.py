@@ -51,7 +51,7 @@ class Recorded:
         """Return a new law with the settings of the run, as it was at the run's start."""
         law = robot_parts(self.settings, scene_of(self.name)).law
         if not isinstance(law, SweptLaw):
-            raise TypeError(f"a {type(law).__name__}; valid: SweptLaw")
+            raise TypeError(f"law is a {type(law).__name__}; valid: a SweptLaw")
         # Fields along the triggers alone; contact distances from around are not computed.
         law.ask_around(asked=False)
         return law

@@ -89,7 +89,7 @@ def read_link_sample(path: Path, flag: str) -> LinkSample:
     """Read a recording with send times; otherwise ConfigurationError, in one line that names `flag`."""
     samples = read_samples(path, flag)
     if len(samples) < 2 or any(sample.sent_s is None for sample in samples):
-        raise ConfigurationError(f"{flag}: {path} lacks send times; valid: two messages or more with sent_ns")
+        raise ConfigurationError(f"{flag}: {path} lacks send times; valid: two messages or more, each with its sent_ns")
     return LinkSample(
         np.array([sample.sent_s for sample in samples], dtype=np.float64),
         np.array([math.nan if sample.delay_s is None else sample.delay_s for sample in samples]),

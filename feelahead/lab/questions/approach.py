@@ -91,10 +91,12 @@ class ApproachSettings(Sweep):
         super().__post_init__()
         for name in ("force", "strongest_effect", "link", "law", "compensation"):
             if not getattr(self, name):
-                raise ValueError(f"--{name.replace('_', '-')}: valid: one value or more")
+                raise ValueError(f"--{name.replace('_', '-')}: no value is given; valid: one value or more")
         for name in ("stick", "turn"):
             if not math.hypot(*getattr(self, name)) <= 1.0 + 1e-9:  # false for NaN, too
-                raise ValueError(f"--{name} {getattr(self, name)}: valid: two numbers, together at most 1 long")
+                raise ValueError(
+                    f"--{name} {getattr(self, name)}: is longer than 1; valid: two numbers x and y with √(x² + y²) <= 1"
+                )
         for spec in self.link:
             require_young_loop(spec, self.link_model)
         for model in self.model:
@@ -175,9 +177,11 @@ def sentence(row: Row) -> str:
         speed = round(row["contact_speed_mm_s"])
         what += f"touches {row['contact_with']} at {speed} mm/s after {row['ended_s']:.2f} s"
     elif row["stops_at_mm"] is not None:
-        what += f"stops {_gap(row['stops_at_mm'])} off ({_gap(row['way_left_mm'])} along the approach)"
+        what += (
+            f"stops {_gap(row['stops_at_mm'])} from the nearest object ({_gap(row['way_left_mm'])} along the approach)"
+        )
     else:
-        what += f"undecided after {row['ended_s']:.1f} s: it still moves"
+        what += f"undecided after {row['ended_s']:.1f} s: the gripper still moves"
     return f"{what}; least gap {_gap(row['least_gap_mm'])}, reversals {row['reversals']}"
 
 

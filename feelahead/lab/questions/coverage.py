@@ -63,9 +63,15 @@ class CoverageSettings(Sweep):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.laws or len(set(self.laws)) < len(self.laws):
-            raise ValueError(f"--laws {' '.join(self.laws)}: valid: one or more of {', '.join(LAWS)}, each once")
+            raise ValueError(
+                f"--laws {' '.join(self.laws)}: none is given, or one is given twice; valid: one or more of"
+                f" {', '.join(LAWS)}, each once"
+            )
         if not any(pulls.cells for pulls in self.pulls()):
-            raise ValueError(f"--only {' '.join(self.only)}: no cell's name contains it; valid: as wall/bell/200 ms")
+            raise ValueError(
+                f"--only {' '.join(self.only)}: no cell's name contains it; valid: a part of a cell's name, such as"
+                " wall/bell/200 ms"
+            )
 
     def pulls(self) -> list[Pulls]:
         """Return the motions with their chosen cells; motions with the most cells come first."""

@@ -54,9 +54,11 @@ class DemoSettings(Sweep):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.person.pull_n is not None:
-            raise ValueError(f"--person.pull-n {self.person.pull_n}: valid: not here, where a task is done")
+            raise ValueError(
+                f"--person.pull-n {self.person.pull_n}: a finger that only pulls cannot do the task; valid: without it"
+            )
         if not self.link:
-            raise ValueError("--link: valid: one value or more")
+            raise ValueError("--link: no value is given; valid: one value or more")
         for spec in self.link:
             require_young_loop(spec, self.link_model)
 

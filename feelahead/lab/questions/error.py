@@ -79,7 +79,9 @@ class ErrorSettings(Sweep):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.draws is not None and self.draws % BATCHES:
-            raise ValueError(f"--draws {self.draws}: valid: a multiple of {BATCHES}, whose parts give the deviation")
+            raise ValueError(
+                f"--draws {self.draws}: cannot be split into {BATCHES} equal parts; valid: a multiple of {BATCHES}"
+            )
         require_output_file("--table", self.table)
 
 

@@ -67,11 +67,13 @@ class FeltSweep(Sweep):
         if len(asked) > 1:
             raise ValueError(f"{' and '.join(asked)} exclude each other; valid: one of them")
         if self.definition and self.picture is not None:
-            raise ValueError(f"--picture {self.picture}: --definition has no figure; valid: without --definition")
+            raise ValueError(
+                f"--picture {self.picture}: --definition has no figure; valid: --picture without --definition"
+            )
         if (self.model or self.site is not None) and not (self.cover or self.field):
-            raise ValueError("--model and --site are for --cover and --field; valid: with one of them")
+            raise ValueError("--model and --site are only for --cover and --field; valid: with one of these two")
         if self.cover and bool(self.model) != (self.site is not None):
-            raise ValueError("--cover takes --model and --site together; valid: both, or neither")
+            raise ValueError("--cover is given with only one of --model and --site; valid: both, or neither")
         for model in self.model:
             require_input_file("--model", model, "an MJCF file")
 

@@ -66,11 +66,16 @@ class HapticsSettings(Sweep):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.person.pull_n is not None:
-            raise ValueError(f"--person.pull-n {self.person.pull_n}: valid: not here, where a task is done")
+            raise ValueError(
+                f"--person.pull-n {self.person.pull_n}: a finger that only pulls cannot do the task; valid: without it"
+            )
         for name in ("scenes", "delays"):
             values = getattr(self, name)
             if not values or len(set(values)) < len(values):
-                raise ValueError(f"--{name} {' '.join(map(str, values))}; valid: one or more values, each once")
+                raise ValueError(
+                    f"--{name} {' '.join(map(str, values))}: a value is missing or given twice; valid: one value or"
+                    " more, each once"
+                )
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,9 @@ class LatencySettings(Sweep):
         for name in ("links", "haptics", "media"):
             values = getattr(self, name)
             if len(set(values)) < len(values) or not (values or (name == "media" and self.compose)):
-                raise ValueError(f"--{name} {' '.join(values)}: valid: one or more, each once")
+                raise ValueError(
+                    f"--{name} {' '.join(values)}: a value is missing or given twice; valid: one or more, each once"
+                )
         for link in self.links:
             require_young_loop(link, self.model)
 

@@ -77,7 +77,7 @@ class LinkSweep(Played, Sweep):
         super().__post_init__()
         self.profile(0)
         if self.against is not None and not self.virtual:
-            raise ValueError(f"--against {self.against}: valid: with --virtual")
+            raise ValueError(f"--against {self.against}: is given without --virtual; valid: both, or neither")
 
 
 @dataclass(frozen=True)

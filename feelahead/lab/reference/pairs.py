@@ -11,13 +11,19 @@ from common.arrays import FloatArray, IntArray
 Solid = Literal["tetrahedron", "box", "half-space", "sphere"]
 
 TETRAHEDRON_TRIANGLES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
-"""Vertices of each face, anticlockwise from outside if right-handed: det(v1 - v0, v2 - v0, v3 - v0) > 0."""
+"""Vertices of each face of a tetrahedron with vertices v0 to v3, anticlockwise as seen from outside.
+
+It must be right-handed: det(v1 - v0, v2 - v0, v3 - v0) > 0.
+"""
 
 BOX_SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
 """Corners (8, 3) in units of the half sizes, the last axis changing first."""
 
 BOX_QUADRILATERALS = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-"""Corners of each face in `BOX_SIGNS`, anticlockwise from outside for a right-handed box."""
+"""Corners of each face of a box as indices of `BOX_SIGNS`, anticlockwise as seen from outside.
+
+The box's axes must be right-handed.
+"""
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,10 @@ class CompiledHeader:
         compiler = next((path for name in ("c++", "g++", "clang++") if (path := shutil.which(name))), None)
         eigen = next((path for path in _EIGEN if path.is_dir()), None)
         if header is None:
-            self.missing = f"no header: {SDIST}, unpack it, --peer-header .../include/overlap/overlap.hpp"
+            self.missing = (
+                f"its header is not given; to get it: {SDIST}; unpack it, then give"
+                " --peer-header .../include/overlap/overlap.hpp"
+            )
         elif compiler is None:
             self.missing = "no C++ compiler (c++, g++ or clang++ in the PATH)"
         elif eigen is None:

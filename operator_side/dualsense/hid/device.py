@@ -187,7 +187,7 @@ def _write(handle: HidHandle, report: bytes) -> None:
     except OSError as error:
         raise _gone(str(error)) from error
     if written < len(report):
-        raise _gone(handle.error() or f"{written} of {len(report)} bytes written")
+        raise _gone(handle.error() or f"only {written} of {len(report)} bytes were written")
 
 
 def _ask(handle: HidHandle, path: bytes) -> Identity:

@@ -82,7 +82,7 @@ def find_controller(backend: HidBackend, preferred: str | None = None, *, others
             other.close()
     if left_alone:
         raise failure or NoDeviceError(
-            f"the controller {preferred} is not there, only another: {chosen.identity.address}"
+            f"the controller {preferred} is not connected, only another one: {chosen.identity.address}"
         )
     transport, address = chosen.identity.transport, chosen.identity.address
     name = f"{sighting.model} on {transport.value}{'' if address is None else f' ({address})'}"

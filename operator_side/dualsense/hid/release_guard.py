@@ -12,7 +12,7 @@ _END_TIMEOUT_S = 2.0
 """Seconds to wait for the watchdog's end before it is killed; usually it takes milliseconds"""
 MOST_REPLACEMENTS: Final = 3
 """Maximum number of times that an ended watchdog is replaced, as the cause would end the next one, too"""
-_LEFT_ALONE: Final = "should this one be killed or hang now, the triggers stay as stiff as they are"
+_LEFT_ALONE: Final = "if this program is now killed or hangs, the triggers stay as stiff as they are"
 
 
 class ReleaseGuard:
@@ -65,10 +65,10 @@ class ReleaseGuard:
                 self._process = _started()
         if self._process is None:
             self._given_up = True
-            return [f"the watchdog process has ended, and there is no other: {_LEFT_ALONE}"]
+            return [f"the process that would release the triggers has ended and is not replaced: {_LEFT_ALONE}"]
         if self._held is not None:
             self.hold(*self._held)
-        return ["the watchdog process has ended; another one has taken its place"]
+        return ["the process that would release the triggers has ended; a new one has replaced it"]
 
     def hold(self, path: bytes, release: bytes) -> None:
         """Let the watchdog write `release` to the controller at `path` if this process dies or hangs from now on."""
@@ -101,7 +101,11 @@ class ReleaseGuard:
             return []
         self._answers += self._process.stdout.read(4096) or b""
         *answers, self._answers = self._answers.split(b"\n")
-        return [f"the watchdog process cannot open the controller: {_LEFT_ALONE}"] if b"refused" in answers else []
+        return (
+            [f"the process that would release the triggers cannot open the controller: {_LEFT_ALONE}"]
+            if b"refused" in answers
+            else []
+        )
 
 
 def _started() -> subprocess.Popen[bytes]:

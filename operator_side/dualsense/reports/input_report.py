@@ -149,7 +149,7 @@ def _checked_transport(report: bytes) -> Transport:
     if transport is Transport.BLUETOOTH:
         if is_simple_report(report):
             raise RemoteProtocolError(
-                f"input report: {described(report)}: Bluetooth's simple mode; valid: full reports"
+                f"input report: {described(report)}: it is of Bluetooth's simple mode; valid: a full report"
             )
         check(Seed.INPUT, report)
     return transport

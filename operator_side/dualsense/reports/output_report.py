@@ -55,7 +55,7 @@ def build_output_report(feel: Feel, transport: Transport = Transport.USB, sequen
         code = report[framing.start + place]
         # Last check before sending, on the very bytes that are sent.
         if len(report) != framing.length or (code not in COMMANDED_CODES if report[framing.start] & flag else code):
-            raise ValueError(f"report holds the effect code 0x{code:02x}; valid: 0x05, 0x21")
+            raise ValueError(f"output report: the effect code is 0x{code:02x}; valid: 0x05, 0x21")
     return bytes(report) if transport is Transport.USB else sealed(Seed.OUTPUT, bytes(report[:-CHECKSUM_LENGTH]))
 
 
@@ -108,7 +108,9 @@ def _block_of(report: bytes) -> bytes:
     block = report[start : start + _COMMON_LENGTH]
     for place in (_L2_EFFECT, _R2_EFFECT):
         if block[place] in DEBUG_CODES:
-            raise RemoteProtocolError(f"output report: debug effect code 0x{block[place]:02x}; valid: none")
+            raise RemoteProtocolError(
+                f"output report: 0x{block[place]:02x} is an effect code for debugging; valid: other codes"
+            )
     return block
 
 
@@ -150,5 +152,5 @@ def _common_start(report: bytes) -> int:
         return _OTHER_START
     raise RemoteProtocolError(
         f"output report: bytes 1 and 2 are 0x{report[1]:02x}, 0x{report[2]:02x}; "
-        "valid: the sequence and 0x10 (hid-playstation), or 0x02 and no tag (SDL)"
+        "valid: the sequence number and 0x10 (hid-playstation), or 0x02 without a tag (SDL)"
     )

@@ -97,9 +97,11 @@ class SimulatedDualSense:
         is a DualSense Edge.
         """
         if pressed & _TRIGGER_BUTTONS:
-            raise ValueError("pressed has L2 or R2; valid: any other button, and set_finger_force for these")
+            raise ValueError("pressed holds L2 or R2; valid: other buttons (set_finger_force pulls L2 and R2)")
         if pressed & _EDGE_BUTTONS and self.model is not Model.EDGE:
-            raise ValueError("pressed has a paddle or a function key; valid: only on a DualSense Edge")
+            raise ValueError(
+                "pressed holds a paddle or a function key; valid: buttons of a DualSense, as only a DualSense Edge has these"
+            )
         if pressed != self._held.pressed:
             self._held = replace(self._held, pressed=pressed)
 
@@ -169,7 +171,9 @@ class SimulatedDualSense:
         self._require_open()
         try:
             if transport_of_output(report) is not self.transport:
-                raise ValueError(f"report: id 0x{report[0]:02x} is not for a controller on {self.transport.value}")
+                raise ValueError(
+                    f"report: id 0x{report[0]:02x} is of another transport; valid: a report for {self.transport.value}"
+                )
             feel = parse_output_report(report)
         except RemoteProtocolError as error:
             raise ValueError(f"report: {error}") from error
@@ -200,7 +204,7 @@ class SimulatedDualSense:
         if not math.isfinite(now_s):
             raise ValueError(f"now_s = {now_s}; valid: a finite number")
         if now_s < self._now_s:
-            raise ValueError(f"now_s = {now_s}; valid: not before {self._now_s}, the last time given")
+            raise ValueError(f"now_s = {now_s}; valid: {self._now_s}, the last time given, or later")
         if self._woke_s is None:
             self._woke_s = self._now_s = now_s
         due = math.floor((now_s - self._woke_s) / INPUT_REPORT_PERIOD_S + _ROUNDING_OF_TICKS)

@@ -37,7 +37,7 @@ def equilibrium_travel(
         if not (math.isfinite(value) and value >= 0.0):
             raise ValueError(f"{name} = {value}; valid: finite, 0 or more")
     if len(zone_strengths) != ZONE_COUNT or not all(0 <= k <= MAX_STRENGTH for k in zone_strengths):
-        raise ValueError(f"zone_strengths = {zone_strengths}; valid: {ZONE_COUNT} from 0 to {MAX_STRENGTH}")
+        raise ValueError(f"zone_strengths = {zone_strengths}; valid: {ZONE_COUNT} strengths from 0 to {MAX_STRENGTH}")
     for zone, strength in enumerate(zone_strengths):
         balance = (finger_force_n - SPRING_PRELOAD_N - strength * strength_step_n) / SPRING_RISE_N
         if balance < (zone + 1) / ZONE_COUNT:

@@ -114,7 +114,7 @@ class UhidController:
         opens or closes the device, or a newer kernel sends an unknown event. ValueError for an impossible length.
         """
         if not _TYPE.size <= len(event) <= EVENT_LENGTH:
-            raise ValueError(f"event has {len(event)} bytes; valid: {_TYPE.size} to {EVENT_LENGTH}")
+            raise ValueError(f"the event has {len(event)} bytes; valid: {_TYPE.size} to {EVENT_LENGTH}")
         payload = event[_TYPE.size :].ljust(EVENT_LENGTH - _TYPE.size, b"\0")
         match _TYPE.unpack_from(event)[0]:
             case _Type.START:

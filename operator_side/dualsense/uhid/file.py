@@ -15,7 +15,7 @@ from operator_side.dualsense.uhid.controller import EVENT_LENGTH, UhidController
 
 UHID_PATH: Final = Path("/dev/uhid")
 
-_IN_A_CONTAINER = "in a container, on its host, and start it with --device=/dev/uhid"
+_IN_A_CONTAINER = "for a container: run this on its host, and start the container with --device=/dev/uhid"
 
 
 class UhidFile:
@@ -28,15 +28,18 @@ class UhidFile:
             self._descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | os.O_NONBLOCK)
         except FileNotFoundError:
             raise ConfigurationError(
-                f"no {path}, by which Linux takes virtual controllers: sudo modprobe uhid ({_IN_A_CONTAINER})"
+                f"{path} does not exist: Linux needs the module uhid for virtual controllers. To load it: sudo modprobe"
+                f" uhid ({_IN_A_CONTAINER})"
             ) from None
         except PermissionError:
             raise ConfigurationError(
-                f"no permission to open {path}: sudo setfacl -m u:$USER:rw {path}, or as root ({_IN_A_CONTAINER})"
+                f"no permission to open {path}: run as root, or permit it: sudo setfacl -m u:$USER:rw {path}"
+                f" ({_IN_A_CONTAINER})"
             ) from None
         except OSError as error:
             raise ConfigurationError(
-                f"{path} cannot be opened ({os.strerror(error.errno or 0)}); try sudo modprobe uhid ({_IN_A_CONTAINER})"
+                f"{path} cannot be opened ({os.strerror(error.errno or 0)}); try: sudo modprobe uhid"
+                f" ({_IN_A_CONTAINER})"
             ) from None
 
     def __enter__(self) -> "UhidFile":
@@ -62,7 +65,11 @@ class UhidFile:
             os.write(self._open_descriptor(), event)
         except OSError as error:
             reason = os.strerror(error.errno or 0)
-            said = "the kernel has released the controller" if error.errno == errno.EINVAL else "the kernel refused"
+            said = (
+                "the kernel has released the controller"
+                if error.errno == errno.EINVAL
+                else "the kernel refused an event"
+            )
             raise DeviceError(f"{said} ({reason}); its messages: sudo dmesg | grep playstation") from error
 
     def close(self) -> None:

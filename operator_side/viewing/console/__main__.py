@@ -85,7 +85,7 @@ class _Process:
         try:
             part.bind(("127.0.0.1", port))
         except OSError as error:
-            self._give_up(f"--console-port {port}: {error.strerror}; valid: 0 for any port that is free")
+            self._give_up(f"--console-port {port}: {error.strerror}; valid: a free port, or 0 to choose one")
             return
         port = part.getsockname()[1]
         gate = Gate(token, port)
@@ -97,7 +97,7 @@ class _Process:
             return
         self._drawing = Drawing(server.viser)
         if (hole := prove(port, token)) is not None:
-            self._give_up(f"its gate failed a check: {hole}")
+            self._give_up(f"its protection against other programs and pages failed a check: {hole}")
             return
         assert server.loop is not None  # noqa: S101  # Server guarantees it
         server.loop.call_soon_threadsafe(self._begin, server.loop, gate.address)

@@ -74,7 +74,7 @@ class Server:
         with self._in_between():
             self.viser = Viser(host="127.0.0.1", port=part.getsockname()[1], verbose=False)
         if self.loop is None or self.viser.get_port() != part.getsockname()[1]:
-            raise RuntimeError("this viser opens its server in another way than viser 1.1 does")
+            raise RuntimeError("viser has another version, which opens its server in another way; valid: viser 1.1")
 
     @contextlib.contextmanager
     def _in_between(self) -> Iterator[None]:

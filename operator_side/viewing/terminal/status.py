@@ -40,7 +40,9 @@ class TerminalStatus(Status):
         """Raise ConfigurationError unless standard output is a terminal whose cursor can be moved."""
         super().__init__("line", program)
         if not sys.stdout.isatty() or os.environ.get("TERM", "dumb") == "dumb":
-            raise ConfigurationError("--tui: no terminal with a cursor; valid: a terminal and its TERM, or no --tui")
+            raise ConfigurationError(
+                "--tui: the output is no terminal with a cursor; valid: a terminal, with TERM set, or no --tui"
+            )
 
     def __enter__(self) -> Self:
         self._before = termios.tcgetattr(sys.stdout)

@@ -81,7 +81,7 @@ class GripperDrive:
         return inputs
 
     def command(self, closing: float, valid_until_s: float) -> None:
-        """Close (+1), open (-1) or hold (0) until `valid_until_s`; closing: a share of the full speed.
+        """Close (`closing` = 1), open (-1) or hold (0) until `valid_until_s`; values between: shares of full speed.
 
         ValueError for a value outside [-1, 1] or a time that is not finite; nothing of such a command is applied.
         """

@@ -164,13 +164,15 @@ class DriverSession:
                 f"joint_velocity_rad_s = {velocities_rad_s}; valid: {len(self._shape.joint_names)} finite numbers"
             )
         if not math.isfinite(until_s):
-            raise ValueError(f"valid_until_s = {until_s}; valid: finite")
+            raise ValueError(f"valid_until_s = {until_s}; valid: a finite time")
         self._last_command = _LastCommand(velocities, until_s)
 
     def command_gripper(self, closing: float, until_s: float) -> None:
         """Store the gripper's command, which expires at `until_s`. ValueError as for `Arm.command_gripper`."""
         if not (-1.0 <= closing <= 1.0 and math.isfinite(until_s)):
-            raise ValueError(f"closing = {closing} until {until_s}; valid: -1 to 1, and a finite time")
+            raise ValueError(
+                f"closing = {closing}, valid_until_s = {until_s}; valid: closing from -1 to 1, and a finite time"
+            )
         self._closing = closing, until_s
 
     def outgoing(self, now_s: float) -> list[tuple[bytes, bytes]]:

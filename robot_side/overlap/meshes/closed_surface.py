@@ -140,9 +140,9 @@ def require_outward(corners: FloatArray, parts: IntArray, numbers_given: IntArra
 
 
 def _winding_around(corners: FloatArray, members: Sequence[IntArray], boxes: FloatArray, part: int) -> int | None:
-    """Return the winding number of all other parts about the part `part`: 0 if it lies within none.
+    """Return how often the mesh's other parts wind around the part `part`: 0 if it lies within none of them.
 
-    Return None if it touches them at all sampled points, so that the number is undecided.
+    Return None if every sampled point of the part lies on another part, so that this number is undecided.
     """
     if len(members) == 1:
         return 0

@@ -40,7 +40,7 @@ _scratch = on_stack(SCRATCH)
 def to_mesh(center: Vector, positions: FloatArray, rotations: FloatArray, pair: int) -> PreciseVector:
     """Return a sphere's centre in the mesh's frame, in double-double.
 
-    A float would be too coarse for a small ball at the far end of a large mesh.
+    One double would be too coarse for a small sphere at the far end of a large mesh.
     """
     away = (
         two_sum(center[0], -positions[pair, 0]),

@@ -49,12 +49,13 @@ _WHOLE = 4.0 * math.pi
 _UNDECIDED_AREA = 1e-11
 """Distance of a solid angle from 0 or 4π, in sr, up to which rounding may have turned one into the other"""
 _UNDECIDED_VOLUME = 1e-8
-"""Size of the volume that follows from a solid angle near 0 (radius 1), up to which it does not show whether the solid
-angle is really 4π"""
+"""Volume (for radius 1) computed with a solid angle near 0, up to which the solid angle may in truth be 4π. A volume
+below the negative of this value shows that it is 4π."""
 _SMALL_VOLUME = 1e-5
 """Overlap (for radius 1) below which it is recomputed with less cancellation"""
 _CLOSE = 0.02
-"""Distance of the centre from the surface, in radii, beyond which the centre is outside if the overlap is small"""
+"""Distance of the sphere's centre from the surface, in radii. A centre farther away lies outside the mesh if the
+overlap is small."""
 
 
 class Sums(NamedTuple):

@@ -99,7 +99,7 @@ def test_a_recorder_that_is_killed_leaves_all_but_the_last_second(tmp_path: Path
     # The side continues, and reports once what became of the recording.
     _, said = note_until(recording, lambda: recording._channel.ended)
     said += recording.idle(0.0)
-    assert [text for text in said if "the recorder is gone" in text] == said
+    assert [text for text in said if "the recorder has ended" in text] == said
     assert len(said) == 1
     assert recording.close()["error"] == "the recorder was killed"
     found = open_recording(path)

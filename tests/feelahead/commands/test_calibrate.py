@@ -119,7 +119,7 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_anything_is_meas
     out: str, handle: PlayedHandle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigurationError, match=f"--out {out}: is a folder, or its folder is not there"):
+    with pytest.raises(ConfigurationError, match=f"--out {out}: is a folder, or lies in a folder that does not exist"):
         command(["calibrate", "--out", out])
     assert handle.now_s == 0.0
     assert list(tmp_path.iterdir()) == []

@@ -46,8 +46,8 @@ def test_wrong_content_in_a_right_file_is_one_line(tmp_path: Path) -> None:
     ("name", "told"),
     [
         ("run.txt", "ends in .mcap"),
-        ("missing/run.mcap", "its folder is not there"),
-        ("there.mcap", "exists already; valid: a new file's path"),
+        ("missing/run.mcap", "its folder does not exist"),
+        ("there.mcap", "exists already; valid: the path of a new file"),
     ],
 )
 def test_where_nothing_can_be_recorded(tmp_path: Path, name: str, told: str) -> None:

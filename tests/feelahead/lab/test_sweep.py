@@ -98,7 +98,7 @@ def test_only_missing_cells_are_run_and_a_larger_grid_goes_on(tmp_path: Path) ->
 def test_a_file_that_is_no_journal_is_refused_and_left_as_it_is(tmp_path: Path, content: str) -> None:
     path = tmp_path / "mine.txt"
     path.write_text(content)
-    with pytest.raises(ConfigurationError, match=r"--resume .*: (it holds no journal|made by another)"):
+    with pytest.raises(ConfigurationError, match=r"--resume .*: (it holds no journal|it was written by another)"):
         ask(QUESTION, ["--resume", str(path), "--workers", "1"])
     assert path.read_text() == content
 
@@ -107,7 +107,7 @@ def test_a_journal_of_other_code_or_one_in_use_is_refused(tmp_path: Path) -> Non
     path = tmp_path / "journal"
     with Journal(path, {"code": "older"}), pytest.raises(ConfigurationError, match="another run writes to it"):
         ask(QUESTION, ["--resume", str(path)])
-    with pytest.raises(ConfigurationError, match="made by another question and code"):
+    with pytest.raises(ConfigurationError, match="it was written by another question and code"):
         ask(QUESTION, ["--resume", str(path), "--workers", "1"])
 
 

@@ -76,7 +76,7 @@ def test_the_command_says_so_and_another_setting_makes_other_stiffness(
 ) -> None:
     assert replay([str(run.path), "--check"]) == 0
     said = capsys.readouterr().out.splitlines()
-    assert said[-1] == "the same, within what is promised"
+    assert said[-1] == "the same, within the promised tolerance"
     assert "equal bit for bit" in said[0]
     build = build_parts
 

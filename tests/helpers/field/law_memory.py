@@ -41,7 +41,7 @@ def farthest_m_s(kept: Memory, pose: GripperPose, ahead_m: float) -> float:
 
 
 def fingers_m_s(kept: Memory, pose: GripperPose, now_s: float, *, changed: bool = False) -> FloatArray:
-    """Measure the spheres at one more pose; return their velocities (m, 3) relative to the tool."""
+    """Let the law measure its spheres at one more pose; return the spheres' velocities (m, 3) relative to the tool."""
     _measure(kept.bundle, pose.sphere_centers_m, pose.tool_position_m, pose.tool_rotation, now_s, changed)
     return kept.own_m_s.copy()
 
