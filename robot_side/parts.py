@@ -192,7 +192,7 @@ def _camera(settings: RobotSettings, scene: Scene, seed: int) -> MujocoCamera:
 
 def _notes(scene: Scene, settings: RobotSettings) -> tuple[str, ...]:
     """Return the notes shown before the run: start pose, objects and their roles, and shapes that are not exact."""
-    notes = [f"starts at {scene.start_pose}"]
+    notes = [f"the arm starts at {scene.start_pose}"]
     if settings.arm is not None:
         joints, fingers = (", ".join(names) or "none" for names in _joint_names(scene))
         notes = [f"the driver's joints, in this order: {joints}; of the gripper: {fingers}"]
@@ -205,7 +205,7 @@ def _notes(scene: Scene, settings: RobotSettings) -> tuple[str, ...]:
             ' [roles] NAME = "target" in the --config file (feelahead demo: --robot-config)'
         )
     notes += [
-        f"{name!r} names more than one thing, such as a body and a geom of the world: they count as one object"
+        f"{name!r} names several things, such as a body and a geom of the world: they count as one object"
         for name in scene.shared_names[:_NAMED_OBJECTS]
     ]
     shapes = scene.primitives
@@ -218,7 +218,7 @@ def _notes(scene: Scene, settings: RobotSettings) -> tuple[str, ...]:
             for name, reach_m in largest_first[:_NAMED_OBJECTS]
         ]
         if len(largest_first) > len(shown):
-            shown.append(f"and {len(largest_first) - len(shown)} more by no more than that")
+            shown.append(f"and {len(largest_first) - len(shown)} more, none by more than these")
         notes.append(f"perceived larger than they are, at most: {', '.join(shown)}")
     return tuple(notes)
 

@@ -127,9 +127,13 @@ class RobotSettings(SideOptions):
         super().__post_init__()
         check_limits(self)
         if self.scene is not None and self.model is not None:
-            raise ValueError(f"--scene {self.scene} with --model: valid: one of them; a model brings its own scene")
+            raise ValueError(
+                f"--scene {self.scene} and --model exclude each other, as a model has its own scene; valid: one of them"
+            )
         if self.keys is not None and self.insecure:
-            raise ValueError("--insecure with --keys: valid: one of them, as keys already say who may come in")
+            raise ValueError(
+                "--insecure and --keys exclude each other, as keys decide who may connect; valid: only one of them"
+            )
         self.uncertainty(PredictionErrors())
 
     def uncertainty(self, prediction: PredictionErrors) -> Uncertainty:

@@ -78,7 +78,7 @@ class Comparison:
         """Return the lines that report the comparison."""
         difference = "none"
         if not math.isfinite(self.worst_eighths):
-            difference = "some messages are missing or of another kind"
+            difference = "messages are missing, or differ in more than strengths and distances"
         elif self.worst_eighths or self.worst_m or self.equal < self.made:
             difference = f"{self.worst_eighths:g} of 8 in strength, {self.worst_m:.3g} m in distances"
         lines = [
@@ -120,13 +120,13 @@ def differing_origin(recorded: Mapping[str, object], present: Mapping[str, objec
         if isinstance(there, Mapping) and isinstance(here, Mapping):
             others = [key for key in there if there[key] != here.get(key)]
             notes += (
-                [f"recorded with other {name} ({', '.join(others)[:100]}): the results may differ in their last bits"]
+                [f"recorded with other {name} ({', '.join(others)[:100]}): the last bits of results may differ"]
                 if others
                 else []
             )
         elif there != here:
             notes.append(
-                f"recorded with {name} {str(there)[:60]}, here {str(here)[:60]}: the results may differ in their last bits"
+                f"recorded with {name} {str(there)[:60]}, here {str(here)[:60]}: the last bits of results may differ"
             )
     return notes
 
@@ -135,12 +135,12 @@ def require_side(recording: Recording, side: str) -> Mapping[str, Any]:
     """Return the header of `side`; raises ConfigurationError if it is missing or incomplete."""
     if side not in recording.headers:
         raise ConfigurationError(
-            f"{recording.path}: the {side} side was not recorded; valid: a recorded side: {', '.join(recording.headers)}"
+            f"{recording.path}: the {side} side was not recorded; valid: {', '.join(recording.headers)}"
         )
     header = dict(recording.headers[side])
     if missing := [name for name in _NEEDED if name not in header]:
         raise ConfigurationError(
-            f"{recording.path}: the header lacks the {side} side's {missing[0]}; valid: a recording with whole headers"
+            f"{recording.path}: the header lacks the {side} side's {missing[0]}; valid: a whole recording"
         )
     return header
 

@@ -82,8 +82,8 @@ def replay_robot(recording: Recording) -> Comparison:
     here = _by_last_names(kernel_digests())
     if gone := [name for name in recorded if name not in here]:
         raise ConfigurationError(
-            f"recorded by another version, with {len(gone)} kernels that this version lacks, such as {gone[0]}: its robot"
-            " side cannot be replayed; what works: feelahead replay without --check, export and plot"
+            f"recorded by another version, with {len(gone)} kernels that this version lacks, such as {gone[0]}: its"
+            " robot side cannot be replayed; what works: feelahead replay without --check, export, plot"
         )
     kernels = {name: here.get(name) for name in recorded}
     origin = {"processor": processor_name(), "kernels": kernels}

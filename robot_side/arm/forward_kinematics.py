@@ -83,8 +83,8 @@ def place(tree: LinkTree, arm_readings: FloatArray, finger_readings: FloatArray,
     placed = Placed(np.empty(3), np.empty((3, 3)), np.empty((6, arm_readings.size)), np.empty((tree.points.size, 3)))
     if not _place(*tree, arm_readings, finger_readings, link_poses, *placed):
         raise ValueError(
-            f"{arm_readings.size} readings of the arm and {finger_readings.size} of the fingers; valid: one for each of"
-            f" {np.count_nonzero(tree.joints['of_arm'])} and {np.count_nonzero(1 - tree.joints['of_arm'])} joints"
+            f"{arm_readings.size} joint readings of the arm and {finger_readings.size} of the fingers are given; valid:"
+            f" {np.count_nonzero(tree.joints['of_arm'])} and {np.count_nonzero(1 - tree.joints['of_arm'])}"
         )
     return placed
 

@@ -70,7 +70,7 @@ class JointEstimate:
         """
         last = self._last
         if last is None:
-            raise ValueError("no state has been measured; valid: after the first update")
+            raise ValueError("no state has been measured yet; valid: a call after the first update")
         if late_s == 0.0:
             return last
         since_s = min(late_s, _LOST_S)

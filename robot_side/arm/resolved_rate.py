@@ -35,7 +35,10 @@ def joint_velocities(
     ValueError for a wrong shape, a limit that is not above 0, or a value that is not finite.
     """
     if (jacobian.shape, twist.shape) != ((6, velocity_limits_rad_s.size), (6,)):
-        raise ValueError(f"jacobian has the shape {jacobian.shape}; valid: (6, n), with n limits and a twist (6,)")
+        raise ValueError(
+            f"jacobian has the shape {jacobian.shape}, and twist {twist.shape};"
+            f" valid: (6, {velocity_limits_rad_s.size}) and (6,)"
+        )
     velocity = np.empty(jacobian.shape[1])
     if not _resolve_loop(*map(np.ascontiguousarray, (jacobian, twist, velocity_limits_rad_s)), velocity):
         refuse(jacobian, twist, velocity_limits_rad_s)
@@ -47,8 +50,8 @@ def refuse(jacobian: FloatArray, twist: FloatArray, velocity_limits_rad_s: Float
     for name, values in (("jacobian", jacobian), ("twist", twist)):
         require_finite(name, values)
     if not (velocity_limits_rad_s > 0.0).all():
-        raise ValueError("velocity_limits_rad_s holds a value that is not above 0; valid: above 0, rad/s")
-    raise ValueError("jacobian and twist are too large to be multiplied; valid: SI units")
+        raise ValueError("velocity_limits_rad_s holds a value that is not above 0; valid: values above 0, in rad/s")
+    raise ValueError("jacobian and twist are too large to be multiplied; valid: values in SI units")
 
 
 @building_block

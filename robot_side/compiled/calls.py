@@ -20,7 +20,7 @@ def call_at_address(returns: Any, arguments: tuple[Any, ...]) -> Callable[[int, 
 
     def call(_typing: Any, _address: Any, given: Any) -> Any:
         if len(given) != len(wanted.args) or not all(map(_fits, given, wanted.args)):
-            raise numba.TypingError(f"the kernel takes {wanted.args}, not {given}")
+            raise numba.TypingError(f"the kernel is called with arguments of the types {given}; valid: {wanted.args}")
 
         def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
             address, packed = arguments

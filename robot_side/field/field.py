@@ -87,7 +87,8 @@ class Ahead:
         approach_m = _STILL if along.approach_m is None else along.approach_m
         if len(classes) != objects or len(approach_m) not in (0, objects):
             raise ValueError(
-                f"classes has {len(classes)} entries, approach_m {len(approach_m)}; valid: {objects}, one per object"
+                f"classes has {len(classes)} entries, approach_m has {len(approach_m)};"
+                f" valid: one for each of {objects} objects"
             )
         needed = len(pose.sphere_radii_m), len(scene.kinds), len(scene.first_rows)
         if not self.scratch.fits(*needed):
@@ -113,4 +114,6 @@ def _refuse(pose: GripperPose, along: Along) -> NoReturn:
         require_finite(f"along.{name}", getattr(along, name))
     if along.approach_m is not None:
         require_finite("along.approach_m", along.approach_m)
-    raise ValueError("encoder_sigma_rad or a sum of all numbers is not finite; valid: numbers in metres and radians")
+    raise ValueError(
+        "encoder_sigma_rad, or a sum of the other values, is not finite; valid: finite values in metres and radians"
+    )

@@ -258,7 +258,7 @@ class SweptLaw:
             ("pose.sphere_on_finger", len(pose.sphere_on_finger), spheres),
         ):
             if count != valid:
-                raise ValueError(f"{name} = {count}; valid: {valid}, the number of joints or spheres")
+                raise ValueError(f"{name} = {count}; valid: {valid}, the number that the law was made for")
         for name in ("tool_position_m", "tool_rotation", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
             require_finite(f"pose.{name}", getattr(pose, name))
         require_finite("joint_velocities_rad_s", rates)

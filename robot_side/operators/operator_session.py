@@ -204,7 +204,9 @@ class OperatorSession:
         epoch = message.header.epoch
         if self.lease.has_ended(epoch):
             self.refused += isinstance(message, Hello)
-            self._announcements.refuse(peer, SessionState.ENDED, "this epoch has ended; begin a new one", now_s)
+            self._announcements.refuse(
+                peer, SessionState.ENDED, "this epoch of the operator side has ended; valid: a new epoch", now_s
+            )
             return None
         if not isinstance(message, Hello):
             self._announcements.refuse(peer, SessionState.UNKNOWN, "no Hello yet", now_s)
@@ -213,7 +215,7 @@ class OperatorSession:
         participant = Participant(epoch, peer, self._new_link(), now_s)
         if not self.lease.ask(participant, now_s):
             self.refused += 1
-            why = f"{MOST_OBSERVERS} others observe already"
+            why = f"{MOST_OBSERVERS} other operators observe already, which is the maximum"
             self._announcements.refuse(peer, SessionState.UNKNOWN, why, now_s)
             return None
         self._follow_owner()

@@ -133,7 +133,7 @@ class FrameUnpacker:
         """Decode a frame; ValueError or struct.error for invalid content, or for changes without the frame before."""
         time_s, whole = _FRAME.unpack_from(content)
         if not whole and self._last is None:
-            raise ValueError("a frame of changes alone, without a frame before it")
+            raise ValueError("the frame holds only changes, but no complete frame came before it")
         last, position = None if whole else self._last, _FRAME.size
         arrays: dict[str, Any] = {}
         for name, (kind, shape) in ARRAYS.items():
@@ -148,10 +148,10 @@ class FrameUnpacker:
             names = last.names
         others = names != self._scene.names
         if others and len(arrays["mesh_index"]):
-            raise ValueError("a frame of other objects than the scene's")
+            raise ValueError("the frame has other objects than the scene")
         roles = tuple(_ROLES[role] for role in content[position:])
         if len(roles) != len(names):
-            raise ValueError(f"a frame with {len(roles)} roles of {len(names)} objects")
+            raise ValueError(f"the frame has {len(roles)} roles; valid: one for each of {len(names)} objects")
         library = None if others else self._scene.mesh_library
         self._last = PerceivedObjects(time_s=time_s, names=names, roles=roles, mesh_library=library, **arrays)
         return self._last
@@ -167,7 +167,7 @@ def _unpacked(content: bytes, position: int, kind: type, shape: tuple[int, ...],
         values = np.frombuffer(content, kind, rows * width, position).reshape(rows, *shape).copy()
         return values, position + values.nbytes
     if last is None or len(last) != rows:
-        raise ValueError("a frame that does not follow the one before it")
+        raise ValueError("the frame's changes do not fit the frame before it")
     if tag == _SAME:
         return last, position
     (count,) = struct.unpack_from("<I", content, position)

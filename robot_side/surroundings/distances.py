@@ -35,7 +35,7 @@ def nearest_mesh_points(points_m: FloatArray, scene: SceneTable, rows: IntArray)
 
     objects, own = scene.objects, scene.rows_of_kind.take(rows)
     if objects.mesh_library is None:
-        raise ValueError("rows name meshes although the scene has no library of them")
+        raise ValueError("rows name meshes, but the scene has no mesh library; valid: objects with their mesh_library")
     return nearest_mesh_pairs(
         points_m,
         objects.mesh_library,

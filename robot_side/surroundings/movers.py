@@ -45,7 +45,7 @@ class Movers:
             raise ValueError("first is a frame of changes; valid: a complete frame, with since = None")
         beyond = things.size > 0 and (things[0] < 0 or things[-1] >= len(first.names))
         if beyond or (np.diff(things) <= 0).any():
-            raise ValueError(f"things holds {things}; valid: rising indices below {len(first.names)}")
+            raise ValueError(f"things = {things}; valid: rising indices from 0 to {len(first.names) - 1}")
         self.first = first
         self.things = things
         self.measured = first.velocities_m_s is not None
@@ -93,9 +93,12 @@ class Movers:
         """
         shape = len(self._own) + len(self.things), NUMBERS
         if numbers.shape != shape or numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
-            raise ValueError(f"numbers holds {numbers.dtype} {numbers.shape}; valid: contiguous float64 {shape}")
+            raise ValueError(
+                f"numbers is {numbers.dtype} in the shape {numbers.shape};"
+                f" valid: contiguous float64 in the shape {shape}"
+            )
         if len(roles) != len(self.first.names):
-            raise ValueError(f"roles holds {len(roles)}; valid: one for each of {len(self.first.names)} objects")
+            raise ValueError(f"roles holds {len(roles)} roles; valid: one for each of {len(self.first.names)} objects")
         return _MoversFrame(**self._still, time_s=time_s, roles=roles, since=(self, numbers))
 
 

@@ -34,10 +34,13 @@ def require_valid(objects: PerceivedObjects) -> None:
             )
         if indices.size and (indices.min() < 0 or indices.max() >= len(objects.names)):
             raise ValueError(
-                f"objects.{owner} holds {indices.min()} to {indices.max()}; valid: 0 to {len(objects.names) - 1}"
+                f"objects.{owner} holds indices from {indices.min()} to {indices.max()};"
+                f" valid: 0 to {len(objects.names) - 1}"
             )
     if len(objects.roles) != len(objects.names):
-        raise ValueError(f"objects.roles holds {len(objects.roles)}; valid: one for each of {len(objects.names)} names")
+        raise ValueError(
+            f"objects.roles holds {len(objects.roles)} roles; valid: one for each of {len(objects.names)} objects"
+        )
     _require_known_meshes(objects)
     velocities = objects.velocities_m_s
     if velocities is not None:
@@ -59,11 +62,13 @@ def _require_known_meshes(objects: PerceivedObjects) -> None:
         return
     if objects.mesh_library is None:
         raise ValueError(
-            f"objects.mesh_library is None with {indices.size} meshes placed; valid: the library of their shapes"
+            f"objects.mesh_library is None although {indices.size} meshes are placed; valid: the library of the meshes"
         )
     known = len(objects.mesh_library)
     if indices.min() < 0 or indices.max() >= known:
-        raise ValueError(f"objects.mesh_index holds {indices.min()} to {indices.max()}; valid: 0 to {known - 1}")
+        raise ValueError(
+            f"objects.mesh_index holds indices from {indices.min()} to {indices.max()}; valid: 0 to {known - 1}"
+        )
 
 
 def _described(values: np.ndarray) -> str:
@@ -82,7 +87,7 @@ def _refuse(objects: PerceivedObjects) -> None:
             error = np.abs(columns.swapaxes(1, 2) @ columns - np.eye(columns.shape[2]))
             if (error > _UNIT_TOLERANCE).any():
                 raise ValueError(
-                    f"objects.{name} is {error.max():.1e} off unit length or a right angle; valid: at most 1e-6"
+                    f"objects.{name} is off unit length or a right angle by {error.max():.1e}; valid: up to 1e-6"
                 )
 
 

@@ -34,7 +34,7 @@ class ObjectVelocities:
         """
         if self._kept and positions_m.size != self._positions_m.shape[1]:
             raise ValueError(
-                f"positions_m holds {len(positions_m)}; valid: {self._positions_m.shape[1] // 3}, as before"
+                f"positions_m holds {len(positions_m)} positions; valid: {self._positions_m.shape[1] // 3}, as before"
             )
         if self._kept == len(self._times_s):
             rows = max(2 * self._kept, _FRAMES)

@@ -112,7 +112,7 @@ class Cameras:
         self._has_worked = False
         self._hopeless = not settings.on
         if len(self._setup) > MESSAGE_LIMIT_BYTES:
-            self._give_up(f"the model takes {len(self._setup) >> 20} MB; valid: up to {MESSAGE_LIMIT_BYTES >> 20}")
+            self._give_up(f"the model takes {len(self._setup) >> 20} MB; valid: up to {MESSAGE_LIMIT_BYTES >> 20} MB")
 
     @property
     def works(self) -> bool:
@@ -249,7 +249,9 @@ class Cameras:
         self._ordered_s.pop(_SETUP, None)
         self._h264 &= message.h264
         if message.trouble and not self._has_worked:
-            self._note(f"cameras: pictures are JPEG, ten times the bytes: PyAV makes no H.264: {message.trouble}")
+            self._note(
+                f"cameras: pictures are JPEG, with ten times the bytes, as PyAV makes no H.264: {message.trouble}"
+            )
 
     def _died(self, now_s: float, how: str) -> None:
         if self._companion is not None:
@@ -259,14 +261,14 @@ class Cameras:
     def _failed(self, now_s: float, why: str) -> None:
         self._failures += 1
         if self._failures >= _NEVER_BEGAN and not self._has_worked:
-            self._give_up(f"{why}, {self._failures} times in a row; feelahead doctor tells what is missing")
+            self._give_up(f"{why}, {self._failures} times in a row; to see what is missing: feelahead doctor")
         else:
             self._not_before_s = now_s + RETRY_S
-            self._note(f"cameras: {why}; it is started again in {RETRY_S:g} s, the arm goes on")
+            self._note(f"cameras: {why}; the process is started again in {RETRY_S:g} s; the arm works meanwhile")
 
     def _give_up(self, why: str) -> None:
         self._hopeless = True
-        self._note(f"cameras: no pictures, the arm goes on without: {why}")
+        self._note(f"cameras: there are no pictures, and the arm works without them: {why}")
 
     def _end(self, companion: Renders, now_s: float) -> None:
         companion.channel.close()

@@ -198,7 +198,7 @@ def test_without_a_controller_it_says_so_and_commands_nothing_until_one_appears(
         world.until(lambda: world.source.hellos >= 5 and bool(world.notes()))
         [note] = world.notes()
         assert "no DualSense" in note
-        assert "waiting for one" in note
+        assert "waiting for a controller" in note
         world.until(lambda: world.controller() == "absent")
         assert (world.source.commands, world.written) == (0, [])
         world.plug(True)
@@ -235,7 +235,7 @@ def test_a_watchdog_that_ends_before_us_is_told_of_once_and_replaced(world: Worl
     world.until(lambda: world.controller() == "connected")
     [watchdog] = Path(f"/proc/{world.process.pid}/task/{world.process.pid}/children").read_text().split()
     os.kill(int(watchdog), signal.SIGKILL)
-    world.until(lambda: any("watchdog process has ended" in note for note in world.notes()))
+    world.until(lambda: any("would release the triggers has ended" in note for note in world.notes()))
     seen = len(world.events)
     world.until(lambda: len(world.events) > seen + 5)
     assert sum("watchdog" in note for note in world.notes()) == 1

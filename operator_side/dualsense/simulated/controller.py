@@ -100,7 +100,7 @@ class SimulatedDualSense:
             raise ValueError("pressed holds L2 or R2; valid: other buttons (set_finger_force pulls L2 and R2)")
         if pressed & _EDGE_BUTTONS and self.model is not Model.EDGE:
             raise ValueError(
-                "pressed holds a paddle or a function key; valid: buttons of a DualSense, as only a DualSense Edge has these"
+                "pressed holds a paddle or a function key; valid: other buttons, as only a DualSense Edge has these"
             )
         if pressed != self._held.pressed:
             self._held = replace(self._held, pressed=pressed)

@@ -78,8 +78,8 @@ def measure_gripper(scene: Scene) -> GripperTravel | None:
     unknown = actuators[~model.actuator_ctrllimited[actuators].astype(bool)]
     if unknown.size:
         raise ConfigurationError(
-            f"model: the gripper's actuator {model.actuator(int(unknown[0])).name!r} has no ctrlrange; valid: its open"
-            " and its closed input"
+            f"model: the gripper's actuator {model.actuator(int(unknown[0])).name!r} has no ctrlrange; valid: the"
+            " inputs at which the gripper is open and closed"
         )
     # The copy is in empty space; its arm is without drive and put back after every step.
     model.opt.gravity[:] = 0.0

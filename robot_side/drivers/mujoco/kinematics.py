@@ -31,7 +31,9 @@ class MujocoKinematics:
         model, robot = scene.model, scene.robot
         geoms = robot.gripper_geoms
         if geoms.size == 0:
-            raise ConfigurationError("model: nothing at the tool can touch anything; valid: 1 or more colliding geoms")
+            raise ConfigurationError(
+                "model: no geom of the gripper can touch anything; valid: 1 or more colliding geoms"
+            )
         data = mujoco.MjData(model)
         data.qpos[:] = scene.data.qpos
         mujoco.mj_kinematics(model, data)

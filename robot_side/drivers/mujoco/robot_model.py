@@ -59,7 +59,7 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
     """
     site = _find_site(model, site_name)
     if model.nu == 0:
-        raise ConfigurationError("model: it has no actuators; valid: one for each arm joint")
+        raise ConfigurationError("model: it has no actuators; valid: an actuator for each joint of the arm")
     chain = _chain(model, int(model.site_bodyid[site]))
     joints = np.array([joint for body in chain for joint in _joints(model, body)], dtype=np.int64)
     if joints.size == 0:
@@ -148,9 +148,11 @@ def _moved_by_mocap(model: Any, chain: list[int]) -> str:
 def _find_site(model: Any, site_name: str | None) -> int:
     names = _site_names(model)
     if not names:
-        raise ConfigurationError("site: the model has no named site; valid: one at the tool, its z axis the approach")
+        raise ConfigurationError(
+            "site: the model has no named site; valid: a site at the tool, whose z axis is the approach"
+        )
     if site_name not in names:
-        said = "none was named" if site_name is None else f"the model has no site {site_name!r}"
+        said = "none is given" if site_name is None else f"the model has no site {site_name!r}"
         raise ConfigurationError(f"site: {said}; valid: {', '.join(names)}")
     return int(model.site(site_name).id)
 
@@ -188,7 +190,7 @@ def _joint_name(model: Any, joint: int) -> str:
 def _why_no_actuator(model: Any, joint: int) -> str:
     """Return the reason why a joint has no actuator of its own."""
     if any(_moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu)):
-        return "it is pulled by a tendon that it shares"
+        return "it shares the tendon that pulls it with another joint"
     if model.nmocap > 0:
         return "the model is moved by a mocap body, which no real robot has"
     return "nothing would hold or move it"

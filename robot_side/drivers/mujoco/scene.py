@@ -122,7 +122,9 @@ def load_scene(
         ) from error
     for geom in np.flatnonzero(~np.isfinite(data.geom_xpos).all(axis=1)):
         stray = model.geom(int(geom)).name or f"geom{geom}"
-        raise ConfigurationError(f"model: {stray!r} stands at {data.geom_xpos[geom]}; valid: finite positions")
+        raise ConfigurationError(
+            f"model: {stray!r} is at the position {data.geom_xpos[geom]}; valid: a finite position"
+        )
     objects, shared_names = _objects(model, robot)
     return Scene(
         model=model,
@@ -180,11 +182,14 @@ def _start_configuration(model: Any, robot: RobotModel) -> tuple[FloatArray, str
         start, name = _finite(model, key, "qpos"), model.key(key).name
         if name == "home":
             return start, "the keyframe 'home'"
-        return start, f"the first keyframe, {name!r} (a keyframe named 'home' would come before it)"
+        return start, f"the first keyframe, {name!r} (a keyframe named 'home' would be used instead)"
     start = model.qpos0.copy()
     limited = np.isfinite(robot.lower_rad)
     start[robot.arm_positions[limited]] = 0.5 * (robot.lower_rad[limited] + robot.upper_rad[limited])
-    return start, "the middle of the joints' ranges, as there is no keyframe (to choose: a keyframe named 'home')"
+    return (
+        start,
+        "the middle of the joints' ranges, as the model has no keyframe (to choose a pose: a keyframe named 'home')",
+    )
 
 
 def _start_velocities(model: Any, robot: RobotModel) -> FloatArray:

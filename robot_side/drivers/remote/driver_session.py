@@ -130,7 +130,12 @@ class DriverSession:
     def receive(self, peer: bytes, payload: bytes, received_s: float) -> None:
         """Take one message; an invalid message is rejected as a whole, counted and reported."""
         if self._peer not in (None, peer):
-            self._reject("second", "a second driver, while the first one goes on", peer, received_s)
+            self._reject(
+                "second",
+                "a second driver sends, while the first one still does; valid: one driver at a time",
+                peer,
+                received_s,
+            )
             return
         try:
             said = decoded(payload, _DECODER, DRIVER_VERSION)
@@ -208,9 +213,11 @@ class DriverSession:
             ("finger_positions", said.finger_positions, self._shape.finger_names),
         ):
             if values is not None and len(values) != len(names):
-                raise ValueError(f"{name} holds {len(values)}; valid: {len(names)} ({', '.join(names) or 'none'})")
+                raise ValueError(
+                    f"{name} holds {len(values)} values; valid: {len(names)} ({', '.join(names) or 'none'})"
+                )
         if said.measured_s > said.sent_s:
-            raise RemoteProtocolError(f"measured_s = {said.measured_s} after sent_s = {said.sent_s}; valid: before")
+            raise RemoteProtocolError(f"measured_s = {said.measured_s}; valid: up to sent_s = {said.sent_s}")
 
     def _take(self, peer: bytes, said: DriverState, received_s: float) -> None:
         if self._peer is None:
@@ -219,7 +226,7 @@ class DriverSession:
                 self._begin(said.sequence)
             self._peer = self._last_peer = peer
         if said.sequence <= self._sequence:
-            why = f"sequence {said.sequence} after {self._sequence}; valid: rising"
+            why = f"sequence = {said.sequence}; valid: above that of the message before, {self._sequence}"
             self._reject("order", why, peer, received_s)
             return
         self._heard_s, self._sequence = received_s, said.sequence
@@ -227,11 +234,16 @@ class DriverSession:
         echoed = (said.echo_s, said.held_s) if ours and said.echo_s is not None else None
         if not self._clock.take(said.sent_s, received_s, echoed):
             self._clock = DriverClock()
-            self._reject("clock", "its clock jumped, or echo_s and held_s are no stamps of ours", peer, received_s)
+            self._reject(
+                "clock",
+                "the driver's clock jumped, or echo_s and held_s are not from our commands; valid: a clock that never jumps",
+                peer,
+                received_s,
+            )
             return
         if not self._clock.known:
             if self._sent - self._sent_before > _UNANSWERED:
-                why = "echo_s is none of our stamps; valid: sent_s of the newest command that was read"
+                why = "echo_s is no time from our commands; valid: sent_s of the newest command that was read"
                 self._reject("echo", why, peer, received_s)
             return
         # A late state has its true age: the arm is lost by that age until younger states come.
@@ -257,7 +269,9 @@ class DriverSession:
         self.rejected[why] += 1
         if why not in self._said:
             self._said.add(why)
-            self._notes.append(f"driver: a message was refused as a whole; more of this kind are only counted: {text}")
+            self._notes.append(
+                f"driver: a message was refused as a whole: {text} (further messages with this fault are only counted)"
+            )
         if now_s - self._refused_s >= _REFUSAL_PERIOD_S:
             self._refused_s = now_s
             self._outgoing.append((peer, encode(Refusal(DRIVER_VERSION, text))))

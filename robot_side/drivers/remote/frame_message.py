@@ -74,16 +74,18 @@ FRAME_DECODER: Final = msgspec.msgpack.Decoder(ObjectFrame)
 def require_possible(frame: ObjectFrame) -> None:
     """Raise ValueError for a repeated name, no or several shapes, a wrong quaternion, or `taken_s` after `sent_s`."""
     if frame.taken_s > frame.sent_s:
-        raise ValueError(f"taken_s = {frame.taken_s} after sent_s = {frame.sent_s}; valid: before")
+        raise ValueError(f"taken_s = {frame.taken_s}; valid: up to sent_s = {frame.sent_s}")
     names = [thing.name for thing in frame.objects]
     for thing in frame.objects:
         if names.count(thing.name) > 1:
             raise ValueError(f"{thing.name!r} occurs {names.count(thing.name)} times; valid: once")
         shapes = sum(bool(getattr(thing, shape)) for shape in SHAPES)
         if shapes != 1:
-            raise ValueError(f"{thing.name!r} has {shapes} shapes; valid: 1 of {', '.join(SHAPES)}")
+            raise ValueError(f"{thing.name!r} has {shapes} shapes; valid: exactly one of {', '.join(SHAPES)}")
         if abs(math.hypot(*thing.quaternion) - 1.0) > _UNIT:
-            raise ValueError(f"{thing.name!r}: quaternion = {thing.quaternion}; valid: of length 1, w first")
+            raise ValueError(
+                f"{thing.name!r}: quaternion = {thing.quaternion}; valid: a quaternion of length 1, w first"
+            )
 
 
 def perceived(things: Sequence[SeenObject], roles: Sequence[Role], time_s: float) -> PerceivedObjects:

@@ -74,12 +74,17 @@ class RemoteObjects:
 
     def _receive(self, peer: bytes, payload: bytes, received_s: float) -> None:
         if peer != self._peer and received_s - self._heard_s <= OLD_S:
-            self._reject("second", "a second sender, while the first one goes on", peer, received_s)
+            self._reject(
+                "second",
+                "a second perception sends, while the first one still does; valid: one at a time",
+                peer,
+                received_s,
+            )
             return
         try:
             frame = decoded(payload, FRAME_DECODER, FRAME_VERSION)
             if peer == self._peer and frame.sequence <= self._sequence and received_s - self._heard_s <= OLD_S:
-                why = f"sequence {frame.sequence} after {self._sequence}; valid: rising"
+                why = f"sequence = {frame.sequence}; valid: above that of the frame before, {self._sequence}"
                 self._reject("order", why, peer, received_s)
                 return
             self._take(frame, received_s)
@@ -98,7 +103,7 @@ class RemoteObjects:
         known = self._known | {thing.name: thing for thing in frame.objects}
         if len(known) > MOST_OBJECTS:
             raise ValueError(
-                f"{len(known)} names so far; valid: up to {MOST_OBJECTS}, the same name for the same object"
+                f"{len(known)} names of objects have been sent; valid: up to {MOST_OBJECTS}, one name for each object"
             )
         present = {thing.name for thing in frame.objects}
         roles = [self._role(thing) if thing.name in present else Role.IGNORED for thing in known.values()]
@@ -108,7 +113,7 @@ class RemoteObjects:
         self._known, self._frame, self._taken_s = known, seen, taken_s
         widest = max(frame.objects, key=lambda thing: thing.sd_m, default=None)
         if widest is not None and widest.sd_m > self._sd_m:
-            text = f"sd_m = {widest.sd_m} of {widest.name!r} is more than the {self._sd_m} that the law uses"
+            text = f"sd_m = {widest.sd_m} of {widest.name!r} is more than {self._sd_m}, which the law uses"
             self._report_once("sd", f"objects: {text}; to raise that: --camera.sd-m {widest.sd_m}")
 
     def _role(self, thing: SeenObject) -> Role:
@@ -121,7 +126,9 @@ class RemoteObjects:
 
     def _reject(self, why: Why, text: str, peer: bytes, now_s: float) -> None:
         self.rejected[why] += 1
-        self._report_once(why, f"objects: a frame was refused as a whole; more of this kind are only counted: {text}")
+        self._report_once(
+            why, f"objects: a frame was refused as a whole: {text} (further frames with this fault are only counted)"
+        )
         if now_s - self._refused_s >= _REFUSAL_PERIOD_S:
             self._refused_s = now_s
             self._wire.send(peer, encode(Refusal(FRAME_VERSION, text)))

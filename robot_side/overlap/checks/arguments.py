@@ -133,7 +133,9 @@ def broadcast(arguments: Sequence[Argument]) -> tuple[int, ...]:
         return np.broadcast_shapes(*(argument.leading for argument in arguments))
     except ValueError as error:
         shapes = ", ".join(f"{argument.name} {argument.values.shape}" for argument in arguments)
-        raise ValueError(f"the leading dimensions do not broadcast: {shapes}") from error
+        raise ValueError(
+            f"the arguments' leading dimensions do not broadcast: {shapes}; valid: equal ones, or 1"
+        ) from error
 
 
 def _shape_text(trailing: tuple[int, ...]) -> str:

@@ -39,7 +39,10 @@ def checked_triangles(triangles: npt.ArrayLike, vertex_count: int) -> IntArray:
     wrong = np.argwhere((raw < 0) | (raw >= vertex_count))
     if len(wrong):
         row = int(wrong[0, 0])
-        raise ValueError(f"triangles[{row}] = {raw[row].tolist()} is out of range; valid: 0 to {vertex_count - 1}")
+        raise ValueError(
+            f"triangles[{row}] = {raw[row].tolist()} names a vertex that does not exist;"
+            f" valid: indices from 0 to {vertex_count - 1}"
+        )
     return raw.astype(np.int64)
 
 
@@ -70,7 +73,8 @@ def require_closed(triangles: IntArray, numbers_given: IntArray) -> None:
     backward = int(np.count_nonzero((starts == end) & (ends == start)))
     raise ValueError(
         f"triangles[{numbers_given[row]}]: its edge from vertex {start} to {end} is used {forward} times in this "
-        f"direction and {backward} times in the other; valid: a closed surface, equally often in both"
+        f"direction and {backward} times in the other; valid: a closed surface, with each edge used equally "
+        "often in both directions"
     )
 
 
@@ -97,7 +101,7 @@ def require_all_different(triangles: IntArray, numbers_given: IntArray) -> None:
         return
     one, other = np.flatnonzero(place == place[repeated[0]])[:2]
     raise ValueError(
-        f"triangles[{numbers_given[other]}] is triangles[{numbers_given[one]}] again, the same way round; "
+        f"triangles[{numbers_given[other]}] is triangles[{numbers_given[one]}] again, with the same orientation; "
         "valid: each triangle once"
     )
 
@@ -130,7 +134,7 @@ def require_outward(corners: FloatArray, parts: IntArray, numbers_given: IntArra
         if volume < 0.0 and around in (0, None):
             raise ValueError(
                 f"triangles[{first}] and those connected with it enclose {volume:.3g} m³; valid: a volume above 0, "
-                "corners anticlockwise as seen from outside (clockwise only round a cavity)"
+                "with corners anticlockwise as seen from outside (clockwise only around a cavity)"
             )
         if volume > 0.0 and around not in (0, None):
             raise ValueError(

@@ -46,7 +46,7 @@ class Mesh:
         given = checked_triangles(triangles, len(places))
         kept, numbers_given = merged(places, given)
         if len(kept) == 0:
-            raise ValueError("triangles all have a corner twice; valid: a closed surface with a volume above 0")
+            raise ValueError("each of triangles has a corner twice; valid: a closed surface with a volume above 0")
         require_closed(kept, numbers_given)
         require_all_different(kept, numbers_given)
         corners = places[kept]

@@ -70,7 +70,7 @@ def convex_hull_mesh(points: npt.ArrayLike) -> ShapeMesh:
         hull = ConvexHull(places)
     except (QhullError, ValueError) as error:
         raise ValueError(
-            f"points ({len(places)}, 3) have no convex hull; valid: 4 or more, not in one plane"
+            f"the {len(places)} points have no convex hull; valid: 4 points or more that are not in one plane"
         ) from error
     vertices = places[hull.vertices]
     return ShapeMesh(vertices, _outward_hull(vertices), 0.0, 0.0)

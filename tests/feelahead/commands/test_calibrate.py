@@ -184,5 +184,5 @@ def test_a_file_that_breaks_while_it_runs_is_said_and_the_defaults_hold(
     assert taken == [MEASURED, TravelCalibration(), MEASURED]
     said = capsys.readouterr().out
     assert said.count(f"{calibration_path(ADDRESS)}: ") == 1
-    assert "its travel is read by the defaults" in said
-    assert said.count(f"its travel calibration: {calibration_path(ADDRESS)}") == 2
+    assert "the controller's travel is read with the default calibration" in said
+    assert said.count(f"the controller's calibration: {calibration_path(ADDRESS)}") == 2

@@ -107,7 +107,7 @@ def arm_and_move(desk: Desk) -> None:
 def test_without_a_controller_it_says_so_and_commands_nothing(desk: Desk) -> None:
     plugged, robot = desk.plugged, desk.robot
     desk.note("no DualSense", _START_PATIENCE_S)
-    assert "waiting for one" in desk.notes[0]
+    assert "waiting for a controller" in desk.notes[0]
     assert robot.commands == 0
     plugged.plug_in()
     wait_until("commands come", lambda: robot.commands > 10, _PATIENCE_S, instead=lambda: desk.notes)

@@ -72,8 +72,8 @@ def test_the_steps_come_in_order_and_tell_what_to_do() -> None:
 def test_pulls_that_disagree_are_asked_for_again_and_then_refused() -> None:
     hands = Hands(Wear(), lambda _, number: 0.7 if number == 1 else 1.0)
     assert hands.run().result is not None
-    assert any("0.70" in complaint and "three times again" in complaint for complaint in hands.complaints)
-    with pytest.raises(CalibrationError, match=r"the pulls of R2 ended at .*0\.70.*3 times"):
+    assert any("0.70" in complaint and "again, three times" in complaint for complaint in hands.complaints)
+    with pytest.raises(CalibrationError, match=r"the pulls of R2 ended at .*0\.70.*3 attempts"):
         Hands(Wear(), lambda trigger, number: 0.7 if trigger == "r2" and number % 2 else 1.0).run()
 
 
@@ -115,7 +115,7 @@ def test_what_never_rests_is_refused() -> None:
         (Wear(right=((0.4, 0.0), (0.4, 0.0))), 1.0, "the right stick rests at"),
         (Wear(left=((-0.3, 0.0), (0.3, 0.0))), 1.0, "the left stick rested at"),
         # The highest rest and the smallest pull, each of which is accepted by itself.
-        (Wear(l2=(0.25, 0.5)), 1.0, r"L2 rests at 0\.25 and ends at 0\.50: there is too little travel"),
+        (Wear(l2=(0.25, 0.5)), 1.0, r"L2 rests at 0\.25 and ends at 0\.50: its travel is too short"),
         (Wear(), 0.45, r"the pulls of L2 ended at 0\.45, 0\.45, 0\.45; valid: 0\.5"),
         (Wear(), 0.0, "not done: Pull L2"),
     ],

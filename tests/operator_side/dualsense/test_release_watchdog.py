@@ -197,7 +197,7 @@ def test_a_watchdog_that_has_ended_is_replaced_and_told_what_is_held(
     guard.hold(controller.path, REPORT)
     first = process_of(guard)
     end_watchdog(guard)
-    assert guard.take_notes() == ["the watchdog process has ended; another one has taken its place"]
+    assert guard.take_notes() == ["the process that would release the triggers has ended; a new one has replaced it"]
     assert guard.take_notes() == []
     assert guard.running
     assert process_of(guard) != first

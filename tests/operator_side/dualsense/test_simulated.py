@@ -180,7 +180,7 @@ def test_a_report_that_cannot_be_read_changes_nothing(transport: Transport) -> N
         (b"", "no bytes"),
         (good[:-1], f"{len(good) - 1} bytes"),
         (bytes(debug), "0xfc" if transport is Transport.USB else "checksum"),
-        (build_output_report(STIFF, other), f"not for a controller on {transport.value}"),
+        (build_output_report(STIFF, other), f"of another transport; valid: a report for {transport.value}"),
     ):
         with pytest.raises(ValueError, match=message):
             device.take_report(report, 0.1)
@@ -219,9 +219,9 @@ def used(what: str, *arguments: Any, **named: Any) -> Any:
         *(("set_finger_force", (1.0, force_n), "finger_force_n = ") for force_n in (-1.0, NAN, INF)),
         *(("advance", (step_s,), "step_s = ") for step_s in (-0.1, NAN, INF)),
         ("set_sticks", ((1.5, 0.0),), "left_stick"),
-        ("set_buttons", (frozenset({Button.L2}),), "pressed has L2 or R2"),
+        ("set_buttons", (frozenset({Button.L2}),), "pressed holds L2 or R2"),
         ("set_buttons", (frozenset({Button.UP, Button.DOWN}),), "down and up"),
-        ("set_buttons", (frozenset({Button.LEFT_PADDLE}),), "valid: only on a DualSense Edge"),
+        ("set_buttons", (frozenset({Button.LEFT_PADDLE}),), "only a DualSense Edge has these"),
     ],
 )
 def test_refusals(what: str, arguments: tuple[Any, ...], message: str) -> None:

@@ -90,5 +90,5 @@ def test_a_convex_hull_keeps_what_it_needs() -> None:
     assert excess == stands_out_m == 0.0
     assert Mesh(vertices, triangles).volume_m3 == pytest.approx(8.0)
     for flat in (np.eye(3), [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0.0, np.inf, 0.0]]):
-        with pytest.raises(ValueError, match=r"points \(\d, 3\) have no convex hull"):
+        with pytest.raises(ValueError, match=r"\d points have no convex hull"):
             convex_hull_mesh(flat)

@@ -102,7 +102,7 @@ def test_nobody_measures_velocities() -> None:
 def test_after_a_gap_only_a_whole_frame_is_taken() -> None:
     one, packer = frame(3, (2,) * len(ARRAYS)), FramePacker()
     packer.pack(one)
-    with pytest.raises(ValueError, match="without a frame before"):
+    with pytest.raises(ValueError, match="no complete frame came before"):
         FrameUnpacker(one).unpack(packer.pack(one))
     packer.begin_epoch()
     assert same(FrameUnpacker(one).unpack(packer.pack(one)), one)

@@ -149,5 +149,5 @@ def test_nothing_at_the_tool_is_told(tmp_path: Path) -> None:
       <site name="end"/></body><body name="box"><geom size="0.1"/></body></worldbody>
       <actuator><motor joint="j"/></actuator></mujoco>"""
     (tmp_path / "bare.xml").write_text(bare)
-    with pytest.raises(ConfigurationError, match="nothing at the tool can touch"):
+    with pytest.raises(ConfigurationError, match="no geom of the gripper can touch"):
         MujocoKinematics(load_scene(tmp_path / "bare.xml", "end"))

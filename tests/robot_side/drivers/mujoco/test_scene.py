@@ -170,7 +170,7 @@ KEYS = '<keyframe><key name="{first}" qpos="0.1 -0.2 0.01 0.01"/><key name="{sec
     [
         (KEYS.format(first="rest", second="home"), "the keyframe 'home'"),
         (KEYS.format(first="rest", second="up"), "the first keyframe, 'rest' ("),
-        ("", "the middle of the joints' ranges, as there is no keyframe ("),
+        ("", "the middle of the joints' ranges, as the model has no keyframe ("),
     ],
 )
 def test_the_start_pose_is_said(tmp_path: Path, extra_bottom: str, said: str) -> None:

@@ -97,16 +97,24 @@ def test_a_role_is_changed_from_the_next_frame_on() -> None:
     ("things", "fields", "says"),
     [
         ([CUP, CUP], {}, "'cup' occurs 2 times; valid: once"),
-        ([{"name": "cup"}], {}, "'cup' has 0 shapes; valid: 1 of sphere, box"),
+        ([{"name": "cup"}], {}, "'cup' has 0 shapes; valid: exactly one of sphere, box"),
         ([CUP | {"box": [1, 1, 1]}], {}, "'cup' has 2 shapes"),
-        ([CUP | {"quaternion": [1, 1, 0, 0]}], {}, "quaternion = (1.0, 1.0, 0.0, 0.0); valid: of length 1"),
+        (
+            [CUP | {"quaternion": [1, 1, 0, 0]}],
+            {},
+            "quaternion = (1.0, 1.0, 0.0, 0.0); valid: a quaternion of length 1",
+        ),
         ([CUP | {"position_m": [math.nan, 0, 0]}], {}, "position_m"),
         ([CUP | {"sphere": -1.0}], {}, "sphere"),
-        ([CUP], {"taken_s": 4.0}, "taken_s = 4.0 after sent_s = 3.0"),
+        ([CUP], {"taken_s": 4.0}, "taken_s = 4.0; valid: up to sent_s = 3.0"),
         ([CUP], {"version": 2}, "version 2; valid: 1"),
-        ([CUP], {"sequence": 1}, "sequence 1 after 1; valid: rising"),
-        ([CUP], {"peer": b"other"}, "a second sender"),
-        ([{"name": f"n{k}", "sphere": 0.1} for k in range(512)], {}, "513 names so far; valid: up to 512"),
+        ([CUP], {"sequence": 1}, "sequence = 1; valid: above"),
+        ([CUP], {"peer": b"other"}, "a second perception"),
+        (
+            [{"name": f"n{k}", "sphere": 0.1} for k in range(512)],
+            {},
+            "513 names of objects have been sent; valid: up to 512",
+        ),
     ],
 )
 def test_what_cannot_be_is_rejected_whole_counted_and_told_once(
