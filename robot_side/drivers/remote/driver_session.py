@@ -236,7 +236,7 @@ class DriverSession:
             self._clock = DriverClock()
             self._reject(
                 "clock",
-                "the driver's clock jumped, or echo_s and held_s are not from our commands; valid: a clock that never jumps",
+                "the driver's clock jumped, or echo_s and held_s are not from our commands",
                 peer,
                 received_s,
             )

@@ -76,7 +76,7 @@ def test_other_objects_than_the_movers_are_refused() -> None:
     movers = Movers(first, np.array([0, 1, 4]))
     with pytest.raises(ValueError, match=r"numbers holds float64 \(1, 20\); valid: contiguous float64 \(.*, 20\)"):
         movers.frame(0.0, movers.at_first[:1], first.roles)
-    with pytest.raises(ValueError, match=r"roles holds 0; valid: one for each"):
+    with pytest.raises(ValueError, match=r"roles holds 0 roles; valid: one for each"):
         movers.frame(0.0, movers.at_first, ())
     for things in ([4, 0], [0, 0], [-1], [len(first.names)]):
         with pytest.raises(ValueError, match="rising indices"):

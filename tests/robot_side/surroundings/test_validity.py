@@ -97,5 +97,5 @@ def test_each_primitive_belongs_to_an_object_that_is_there(owner: str, bad: int)
 
 
 def test_each_object_has_a_role() -> None:
-    with pytest.raises(ValueError, match=r"objects\.roles holds 0; valid: one for each"):
+    with pytest.raises(ValueError, match=r"objects\.roles holds 0 roles; valid: one for each"):
         require_valid(_changed("roles", lambda _: ()))

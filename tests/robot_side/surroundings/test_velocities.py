@@ -48,5 +48,5 @@ def test_a_window_that_is_none_is_refused(window_s: float) -> None:
 def test_another_number_of_objects_is_refused() -> None:
     seen = ObjectVelocities()
     seen.see(0.0, np.zeros((2, 3)))
-    with pytest.raises(ValueError, match="positions_m holds 3; valid: 2"):
+    with pytest.raises(ValueError, match="positions_m holds 3 positions; valid: 2"):
         seen.see(0.1, np.zeros((3, 3)))

@@ -121,11 +121,11 @@ def test_a_second_driver_is_refused_and_hears_why() -> None:
     [
         ({"joint_positions": [math.nan, 0.0]}, "malformed", "joint_positions"),
         ({"joint_velocities": [math.inf, 0.0]}, "malformed", "joint_velocities"),
-        ({"joint_positions": [0.0]}, "joints", "joint_positions holds 1; valid: 2 (shoulder, elbow)"),
+        ({"joint_positions": [0.0]}, "joints", "joint_positions holds 1 values; valid: 2 (shoulder, elbow)"),
         ({"finger_positions": [0.0, 0.0]}, "joints", "valid: 1 (finger)"),
         ({"version": 2}, "version", "version 2; valid: 1"),
         ({"version": 2, "joint_positions": "elsewhere"}, "version", "version 2; valid: 1"),
-        ({"sequence": 1}, "order", "sequence 1 after"),
+        ({"sequence": 1}, "order", "sequence = 1; valid: above"),
         ({"measured_s": 1e9}, "malformed", "measured_s"),
         ({"sent_s": 2000.0, "measured_s": 2000.0}, "clock", "clock jumped"),
         ({"extra": 1}, "malformed", "extra"),
