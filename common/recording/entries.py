@@ -90,11 +90,11 @@ class Block:
         position, end = 0, len(self.entries)
         while position < end:
             if end - position < _ENTRY.size:
-                raise ValueError("a block of entries that ends within one")
+                raise ValueError("the block is cut off within an entry")
             kind, length, now_s = _ENTRY.unpack_from(self.entries, position)
             position += _ENTRY.size
             if end - position < length:
-                raise ValueError("a block of entries that ends within one")
+                raise ValueError("the block is cut off within an entry")
             yield Entry(kind, now_s, self.entries[position : position + length])
             position += length
 

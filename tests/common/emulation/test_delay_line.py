@@ -132,7 +132,9 @@ def test_clauses_that_apply_to_nothing_are_told() -> None:
     assert len(unused_clauses(spec, sent)) == 2
     assert "'to_robot'" in unused_clauses(spec, sent)[0]
     overridden = LinkSpec.parse("delay 1ms; haptics: delay 2ms; telemetry: delay 3ms")
-    assert unused_clauses(overridden, sent) == ["link: the profile without a name applies to nothing that is sent here"]
+    assert unused_clauses(overridden, sent) == [
+        "link: the profile without a name has no effect, as nothing to which it applies is sent here"
+    ]
     assert LinkSpec.parse("delay 1ms").unused(sent) == []
 
 

@@ -74,7 +74,7 @@ WORDS = (
         ("slot 1ms", "'slot' is unknown", "delay TIME"),
         ("loss state 1%", "'loss state'", "gemodel"),
         ("delay 5ms 1ms distribution my.dist", "'my.dist'", "paretonormal, exponential"),
-        ("outage 2s at 1s every 2s", "every 2.0 s", "longer than the 2 s"),
+        ("outage 2s at 1s every 2s", "every 2.0 s", "longer than an outage lasts, 2 s"),
         ("retransmit 200ms", "'retransmit'", "retransmit TIME"),
         ("delay 50ms 'loss", "no closing quotation", "quotes in pairs"),
         ("''", "''", "delay TIME"),

@@ -54,10 +54,10 @@ def test_lost_messages_were_sent_between_their_neighbours(tmp_path: Path) -> Non
     [
         ("", "the columns none"),
         ("sent_ns\n1\n", "the columns sent_ns"),
-        ("delay_ns\n\n", "no message arrives"),
+        ("delay_ns\n\n", "no message in it arrives"),
         ("delay_ns\nsoon\n", "row 1: delay_ns = 'soon'"),
         ("delay_ns\n5\nnan\n", "row 2: delay_ns = 'nan'"),
-        ("delay_ns\n-5\n", "row 1: a delay of -5 ns"),
+        ("delay_ns\n-5\n", "row 1: the delay is -5 ns"),
         ("sent_ns,received_ns\n,5\n", "row 1: sent_ns is empty"),
         ("seq,delay_ns\n0,5\n99999999,5\n", "seq jumps from 0 to 99999999"),
     ],

@@ -74,7 +74,9 @@ def test_figures_unknown_for_some_objects_are_unknown_for_all() -> None:
 def test_other_objects_than_the_movers_are_refused() -> None:
     first = whole(np.random.default_rng(2))
     movers = Movers(first, np.array([0, 1, 4]))
-    with pytest.raises(ValueError, match=r"numbers holds float64 \(1, 20\); valid: contiguous float64 \(.*, 20\)"):
+    with pytest.raises(
+        ValueError, match=r"numbers is float64 in the shape \(1, 20\); valid: contiguous float64 in the shape"
+    ):
         movers.frame(0.0, movers.at_first[:1], first.roles)
     with pytest.raises(ValueError, match=r"roles holds 0 roles; valid: one for each"):
         movers.frame(0.0, movers.at_first, ())
