@@ -147,7 +147,7 @@ class CalibrationProcedure:
             self._feed_pull(state, now_s)
         if self._since_s is not None and now_s - self._since_s > _LONGEST_WAIT_S:
             why = f" ({self.complaint})" if self.complaint is not None else ""
-            raise CalibrationError(f"after {_LONGEST_WAIT_S:.0f} s this step was not done: {self.step.value!r}{why}")
+            raise CalibrationError(f"after {_LONGEST_WAIT_S:.0f} s this step was not done: {self.step.value}{why}")
 
     def _feed_rest(self, state: ControllerState, now_s: float) -> None:
         self.complaint = self._rest.feed(state, now_s)

@@ -192,7 +192,7 @@ def test_a_run_reads_as_a_story() -> None:
         "   3.0 s  R2 stiffens to 30 %  (R2 pulled 50 %, nearest 10 mm, target 10 mm)",
         "   4.0 s  R2 resists fully; touches carton, as perceived  (R2 pulled 50 %, nearest 0 mm, target 0 mm)",
         "   5.0 s  lifting; R2 eases to 50 %; touches nothing; holds carton  (R2 pulled 50 %, nearest 10 mm)",
-        "   6.0 s  lowering; what is held stands  (R2 pulled 50 %, nearest 10 mm)",
+        "   6.0 s  lowering; the held object stands on something  (R2 pulled 50 %, nearest 10 mm)",
         "   7.0 s  LINK LOST: nothing heard; R2 yields freely, after up to 100 %; lets go of carton",
     ]
 

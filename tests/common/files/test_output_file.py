@@ -90,7 +90,7 @@ def test_a_file_that_may_not_be_written_is_refused_before_and_after(
     before = path.stat().st_ino
     # Tests may run as root, whom no mode keeps out.
     monkeypatch.setattr(os, "access", lambda asked, _: Path(asked) != path)
-    with pytest.raises(ValueError, match=r"--summary .*out.json: cannot be written to; valid: "):
+    with pytest.raises(ValueError, match=r"--summary .*out.json: this user may not write to it; valid: "):
         require_output_file("--summary", path)
     if os.geteuid() == 0:
         write_json("--summary", path, 1)

@@ -48,7 +48,7 @@ def test_the_command_prints_its_goals_and_writes_its_files(tmp_path: Path, capsy
     arguments = ["bench", "overlap", *SMALL, f"--csv={written}", f"--picture={picture}", f"--summary={summary}"]
     assert feelahead.main.command(arguments) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "not measured: overlap, C++: no header: pip download" in said
+    assert "not measured: overlap, C++: its header is not given; to get it: pip download" in said
     assert "met worst error over every class, of the sphere" in said
     assert "met false zeros of " in said
     with written.open(newline="", encoding="utf-8") as file:

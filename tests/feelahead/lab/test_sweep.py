@@ -134,15 +134,15 @@ def test_bad_input_ends_the_sweep_at_once(tmp_path: Path) -> None:
     [
         (["--workers", "2"], "--workers 2: try counting measures time"),
         (["--scheduler", "tcp://127.0.0.1:1"], "--scheduler tcp://127.0.0.1:1: try counting measures time"),
-        (["--scheduler", ""], "--scheduler '': valid: as tcp://127.0.0.1:8786"),
+        (["--scheduler", ""], "--scheduler '': is no address; valid: an address such as tcp://127.0.0.1:8786"),
         (["--picture", "/a.png"], "--picture /a.png: try counting has no figure"),
         (["--workers", "0"], "--workers = 0; valid: at least 1"),
         (["--seeds", "1000000000000"], "3 cells with 1000000000000 seeds each; valid: one value or more"),
         (["--numbers"], "0 cells with 1 seeds each; valid: one value or more"),
-        (["--csv", "/nowhere/a.csv"], "--csv /nowhere/a.csv: is a folder, or its folder is not there"),
+        (["--csv", "/nowhere/a.csv"], "--csv /nowhere/a.csv: is a folder, or lies in a folder that does not exist"),
         (["--csv", "a", "--resume", "a"], "--csv a: --resume writes to"),
         (["--csv", "a", "--summary", "a.json"], "--summary a.json: --csv writes to"),
-        (["--parquet", "pipe"], "--parquet pipe: not a regular file"),
+        (["--parquet", "pipe"], "--parquet pipe: this is no regular file"),
     ],
 )
 def test_what_cannot_be_would_lose_work_or_never_end_is_refused_in_a_line(

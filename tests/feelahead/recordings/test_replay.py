@@ -112,8 +112,8 @@ def test_damage_is_said_and_what_comes_before_is_compared(
     damaged.write_bytes(content)
     assert replay([str(damaged), "--check"]) == 0
     said = capsys.readouterr()
-    assert "robot: the file is damaged: compared up to there" in said.out
-    assert f"{damaged}: is damaged; what can be read of it: " in said.err
+    assert "robot: the file is damaged: the comparison ends at the damage" in said.out
+    assert f"{damaged}: is damaged; " in said.err
     assert 0.0 < open_recording(damaged).length_s() < run.length_s()
 
 

@@ -83,7 +83,7 @@ def test_the_wrong_trigger_is_pointed_out_and_does_not_count() -> None:
         hands.run(hands.now_s + REPORT_S)
     for r2 in (0.0, 0.5, 1.0, 0.5, 0.0):
         hands.procedure.feed(ControllerState(r2=r2), hands.now_s)
-    assert hands.procedure.complaint == "that is R2; release it and pull L2"
+    assert hands.procedure.complaint == "R2 is pulled; release it and pull L2"
     assert hands.procedure.progress == 0.0
 
 
@@ -103,7 +103,9 @@ def test_what_never_rests_is_refused() -> None:
         for tick in range(1000):
             procedure.feed(ControllerState(l2=0.4 * (tick % 2)), tick * 0.1)
 
-    with pytest.raises(CalibrationError, match=r"after 60 s this was not done: Put the controller down.*L2 is being"):
+    with pytest.raises(
+        CalibrationError, match=r"after 60 s this step was not done: Put the controller down.*L2 is being"
+    ):
         shake()
 
 

@@ -45,7 +45,7 @@ class Owner:
 
 
 def test_another_number_of_views_than_of_columns_is_refused() -> None:
-    with pytest.raises(TypeError, match="Columns has 7 columns, not 1"):
+    with pytest.raises(TypeError, match="Columns has 7 columns; 1 forms are given"):
         Declared(Columns, NUMBERS)
 
 

@@ -85,7 +85,9 @@ def test_where_it_cannot_work_that_is_said_once_and_nothing_is_tried_again(desk:
     for turn in range(1000):
         desk.cameras.update(0.1 * turn, 0.0, BOTH)
     assert len(desk.companions) == 1
-    assert desk.notes == ["cameras: no pictures, the arm goes on without: no EGL; to mend it: install something"]
+    assert desk.notes == [
+        "cameras: there are no pictures, and the arm works without them: no EGL; to mend it: install something"
+    ]
     assert not desk.cameras.works
 
 

@@ -279,7 +279,7 @@ def test_a_port_that_is_taken_is_said() -> None:
             # As another version of viser, which opens its server differently, would do.
             "class ViserServer:\n    def __init__(self, **options): pass\n    def get_port(self): return 1\n"
             "SceneApi = BatchedMeshHandle = LabelHandle = None",
-            "no console: this viser opens its server in another way than viser 1.1 does",
+            "no console: viser has another version, which opens its server in another way; valid: viser 1.1",
         ),
     ],
 )

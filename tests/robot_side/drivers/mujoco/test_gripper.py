@@ -56,7 +56,9 @@ def test_a_servo_leads_by_its_force_and_lags_by_its_damping(tmp_path: Path) -> N
 
 def test_a_gripper_of_unknown_range_is_named(tmp_path: Path) -> None:
     unlimited = TENDON_GRIPPER.replace('ctrlrange="0 255"', "")
-    with pytest.raises(ConfigurationError, match="'hand' has no ctrlrange; valid: its open and its closed input"):
+    with pytest.raises(
+        ConfigurationError, match="'hand' has no ctrlrange; valid: the inputs at which the gripper is open and closed"
+    ):
         measure_gripper(load_scene(planar_arm(tmp_path, gripper_actuators=unlimited), "tcp"))
 
 

@@ -202,7 +202,7 @@ def test_a_body_and_a_geom_of_one_name_are_one_object_and_that_is_said(tmp_path:
     model = planar_arm(tmp_path, world=world)
     assert load_scene(model, "tcp").shared_names == ("target",)
     notes = build_parts(RobotSettings(model=model, site="tcp"), 1, "clock").notes
-    assert notes[2].startswith("'target' names more than one thing")
+    assert notes[2].startswith("'target' names several things")
     assert load_scene().shared_names == ()
 
 
