@@ -100,7 +100,7 @@ def _news(reported: _State, state: _State, view: LiveView, peaks: Mapping[str, f
         if after is not before:
             news.append(_resistance(trigger, before, after, peaks[trigger.name], view.operator.haptics))
     if state.touched != reported.touched:
-        news.append("touches nothing" if state.touched is None else f"touches {state.touched}, as far as is perceived")
+        news.append("touches nothing" if state.touched is None else f"touches {state.touched}, as perceived")
     if state.holding != reported.holding:
         news.append(f"lets go of {reported.holding}" if state.holding is None else f"holds {state.holding}")
     if state.stands and not reported.stands:

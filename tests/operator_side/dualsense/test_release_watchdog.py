@@ -211,7 +211,7 @@ def test_watchdogs_that_end_again_and_again_are_given_up(guard: ReleaseGuard, co
         end_watchdog(guard)
         notes += guard.take_notes()
     assert len(notes) == MOST_REPLACEMENTS + 1
-    assert "there is no other" in notes[-1]
+    assert "is not replaced" in notes[-1]
     assert not guard.running
     guard.hold(controller.path, REPORT)
     guard.beat()

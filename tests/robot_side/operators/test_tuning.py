@@ -75,7 +75,7 @@ def test_observers_tune_nothing(bench: Bench) -> None:
     tune(bench, observer, 1, 0.5, "delay 100ms")
     tuning = bench.robot.session.tuning
     assert (tuning.probability, tuning.take_link(), tuning.refused) == (0.99, None, 1)
-    assert tuning.take_notes() == ["tuning refused: only the owner may"]
+    assert tuning.take_notes() == ["tuning refused: only the owner of the robot may tune"]
 
 
 def test_without_permission_nothing_is_tuned_and_that_is_said_once() -> None:

@@ -177,7 +177,7 @@ def test_the_start_pose_is_said(tmp_path: Path, extra_bottom: str, said: str) ->
     model = planar_arm(tmp_path, extra_bottom=extra_bottom)
     assert load_scene(model, "tcp").start_pose.startswith(said)
     notes = build_parts(RobotSettings(model=model, site="tcp"), 1, "clock").notes
-    assert notes[0].startswith(f"starts at {said}")
+    assert notes[0].startswith(f"the arm starts at {said}")
     assert notes[1].startswith("objects: target: target; obstacle: ")
 
 
@@ -218,7 +218,7 @@ REFUSED: list[tuple[dict[str, str] | str, str | None, str]] = [
     ("<mujoco", "tcp", "valid: an MJCF file that MuJoCo compiles"),
     ("<robots/>", "tcp", "valid: an MJCF file that MuJoCo compiles"),
     ({}, "tool", "valid: tcp, camera_mount"),
-    ({}, None, "none was named; valid: tcp, camera_mount"),
+    ({}, None, "none is given; valid: tcp, camera_mount"),
     ({"arm_actuators": "", "gripper_actuators": ""}, "tcp", "no actuators"),
     ({"arm_actuators": MOTORS.split("/>")[0] + "/>"}, "tcp", "arm's joint 'elbow' has no actuator of its own: nothing"),
     ({"arm_actuators": MUSCLE}, "tcp", "'pull' of joint 'elbow' is of an unsupported kind; valid: position"),
