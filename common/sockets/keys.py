@@ -166,7 +166,7 @@ class KeyFolder:
         if (other := self.allowed().get(key)) is not None:
             raise ConfigurationError(
                 f"{name} is revoked, but the same key is still let in as {other}; "
-                f"to revoke it as well: `{self.command(f'revoke {other}')}`"
+                f"valid: `{self.command(f'revoke {other}')}` to revoke it as well"
             )
 
     def allowed(self) -> dict[str, str]:

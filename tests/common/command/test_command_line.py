@@ -93,7 +93,7 @@ def test_bad_flags_become_one_line_that_names_them(arguments: list[str], named: 
         (9000 * "a" + " = 1", "unknown key"),
         ('config = "other.toml"', "unknown key 'config'"),
         (f"[{9000 * 'a'}]\n[{9000 * 'a'}]", "no valid TOML"),
-        ("#" * 1_000_001, "more than 1000000 bytes"),
+        ("#" * 1_000_001, "too large; valid: up to 1000000 bytes"),
     ],
 )
 def test_bad_files_become_one_line_that_names_file_and_key(tmp_path: Path, content: str, named: str) -> None:

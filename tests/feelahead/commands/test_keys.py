@@ -40,5 +40,5 @@ def test_a_public_file_may_be_handed_over_and_a_file_named_as_no_peer_is_pointed
     for name in ("alice.smith.public", ".hidden.public"):
         (tmp_path / "robot" / "allowed" / name).write_text(handed.read_text())
     listed = said(capsys, "list", *folder)
-    assert "alice.smith.public: its name is no peer's; valid: letters" in listed
+    assert "alice.smith.public: its name is no peer's name; valid: letters" in listed
     assert "hidden" not in listed

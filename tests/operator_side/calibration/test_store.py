@@ -58,7 +58,7 @@ def test_every_calibration_is_read_as_it_was_written(calibration: TravelCalibrat
         ("aa:bb:cc:00:11:22", "AA:BB", "address = 'AA:BB'"),
         ("aa:bb:cc:00:11:22", "aa:bb:cc:00:11:23", "belongs to the controller aa:bb:cc:00:11:23"),
         ("[l2]", "[l2", "Expected"),
-        ("#", "#" * 20_000, "more than 10000 bytes"),
+        ("#", "#" * 20_000, "too large; valid: up to 10000 bytes"),
         ("dead_zone = 0.06", f"dead_zone = 1{400 * '0'}", "more than 64 bits"),
         ("version = 1", f"version = '{9000 * 'a'}'", 'version = "aaa'),
         (ADDRESS, 9000 * "a", "address = 'aaa"),

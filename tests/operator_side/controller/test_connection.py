@@ -135,7 +135,7 @@ def test_the_first_search_is_at_once_then_once_a_second_and_a_missing_controller
     world.run(10.0)
     assert 10 <= len(world.search.looks) <= 11
     assert world.connection.state is ConnectionState.ABSENT
-    assert world.connection.take_notes() == ["no controller found; waiting for one"]
+    assert world.connection.take_notes() == ["no controller found; waiting for a controller"]
     assert (world.connection.read(world.now_s), world.connection.write(STIFF, world.now_s)) == (None, False)
     world.plug_in()
     world.run(LOOK_PERIOD_S + PERIOD_S)
