@@ -64,6 +64,7 @@ class OperatorTurns:
         self._process, self._core, self._sockets = process, core, sockets
         self._connection, self._guard, self._person, self._pages, console = desk
         self._sending = Sending(settings.link_spec(), sockets)
+        self._pages.pictures.video_later_s = self._sending.video_later_s
         self._viewing = Viewing(
             core,
             self._surroundings,
@@ -134,7 +135,7 @@ class OperatorTurns:
         for payload in received:
             self._core.receive(payload, now_s)
         for topic, payload in seen:
-            if not self._viewing.take(topic, payload):
+            if not self._viewing.take(topic, payload, now_s):
                 self._core.receive_view(payload, now_s)
 
     def _tell_controller(self, now_s: float) -> None:
@@ -148,6 +149,7 @@ class OperatorTurns:
         # First, so that the wish arrives after all messages of the old link.
         if (words := core.tuner.take_link()) is not None:
             self._sending.tune(words)
+            self._pages.pictures.video_later_s = self._sending.video_later_s
         if self._person is not None:
             self._person.tick(now_s, core.screen, core.link.round_trip.mean or 0.0)
         connection.update(now_s)
@@ -167,7 +169,7 @@ class OperatorTurns:
         person = self._person
         page = self._pages.facts(self._core, now_s, person=person is not None and person.has_person)
         hands = Hands.CONTROLLER if person is None else person.hands
-        return Surroundings(hands, self._sending.line.profile.words, page)
+        return Surroundings(hands, self._sending.line.profile.words, page, self._pages.pictures.facts())
 
     def _status(self, now_s: float) -> OperatorStatus:
         """Return the core's status with the process's fields."""

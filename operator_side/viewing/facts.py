@@ -60,6 +60,17 @@ class HandsFacts(msgspec.Struct, frozen=True):
     """Reason why the last tuning wish was refused; empty if it was not"""
     link_asked: str | None
     """Link of this side's last tuning wish, in netem's words; None before the first"""
+    counts: float = 1.0
+    """Share of a page's motion that counts, 0 to 1: less while the pictures are old"""
+
+
+class PictureFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Limits of the pictures' freshness by view, in the order of VIEW_NAMES."""
+
+    old_s: tuple[float | None, ...]
+    """Age from which a picture is old; None while unknown"""
+    dead_s: tuple[float, ...]
+    """Silence from which a view is dead"""
 
 
 class SceneFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -101,6 +112,7 @@ class OperatorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """P of the robot side; None while unknown"""
     page: HandsFacts | None = None
     """None if pages can neither drive nor stop"""
+    pictures: PictureFacts | None = None
     scene: SceneFacts | None = None
     robot: RobotStatus | None = None
     """Given where both sides' statuses are known: in the demo, and in a recording of both"""

@@ -79,16 +79,18 @@ class Viewing:
         if self.console is not None:
             self.console.note(text)
 
-    def take(self, topic: bytes, payload: bytes) -> bool:
+    def take(self, topic: bytes, payload: bytes, now_s: float) -> bool:
         """Take a view payload for viewers, once its pieces are joined; False for one of the core."""
         of, is_piece, _ = topic.partition(PIECE)
         if of not in self._joining:
             return False
         if is_piece:
             whole = self._joining[of].take(payload)
-            return whole is None or self.take(of, whole)
+            return whole is None or self.take(of, whole, now_s)
         if topic == SCENE_TOPIC and self._status.wants_facts:
             self._figures.take(payload)
+        if topic == VIDEO_TOPIC:
+            self._pages.pictures.take(payload, now_s)
         if self.console is not None:
             self.console.view(payload, video=topic == VIDEO_TOPIC)
         return True

@@ -15,6 +15,7 @@ from common.status.codes import Doing
 from operator_side.core import OperatorSide
 from operator_side.viewing.facts import HandsFacts
 from operator_side.viewing.pages.page_messages import PageHands, PageMessage, TuneWish
+from operator_side.viewing.pages.pictures import Pictures
 
 SILENCE_S: Final = 0.15
 """Silence after which a page drives no more, and its stop counts as released, in seconds."""
@@ -32,6 +33,8 @@ class DrivingPage:
         self.may_drive = may_drive
         self.rejected = 0
         """Number of invalid messages."""
+        self.pictures = Pictures()
+        """Freshness of what pages show"""
         self.stale = 0
         """Number of messages that others of the same page had overtaken; only their stop counts."""
         self.silences = 0
@@ -103,6 +106,7 @@ class DrivingPage:
 
     def follow(self, core: OperatorSide, now_s: float) -> None:
         """Apply pages' stops, as the controller's, and their tuning wishes; call it every turn."""
+        self.pictures.follow(core, None if self._newest is None else self._newest.shown_s, now_s)
         if self.stopping(now_s):
             core.press_stop(now_s)
         while self.wishes:
@@ -112,7 +116,9 @@ class DrivingPage:
     def facts(self, core: OperatorSide, now_s: float, *, person: bool) -> HandsFacts:
         """Return the facts for the pages. person: as in HandsFacts."""
         self._expire(now_s)
-        return HandsFacts(self.may_drive, self.driver, person, core.tuner.why, core.tuner.link)
+        return HandsFacts(
+            self.may_drive, self.driver, person, core.tuner.why, core.tuner.link, counts=self.pictures.hands
+        )
 
     def _take(self, page: int, hands: PageHands, now_s: float) -> None:
         if hands.stop:  # even an overtaken one

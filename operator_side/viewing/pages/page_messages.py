@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from common.limits import Share
+from common.limits import Finite, Share
 
 Deflection = tuple[Annotated[float, Meta(ge=-1.0, le=1.0)], Annotated[float, Meta(ge=-1.0, le=1.0)]]
 _LARGEST = 2**53 - 1
@@ -38,6 +38,8 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Whether the emergency stop is pressed"""
     give_back: bool = False
     """Whether the person hands back to the scripted one"""
+    shown_s: Finite | None = None
+    """Capture time of the picture shown in the first view, on the robot side's clock; None without one"""
 
     @property
     def moves_nothing(self) -> bool:

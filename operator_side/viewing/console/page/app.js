@@ -2,7 +2,7 @@
 import { Chart } from "./charts.js";
 import { Hands as PageHands } from "./hands.js";
 import { make } from "./make.js";
-import { LinkState, ShownKind, VIEWS } from "./names.js";
+import { Hands, LinkState, MotionState, ShownKind, VIEWS } from "./names.js";
 import { Player } from "./player.js";
 import { Clock, View } from "./views.js";
 import { Trigger } from "./triggers.js";
@@ -49,7 +49,7 @@ let run = { title: "", live: true };
 const send = (object) => {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(object));
 };
-const hands = new PageHands(document, send);
+const hands = new PageHands(document, send, () => views[0].capturedS);
 const player = new Player(byId("player"), send);
 
 function connect() {
@@ -126,6 +126,17 @@ function showFacts(message) {
   charts.delay.said = asked.map(([side, words]) => `emulated to the ${side}: ${words}`).join("; ");
   charts.stiffness.add(clock.nowMs, [facts.l2.stiffness, facts.r2.stiffness]);
   hands.show(facts);
+  showCounts(facts);
+}
+
+// The operator side lets a page's hands fade while the pictures are old.
+function showCounts({ page, hands: whose, status }) {
+  const drives = run.live && whose === Hands.BROWSER && page?.driver && status.state === MotionState.ARMED;
+  const off = drives && page.counts < 1;
+  document.body.classList.toggle("hands_off", Boolean(off));
+  byId("hands_off").hidden = !off;
+  const share = off && page.counts > 0 ? `hands at ${Math.round(100 * page.counts)} %` : "hands off";
+  if (off) text("hands_off", `PICTURES ARE OLD: ${share} until they are fresh`);
 }
 
 // Rate and queue as measured by the robot side, lost packets, and held-back streams.
@@ -200,7 +211,8 @@ function look() {
     const old = everHeard ? `What you see is ${(silentMs / 1000).toFixed(1)} s old. ` : "";
     because.textContent = old + (open ? "The operator side is silent." : `The console: ${closedBecause || "not reached yet"}.`);
   }
-  for (const view of views) view.look();
+  const limits = facts?.pictures;
+  views.forEach((view, k) => view.look(limits?.old_s[k] ?? null, limits?.dead_s[k]));
 }
 
 document.addEventListener("visibilitychange", () => send({ looks: !document.hidden }));

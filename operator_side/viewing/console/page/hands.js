@@ -42,9 +42,13 @@ export class Hands {
   #giveBack = false;
   #why = "";
 
-  constructor(document, send) {
+  #shownS;
+
+  // shownS(): capture time of the first view's picture, on the robot side's clock; null without one.
+  constructor(document, send, shownS = () => null) {
     this.#document = document;
     this.#send = send;
+    this.#shownS = shownS;
     this.#panel = new Panel(document, {
       drive: () => (this.#state === "watching" ? this.#begin() : this.#end("You stopped driving.")),
       stop: (held) => this.#stop("pointer", held),
@@ -242,7 +246,7 @@ export class Hands {
     if (this.#sent === "" && !driving && !stop && !this.#giveBack) return; // nothing to send yet
     this.#sent = text;
     this.#sentMs = nowMs;
-    this.#send({ hands: { page: this.#page, number: this.#number++, ...said } });
+    this.#send({ hands: { page: this.#page, number: this.#number++, shown_s: this.#shownS(), ...said } });
   }
 
   #draw() {
