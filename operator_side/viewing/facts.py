@@ -62,6 +62,8 @@ class HandsFacts(msgspec.Struct, frozen=True):
     """Link of this side's last tuning wish, in netem's words; None before the first"""
     counts: float = 1.0
     """Share of a page's motion that counts, 0 to 1: less while the pictures are old"""
+    reset_first: bool = False
+    """Whether a stop must be reset before a page's hands count"""
 
 
 class PictureFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -29,7 +29,7 @@ ARROWS = """
     common/video: common/protocol
     common/sockets: common common/files
     common/status: common/protocol
-    common/command: common common/emulation common/files common/recording common/status
+    common/command: common common/emulation common/files common/protocol common/recording common/status
     common/loop: common common/command common/files common/realtime common/recording
 
     robot_side/compiled: common common/companion common/files

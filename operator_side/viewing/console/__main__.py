@@ -20,7 +20,7 @@ from typing import Any, Final
 import msgspec
 
 from common.command.live_view import LiveView
-from common.command.words import link_words, words
+from common.command.words import lease_words, link_words, words
 from common.companion.channel import Channel
 from common.companion.process import companion_channel
 from common.errors import RemoteProtocolError
@@ -207,7 +207,7 @@ def said(facts: OperatorFacts) -> dict[str, Any]:
         "state": state.upper(),
         "why": (None if state == view.phase else view.phase, view.reason),
         "link": link_words(status),
-        "lease": words(status.owner) or None,
+        "lease": lease_words(status.owner) or None,
         "whose": "scripted person" if facts.hands is Hands.PERSON else words(facts.hands),
         "holding": None if status.holding is None else f"{view.holding or 'nothing'}{view.stands}",
     }

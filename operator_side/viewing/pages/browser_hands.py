@@ -33,7 +33,7 @@ class BrowserHands:
         self._calibrate = calibrate
         self._swap_sides = swap_sides
         self._began_s: float | None = None
-        self._was_armed = False
+        self._was_armed = self._was_stopped = False
         self._moves = False
         self._state = ControllerState()
         self._commanded = RELEASED
@@ -54,6 +54,10 @@ class BrowserHands:
         """Take the page's hands; the screen reports whether the arm is armed."""
         del delay_s
         self._calibrate(IDENTITY)
+        stopped = self._was_stopped if screen is None else screen.state == "stopped"
+        if stopped and not self._was_stopped:
+            self._pages.require_reset()
+        self._was_stopped = stopped
         hands = self._pages.hands(now_s)
         armed = screen is not None and screen.state == "armed"
         if hands is not None and self._was_armed and not armed:

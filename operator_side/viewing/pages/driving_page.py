@@ -3,6 +3,7 @@
 nobody ─▶ resting ─▶ ready ─▶ running         the page that drives: the first that began on purpose
              ▲         │         │
              └─────────┴─────────┘  a key besides hold-to-run, hold-to-run released, a stop, a disarmed arm
+After a stop the hands rest until it was reset on purpose: hold-to-run alone never arms again.
 silence for 150 ms, a page that stops driving or closes: nobody, and the next driver rests first
 """
 
@@ -49,6 +50,8 @@ class DrivingPage:
         self.doing = Doing.NOBODY_DRIVES
         """Action of the page that drives, as of the last call"""
         self._stop_s: float | None = None
+        self.reset_first = False
+        """Whether a stop waits for its reset, so that no page's hands count"""
         self._giving_back: set[int] = set()
         self._give_back = False
         self.wishes: deque[TuneWish] = deque(maxlen=_MOST_WISHES)
@@ -99,6 +102,11 @@ class DrivingPage:
         if self._driver is not None:
             self.doing, self._up_since_s = Doing.ALL_KEYS_UP_FIRST, None
 
+    def require_reset(self) -> None:
+        """Let no page's hands count before a reset, as the arm was stopped."""
+        self.reset_first = self.may_drive
+        self.rest_anew()
+
     def take_give_back(self) -> bool:
         """Return whether a page has handed back to the scripted person since the last call."""
         given, self._give_back = self._give_back, False
@@ -116,18 +124,19 @@ class DrivingPage:
     def facts(self, core: OperatorSide, now_s: float, *, person: bool) -> HandsFacts:
         """Return the facts for the pages. person: as in HandsFacts."""
         self._expire(now_s)
-        return HandsFacts(
-            self.may_drive, self.driver, person, core.tuner.why, core.tuner.link, counts=self.pictures.hands
-        )
+        known = (self.may_drive, self.driver, person, core.tuner.why, core.tuner.link)
+        return HandsFacts(*known, counts=self.pictures.hands, reset_first=self.reset_first)
 
     def _take(self, page: int, hands: PageHands, now_s: float) -> None:
         if hands.stop:  # even an overtaken one
             self._stop_s = now_s
-            self.rest_anew()
+            self.require_reset()
         if hands.number <= self._numbers.get(page, -1):
             self.stale += 1
             return
         self._numbers[page] = hands.number
+        if hands.reset and self._driver in (None, page) and not self.stopping(now_s):
+            self.reset_first = False
         self._choose(page, hands)
         if page == self._driver:
             self._newest, self._heard_s = hands, now_s
@@ -135,7 +144,7 @@ class DrivingPage:
 
     def _choose(self, page: int, hands: PageHands) -> None:
         """Choose the driver after this message: nobody takes over from a page that drives."""
-        may_give_back = self._driver in (None, page) and page not in self._giving_back
+        may_give_back = self._driver in (None, page) and page not in self._giving_back and not self.reset_first
         (self._giving_back.add if hands.give_back else self._giving_back.discard)(page)
         if hands.give_back and may_give_back:
             self._give_back = True
@@ -157,7 +166,7 @@ class DrivingPage:
                 if since_s is not None and now_s - since_s >= REST_S:
                     self.doing = Doing.READY
                     self._follow(hands, now_s)
-                elif not hands.all_up:
+                elif self.reset_first or not hands.all_up:
                     self._up_since_s = None
                 elif since_s is None:
                     self._up_since_s = now_s

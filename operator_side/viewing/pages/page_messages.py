@@ -36,6 +36,8 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     hand_over: bool = False
     stop: bool = False
     """Whether the emergency stop is pressed"""
+    reset: bool = False
+    """Whether the person resets the stop"""
     give_back: bool = False
     """Whether the person hands back to the scripted one"""
     shown_s: Finite | None = None
@@ -49,7 +51,7 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def all_up(self) -> bool:
         """Whether nothing is pressed."""
-        pressed = self.run or self.gripper != 0 or self.next_target or self.hand_over or self.stop
+        pressed = self.run or self.gripper != 0 or self.next_target or self.hand_over or self.stop or self.reset
         return self.moves_nothing and not pressed
 
 

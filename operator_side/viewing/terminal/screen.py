@@ -11,7 +11,7 @@ from rich.text import Text
 
 from common.command.live_line import UNKNOWN, millimetres, percent
 from common.command.live_view import LiveView, number
-from common.command.words import link_words, printable, words
+from common.command.words import lease_words, link_words, printable, words
 from common.status.codes import Sight
 from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts
@@ -81,7 +81,7 @@ def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
     """Draw both sides' figures of the link, over the last second, of objects ahead and of the held one."""
     status, robot, known = view.operator, view.robot, view.scene
     felt = {} if status.feel in (None, Sight.SEEING) else {"feel": words(status.feel)}
-    who = {"lease": words(status.owner), "hands": words(facts.hands), "controller": words(status.controller)}
+    who = {"lease": lease_words(status.owner), "hands": words(facts.hands), "controller": words(status.controller)}
     lines = [_named(link=link_words(status), **who, **felt)]
     for name, delay in (("to operator", facts.to_operator), ("to robot   ", facts.to_robot)):
         mean, p99, newest = (_figure(value, 5) for value in (delay.mean_ms, delay.p99_ms, delay.newest_ms))
@@ -114,6 +114,7 @@ def _trigger(facts: OperatorFacts, name: str, cells: int) -> Group:
     raw, metres, cells = number(trigger.raw), number(trigger.needed_m), max(1, cells)
     reached = math.ceil(min(1.0, max(0.0, (raw or 0.0) * SENSED_TRAVEL)) * cells * 10)
     rest = (UNKNOWN if raw is None else "·") * (cells * 10 - reached)
+    behind = " behind" if round(1e3 * (metres or 0.0)) < 0 else " ahead"
     travel, free = percent(number(trigger.travel), 3), percent(number(trigger.free))
     meets = (f"{trigger.meets} of 8", _FELT if trigger.meets else "")
     return Group(
@@ -121,7 +122,7 @@ def _trigger(facts: OperatorFacts, name: str, cells: int) -> Group:
         _line("finger  ", ("━" * (reached - 1) + "┫" * (reached > 0), _PULL), (rest, _FAINT)),
         _line("zones   ", *((f"{zone or '.'}".ljust(cells), _FELT if zone else "") for zone in trigger.zones)),
         _line("meets   ", meets, f"  stiffness {_figure(trigger.stiffness)}"),
-        _line("D       ", (f"{UNKNOWN if metres is None else f'{1e3 * metres:z.0f}'} mm", _TITLE), " ahead"),
+        _line("D       ", (f"{UNKNOWN if metres is None else f'{1e3 * abs(metres):.0f}'} mm", _TITLE), behind),
         _line("fast mm ", " ".join(f"{1e3 * way:z.0f}" for way in trigger.fast_m) or UNKNOWN),
         _line("slow mm ", " ".join(f"{1e3 * way:z.0f}" for way in trigger.slow_m) or UNKNOWN),
     )

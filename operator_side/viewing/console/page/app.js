@@ -41,7 +41,7 @@ let heardMs = performance.now();
 let everHeard = false;
 let closedBecause = "";
 let facts = null;
-let drawn = true;
+let drawn = false;
 const frame = document.querySelector("#scene iframe");
 const slow = drawsSlowly();
 let run = { title: "", live: true };
@@ -148,15 +148,17 @@ function showLink(status) {
   text("pictures", `${status.pictures ?? "?"}${held}`);
 }
 
-byId("drawn").onclick = ({ currentTarget }) => {
-  drawn = !drawn;
-  currentTarget.textContent = `3-D drawing: ${drawn ? "on" : "off"}`;
-  currentTarget.setAttribute("aria-pressed", drawn);
+function draw(wanted) {
+  drawn = wanted;
+  byId("drawn").textContent = `3-D drawing: ${drawn ? "on" : slow ? "off, as this browser has no graphics processor" : "off"}`;
+  byId("drawn").setAttribute("aria-pressed", drawn);
   frame.hidden = true;
   if (!drawn) frame.removeAttribute("src");
-};
+}
+byId("drawn").onclick = () => draw(!drawn);
+draw(!slow);
 
-// Without a graphics processor the drawing takes processor time from all else: it is drawn less often.
+// Without a graphics processor the drawing takes processor time from all else: only on request, and less often.
 function drawsSlowly() {
   const context = document.createElement("canvas").getContext("webgl");
   const renderer = context?.getParameter(context.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? 0);
@@ -197,7 +199,7 @@ function showNote(note) {
   const item = make("li", {}, note);
   byId("notes").append(item);
   while (byId("notes").childElementCount > MOST_NOTES) byId("notes").firstChild.remove();
-  item.scrollIntoView({ block: "nearest" });
+  byId("notes").scrollTop = byId("notes").scrollHeight;
 }
 
 function look() {
