@@ -72,7 +72,7 @@ ARROWS = """
         robot_side/surroundings
     robot_side/drivers/remote: common common/sockets common/timing robot_side/arm robot_side/surroundings
     robot_side/viewing: common common/companion common/protocol robot_side/core.py robot_side/drivers/mujoco
-        robot_side/laws robot_side/reporting robot_side/surroundings
+        robot_side/gripper robot_side/laws robot_side/reporting robot_side/surroundings
     robot_side/settings.py: common common/command robot_side/arm robot_side/drivers/mujoco robot_side/enlargement
         robot_side/laws/named.py robot_side/operators robot_side/viewing
     robot_side/recording: common common/recording robot_side/arm robot_side/compiled robot_side/events.py

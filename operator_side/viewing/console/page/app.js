@@ -3,6 +3,7 @@ import { Chart } from "./charts.js";
 import { Hands as PageHands } from "./hands.js";
 import { make } from "./make.js";
 import { Hands, LinkState, MotionState, ShownKind, VIEWS } from "./names.js";
+import { Overlay } from "./overlay.js";
 import { Player } from "./player.js";
 import { Clock, View } from "./views.js";
 import { Trigger } from "./triggers.js";
@@ -29,6 +30,7 @@ for (const [id, title] of Object.entries(FIGURES)) {
 
 const clock = new Clock();
 const views = VIEWS.map((name) => new View(byId(name), clock));
+const overlay = new Overlay(byId("first_person"));
 const triggers = { l2: new Trigger(byId("l2"), "L2"), r2: new Trigger(byId("r2"), "R2") };
 const charts = {
   delay: new Chart(byId("delay_chart"), "delay", "ms", [["to here", "--l2"], ["to the robot", "--r2", [5, 3]]]),
@@ -177,6 +179,7 @@ function showScene(scene) {
   // Earlier, viser has no camera position for the scene.
   if (drawn && !frame.src) frame.src = sceneAddress();
   frame.hidden = !drawn;
+  overlay.show(scene, facts);
   charts.overlap.add(clock.nowMs, scene.overlap_mm3);
   charts.tick.add(clock.nowMs, scene.tick_us);
   const rows = scene.objects.map(({ name, role, overlap_mm3: [l2, r2] }) => {
