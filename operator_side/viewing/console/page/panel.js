@@ -31,8 +31,8 @@ export class Panel {
     document.getElementById("stopping").replaceChildren(stopButton, resetButton);
     document.getElementById("driving").replaceChildren(
       place("drive", make("button", { type: "button", id: "drive", onclick: drive }, "Drive from here")),
-      place("giveBack", make("button", { type: "button", id: "give_back", onclick: giveBack, hidden: true },
-        "Let the person continue")),
+      place("giveBack", make("button", { type: "button", id: "give_back", onclick: giveBack, hidden: true,
+        title: "The scripted person goes on" }, "Hand back")),
       place("state", make("p", { id: "hands_state", tabIndex: -1, role: "status" })),
       place("rest", make("p", { id: "hands_rest" })),
       place("stopped", make("p", { id: "hands_stopped", role: "alert" })));
@@ -114,7 +114,7 @@ export class Panel {
 
   #aboutStop(stop, facts, hands) {
     if (facts?.status.state === MotionState.STOPPED) {
-      return hands?.reset_first ? "STOPPED. Nothing arms before the stop is reset."
+      return hands?.reset_first ? "STOPPED."
         : hands?.may_drive ? "Stopped, and reset." : "STOPPED. The controller arms again.";
     }
     if (stop === null) return "";

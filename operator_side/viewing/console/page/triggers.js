@@ -37,6 +37,6 @@ export class Trigger {
     const mm = facts.needed_m === null ? null : Math.round(1000 * facts.needed_m);
     const ahead = mm === null ? "?" : `${Math.abs(mm)} mm ${mm < 0 ? "behind" : "ahead"}`;
     const stiffness = facts.stiffness === null ? "?" : facts.stiffness.toFixed(2);
-    this.#words[1].textContent = `D = ${ahead} · stiffness s(δ) ${stiffness}`;
+    this.#words[1].textContent = `D = ${ahead} · s(δ) = ${stiffness}`;
   }
 }
