@@ -7,6 +7,7 @@ import contextlib
 import math
 from collections import deque
 from collections.abc import Iterable
+from itertools import islice
 from statistics import median
 from typing import Final
 
@@ -29,6 +30,7 @@ _KEPT: Final = 15
 _TAIL: Final = 0.95
 _WINDOW_S: Final = 10.0
 """Time over which the control stream's delay is measured, in seconds"""
+_MOST_SAMPLES: Final = 1000
 _PERIOD_S: Final = 0.25
 _PATIENCE_S, _FALL_S, _RISE_S = 0.2, 0.6, 0.5
 """Old pictures are tolerated for the first, the hands fade in the second, and return in the third, in seconds."""
@@ -123,8 +125,9 @@ class Pictures:
         return PictureFacts(tuple(self._old_s.values()), tuple(dead_after_s(view.interval_s) for view in views))
 
     def _measure(self, core: OperatorSide, now_s: float) -> None:
-        recent = (there_s for at_s, there_s, _ in core.link.recent if now_s - at_s <= _WINDOW_S)
-        known_s = _tail(there_s for there_s in recent if there_s is not None)
+        newest = islice(reversed(core.link.recent), _MOST_SAMPLES)
+        recent_s = (there_s for at_s, there_s, _ in newest if now_s - at_s <= _WINDOW_S)
+        known_s = _tail(there_s for there_s in recent_s if there_s is not None)
         if known_s is not None:
             self._control_p95_s = known_s
         if self._control_p95_s is None:

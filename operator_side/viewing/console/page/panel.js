@@ -73,6 +73,7 @@ export class Panel {
 
   focus() {
     this.#places.state.focus({ preventScroll: true });
+    this.#document.getElementById("overview")?.scrollIntoView({ block: "nearest" }); // in a small window
   }
 
   #text(name, text) {
