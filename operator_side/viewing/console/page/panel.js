@@ -17,7 +17,7 @@ export class Panel {
     this.#section = document.getElementById("hands");
     const stopButton = place("stop", make("button", { type: "button", id: "stop", title: "Esc" }, "STOP", make("small", {}, " Esc")));
     const resetButton = place("reset", make("button", { type: "button", id: "reset", onclick: reset, hidden: true },
-      "Reset the stop", make("small", {}, " X")));
+      "RESET", make("small", {}, " X")));
     stopButton.addEventListener("pointerdown", () => stop(true));
     for (const end of ["pointerup", "pointercancel", "pointerleave"]) stopButton.addEventListener(end, () => stop(false));
     stopButton.addEventListener("click", () => (stop(true), stop(false)));
