@@ -1,4 +1,4 @@
-"""The console script `feelahead-operator`, also `python -m operator_side`."""
+"""Start of the operator side: the command `feelahead-operator`, also `python -m operator_side`."""
 
 from common.command.launch import Command, launch
 

@@ -11,7 +11,7 @@ from operator_side.settings import OperatorSettings
 def build_operator_side(
     settings: OperatorSettings, epoch: int, clock_domain: str, listeners: Sequence[Listener] = ()
 ) -> OperatorSide:
-    """Build an operator side. listeners: notified of its inputs and outputs."""
+    """Build an operator side's core from `settings`. listeners: notified of its inputs and outputs."""
     alike = {one.name: getattr(settings, one.name) for one in fields(CoreSettings) if one.name != "asymmetry_s"}
     core = CoreSettings(asymmetry_s=settings.asymmetry_s(), **alike)
     return OperatorSide(epoch, clock_domain, core, listeners)

@@ -1,4 +1,4 @@
-"""Controllers by --device, and how each is opened. To add one, write its file and add a line here."""
+"""Table of the controllers that --device selects, and how each is opened. A new controller needs a line here."""
 
 import dataclasses
 import functools
@@ -22,28 +22,28 @@ from operator_side.viewing.pages.shared_hands import SharedHands
 
 
 class OpeningParts(NamedTuple):
-    """Parts that a controller may be opened with."""
+    """Parts that the opening of a controller may need."""
 
     settings: OperatorSettings
     core: OperatorSide
     pages: DrivingPage
     backend: HidBackend | None = None
-    """hidapi if None"""
+    """Module to use instead of hidapi; None for hidapi"""
 
 
 class Opening(NamedTuple):
-    """Search for the controller, and the parts that go with it."""
+    """Search for a controller, and the parts that belong to it."""
 
     search: BackgroundSearch
     guard: ReleaseGuard | None = None
-    """Releases it if this process is killed; its context is still to be entered"""
+    """Watchdog for the controller, whose context the caller enters; None if none is needed"""
     hands: BrowserHands | None = None
-    """Hands on it that must be moved in every turn; None for a person's own"""
+    """Page or scripted person at the controller, called in every turn; None for a real controller"""
 
 
 def _hid(given: OpeningParts) -> Opening:
     find = Finder(load_backend() if given.backend is None else given.backend)
-    # Without haptics nothing must be released.
+    # Without haptics nothing needs to be released, so there is no watchdog.
     return Opening(
         BackgroundSearch(functools.partial(_with_background_writes, find)),
         ReleaseGuard() if given.settings.haptics else None,

@@ -1,4 +1,4 @@
-"""The operator side without I/O: bytes in, bytes out, `now_s` with every call.
+"""Core of the operator side, without I/O or clock: bytes in, bytes out, and the time `now_s` in every call.
 
 control payloads ─▶ receive ─▶ newest stiffness ─▶ feel_now ─▶ controller
                                                   ▲ own commands under way
@@ -37,24 +37,24 @@ from operator_side.robot_link.tuner import Tuner
 
 @dataclass(frozen=True, kw_only=True)
 class CoreSettings:
-    """Settings of an operator side's rendering and commands."""
+    """Settings of the core: rendering and commands."""
 
     haptics: bool = True
-    """Whether the triggers are stiffened"""
+    """Whether the triggers resist and the motors rumble"""
     calibration: TravelCalibration = field(default_factory=TravelCalibration)
     rendering: RenderingSettings = field(default_factory=RenderingSettings)
     compensation: Compensation = "operator"
     swap_sides: bool = False
-    """Whether left and right of the controller are swapped"""
+    """Whether left and right are exchanged: triggers, sticks and hold-to-run"""
     seed: int = 0
     asymmetry_s: float = 0.0
-    """Least delay to the robot minus that to the operator, if known"""
+    """Minimum delay to the robot side minus minimum delay to the operator side, in seconds, if known"""
     full_rate: bool = False
-    """Whether every command is sent, as HeldCommand's"""
+    """Whether to send a command in every turn of the loop, without waiting for changes"""
 
 
 class OperatorSide:
-    """From stiffness to trigger effects, and from travel to motion commands, towards one robot."""
+    """Core of the operator side: turns stiffness messages into trigger effects, and travel into commands."""
 
     def __init__(
         self,
@@ -63,12 +63,12 @@ class OperatorSide:
         settings: CoreSettings | None = None,
         listeners: Sequence[Listener] = (),
     ) -> None:
-        """listeners: notified of inputs and outputs."""
+        """listeners: notified of the core's inputs and outputs."""
         self.settings = settings = settings or CoreSettings()
         self.link = LinkEnd("operator", epoch, clock_domain, settings.seed, settings.asymmetry_s)
         self.felt = NewestStiffness(settings.seed)
         self.screen: Telemetry | None = None
-        """Newest telemetry of the robot; None before the first."""
+        """Newest telemetry of the robot side; None before the first."""
         self.hands = Hands(settings.calibration, swap_sides=settings.swap_sides)
         self.haptics = Haptics(
             settings.rendering,
@@ -77,7 +77,7 @@ class OperatorSide:
             swap_sides=settings.swap_sides,
             compensation=settings.compensation,
         )
-        """Rendering, and the last write."""
+        """Rendering of stiffness, and memory of the last write"""
         self.commands = Commands(self.link, settings.compensation, full_rate=settings.full_rate)
         self.tuner = Tuner()
         self.rejected = 0
@@ -87,17 +87,17 @@ class OperatorSide:
 
     @property
     def lease(self) -> LeaseNotice | None:
-        """The newest notice of the lease; None before the first and once it has expired."""
+        """Newest LeaseNotice; None before the first and once it has expired."""
         return self._standing.lease
 
     @property
     def intent(self) -> OperatorIntent | None:
-        """The newest intent; None before the first."""
+        """Newest intent of the operator; None before the first and once the controller is lost."""
         return self.hands.intent
 
     @property
     def stiffness(self) -> StiffnessUpdate | None:
-        """The newest stiffness; None before the first and once it has expired."""
+        """Newest stiffness message; None before the first and once it has expired."""
         return self.felt.update
 
     def receive(self, payload: bytes, now_s: float) -> None:
@@ -114,7 +114,7 @@ class OperatorSide:
             return
         self._standing.other_version = None
         if isinstance(message, LinkReport):
-            # Its sequence is separate, and says nothing of the stiffness's order.
+            # Link reports are numbered separately, so that their numbers do not show the order of stiffness messages.
             if message.header.epoch == self.link.peer_epoch:
                 self._standing.note(message, now_s)
             return
@@ -132,7 +132,7 @@ class OperatorSide:
             self.felt.note(felt, arrival)
             self.haptics.take_map(felt)
         if arrival.fresh:
-            self._look(now_s)  # first: an expired field counts as lost before the new one arrives
+            self._look(now_s)  # first, so that a field that has expired counts as lost even if a new one arrives now
             self._blindness.end()
             self.felt.apply(felt, arrival, now_s)
             self.hands.see(armed=felt.state == "armed", now_s=now_s)
@@ -145,7 +145,7 @@ class OperatorSide:
             self.commands.stop_button.forget()
 
     def receive_view(self, payload: bytes, now_s: float) -> None:
-        """Take one view payload; only the newest of the robot's present epoch is kept."""
+        """Take one view payload; keep it if it is the newest telemetry of the robot side's present epoch."""
         self._hear("seen", payload, now_s)
         message = None
         with contextlib.suppress(RemoteProtocolError):
@@ -163,29 +163,29 @@ class OperatorSide:
         self._blindness.see_hands(released=self.hands.read(state, now_s).triggers_released)
 
     def tune(self, probability: float | None, link: str | None, now_s: float) -> None:
-        """Take the person's wish for another P, another emulated link, or both; None leaves it."""
+        """Take a tuning request for another P, another emulated link, or both; None leaves a value unchanged."""
         self._hear("tuned", {"probability": probability, "link": link}, now_s)
         self.tuner.ask(probability, link, self._standing, now_s)
 
     def calibrate(self, calibration: TravelCalibration) -> None:
-        """Read the triggers and sticks of the newly found controller through `calibration`."""
+        """Use `calibration` for the newly found controller from now on."""
         if calibration != self.hands.calibration:
             self._hear("calibrated", calibration, None)
             self.hands.calibration = calibration
             self.haptics.calibrate(calibration)
 
     def controller_found(self, now_s: float) -> None:
-        """Note a controller, perhaps with effects on: it is released first, then written again."""
+        """Note that a controller was found. Its effects may be on: it is released first, then written again."""
         self._hear("found", b"", now_s)
         self.haptics.controller_found()
 
     def controller_lost(self, now_s: float) -> None:
-        """Note the controller's loss: its intent is dropped, and none counts before the arm has stopped."""
+        """Note that the controller was lost: drop the intent, and send no other before the arm has stopped."""
         self._hear("lost", b"", now_s)
         self.hands.lose(now_s)
 
     def press_stop(self, now_s: float) -> None:
-        """Stop the arm, as pressed away from the controller."""
+        """Take an emergency stop that was pressed elsewhere than on the controller."""
         self._hear("stopped", b"", now_s)
         self.commands.stop_button.press(now_s)
 
@@ -194,7 +194,7 @@ class OperatorSide:
             one.on_input(what, content, now_s)
 
     def motion(self, now_s: float) -> list[ToRobot]:
-        """Return the messages to send now: the owner's motion command, else a Hello each period."""
+        """Return the messages to send now: a command if one is due; Hellos if there is none or the link is down."""
         self._look(now_s)
         self._standing.expire(now_s)
         linked = self.felt.within(2 * HEARTBEAT_PERIOD_S, now_s)
@@ -216,23 +216,23 @@ class OperatorSide:
         return messages
 
     def _meant(self, now_s: float) -> OperatorIntent | None:
-        """Return the intent to send; None without ownership, or with neither a controller nor a pressed stop."""
+        """Return the intent to send; None without the lease, or with neither a controller nor a pressed stop."""
         if self.lease is None or not self._standing.owns:
             return None
         state = None if self.stiffness is None else self.stiffness.state
         intent = STOPPING if self.commands.stop_button.holds(now_s, state) else self.hands.present(now_s)
-        # The arm may still be armed from before the loss: silence disarms it.
+        # After a loss the arm may still be armed; sending nothing disarms it.
         if intent is None or (self.hands.lost_s is not None and not intent.emergency_stop):
             return None
         return intent.resting() if self._blindness.holds else intent
 
     def _look(self, now_s: float) -> None:
-        """Expire an old stiffness; the owner is blind from then on."""
+        """Forget an expired stiffness message; an operator with the lease is blind from then on."""
         if self.felt.expired(now_s) and self._standing.owns:
             self._blindness.lose(now_s)
 
     def feel_now(self, now_s: float) -> Feel | None:
-        """Return the change to write to the controller now; None without a change, or while a change must wait."""
+        """Return the effects to write to the controller now; None without a change, or while a change must wait."""
         self._look(now_s)
         felt, intent = self.stiffness, self.hands.present(now_s)
         if felt is not None and felt.state != "armed":
@@ -244,7 +244,7 @@ class OperatorSide:
         return feel
 
     def status(self, now_s: float) -> OperatorStatus:
-        """Return the status for a person, without what only the process knows."""
+        """Return the status, without the fields that only the process knows."""
         mean_s, screen, felt = self.link.delay.mean, self.screen, self.stiffness
         intent, rendering = self.hands.present(now_s), self.haptics.rendering
         order, linked = -1 if self.settings.swap_sides else 1, self.felt.within(STIFFNESS_EXPIRES_S, now_s)
@@ -274,7 +274,7 @@ class OperatorSide:
         )
 
     def summary(self) -> dict[str, Any]:
-        """Return this side's part of the run's summary."""
+        """Return the operator side's part of the run's summary."""
         return {
             "messages": {
                 "stiffness_received": self.felt.count,

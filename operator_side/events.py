@@ -1,4 +1,4 @@
-"""Events of an operator side, for listeners such as recording and experiments. A listener changes nothing."""
+"""Events of the operator side's core, for listeners such as recordings and experiments, which only observe."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -7,18 +7,18 @@ from operator_side.controller.feel import Feel
 from operator_side.robot_link.commanding import ToRobot
 
 Input = Literal["received", "seen", "state", "tuned", "calibrated", "found", "lost", "stopped"]
-"""Inputs: a control payload, a view payload, a controller's state, another P or link, a calibration, the controller
-found or lost, a stop pressed away from it."""
+"""Kind of an input, in the order above: a control payload; a view payload; a controller's state; a tuning request; a
+calibration; a controller found; a controller lost; an emergency stop pressed elsewhere than on the controller."""
 
 
 class Listener:
     """Receiver of a core's inputs and outputs."""
 
     def on_input(self, what: Input, content: object, now_s: float | None) -> None:
-        """Take an input before validation. now_s: None if it has no time."""
+        """Take an input, before the core checks it. now_s: None for a calibration, which has no time."""
 
     def on_motion(self, messages: Sequence[ToRobot], now_s: float) -> None:
-        """Take the messages to the robot side."""
+        """Take the messages to the robot side of one turn."""
 
     def on_output(self, feel: Feel | None, now_s: float) -> None:
-        """Take the write to the controller; None for none."""
+        """Take the effects to write to the controller; None if nothing is to be written."""

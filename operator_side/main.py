@@ -1,4 +1,4 @@
-"""Process `feelahead-operator`: settings, parts, and `run`."""
+"""Process `feelahead-operator`: reads the settings, makes the parts, and runs them."""
 
 import secrets
 from collections.abc import Sequence
@@ -25,15 +25,21 @@ from operator_side.viewing.viewing import view_topics
 
 
 def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
-    """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released on every exit.
+    """Run the operator side until --duration, Ctrl-C or SIGTERM; the triggers are released however it ends.
 
-    A real controller may be absent or unplugged: the process waits for it. backend: hidapi if None.
+    If a real controller is absent or unplugged, the process waits for it. backend: used instead of hidapi, if given.
     """
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     status = TerminalStatus("operator") if settings.tui else Status(settings.status, "operator")
     loop = Loop(MOTION_PERIOD_S, REMEDIES, settings.seed)
     with Process(settings, "operator", status, OperatorEncoder(), loop) as process:
+        # The console first, as its process takes longest to start, and before the priority is raised, which the process
+        # would inherit.
+        console = None
+        if settings.console:
+            console = Console(settings.connect, port=settings.console_port, token=settings.console_token)
+            process.stack.enter_context(console)
         topics, connections = view_topics(settings), settings.connections
         sockets = OperatorSockets(
             settings.connect, settings.view_connect, topics=topics, keys=keys, connections=connections
@@ -42,13 +48,19 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
         core = build_recorded(settings, secrets.randbits(53), process.recording)
         for text in unused_clauses(settings.link_spec(), [("to_robot", "haptics")]):
             process.note(text)
-        desk = _desk(settings, core, process, backend)
+        desk = _desk(settings, core, process, backend, console)
         stored_travel = "calibration" not in given_fields(arguments, OperatorSettings)
         return process.run(lambda: OperatorTurns(settings, core, desk, sockets, process, stored_travel=stored_travel))
 
 
-def _desk(settings: OperatorSettings, core: OperatorSide, process: Process, backend: HidBackend | None) -> Devices:
-    """Open the controller, and the console before the priority is raised, which the console would inherit."""
+def _desk(
+    settings: OperatorSettings,
+    core: OperatorSide,
+    process: Process,
+    backend: HidBackend | None,
+    console: Console | None,
+) -> Devices:
+    """Open the controller, and return it with the page and the console."""
     pages, stack = DrivingPage(), process.stack
     search, guard, person = DEVICES[settings.device](OpeningParts(settings, core, pages, backend))
     pages.may_drive = person is not None
@@ -56,7 +68,4 @@ def _desk(settings: OperatorSettings, core: OperatorSide, process: Process, back
         stack.enter_context(guard)
     connection = Connection(search, core, guard)
     stack.callback(connection.close)
-    console = None
-    if settings.console:
-        console = stack.enter_context(Console(settings.connect, port=settings.console_port))
     return Devices(connection, guard, person, pages, console)

@@ -1,4 +1,4 @@
-"""Recording of every call of the core and its answer, for a replay bit for bit."""
+"""Recording of all inputs and outputs of the core, so that a replay computes the same bits."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Final
@@ -33,35 +33,35 @@ _KINDS: Final[dict[Input, Kind]] = {
 
 
 class Recorder(Listener):
-    """Listener that passes inputs and outputs to `note`."""
+    """Listener that passes each input and output of the core to `note`."""
 
     def __init__(self, note: Callable[[Any], None]) -> None:
         self._note = note
         self._now_s = 0.0
 
     def on_input(self, what: Input, content: object, now_s: float | None) -> None:
-        """Note an input; one without a time gets that of the last output."""
+        """Note an input; an input without a time gets the time of the last output."""
         kept = content if isinstance(content, bytes | ControllerState) else msgspec.json.encode(content)
         self._note((_KINDS[what], self._now_s if now_s is None else now_s, kept))
 
     def on_motion(self, messages: Sequence[ToRobot], now_s: float) -> None:
-        """Note the messages."""
+        """Note the messages to the robot side."""
         self._note((Kind.MOTION, now_s, messages))
 
     def on_output(self, feel: Feel | None, now_s: float) -> None:
-        """Note the write."""
+        """Note the effects to write, and that they were asked for."""
         self._now_s = now_s
         self._note((Kind.OUTPUT, now_s, feel))
 
 
 class OperatorEncoder:
-    """Encoder of these notes as entries."""
+    """Encodes the notes of `Recorder` as entries of a recording."""
 
     def begin_epoch(self) -> None:
-        """Do nothing: each entry is complete."""
+        """Do nothing, as each entry can be read without earlier ones."""
 
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
-        """Return a note's time and its entries; pass view payloads to `views`, too."""
+        """Return a note's time and its encoded entries; also pass a view payload to `views`."""
         kind, now_s, content = noted
         if kind == Kind.MOTION:
             sent = [entry(Kind.SENT, now_s, _HAPTICS, _NOBODY, message.payload) for message in content]
@@ -79,7 +79,7 @@ class OperatorEncoder:
 
 
 def build_recorded(settings: OperatorSettings, epoch: int, recording: SideRecording | None) -> OperatorSide:
-    """Build the core of `settings`; record its calls if there is a `recording`."""
+    """Build the core from `settings`; record its inputs and outputs if there is a `recording`."""
     if recording is None:
         return build_operator_side(settings, epoch, clock_domain())
     core = build_operator_side(settings, epoch, clock_domain(), [Recorder(recording.noted.append)])

@@ -16,17 +16,17 @@ from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.settings import PersonSettings
 
 DeviceName = Literal["hid", "evdev", "simulated", "browser"]
-"""Names in operator_side/controllers.py"""
+"""Keys of the table DEVICES in operator_side/controllers.py"""
 
 
 @dataclass(frozen=True)
 class OperatorSettings(SideOptions):
     """The operator side: a DualSense whose triggers stiffen in the direction of danger.
 
-    It connects to a robot side, sends the hands' intent, and lets the fingers feel what is ahead. L1 held: the arm
-    may move. Options: arm it, with released triggers. R2 advances, L2 retreats, the left stick moves across, the
-    right one turns. Cross closes and square opens the gripper, triangle changes the target, circle stops everything,
-    and create hands the robot over to the observer that has waited longest.
+    It connects to a robot side, sends commands from the controller, and lets the fingers feel what is ahead. The arm
+    moves only while L1 is held. Options arms it, with both triggers released. R2 advances, L2 retreats, the left stick
+    moves across, the right stick turns. Cross closes the gripper, square opens it, triangle changes the target, circle
+    stops everything, and create hands the robot over to the observer that has waited longest.
     """
 
     connect: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT")] = "tcp://127.0.0.1:5555"
@@ -34,41 +34,50 @@ class OperatorSettings(SideOptions):
     view_connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Address of the robot side's view port; by default the port after the control port."""
     keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """Authenticate with the operator's key in FOLDER, made by: feelahead keys make operator. The robot side admits it
-    after: feelahead keys allow NAME KEY."""
+    """Authenticate with the operator's key in FOLDER, made by: feelahead keys make operator. The robot side admits this
+    key after this command on its machine: feelahead keys allow NAME KEY."""
     robot_key: Annotated[str | None, tyro.conf.arg(metavar="KEY|FILE")] = None
     """With --keys: the robot side's public key, shown on its machine by: feelahead keys show robot."""
     connections: Annotated[int, Meta(ge=1, le=MOST_CONNECTIONS_EACH)] = CONNECTIONS
-    """Number of connections to the robot side, used in turn. A lost packet then delays only some messages; newer ones
-    overtake. 8 help where packets are lost in bursts."""
+    """Number of connections to the robot side, used in turn, so that a lost packet delays only the messages on its own
+    connection. 8 help where packets are lost in bursts."""
     device: DeviceName = "hid"
-    """hid: a DualSense, awaited while absent. evdev (Linux): any gamepad that rumbles. simulated: a simulated DualSense
-    with a scripted person, from whom a page of the console may take it. browser: a page alone."""
+    """Controller. hid: a DualSense; if absent, it is waited for. evdev (Linux): any gamepad that rumbles. simulated: a
+    simulated DualSense with a scripted person, which a page of the console may take over. browser: only a page of the
+    console."""
     haptics: bool = True
-    """Whether the triggers are stiffened."""
+    """Whether the triggers resist and the motors rumble."""
     compensation: Compensation = "operator"
-    """Side that compensates the delay: operator, by our commands still under way, or robot, by eq. 8."""
+    """Side that compensates the delay. operator: by the commands still under way. robot: by eq. 8."""
     swap_sides: bool = False
-    """Swap left and right: L2 advances and R2 retreats, R1 is held to run, the right stick moves across and the left
-    one turns."""
+    """Swap left and right: L2 advances, R2 retreats, R1 is held to run, the right stick moves across, the left stick
+    turns."""
     calibration: TravelCalibration = field(default_factory=TravelCalibration)
-    """Used part of the triggers' and sticks' travel."""
+    """Calibration of triggers and sticks: dead zones, saturation and rest positions."""
     rendering: RenderingSettings = field(default_factory=RenderingSettings)
-    """Rendering of distances ahead as stiffness."""
+    """Rendering of onset distances as stiffness."""
     console: bool = False
-    """Open the browser console on this machine, at an address that is shown: views, scene, what is felt and why."""
+    """Serve the console for a browser on this machine, and show its address: views, scene, what is felt and why."""
     console_port: Annotated[int, tyro.conf.arg(metavar="PORT"), Meta(ge=0, le=65535)] = 0
     """Port of the console on 127.0.0.1; 0 for any free port."""
+    console_token: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """File that contains the token of the console's address, for a program that restarts this side while the page stays
+    open. Pages then offer to run again, and --status json has an event for it."""
     tui: bool = False
-    """Show the console's facts on the whole terminal instead of a line, for machines without a browser."""
+    """Show the console's facts on the whole terminal instead of one line, for machines without a browser."""
     person: PersonSettings = field(default_factory=PersonSettings)
-    """Limits of the scripted person (simulated device only)."""
+    """Abilities and errors of the scripted person (only with --device simulated)."""
+    person_waits: Annotated[float, Meta(ge=0.0, le=3600.0), tyro.conf.arg(metavar="SECONDS")] = 0.0
+    """Longest time, in seconds, that the scripted person waits for the first picture on a page of the console, counted
+    from the robot side's first telemetry."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_limits(self)
         if self.tui and self.status != "line":
             raise ValueError(f"--tui with --status {self.status}; valid: one of them")
+        if self.device == "browser" and not self.console:
+            raise ValueError("--device browser without --console: no page could drive; valid: both")
         if self.robot_key is not None and self.keys is None:
             raise ValueError("--robot-key without --keys; valid: both (feelahead keys make operator makes ours)")
         if self.swap_sides and self.person.pull_n is not None:
@@ -76,5 +85,5 @@ class OperatorSettings(SideOptions):
 
     @property
     def tells_facts(self) -> bool:
-        """Whether the console's facts go to the terminal, or to a program."""
+        """Whether the console's facts are shown in the terminal (--tui) or printed for a program (--status facts)."""
         return self.tui or self.status == "facts"

@@ -1,4 +1,4 @@
-"""Use of the travel calibration that is stored for a controller, as soon as it is found."""
+"""Use of the travel calibration that is stored for a controller, as soon as the controller is found."""
 
 from collections.abc import Callable
 
@@ -10,7 +10,7 @@ from operator_side.hands.travel_calibration import TravelCalibration
 
 
 class StoredTravel:
-    """Loader of the stored calibration, once for each controller found, with a note of the one in use."""
+    """Loads the stored calibration of each controller that is found, and notes which calibration is in use."""
 
     def __init__(self, connection: Connection, core: OperatorSide, note: Callable[[str], None]) -> None:
         self._connection, self._core, self._note = connection, core, note
@@ -18,9 +18,9 @@ class StoredTravel:
         self._reported: set[str] = set()
 
     def follow(self) -> None:
-        """Load the calibration of a newly found controller; call it every turn.
+        """Load the calibration of a newly found controller; call it in every turn of the loop.
 
-        ConfigurationError if the stored calibration of the run's first controller is broken; a later one is only noted.
+        If the stored calibration is invalid: ConfigurationError for the run's first controller, a note for later ones.
         """
         controller = self._connection.controller
         if controller is None or self._calibrated == self._connection.found:

@@ -1,5 +1,6 @@
-"""Work of the operator side in each turn of its loop: sockets, controller and people around the core."""
+"""Work of the operator side in each turn of its loop: the core, with sockets, controller and viewers around it."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
@@ -29,26 +30,28 @@ REMEDIES: Final = {
     "hands": "another controller",
     "": "a page of the console fewer, or a faster machine,",
 }
-"""Remedies by stage of a turn. Stages: sending and receiving; taking in messages; writing to the controller; reading
-it, and commands. "": all else, such as the display."""
+"""Remedy to suggest if a stage of the turn takes too long, keyed by stage.
+
+Stages: sending and receiving; handling messages; writing to the controller; reading the controller and sending
+commands; "" for all else, such as the display."""
 _GUARD_PERIOD_S: Final = 0.5
-"""Period of checks of the watchdog."""
+"""Seconds between checks of the watchdog"""
 
 
 class Devices(NamedTuple):
-    """Devices before the operator: a controller, and who may hold it."""
+    """Devices of the operator: a controller, and who uses it."""
 
     connection: Connection
     guard: ReleaseGuard | None
-    """The watchdog of a real controller"""
+    """Watchdog of a real controller; None if there is none"""
     person: BrowserHands | None
-    """The hands that must be moved in every turn; None for a person's own"""
+    """Page or scripted person at the controller, called in every turn; None for a real controller"""
     pages: DrivingPage
     console: Console | None
 
 
 class OperatorTurns:
-    """Motion, messages, effects and display of each turn."""
+    """Steps of a turn of the loop: receive, write effects, read the controller, send commands, display."""
 
     def __init__(
         self,
@@ -60,7 +63,7 @@ class OperatorTurns:
         *,
         stored_travel: bool,
     ) -> None:
-        """stored_travel: use the calibration that is stored for a controller."""
+        """stored_travel: whether to use the calibration that is stored for a controller."""
         self._process, self._core, self._sockets = process, core, sockets
         self._connection, self._guard, self._person, self._pages, console = desk
         self._sending = Sending(settings.link_spec(), sockets)
@@ -76,6 +79,9 @@ class OperatorTurns:
         self.turn = timed("hands", self._move)
         self.wait, self.next_due, self.note = sockets.wait, self._sending.line.next_due, self._viewing.note
         self._guard_s = 0.0
+        self._person_waits_s = settings.person_waits if console is not None else 0.0
+        self._person_since_s: float | None = None
+        """Time of the robot side's first telemetry; None before it"""
 
     @property
     def resting(self) -> bool:
@@ -88,17 +94,17 @@ class OperatorTurns:
         return self._sockets.receive(), self._sockets.receive_view()
 
     def take(self, received: tuple[Sequence[bytes], Sequence[tuple[bytes, bytes]]], now_s: float) -> None:
-        """Take in the messages, and write the resulting effects."""
+        """Handle the messages, and write the resulting effects to the controller."""
         self._take(*received, now_s)
         self._feel(now_s)
 
     def send(self) -> None:
-        """Send the due messages."""
+        """Send the messages that are due."""
         if not self._sending.send(self._process.loop.clock.now()):
             self._core.commands.held.forget()
 
     def rest(self, now_s: float, turned_s: float) -> None:
-        """Record, check the watchdog, and update the display."""
+        """Do the less urgent work of a turn: record, check the watchdog, update the display."""
         del turned_s
         recording, status = self._process.recording, self._process.status
         if recording is not None:
@@ -122,7 +128,7 @@ class OperatorTurns:
         self._connection.close()
 
     def summary(self) -> dict[str, Any]:
-        """Return the figures of the core and of the process."""
+        """Return the run's figures of the core, of sending and of the process."""
         pages = self._pages
         figures = {
             "controller": {"found": self._connection.found, "state": str(self._connection.state)},
@@ -146,12 +152,13 @@ class OperatorTurns:
     def _move(self, now_s: float) -> None:
         core, connection = self._core, self._connection
         self._pages.follow(core, now_s)
-        # First, so that the wish arrives after all messages of the old link.
+        # First, so that the tuning request, sent over the new link, arrives after all messages of the old one.
         if (words := core.tuner.take_link()) is not None:
             self._sending.tune(words)
             self._pages.pictures.video_later_s = self._sending.video_later_s
         if self._person is not None:
-            self._person.tick(now_s, core.screen, core.link.round_trip.mean or 0.0)
+            screen = core.screen if self._person_sees(now_s) else None
+            self._person.tick(now_s, screen, core.link.round_trip.mean or 0.0)
         connection.update(now_s)
         self._say_what_is_new()
         if self._travel is not None:
@@ -160,6 +167,13 @@ class OperatorTurns:
             core.read_state(state, now_s)
         self._sending.push([*core.motion(now_s), *map(ToRobot, self._viewing.requests(now_s))], now_s)
         self._sending.measure(core.link.outgoing, now_s)
+
+    def _person_sees(self, now_s: float) -> bool:
+        """Return whether a page has a picture, or the scripted person has waited long enough for one."""
+        if self._person_since_s is None and self._core.screen is not None:
+            self._person_since_s = now_s
+        waited_s = -math.inf if self._person_since_s is None else now_s - self._person_since_s
+        return self._viewing.has_shown_picture or waited_s >= self._person_waits_s
 
     def _say_what_is_new(self) -> None:
         for text in self._connection.take_notes():
@@ -172,7 +186,7 @@ class OperatorTurns:
         return Surroundings(hands, self._sending.line.profile.words, page, self._pages.pictures.facts())
 
     def _status(self, now_s: float) -> OperatorStatus:
-        """Return the core's status with the process's fields."""
+        """Return the core's status, completed with the fields that only the process knows."""
         controller, status = self._connection.controller, self._core.status(now_s)
         if (trouble := self._sockets.trouble) is not None and status.link is not LinkState.UP:
             link = LinkState.REFUSED if self._sockets.key_refused else status.link

@@ -1,4 +1,4 @@
-"""Rules for every test: a busy machine's timing fails none, and a test that starts a process carries the marker."""
+"""Rules for every test: no test fails because the machine is slow, and only marked tests may start a process."""
 
 import sys
 from collections.abc import Iterator
@@ -13,11 +13,11 @@ settings.load_profile("here")
 
 STARTS = {"subprocess.Popen", "os.fork", "os.posix_spawn"}
 FONTS = "fc-list"
-"""Program that matplotlib runs before its first figure on a machine."""
+"""Program that matplotlib runs once on each machine, before its first figure; any test may start it"""
 KERNELS = "robot_side.compiled.helper_processes"
-"""Module that compiles the kernels before the first test that needs them on a machine."""
+"""Module that compiles the kernels once on each machine, before a test that needs them; any test may start it"""
 unmarked: list[str] = []
-"""Name of the running test, unless it carries the marker."""
+"""Name of the running test if it has neither marker, `processes` nor `install`; otherwise empty"""
 
 
 def refuse_processes(event: str, arguments: tuple[Any, ...]) -> None:

@@ -2,8 +2,8 @@
 
     rest ─▶ pull L2 ─▶ pull R2 ─▶ sticks ─▶ rest again ─▶ done
 
-A second of rest gives the noise, hence the dead zones, and the sticks' centres. Three full pulls of each trigger give
-its saturation. Rest is measured again at the end: a worn stick returns to another place.
+A second of rest gives the noise, from which the dead zones follow, and the sticks' rest positions. Three full pulls of
+each trigger give its saturation. Rest is measured again at the end, as a worn stick returns to another position.
 """
 
 import math
@@ -18,19 +18,19 @@ from operator_side.hands.travel_calibration import LARGEST_REST, StickRest, Trav
 REST_S: Final = 1.0
 _LEAST_REPORTS: Final = 20
 _STILL: Final = 0.06
-"""Largest change of a channel at rest, within the second; a larger one is a motion."""
+"""Maximum change of a channel within the second of rest; a larger change counts as a motion"""
 _CHANNELS: Final = ("L2", "R2", "the left stick", "the left stick", "the right stick", "the right stick")
 PULLS: Final = 3
 _PULLED, _RELEASED_ABOVE_REST = 0.4, 0.1
 _LEAST_PULL: Final = 0.5
 _LARGEST_SPREAD: Final = 0.08
-"""Largest difference of full pulls, which all end at the same stop."""
+"""Maximum difference between a trigger's full pulls, which should all end at the same stop"""
 _ATTEMPTS: Final = 3
 _LONGEST_WAIT_S: Final = 60.0
 _REST_MARGIN: Final = 0.02
-"""Added to the highest travel at rest: five of a report's 255 steps."""
+"""Travel added to the highest travel at rest for the dead zone: five of a report's 255 steps"""
 _PULL_MARGIN: Final = 0.03
-"""Subtracted from the smallest full pull, which noise has raised."""
+"""Travel subtracted from the smallest full pull for the saturation, as noise has raised the pulls"""
 _STICK_MARGIN: Final = 0.03
 _LEAST_TRIGGER_DEAD_ZONE: Final = 0.03
 _LEAST_STICK_DEAD_ZONE: Final = 0.05
@@ -41,11 +41,11 @@ _ENOUGH_SECTORS: Final = 6
 
 
 class CalibrationError(FeelaheadError):
-    """Error of a controller, or of the hands on it, that cannot be calibrated; the text gives the reason."""
+    """A controller cannot be calibrated, because of its faults or the way it is handled; the text gives the reason."""
 
 
 class Step(Enum):
-    """Steps of the procedure; the values instruct the person."""
+    """Step of the procedure; its value is the instruction for the person."""
 
     REST = "Put the controller down and touch nothing."
     PULL_L2 = "Pull L2 all the way and let go, three times."
@@ -60,18 +60,20 @@ _ORDER: Final = tuple(Step)
 
 @dataclass(frozen=True)
 class Rest:
-    """Result of a second of rest."""
+    """Result of the measurement of a second of rest."""
 
     l2: float
-    """Highest raw travel."""
+    """Highest raw travel of L2"""
     r2: float
+    """Highest raw travel of R2"""
     left: tuple[Stick, float]
-    """The stick's mean position, and its largest distance from there."""
+    """Mean position of the left stick, and its maximum distance from there"""
     right: tuple[Stick, float]
+    """Mean position of the right stick, and its maximum distance from there"""
 
 
 class RestMeasurement:
-    """Measurement of a second of rest; any motion restarts it."""
+    """Measurement of a second of rest, which any motion restarts."""
 
     def __init__(self) -> None:
         self.result: Rest | None = None
@@ -81,7 +83,7 @@ class RestMeasurement:
         self._reports: list[tuple[float, ...]] = []
 
     def feed(self, state: ControllerState, now_s: float) -> str | None:
-        """Take one report. Return the motion that restarted the second, or None."""
+        """Take one state. If a motion restarts the second, return a text that names it; else None."""
         values = (state.l2, state.r2, *state.left_stick, *state.right_stick)
         self._since_s = self._since_s if self._reports else now_s
         self._reports.append(values)
@@ -104,12 +106,12 @@ class RestMeasurement:
 
 
 class CalibrationProcedure:
-    """One calibration from its first report to its result."""
+    """Calibration of one controller, from the first state to the result."""
 
     def __init__(self) -> None:
         self.step = Step.REST
         self.complaint: str | None = None
-        """Reason why the last attempt did not count, until the next one does."""
+        """Reason why the last attempt did not count; None once an attempt counts."""
         self.result: TravelCalibration | None = None
         self._since_s: float | None = None
         self._rests: list[Rest] = []
@@ -129,7 +131,10 @@ class CalibrationProcedure:
         return 1.0 if self.step is Step.DONE else self._rest.progress
 
     def feed(self, state: ControllerState, now_s: float) -> None:
-        """Take one report; after the last step, do nothing. Raises CalibrationError once it cannot succeed."""
+        """Take one state of the controller; nothing happens after the last step.
+
+        CalibrationError once the calibration has failed.
+        """
         if self._since_s is None:
             self._since_s = now_s
         if self.step is Step.DONE:
@@ -208,7 +213,7 @@ class CalibrationProcedure:
         self._since_s = now_s
 
     def _calibration(self) -> TravelCalibration:
-        """Compute the calibration; CalibrationError for values that no working controller gives."""
+        """Compute the result; CalibrationError for measurements that no working controller gives."""
         before, after = self._rests
         return TravelCalibration(
             l2=_trigger("L2", max(before.l2, after.l2), self._peaks[Step.PULL_L2]),

@@ -1,8 +1,8 @@
-"""Storage of each controller's travel calibration: a readable TOML file in the person's configuration folder.
+"""Storage of each controller's travel calibration, in a TOML file in the user's configuration folder.
 
-    controllers/aa-bb-cc-dd-ee-ff.toml      by the controller's own address, the same on USB and Bluetooth
+    controllers/aa-bb-cc-dd-ee-ff.toml      named by the controller's address, the same on USB and Bluetooth
 
-The file's name has dashes because Windows allows no colons there.
+The file's name has dashes, because Windows allows no colons in names.
 """
 
 import dataclasses
@@ -25,7 +25,7 @@ _MEND: Final = "measure it again with: feelahead calibrate; or delete the file f
 
 @dataclasses.dataclass(frozen=True)
 class _Stored:
-    """Content of a file."""
+    """Content of a calibration file."""
 
     version: Literal[1]
     address: str
@@ -39,14 +39,17 @@ class _Stored:
 
 
 def calibration_path(address: str) -> Path:
-    """Return the file of the controller `address` ("aa:bb:cc:dd:ee:ff"); ValueError for another form."""
+    """Return the path of the calibration file of the controller with this address.
+
+    ValueError unless `address` has the form "aa:bb:cc:dd:ee:ff".
+    """
     return configuration_folder() / "controllers" / f"{checked_address(address).replace(':', '-')}.toml"
 
 
 def load_calibration(address: str) -> TravelCalibration | None:
-    """Load the calibration of the controller `address` ("aa:bb:cc:dd:ee:ff"); None without a file.
+    """Load the calibration of the controller with the address "aa:bb:cc:dd:ee:ff"; None without a file.
 
-    ConfigurationError, in one line with the remedy, if the file is broken or another controller's.
+    ConfigurationError, in one line with the remedy, if the file is invalid or of another controller.
     """
     path = calibration_path(address)
     try:
@@ -62,7 +65,7 @@ def load_calibration(address: str) -> TravelCalibration | None:
 
 
 def read_calibration(path: Path) -> tuple[str, TravelCalibration]:
-    """Read address and calibration from the file `path`; ConfigurationError, in one line, if it is broken."""
+    """Read address and calibration from the file `path`; ConfigurationError, in one line, if it is invalid."""
     try:
         return _read(read_toml(path, _LARGEST_BYTES))
     except OSError as error:
@@ -72,7 +75,7 @@ def read_calibration(path: Path) -> tuple[str, TravelCalibration]:
 
 
 def write_calibration(path: Path, address: str, calibration: TravelCalibration) -> None:
-    """Write the file atomically, and make our own folder for it; ConfigurationError as in `output_file`."""
+    """Write the file atomically, and make its folder if needed; ConfigurationError if that fails."""
     if configuration_folder() in path.absolute().parents:
         path.parent.mkdir(parents=True, exist_ok=True)
     with output_file("calibration", path) as file:
@@ -91,7 +94,7 @@ def _text(address: str, calibration: TravelCalibration) -> str:
 
 
 def _read(content: dict[str, Any]) -> tuple[str, TravelCalibration]:
-    """Convert the file's content; ValueError names the key."""
+    """Convert the file's content; ValueError, which names the key, if it is invalid."""
     try:
         stored = msgspec.convert(content, _Stored)
     except msgspec.ValidationError as error:

@@ -1,1 +1,1 @@
-"""Port of any controller, state in and feel out as values; and the connection that finds and loses one."""
+"""Interface of any controller (states come in, effects go out, both as values), and the connection to one."""

@@ -1,7 +1,7 @@
-"""A controller whose writes run in their own thread, so that the loop does not wait for them.
+"""Wrapper of a controller that writes in its own thread, so that the operator side's loop does not wait.
 
 On USB a write lasts until the controller fetches it: some milliseconds (its interrupt endpoint's interval), longer on
-a bad cable. Waiting writes are merged part by part: latest wins.
+a bad cable. Waiting writes are merged: of each part, the newest value is written.
 """
 
 import threading
@@ -13,16 +13,16 @@ from operator_side.controller.port import Controller
 from operator_side.controller.state import ControllerState
 
 CLOSE_TIMEOUT_S: Final = 0.3
-"""Longest wait for the last write, in seconds; after it the watchdog releases the triggers."""
+"""Seconds to wait for the last write at the end; if it hangs for longer, the watchdog releases the triggers."""
 STALL_S: Final = 0.05
-"""Time after which a write hangs, in seconds; a normal one takes some milliseconds."""
+"""Seconds after which a write counts as hanging; a normal write takes some milliseconds."""
 
 
 class BackgroundWrites:
-    """Wrapper of a device: reads are direct, writes go through the thread."""
+    """Controller that reads from another controller directly, and writes to it in a thread."""
 
     def __init__(self, device: Controller) -> None:
-        """device: only the thread writes to it; its `read` and `write` must tolerate concurrent calls."""
+        """device: controller to wrap. Its `read` and `write` must tolerate concurrent calls."""
         self._device = device
         self._changed = threading.Condition()
         self._waiting: Feel | None = None
@@ -37,7 +37,7 @@ class BackgroundWrites:
 
     @property
     def released(self) -> bool:
-        """Whether the device is released; False while a write waits or has not returned."""
+        """Whether the wrapped controller is released; False while a write waits or has not returned."""
         with self._changed:
             under_way = self._stuck or self._waiting is not None or self._written_since_s is not None
         return not under_way and self._device.released
@@ -48,7 +48,7 @@ class BackgroundWrites:
             return self._written_since_s is not None and now_s - self._written_since_s > STALL_S
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Read the device; DeviceError also if an earlier write has failed."""
+        """Read the wrapped controller; DeviceError also if an earlier write has failed."""
         self._raise_failure()
         return self._device.read(now_s)
 
@@ -61,7 +61,10 @@ class BackgroundWrites:
             self._changed.notify()
 
     def close(self) -> None:
-        """Drop the waiting write and close the device, which releases the triggers."""
+        """Drop the waiting write and close the wrapped controller, which releases the triggers.
+
+        If a write hangs, the wrapped controller is left open.
+        """
         with self._changed:
             self._ends, self._waiting = True, None
             self._changed.notify()

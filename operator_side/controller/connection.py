@@ -1,6 +1,6 @@
-"""Connection to a controller: search for one, notice its loss, find it again.
+"""Connection to a controller: search for one, notice its loss, search again.
 
-Without I/O: the search that opens a controller is an argument, and so is `now_s`.
+It has no I/O or clock of its own: the search that opens a controller and `now_s` are arguments.
 """
 
 from typing import Final, Protocol
@@ -13,38 +13,40 @@ from operator_side.controller.search import BackgroundSearch
 from operator_side.controller.state import ControllerState
 
 BEAT_PERIOD_S: Final = 0.05
-"""Period of beats to the watchdog while an effect is on."""
+"""Seconds between beats to the watchdog while an effect is on"""
 REWRITE_AFTER_S: Final = 0.1
-"""Silence after which effects are written again: half the watchdog's patience. If the watchdog has released the
-triggers, one of two consecutive gaps was longer, even if the process was suspended between clock and beat."""
+"""Seconds between two beats above which effects are written again, as the watchdog may have released the triggers.
+
+Half the watchdog's limit: if it has released them, one of two consecutive gaps was longer than this, even if the
+process was suspended between reading the clock and the beat."""
 LOOK_PERIOD_S: Final = 1.0
-"""Period of searches, also from a loss to the first search: by then the robot side has long stopped."""
+"""Seconds between searches, and from a loss to the next search: by then the arm has long stopped"""
 
 
 class Listener(Protocol):
-    """Receiver of a controller's arrival and loss, called at once."""
+    """Receiver of events: a controller was found or lost."""
 
     def controller_found(self, now_s: float) -> None:
-        """Note a controller; the state of its triggers is unknown."""
+        """Note that a controller was found, or its effects may have been released: its triggers' state is unknown."""
 
     def controller_lost(self, now_s: float) -> None:
-        """Note the controller's loss."""
+        """Note that the controller was lost."""
 
 
 class Guard(Protocol):
     """Watchdog that releases a controller when this process is killed or hangs."""
 
     def hold(self, path: bytes, release: bytes) -> None:
-        """Have `release` written to the controller at `path` if this process dies from now on."""
+        """Let the watchdog write `release` to the controller at `path` if this process dies or hangs from now on."""
 
     def let_go(self) -> None:
         """Cancel `hold`."""
 
     def beat(self) -> None:
-        """Report that an effect is on and this process runs; without a further beat in time, it hangs."""
+        """Report that an effect is on and this process runs; it counts as hanging if no beat or `rest` follows."""
 
     def rest(self) -> None:
-        """Report that no effect is on: no beat is due until the next one."""
+        """Report that no effect is on, so that no beat is due."""
 
 
 class Connection:
@@ -55,9 +57,9 @@ class Connection:
         self.found = 0
         """Number of times that a controller was found."""
         self.released = True
-        """Whether the last controller to be closed had its triggers released; False for one that was unplugged."""
+        """Whether the last closed controller had its triggers released; False if it was unplugged with an effect on."""
         self.controller: OpenController | None = None
-        """The connected controller."""
+        """Connected controller; None without one."""
         self._search = search
         self._listener = listener
         self._guard = guard
@@ -84,7 +86,7 @@ class Connection:
             if self.state is not ConnectionState.LOST:  # the loss has been reported
                 self._say_once(f"{found}; waiting for one")
         elif found is not None:
-            # The system grants permission a moment later: one failure is no trouble yet.
+            # The system grants permission a moment after a controller appears, so a single failure is not reported.
             if str(found) == self._refused:
                 self._say_once(f"{found}; trying again until it works")
             self._refused = str(found)
@@ -93,10 +95,10 @@ class Connection:
             self._search.begin(self._address)
 
     def beat(self, now_s: float) -> None:
-        """Beat for the watchdog while an effect is on; call it every turn, before a write.
+        """Send a beat to the watchdog if one is due; call it in every turn of the loop, before a write.
 
-        After a long silence the watchdog may have released the triggers. Then the listener is notified of a
-        controller, as after a search. A write that does not return counts as silence.
+        After a gap longer than REWRITE_AFTER_S the watchdog may have released the triggers: the listener then gets
+        `controller_found`, so that effects are written again. While a write does not return, no beat is sent.
         """
         if self._guard is None or self.controller is None or not self._held:
             return
@@ -119,7 +121,7 @@ class Connection:
             self._listener.controller_found(now_s)
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Return the newest state; None without a new one, or without a controller."""
+        """Return the controller's newest state; None without a new state, or without a controller."""
         if self.controller is None:
             return None
         try:
@@ -129,11 +131,11 @@ class Connection:
             return None
 
     def write(self, feel: Feel, now_s: float) -> bool:
-        """Write to the controller, if there is one; return whether the write succeeded."""
+        """Write to the controller; return False if there is none, or if it was lost by this write."""
         if self.controller is None:
             return False
         if self._guard is not None and self._held and self._beat_s is None:
-            self._beat_s = now_s  # before the effect is on: we may hang at once
+            self._beat_s = now_s  # before the effect is on, as this process may hang during the write
             self._guard.beat()
         try:
             self.controller.device.write(feel, now_s)
@@ -143,7 +145,7 @@ class Connection:
         return True
 
     def take_notes(self) -> list[str]:
-        """Return the notes for a person since the last call; each trouble appears once, however long it lasts."""
+        """Return the notes since the last call, for the status; a trouble that lasts is noted once."""
         notes, self._notes = self._notes, []
         return notes
 
@@ -158,7 +160,7 @@ class Connection:
             self._let_go()
 
     def _connect(self, controller: OpenController, now_s: float) -> None:
-        # Before the first write.
+        # Hold it before the first write.
         self._held, self._beat_s = False, None
         if self._guard is not None and controller.path is not None:
             self._held = True
@@ -199,9 +201,9 @@ class Connection:
 
 
 def _introduction(controller: OpenController, known: str | None, *, first: bool) -> str:
-    """Name the controller, and say if it is the one before, of address `known`."""
+    """Make the note for a found controller. known: address of the controller before it, None if unknown."""
     if first or known is None or controller.address is None:
-        return f"controller: {controller.name}"  # cannot be told apart
+        return f"controller: {controller.name}"  # unknown whether it is the same as before
     if controller.address == known:
         return f"controller: {controller.name}, back again"
     return f"another controller: {controller.name}"

@@ -1,4 +1,4 @@
-"""Output of a controller as values: strengths along both triggers, motors, a light."""
+"""Effects of a controller as values: strengths of both triggers' zones, drive of the motors, colour of the light."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,10 +12,12 @@ from common.limits import Limited, Share, check_limits
 ZONE_COUNT: Final = 10
 MAX_STRENGTH: Final = 8
 SENSED_TRAVEL: Final = 0.75
-"""Mechanical travel reported as 1 (about; DS4Windows issue 1751). Zones divide the mechanical travel."""
+"""Mechanical travel, about, at which the reported travel reaches 1 (DS4Windows issue 1751).
+
+The ten zones divide the mechanical travel, so a full pull does not enter the last ones."""
 
 Strengths = tuple[int, ...]
-"""Resistance of a trigger in each of ten zones, 0 (none) to 8; the first zone is where the finger starts."""
+"""Resistance of a trigger in each of its ten zones, 0 (none) to 8; the first zone begins at the released trigger."""
 FREE_TRIGGER: Final[Strengths] = (0,) * ZONE_COUNT
 """Strengths of a trigger that only its spring resists."""
 
@@ -24,7 +26,7 @@ Color = tuple[Byte, Byte, Byte]
 """Red, green and blue."""
 WARNING_LIGHT: Final[Color] = (255, 0, 0)
 USUAL_LIGHT: Final[Color] = (0, 0, 128)
-"""Color that Linux hid-playstation sets; restored after a warning."""
+"""Colour that Linux hid-playstation sets; restored after a warning"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +51,7 @@ def _check_strengths(name: str, strengths: object) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Feel:
-    """Parts of a controller to set together; None leaves a part as it is."""
+    """Effects to set together; None leaves a part of the controller unchanged."""
 
     l2: Strengths | None = None
     r2: Strengths | None = None
@@ -64,31 +66,31 @@ class Feel:
             check_limits(self)
 
     def following(self, before: "Feel") -> "Feel":
-        """Merge both, this one after `before`: the newest value of each part counts."""
+        """Return these effects; where a part is None, take it from `before`, which was set earlier."""
         pairs = zip(_parts(self), _parts(before), strict=True)
         return Feel(*(old if new is None else new for new, old in pairs))
 
     def change_from(self, before: "Feel") -> "Feel":
-        """Return the parts that differ from those of `before`; the others are None."""
+        """Return only the parts that differ from those of `before`, with None for all other parts."""
         pairs = zip(_parts(self), _parts(before), strict=True)
         return Feel(*(None if new == old else new for new, old in pairs))
 
     @property
     def farewell(self) -> "Feel":
-        """Output that undoes this one: RELEASED, and the usual light if this one sets a light."""
+        """Effects that undo these: RELEASED, and the usual light if a light was set."""
         return RELEASED if self.light is None else Feel(FREE_TRIGGER, FREE_TRIGGER, Rumble(), USUAL_LIGHT)
 
     @property
     def releases(self) -> bool:
-        """Whether it sets neither resistance nor rumble."""
+        """Whether these effects have neither resistance nor rumble."""
         return not any(self.l2 or ()) and not any(self.r2 or ()) and self.rumble in (None, Rumble())
 
 
 _parts: Final[Callable[[Feel], tuple[Any, ...]]] = attrgetter("l2", "r2", "rumble", "light")
 RELEASED: Final = Feel(FREE_TRIGGER, FREE_TRIGGER, Rumble())
-"""Output without resistance and rumble."""
+"""Effects without resistance and rumble"""
 
 
 def met(strengths: Strengths, reported: float) -> int:
-    """Return the strength that a finger meets at `reported`, the travel from the controller, 0 to 1."""
+    """Return the strength of the zone at `reported`, the raw travel as the controller reports it, 0 to 1."""
     return strengths[min(int(ZONE_COUNT * SENSED_TRAVEL * reported), ZONE_COUNT - 1)]

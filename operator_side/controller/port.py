@@ -1,4 +1,4 @@
-"""Port that every controller implements, real or not."""
+"""Interface that every controller implements, real or simulated."""
 
 import re
 import reprlib
@@ -13,17 +13,17 @@ _ADDRESS: Final = re.compile("[0-9a-f]{2}(:[0-9a-f]{2}){5}")
 
 
 class Controller(Protocol):
-    """An open controller. Any method may raise DeviceError; the text gives the remedy."""
+    """An open controller. Any method may raise DeviceError, whose text gives the remedy."""
 
     @property
     def released(self) -> bool:
-        """Whether both triggers are free and the motors still, as far as is known."""
+        """Whether, as far as is known, the triggers do not resist and the motors do not run."""
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Return the newest state and skip older ones; None without a new one. Never waits."""
+        """Return the newest state, without waiting; None if there is no new state since the last call."""
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Set the parts that `feel` holds."""
+        """Set the parts of `feel` that are not None."""
 
     def close(self) -> None:
         """Switch off resistance, rumble and a warning light if any were written, and close the controller.
@@ -38,15 +38,15 @@ class OpenController:
 
     device: Controller
     name: str
-    """Model and transport, for people."""
+    """Model and transport, in words"""
     address: str | None = None
-    """Address "aa:bb:cc:dd:ee:ff", the same on USB and Bluetooth; None when it did not answer."""
+    """Address "aa:bb:cc:dd:ee:ff", the same on USB and Bluetooth; None if the controller reported none."""
     path: bytes | None = None
-    """Device node, for the guard; None if nothing must be released after this process dies."""
+    """Device node, for the watchdog; None if nothing needs to be released when this process dies."""
     release: bytes = b""
-    """Report that the guard writes to that node to switch everything off."""
+    """Report that the watchdog writes to `path` to switch all effects off."""
     stalls: Callable[[float], bool] = lambda _: False
-    """Whether at `now_s` a write hangs: then `device` cannot reach the controller."""
+    """Function that returns whether a write to `device` hangs at a time `now_s`."""
 
 
 def checked_address(address: object) -> str:

@@ -1,4 +1,4 @@
-"""Search for a controller in the background: opening one takes a few reports' time."""
+"""Search for a controller in a thread, because opening a controller means waiting for its reports."""
 
 import threading
 from collections.abc import Callable
@@ -10,11 +10,11 @@ from operator_side.controller.port import OpenController
 _CLOSE_TIMEOUT_S = 0.3
 
 Find = Callable[[str | None], OpenController]
-"""Find and open a controller, preferably the one of the given address; DeviceError gives the reason for none."""
+"""Function that opens a controller, preferably the one with the given address; DeviceError if it opens none."""
 
 
 class BackgroundSearch:
-    """One search at a time, in its own thread: a controller on Bluetooth may answer late."""
+    """Search in a thread, one at a time: a controller on Bluetooth may answer late."""
 
     def __init__(self, find: Find) -> None:
         self._find = find
@@ -22,15 +22,18 @@ class BackgroundSearch:
         self._closed = False
 
     def begin(self, preferred: str | None) -> None:
-        """Start a search unless one is running; prefer the controller of this address."""
+        """Start a search unless one is running. preferred: address of the controller to prefer."""
         if self._look is None and not self._closed:
             self._look = Future()
-            # A daemon: a controller that never answers must not keep the process from ending.
+            # A daemon thread: a controller that never answers must not keep the process from ending.
             about = self._find, preferred, self._look
             threading.Thread(target=_find_for, args=about, daemon=True, name="controller search").start()
 
     def take(self) -> OpenController | DeviceError | None:
-        """Return the controller, or the reason for none; None during a search. Raises the thread's other errors."""
+        """Return the controller that was found, or the DeviceError why none was; None without a finished search.
+
+        Any other error of the search is raised.
+        """
         if self._look is None or not self._look.done():
             return None
         look, self._look = self._look, None
@@ -38,7 +41,7 @@ class BackgroundSearch:
         return error if isinstance(error, DeviceError) else look.result()
 
     def close(self) -> None:
-        """End the search; a controller found later is closed."""
+        """End the search; a controller that it still finds is closed."""
         look, self._look, self._closed = self._look, None, True
         if look is not None:
             wait([look], _CLOSE_TIMEOUT_S)
@@ -58,7 +61,7 @@ def _let_go(look: "Future[OpenController]") -> None:
 
 
 class Ready(BackgroundSearch):
-    """Search that returns a given controller: a simulated one."""
+    """Search that returns a given controller, such as a simulated one, once."""
 
     def __init__(self, controller: OpenController) -> None:
         super().__init__(lambda _: controller)
@@ -66,4 +69,4 @@ class Ready(BackgroundSearch):
         self._look.set_result(controller)
 
     def begin(self, preferred: str | None) -> None:
-        """Do nothing: the controller is given."""
+        """Do nothing, as the controller is given."""

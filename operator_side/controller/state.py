@@ -1,4 +1,4 @@
-"""State of a controller at one moment, in a program's units."""
+"""State of a controller: sticks, triggers and buttons, in units that do not depend on its model."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -13,7 +13,7 @@ Stick = tuple[Axis, Axis]
 
 
 class Button(Enum):
-    """Buttons; the directional pad counts as four, two of them on a diagonal."""
+    """Button of a controller. The directional pad counts as four buttons; a diagonal presses two of them."""
 
     UP = "up"
     RIGHT = "right"
@@ -26,18 +26,18 @@ class Button(Enum):
     L1 = "L1"
     R1 = "R1"
     L2 = "L2"
-    """The trigger has left its rest."""
+    """Pressed when the trigger has left its rest position"""
     R2 = "R2"
     CREATE = "create"
     OPTIONS = "options"
     L3 = "L3"
-    """The left stick is pushed in."""
+    """Pressed when the left stick is pushed in"""
     R3 = "R3"
     PS = "PS"
     TOUCHPAD = "touchpad"
     MUTE = "mute"
     LEFT_FUNCTION = "left function"
-    """This and the three below: DualSense Edge only."""
+    """The function keys and the paddles exist only on the DualSense Edge."""
     RIGHT_FUNCTION = "right function"
     LEFT_PADDLE = "left paddle"
     RIGHT_PADDLE = "right paddle"
@@ -47,7 +47,7 @@ _OPPOSITES: Final = ({Button.UP, Button.DOWN}, {Button.LEFT, Button.RIGHT})
 
 
 class BatteryState(Enum):
-    """Charging state; the faults are those that Linux hid-playstation names."""
+    """Charging state of the battery; faults as Linux hid-playstation names them."""
 
     DISCHARGING = "discharging"
     CHARGING = "charging"
@@ -63,7 +63,7 @@ class Battery(Limited):
     """Charge and charging state."""
 
     fraction: Share | None = 1.0
-    """Charge, 0 to 1; None if the controller reports none, or a fault instead."""
+    """Charge, 0 to 1; None if the controller does not report it, or reports a fault."""
     state: BatteryState = BatteryState.FULL
 
 
@@ -71,10 +71,10 @@ CHARGED: Final = Battery()
 
 
 class ControllerState(Struct, frozen=True):
-    """Sticks, triggers and buttons; the defaults are an untouched, charged controller."""
+    """State of sticks, triggers, buttons and battery; by default untouched and charged."""
 
     left_stick: Stick = (0.0, 0.0)
-    """(x, y), -1 to 1 each, right and up positive, without a dead zone."""
+    """(x, y), -1 to 1 each, right and up positive; no dead zone is applied."""
     right_stick: Stick = (0.0, 0.0)
     l2: Share = 0.0
     """Raw travel as the controller measures it, 0 to 1."""

@@ -1,9 +1,9 @@
-"""Gamepad with rumble through Linux evdev: its motors render a trigger's resistance.
+"""Driver of any gamepad with rumble on Linux, through evdev: its motors render the triggers' resistance.
 
-The strength that a finger would meet at its trigger's travel drives a motor: L2 the strong one, R2 the weak one; the
-greater of it and the commanded rumble counts. Layout of events and ioctls: linux/input.h. The kernel erases a file's
-effects when the file is closed, so a killed process leaves nothing behind. Each effect also ends soon by itself,
-against a process that hangs.
+The strength of the zone at a trigger's present travel drives a motor: L2's strength the strong motor, R2's the weak
+motor. A commanded rumble counts if it is stronger. Layout of events and ioctls: linux/input.h. The kernel erases a
+file's effects when the file is closed, so nothing keeps rumbling after the process is killed. Each effect also ends by
+itself after 0.2 s, in case the process hangs.
 """
 
 import contextlib
@@ -21,10 +21,11 @@ from operator_side.controller.state import Battery, BatteryState, Button, Contro
 
 NODES: Final = Path("/dev/input")
 LENGTH_S: Final = 0.2
-"""Duration of an effect after the last command, as the release watchdog's patience"""
+"""Duration of an effect after the last command, in seconds; the same as the release watchdog's limit"""
 _AGAIN_S: Final = LENGTH_S / 2
+"""Seconds after which an unchanged effect is sent again"""
 RELEASED_TRAVEL: Final = 0.05
-"""Travel up to which a trigger is released: its strengths drive no motor"""
+"""Raw travel up to which a trigger counts as released, so that its strengths drive no motor"""
 _FULL: Final = 0xFFFF
 
 _SYN, _KEY, _ABS, _FF = 0x00, 0x01, 0x03, 0x15
@@ -46,7 +47,7 @@ BUTTONS: Final = {
     0x13D: Button.L3,
     0x13E: Button.R3,
 }
-"""By the kernel's gamepad rules: south, east, north, west; shoulders and triggers; select, start, mode; sticks."""
+"""Button for each evdev code of Linux's gamepad specification, which names action buttons by their direction"""
 _HATS: Final = {
     (_HAT_X, -1): Button.LEFT,
     (_HAT_X, 1): Button.RIGHT,
@@ -74,9 +75,9 @@ GET_NAME: Final = _request(2, 0x06, _NAME_BYTES)
 GET_UNIQUE: Final = _request(2, 0x08, _NAME_BYTES)
 GET_KEYS: Final = _request(2, 0x18, _KEY_BYTES)
 GET_BITS: Final = _request(2, 0x20, _BIT_BYTES)
-"""Plus the number of the kind of event"""
+"""Request for the supported codes of a kind of event; add the kind's number"""
 GET_AXIS: Final = _request(2, 0x40, _ABSINFO.size)
-"""Plus the number of the axis"""
+"""Request for an axis's value and range; add the axis's number"""
 SEND_EFFECT: Final = _request(1, 0x80, _EFFECT_SIZE)
 
 
@@ -87,15 +88,18 @@ class Axis(NamedTuple):
     most: int
 
     def share(self, value: int) -> float:
-        """Return the place of `value` in the range, 0 to 1."""
+        """Return the position of `value` in the range, 0 to 1."""
         return min(max((value - self.least) / max(self.most - self.least, 1), 0.0), 1.0)
 
 
 class EvdevPad:
-    """Port on an open node; one thread reads and writes. Each read returns a state, as the kernel keeps it."""
+    """Gamepad on an open device node, as a `Controller`. The same thread must read and write.
+
+    Each read returns a state, even an unchanged one, as the kernel keeps the gamepad's state.
+    """
 
     def __init__(self, descriptor: int, ioctl: Ioctl = fcntl.ioctl) -> None:
-        """descriptor: non-blocking, and closed by `close`. DeviceError if the gamepad goes away meanwhile."""
+        """descriptor: non-blocking; `close` closes it. DeviceError if the gamepad is unplugged meanwhile."""
         self._descriptor: int | None = descriptor
         self._ioctl = ioctl
         self._changed = True
@@ -108,7 +112,7 @@ class EvdevPad:
             failing.callback(self.close)
             keys, axes, effects = (self._bits(GET_BITS + kind) for kind in (_KEY, _ABS, _FF))
             self.is_pad = min(BUTTONS) in keys and axes.issuperset(_AXES) and _FF_RUMBLE in effects
-            """Whether it has two sticks, two triggers and motors."""
+            """Whether the device has two sticks, two triggers, buttons and rumble."""
             self.name = self._text(GET_NAME)
             self.address = _address(self._text(GET_UNIQUE))
             self._hats = axes & {_HAT_X, _HAT_Y}
@@ -125,7 +129,7 @@ class EvdevPad:
         return self._commanded.releases
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Return the state after all events until now, and drive the motors by it."""
+        """Return the state after all events so far, and drive the motors by the triggers' new travel."""
         descriptor = self._open_descriptor()
         with _going_wrong(), contextlib.suppress(BlockingIOError):
             while True:
@@ -146,11 +150,11 @@ class EvdevPad:
         self._shake(now_s)
 
     def close(self) -> None:
-        """Stop the motors and close the pad."""
+        """Stop the motors and close the device node."""
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is None:
             return
-        with contextlib.suppress(OSError):  # it is gone: nothing can be written
+        with contextlib.suppress(OSError):  # the gamepad is gone: nothing can be written
             if any(self._drives):
                 os.write(descriptor, _played(self._effect_id, 0))
             self._commanded = self._commanded.farewell
@@ -189,7 +193,7 @@ class EvdevPad:
         )
 
     def _shake(self, now_s: float) -> None:
-        """Drive the motors by the last command and the present travel; again before the effect ends."""
+        """Drive the motors by the last command and the present travel; repeat an effect before it ends."""
         commanded, state = self._commanded, self._state
         left, right = (0.0, 0.0) if commanded.rumble is None else (commanded.rumble.left, commanded.rumble.right)
         drives = (
@@ -201,7 +205,7 @@ class EvdevPad:
         self._drives, self._said_s = drives, now_s
         with _going_wrong():
             descriptor = self._open_descriptor()
-            # Stop it unchanged: the kernel (ff-memless) lets the motors run on if an effect changes and then stops.
+            # To stop, do not change the effect first: the kernel (ff-memless) would let the motors run on.
             if any(drives):
                 effect = bytearray(_EFFECT_SIZE)
                 _EFFECT.pack_into(effect, 0, _FF_RUMBLE, self._effect_id, 0, 0, 0, round(1e3 * LENGTH_S), 0, *drives)
@@ -227,7 +231,7 @@ class EvdevPad:
 
 
 def find_pad(preferred: str | None) -> OpenController:
-    """Open the gamepad of address `preferred`, else the first with rumble; NoDeviceError gives the reason for none."""
+    """Open the gamepad with the address `preferred`, else the first with rumble; NoDeviceError if there is none."""
     found: list[tuple[Path, EvdevPad]] = []
     denied: list[str] = []
     for path in sorted(NODES.glob("event*"), key=lambda path: (len(path.name), path.name)):
@@ -271,7 +275,7 @@ def _address(unique: str) -> str | None:
 
 @contextlib.contextmanager
 def _going_wrong() -> Iterator[None]:
-    """Turn the system's errors of a node into DeviceError; nothing to read is no error."""
+    """Turn OSError of the device node into DeviceError, but let BlockingIOError (nothing to read) pass."""
     try:
         yield
     except BlockingIOError:

@@ -1,1 +1,1 @@
-"""Rendering of onset distances as trigger effects and rumble."""
+"""Rendering of onset distances as trigger resistance and rumble."""

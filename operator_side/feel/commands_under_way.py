@@ -1,7 +1,7 @@
-"""Displacement of the gripper by the commands under way, which the operator side knows and the robot side cannot.
+"""Displacement of the gripper by the commands under way: those that had not reached the robot side when it reported.
 
-A report is old: the arm follows commands that had not reached it then. The operator side integrates these commands
-from the speed in the report. The result replaces ΔT = v t_d (eq. 8), which assumes a constant speed.
+Only the operator side knows these commands. It integrates them, beginning with the speed in the robot side's report.
+The result replaces ΔT = v t_d (eq. 8), which assumes a constant speed.
 """
 
 import math
@@ -16,101 +16,102 @@ from common.following import follow, follow_together
 from common.protocol.around import PERIOD_S
 
 MAX_DELAY_S: Final = 2.0
-"""Loop age beyond which the robot side is disarmed, so that older commands do not matter."""
+"""Loop age, in seconds, beyond which the robot side disarms the arm, so that older commands do not matter"""
 _MOST_COMMANDS: Final = 4096
-"""Capacity of the history: eight times 250 commands a second over the window."""
+"""Maximum number of commands in the history: eight times as many as 250 commands a second over MAX_DELAY_S"""
 _STEP_S: Final = 0.01
-"""Step of a course, in seconds; trigger and sticks approach their mean command over the step."""
+"""Time step of a Course, in seconds; in each step, trigger and sticks follow the step's mean command"""
 _LEAST_S: Final = 1e-9
 _CLOCK_RATES_S: Final = 0.001
-"""Largest excess of `held` by the two clocks' different rates."""
+"""Largest time, in seconds, by which the reported `echo_held_s` may be too long, as the two clocks' rates differ"""
 
 
 class Displacement(NamedTuple):
-    """Effect of the commands under way, along the direction in which R2 advances."""
+    """Motion of the gripper by the commands under way, along the direction in which R2 moves it."""
 
     displacement_m: float
-    """δ, signed: from the gripper's place in the report to its place when a command sent now is followed."""
+    """δ, signed: from the gripper's position in the report to its position when a command sent now takes effect"""
     speed_m_s: float
-    """w, signed: its speed at that time."""
+    """w, signed: the gripper's speed when a command sent now takes effect"""
 
 
 Sticks = tuple[float, float, float, float]
-"""Deflections: across, right and up, and turning, right and up; -1 to 1 each"""
+"""Deflections, -1 to 1 each: across to the right, across upwards, turning right, turning up"""
 AT_REST: Final[Sticks] = (0.0, 0.0, 0.0, 0.0)
 
 
 class Command(NamedTuple):
-    """A command and the time of its stamp."""
+    """A command in the history."""
 
     sent_s: float
+    """Stamp of the command's message"""
     travel: float
+    """Calibrated travel of the advancing trigger less that of the other, -1 to 1"""
     sticks: Sticks = AT_REST
 
 
 class Report(NamedTuple):
-    """Content of a robot side's message about the arm and our commands."""
+    """Content of a stiffness message about the arm and our commands, as of its sending."""
 
     echo_sent_s: float | None
-    """From the header: the stamp of the newest command that the robot side had received."""
+    """Stamp of the newest command that the robot side had received; None before the first"""
     echo_held_s: float | None
-    """From the header: the time for which the robot side had held that command."""
+    """Time since the robot side had received that command; None before the first"""
     speed_m_s: float
-    """v along the direction in which R2 advances"""
+    """v: speed along the direction in which R2 moves the gripper"""
     full_speed_m_s: float
-    """v_max, speed of full travel"""
+    """v_max: speed that full travel commands"""
     told_m_s: float | None = None
-    """Speed that the robot gives that command; None: as the command asks."""
+    """Speed that the robot side gives the newest command it had received, within its limits; None: as commanded"""
 
 
 class Course(NamedTuple):
-    """Sampled course of the gripper by the commands under way."""
+    """Course of the gripper by the commands under way, sampled at k times."""
 
     displacements_m: FloatArray
-    """(k,) displacement since the report, signed along the direction in which R2 advances"""
+    """(k,) displacement since the report, along the direction in which R2 moves the gripper"""
     speed_m_s: float
-    """w: speed at the end, with the same sign"""
+    """w: speed at the end of the course, along the same direction"""
     aside_s: FloatArray
-    """(k, 4) time that each stick, fully deflected, would take to the displacement that it has caused by then"""
+    """(k, 4) displacement by each stick's axis, as the time that full deflection of the axis would take for it"""
     followed: FloatArray
-    """(4,) deflections that the arm follows at the end"""
+    """(4,) deflections that the arm follows at the end of the course"""
     changes_s: FloatArray
-    """(n, 5) K: time of each joint to full travel of R2, and to each fully deflected stick"""
+    """(n, 5) K: time that each joint takes to full travel of R2, and to full deflection of each stick's axis"""
 
     def turned_back(self) -> "Course":
-        """Return the course along the direction in which L2 retreats."""
+        """Return the same course along the opposite direction, in which L2 moves the gripper."""
         changes_s = self.changes_s * [-1.0, 1.0, 1.0, 1.0, 1.0]
         return self._replace(displacements_m=-self.displacements_m, speed_m_s=-self.speed_m_s, changes_s=changes_s)
 
 
 class CommandsUnderWay:
-    """History of our commands, integrated as the robot will follow them.
+    """History of our commands, and the motion of the arm as it will follow them.
 
-    Which commands are under way? The robot made its report at its time T. Its newest message from us bore our stamp
-    `echo` and had been held for `held`, so it arrived at T - held. With the one-way delay d, echo + d = T - held:
-    **a message that we sent at e = echo + held arrives at T.** No clocks are compared: e is our stamp and a duration.
+    Which commands are under way? The robot side made its report at its time T. The newest message that it had from us
+    had our stamp `echo` and had arrived at T - held. With the one-way delay d, echo + d = T - held:
+    **a message that we sent at e = echo + held arrives at T.** No clocks are compared: e is our stamp plus a duration.
     At T:
 
-    - Commands up to `echo` have had their effect. The arm follows the one of `echo`; its measured speed v is as near
-      to that command as the arm could get. Older ones are discarded, as the newest wins. The report also has the
-      speed that the robot gives that command (`told`). It is zero if the command came too late or the arm was
-      stopped, and less at a joint's limit.
-    - Commands after `echo` are under way. On a steady link these were sent after e, and one sent at t is followed
-      from T + (t - e) on. A command between `echo` and e may be overdue, as delays have grown: it arrives at T at
-      the earliest. So e is no later than the first command after `echo`.
+    - The command stamped `echo` has replaced all older ones, and the arm follows it. The arm's measured speed v is as
+      near to that command as the arm could get. The report also has the speed that the robot side gives the
+      command (`told_m_s`): zero if the command came too late or the arm was stopped, less at a joint's limit.
+    - Commands after `echo` are under way. On a steady link they were sent after e, and a command sent at t is followed
+      from T + (t - e) on. A command sent between `echo` and e is overdue, as delays have grown: it arrives at T at
+      the earliest. So e is taken no later than the first command after `echo`.
 
-    A command sent now is followed from T + (now - e) on. Until then the arm goes from the speed v towards
-    u(t) = x(t) v_max, x(t) the newest command sent at or before t, for t from e to now:
+    A command sent now is followed from T + (now - e) on. Until then the arm's speed goes from v towards
+    u(t) = x(t) v_max, for t from e to now. x(t) is the travel of the newest command sent at or before t:
 
         δ = ∫ v dt,  w = v(now),  |dv/dt| <= a
 
-    exactly, as u is constant between commands. Two errors remain: d varies from message to message, and an arm at the
-    edge of its reach does not follow. `course` includes that joints share their acceleration. `feelahead bench error`
-    measures the total.
+    This is exact, as u is constant between commands. Two errors remain: d varies from message to message, and an arm
+    at the edge of its workspace does not follow. `feelahead bench error` measures both together. `displacement` takes
+    the trigger alone; `course` also follows the sticks, with all limited together by the joints' accelerations.
     """
 
     def __init__(self, window_s: float = MAX_DELAY_S) -> None:
-        """Keep the commands of the last `window_s`; ValueError unless finite and above 0."""
+        """Keep the commands of the last `window_s`; ValueError unless `window_s` is finite and above 0."""
         if not (math.isfinite(window_s) and window_s > 0.0):
             raise ValueError(f"window_s = {window_s}; valid: a finite time above 0 s")
         self._window_s = window_s
@@ -121,31 +122,31 @@ class CommandsUnderWay:
         return len(self._sent)
 
     def sent(self, now_s: float, travel: float, sticks: Sticks = AT_REST) -> None:
-        """Add a command sent at `now_s`, the stamp in its header: calibrated travel of R2 less that of L2, -1 to 1.
+        """Add a command. now_s: stamp of its message. travel: calibrated travel of R2 less that of L2, -1 to 1.
 
-        It holds until the next one; add a travel of 0 when commands end. ValueError for a travel out of range, or a
-        time that is not finite or before the last one.
+        The command holds until the next one; add a travel of 0 when commands end. ValueError for a travel out of range,
+        or a time that is not finite or before that of the last command.
         """
         if not -1.0 <= travel <= 1.0:
             raise ValueError(f"travel = {travel}; valid: -1 to 1")
         last_s = self._sent[-1].sent_s if self._sent else -math.inf
         if not (math.isfinite(now_s) and now_s >= last_s):
             raise ValueError(f"now_s = {now_s}; valid: a finite time, not before the last command's, {last_s}")
-        # The newest one before the window stays: it held when the window began.
+        # The newest command before the window stays: it held when the window began.
         while len(self._sent) > 1 and self._sent[1].sent_s <= now_s - self._window_s:
             self._sent.popleft()
         self._sent.append(Command(now_s, travel, sticks))
 
     def sticks_at(self, now_s: float) -> Sticks:
-        """Return the deflections last commanded at `now_s`."""
+        """Return the deflections of the newest command sent at or before `now_s`."""
         return next((one.sticks for one in reversed(self._sent) if one.sent_s <= now_s), AT_REST)
 
     def displacement(self, now_s: float, report: Report, acceleration_m_s2: float) -> Displacement | None:
-        """Compute δ and w at the time when a command sent at `now_s` is followed.
+        """Compute δ and w at the time when a command sent at `now_s` takes effect.
 
-        acceleration_m_s2: a; infinite for an arm that follows at once. None if the commands since the echo are
-        unknown: the echo is missing, impossible, or older than the window or the first command. ValueError for a
-        speed or an acceleration out of range.
+        acceleration_m_s2: a; infinite for an arm that reaches a commanded speed at once. None if the commands since
+        the report's echo are unknown: the echo is missing, impossible, before the window, or before the first command.
+        ValueError for a speed or an acceleration out of range.
         """
         if not acceleration_m_s2 > 0.0:
             raise ValueError(f"acceleration_m_s2 = {acceleration_m_s2}; valid: above 0")
@@ -159,10 +160,10 @@ class CommandsUnderWay:
         return Displacement(displacement_m, speed)
 
     def course(self, now_s: float, report: Report, changes_s: FloatArray) -> Course | None:
-        """Follow trigger and sticks to the time at which a command sent at `now_s` is followed; see `displacement`.
+        """Compute the course by trigger and sticks until a command sent at `now_s` takes effect.
 
-        changes_s: K (n, 5). A change Δ of travel and deflections takes max |K Δ|, all in proportion. None also if the
-        sticks rest throughout.
+        changes_s: K (n, 5) of Course. A change Δ of travel and deflections takes max |K Δ|, all in proportion.
+        None if `displacement` is None, or if the sticks rest in all commands under way.
         """
         counting = self._counting(now_s, report)
         if counting is None or all(one.sticks == AT_REST for one in counting[:-1]):
@@ -183,7 +184,7 @@ class CommandsUnderWay:
         return Course(displacements_m, full_speed_m_s * float(followed[0]), points[:, 1:], followed[1:], changes_s)
 
     def _counting(self, now_s: float, report: Report) -> list[Command] | None:
-        """List the commands in force from e to now, oldest first, and the end; None if they are unknown."""
+        """List the commands in force from e to `now_s`, oldest first, then a last entry at `now_s`; None if unknown."""
         echo_sent_s, held_s, speed_m_s, full_speed_m_s, told_m_s = report
         if not math.isfinite(speed_m_s):
             raise ValueError(f"speed_m_s = {speed_m_s}; valid: finite")
@@ -201,7 +202,7 @@ class CommandsUnderWay:
         return [followed._replace(sent_s=since_s, travel=travel), *under_way, Command(now_s, 0.0)]
 
     def _from(self, since_s: float, until_s: float) -> list[Command]:
-        """List the commands from the one in force at `since_s` to `until_s`, oldest first."""
+        """List the command in force at `since_s` and all later ones until `until_s`, oldest first."""
         newest_first = []
         for one in reversed(self._sent):
             if one.sent_s <= until_s:
@@ -212,7 +213,7 @@ class CommandsUnderWay:
 
 
 def _edges_s(since_s: float, now_s: float) -> tuple[FloatArray, int]:
-    """Sample the times from the map's look over `since_s` to `now_s`; also count the steps to `since_s`."""
+    """Return times from the map's computation over `since_s` to `now_s`, and the number of steps before `since_s`."""
     age_s = 0.5 * PERIOD_S
     before, after = math.ceil(age_s / _STEP_S), max(math.ceil((now_s - since_s) / _STEP_S), 1)
     looked, known = (
@@ -222,7 +223,7 @@ def _edges_s(since_s: float, now_s: float) -> tuple[FloatArray, int]:
 
 
 def _means(commands: list[Command], edges_s: FloatArray) -> FloatArray:
-    """Return the mean commanded travel and sticks (k - 1, 5) between edges (k,)."""
+    """Return the mean commanded travel and sticks (k - 1, 5) between the times `edges_s` (k,)."""
     sent_s = np.array([one.sent_s for one in commands])
     asked = np.array([(one.travel, *one.sticks) for one in commands])
     sums = np.concatenate([np.zeros((1, 5)), np.cumsum(np.diff(sent_s)[:, None] * asked[:-1], axis=0)])

@@ -1,4 +1,4 @@
-"""Haptics: from the robot side's reports and our commands to the writes to a controller."""
+"""Haptics: from stiffness messages and our own commands to the writes to a controller."""
 
 import dataclasses
 import math
@@ -16,11 +16,11 @@ from operator_side.feel.zones import moving_along, needed_m
 from operator_side.hands.travel_calibration import TravelCalibration
 
 MAP_EXPIRES_S: Final = 1.0
-"""Age, against the newest field, at which a map expires; maps come twice in that time."""
+"""Seconds by which a map may be older than the newest field before it expires; two maps are sent in that time."""
 
 
 class Haptics:
-    """Rendering of fields with our commands under way, and memory of the last write."""
+    """Renders stiffness fields with our commands under way, and remembers the last write to the controller."""
 
     def __init__(
         self,
@@ -32,9 +32,9 @@ class Haptics:
         compensation: Compensation,
     ) -> None:
         self.writes = 0
-        """Number of writes."""
+        """Number of writes to a controller."""
         self.without_history = 0
-        """Number of renderings with the robot side's displacement because ours was unknown."""
+        """Number of renderings that used the robot side's displacement, because ours was unknown."""
         self._settings = settings
         self._enabled = enabled
         self._swap_sides = swap_sides
@@ -49,27 +49,27 @@ class Haptics:
         self.calibrate(calibration)
 
     def calibrate(self, calibration: TravelCalibration) -> None:
-        """Render for a controller with this calibration."""
+        """Render for a controller with this calibration from now on."""
         self.rendering = TriggerRendering(self._settings, calibration, swap_sides=self._swap_sides)
 
     def controller_found(self) -> None:
-        """Forget the last write, as the controller's state is unknown: release first, then write again."""
+        """Forget the last write, as the found controller's state is unknown: release it first, then write again."""
         self._written = None if self._enabled else RELEASED
 
     def commanded(self, command: MotionCommand) -> None:
-        """Add a command to the history: it holds until the next one.
+        """Add a command to the history; it holds until the next one.
 
-        Without the run button nothing moves. Whether the arm is armed does not matter here: rendering begins with an
-        armed report, and all commands under way then are followed.
+        A command without hold-to-run counts as travel 0. Whether the arm is armed does not matter here: rendering
+        begins with a report that the arm is armed, and the arm follows all commands that are then under way.
         """
         travel, sticks = command.r2 - command.l2, (*command.lateral, *command.turning)
         self._commands.sent(command.header.sent_s, *((travel, sticks) if command.run else (0.0,)))
         self._commanding = True
 
     def silent(self, now_s: float, *, owns: bool) -> None:
-        """Note that commands have ended: the arm stops if it was moving.
+        """Note that no more commands are sent, so that the arm stops. owns: whether we have the lease.
 
-        Without the lease the history is dropped: another operator may drive the arm.
+        Without the lease the history is dropped, as another operator may drive the arm.
         """
         if not owns and len(self._commands) > 0:
             self._commands = CommandsUnderWay()
@@ -80,9 +80,10 @@ class Haptics:
     def due(
         self, felt: StiffnessUpdate | None, pulled: tuple[float, float], blindness: Blindness, now_s: float
     ) -> Feel | None:
-        """Return the change to write now; None without a change, or while a change must wait.
+        """Return the parts to write to the controller now; None if nothing has changed, or while a change must wait.
 
-        felt: the newest field; None without one or while the arm is not armed. pulled: as TriggerRendering's.
+        felt: the newest stiffness message; None without one, or while the arm is not armed. pulled: calibrated travel
+        of the trigger that retreats, and of the one that advances.
         """
         if not self._enabled:
             return None
@@ -102,22 +103,22 @@ class Haptics:
         return shown if before is None else shown.change_from(before)
 
     def _displacement(self, felt: StiffnessUpdate, now_s: float) -> Displacement | None:
-        """Compute δ and w by our commands under way, from the gripper's place when `felt` was sent."""
+        """Compute δ and w by our commands under way; None if unknown, or if the robot side compensates."""
         if self._compensation == "robot":
             return None
         return self._commands.displacement(now_s, _report(felt), felt.r2.acceleration_m_s2)
 
     def take_map(self, felt: StiffnessUpdate) -> None:
-        """Keep the newest message with a map, even an overtaken one: few have a map."""
+        """Keep `felt` if its map is newer than the known one, even if `felt` is late: few messages have maps."""
         known = self._mapped
         newer = known is None or known.header.epoch != felt.header.epoch or known.header.sent_s < felt.header.sent_s
         if felt.around is not None and newer:
             self._mapped, self._traced_s = felt, -math.inf
 
     def _aside(self, felt: StiffnessUpdate, now_s: float) -> CourseOnMap | None:
-        """Return our sticks' course on the newest map; None while they rest, or without a map.
+        """Return the gripper's course on the newest map; None while the sticks rest, or without a map.
 
-        Cached between two writes to a controller: a path is traced once for each write.
+        The result is kept for WRITE_S, so that a path is traced only once for each write to the controller.
         """
         if not 0.0 <= now_s - self._traced_s < WRITE_S:
             self._traced, self._traced_s = self._newest_aside(felt, now_s), now_s
@@ -137,9 +138,9 @@ class Haptics:
         return CourseOnMap(mapped.around, mapped.horizon_m, course, self._commands.sticks_at(now_s))
 
     def needed_m(self, felt: StiffnessUpdate, pulled: tuple[float, float], now_s: float) -> tuple[float, float]:
-        """Compute D at the present travel, in metres: of the trigger that retreats and of the one that advances.
+        """Compute D_z of `feel/zones.py` at the present travel, for the retreating and for the advancing trigger.
 
-        pulled: as TriggerRendering's.
+        pulled: calibrated travel of the trigger that retreats, and of the one that advances.
         """
         back, forth = moving_along(felt, self._displacement(felt, now_s))
         (retreating, advancing), horizon_s = pulled, self._settings.horizon_s
@@ -154,7 +155,7 @@ class Haptics:
         return self._written or RELEASED
 
     def summary(self) -> dict[str, Any]:
-        """Return the run's figures."""
+        """Return figures of the rendering for the run's summary."""
         return self.rendering.summary() | {"writes": self.writes, "without_history": self.without_history}
 
 

@@ -1,9 +1,9 @@
 """Trace the gripper's path, trigger and sticks together, through the robot side's map of its surroundings.
 
-The robot side knows a stick a loop later than the hand. So it sends contact distances from probes around the gripper
-(`Around`). The path begins where that message was sent. It follows the commands under way, then one reaction, then
-braking: once with the sticks as they are, once with them released. A zone is full where either path exceeds the
-contact distance at some point.
+The robot side receives a stick's deflection late. So it sends a map (`Around`): contact distances from probes, which
+are positions around the gripper. The path begins at the gripper's position when the map was sent. It follows the
+commands under way, then the zone's speed for one reaction, then brakes: once with the sticks as they are, once with
+them released. A zone has full strength if either path exceeds the contact distance at some point.
 """
 
 from bisect import bisect_right
@@ -21,34 +21,37 @@ from operator_side.feel.commands_under_way import AT_REST, Course, Sticks
 from operator_side.feel.zones import FREE, Zones
 
 _UNDER_WAY: Final = 9
-"""Number of points at most of a path by the commands under way"""
+"""Maximum number of points of the path that is due to the commands under way"""
 _AHEAD: Final = 8
-"""Number of points beyond them"""
+"""Number of points of the path during reaction and braking"""
 _LEAST_S: Final = 1e-9
 _ALIKE: Final = 0.1
-"""Half width, as a share of the probes' distance, of the middle band in which both probes count."""
+"""Half width of the band midway between two probes in which both count, as a share of the probes' distance"""
 _ALONE: Final = 0.15
-"""Share of a deflection below which only the other direction counts"""
+"""Share of one axis in a displacement across, below which only the other axis counts"""
 _RISES_M: Final = 0.01
-"""Distance before full strength in which strength rises; a weaker one farther ahead is of another object."""
+"""Distance before full strength within which weaker strengths apply; farther away they are of another object"""
 _LEFT_OUT: Final = 0.02
-"""Share of T up to which a move across or a turn is ignored"""
+"""Share of the outermost probe's displacement up to which a move across or a turn is ignored"""
 _ACROSS, _TURNED = slice(0, 2), slice(2, 4)
 
 
 class CourseOnMap(NamedTuple):
-    """Map and the gripper's course on it."""
+    """Map of contact distances, and the gripper's course on it."""
 
     around: Around
     horizon_m: float
-    """Horizon of the map's message"""
+    """Horizon in the message that brought the map"""
     course: Course
-    """Along the direction in which R2 advances, from the message with `around` to now"""
+    """Course by the commands under way since the map was sent, along the direction in which R2 moves the gripper"""
     sticks: Sticks
-    """Deflections, as commanded now"""
+    """Deflections that are commanded now"""
 
     def onsets_m(self, *, advancing: bool) -> FloatArray:
-        """Return the contact distances (2, PROBES) of one trigger, fast and slow."""
+        """Return one trigger's contact distances (2, PROBES): a row for fast zones and a row for slow ones.
+
+        advancing: for the trigger that moves the gripper forward.
+        """
         return self.around.onsets_m(self.horizon_m)[slice(0, 2) if advancing else slice(2, 4)]
 
 
@@ -61,10 +64,11 @@ def traced_zones(
     *,
     forth: bool,
 ) -> Zones:
-    """Compute the zones: full where a zone's path meets something, and rising before that as `field` does.
+    """Compute the strengths of the zones: full where a zone's path meets something.
 
-    The sticks stay as they are, or are released now. The stiffer result counts, as the future is unknown. travels: at
-    the middle of each zone. forth: the trigger advances.
+    Within 10 mm before that, strengths rise as the onset distances of `field` do. Each zone has two paths: with the
+    sticks as they are, and with the sticks released now; the stiffer result counts. travels: calibrated travel at the
+    middle of each zone. forth: whether this trigger moves the gripper forward.
     """
     where = field, travels, other_travel, horizon_s
     goes_on = _traced(aside, *where, forth=forth)
@@ -116,10 +120,10 @@ def _traced(
 def _ahead(
     course: Course, speeds_m_s: FloatArray, sticks: Sticks, full_m_s: float, horizon_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Continue from the course's end at each zone's speed (z, 1) for one reaction, then brake; the sticks stay.
+    """Continue from the course's end at each zone's speed (z, 1) for one reaction, then brake; `sticks` stay.
 
-    Returns displacements (z, k) and each stick's time (z, k, 4), at _AHEAD times until standstill. Equivalent to
-    `common.following.follow_together` twice.
+    Return, at k = _AHEAD times until standstill, the displacements (z, k) and the displacements by the sticks' axes
+    (z, k, 4), as in Course. Gives the same as two calls of `common.following.follow_together`.
     """
     followed = np.array([course.speed_m_s / full_m_s, *course.followed])
     targets = np.hstack([speeds_m_s / full_m_s, np.tile(sticks, (len(speeds_m_s), 1))])
@@ -136,16 +140,17 @@ def _ahead(
 
 
 def _counts_s(after_s: FloatArray, changing_s: FloatArray) -> FloatArray:
-    """Integrate until `after_s` a share that grows linearly to 1 within `changing_s`."""
+    """Integrate, from 0 to `after_s`, a share that grows linearly from 0 to 1 within `changing_s` and stays at 1."""
     growing_s = np.minimum(after_s, changing_s)
     return after_s - growing_s + 0.5 * growing_s**2 / np.maximum(changing_s, _LEAST_S)
 
 
 def contact_distances_m(onsets_m: FloatArray, aside: FloatArray) -> FloatArray:
-    """Interpolate contact distances (n, PROBES) at points (k, 4): times of fully deflected sticks over T.
+    """Interpolate contact distances (n, PROBES) at points `aside` (k, 4) of the map; return (n, k).
 
-    Points: across, right and up, and turned, right and up. The shorter of across and turned counts. Across, objects
-    begin abruptly: the nearest probe. Turned, walls approach steadily: linear. Beyond the last probe: constant.
+    A point has the displacements across (right, up) and turned (right, up), each as a share of the outermost probe's.
+    Across, the nearest probe counts, as objects begin abruptly. Turned, interpolation is linear, as walls approach
+    steadily. The shorter of the two distances counts. Beyond the outermost probe, distances are constant.
     """
     sides_m = onsets_m[:, 1:].reshape(-1, DIRECTIONS, ACROSS + TURNED)
     here_m = np.broadcast_to(onsets_m[:, :1, None], (len(onsets_m), DIRECTIONS, 1))
@@ -157,9 +162,10 @@ def contact_distances_m(onsets_m: FloatArray, aside: FloatArray) -> FloatArray:
 
 
 def _between(onsets_m: FloatArray, aside: FloatArray, *, linear: bool) -> FloatArray:
-    """Interpolate contact distances (n, DIRECTIONS, r + 1), at points (k, 2): by radius 0 to 1, then by angle.
+    """Interpolate contact distances (n, DIRECTIONS, r + 1) at points `aside` (k, 2), first by radius, then by angle.
 
-    linear: linear in both; else the nearest distance, and the shorter of two about equally near.
+    linear: interpolate linearly. Otherwise the nearest probe counts; of two that are about equally near, the shorter
+    distance.
     """
     size = np.abs(aside).sum(axis=1)
     share = np.abs(aside[:, 0]) / np.where(size > 0.0, size, 1.0)

@@ -1,6 +1,6 @@
-"""Rendering of the field: both triggers' strengths and the motors' drive.
+"""Rendering of the stiffness field as the strengths of both triggers and the drive of the motors.
 
-field ─▶ ten zones of each trigger ─▶ falls over 100 ms, rises at once ─▶ strengths
+field ─▶ strengths of each trigger's ten zones ─▶ smoothing: rise at once, fall over 100 ms ─▶ strengths to write
 """
 
 import math
@@ -28,13 +28,14 @@ from operator_side.feel.zones import FREE, moving_along, zone_strengths, zone_tr
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 
 FALL_S: Final = 0.1
-"""Fall from full strength to none, in seconds, unless the trigger is released."""
+"""Seconds in which a strength falls from 8 to 0; at a release it falls at once"""
 PULSE_S: Final = 0.08
+"""Duration of the right motor's pulse when a held object is set down, in seconds"""
 _PULSE: Final = 0.7
-"""Drive of the right motor alone: the left one signals danger, and both signal a lost field."""
+"""Drive of the right motor in the pulse. The left motor alone signals danger; both together signal blindness."""
 _ROUNDING: Final = 1e-9
 _TOUCHED: Final = MAX_STRENGTH // 2
-"""Largest strength, in slow zones, of an object that is to be touched"""
+"""Maximum strength in slow zones for an object that is meant to be touched"""
 
 
 @dataclass(frozen=True)
@@ -42,18 +43,18 @@ class RenderingSettings(Limited):
     """Settings of the rendering from field to strengths."""
 
     horizon_s: Annotated[float, Meta(ge=0.0, le=2.0)] = HORIZON_S
-    """h: time for which a speed continues before anything felt can change it (reaction, finger's travel, write)."""
+    """Reaction h, in seconds: time for which a speed continues before anything felt can change it."""
 
 
 class RenderedTrigger:
-    """Zones of one trigger, with their state over time."""
+    """Strengths of one trigger's zones, smoothed over time."""
 
     def __init__(self, settings: RenderingSettings, travel: TriggerTravel) -> None:
         self.first_stiff: int | None = None
-        """Lowest zone that ever was stiff."""
+        """Lowest zone that ever had a strength above 0; None before the first."""
         self.max_strength = 0
         self.beyond_horizon = 0
-        """Number of zones, over all renderings, that were full because D exceeded the horizon."""
+        """Number of zones, summed over all renderings, that had full strength because D exceeded the horizon."""
         self._settings = settings
         self._travel = travel
         self._travels = zone_travels(travel)
@@ -74,14 +75,17 @@ class RenderedTrigger:
         *,
         forth: bool = True,
     ) -> Strengths:
-        """Render at `now_s`; for the others see `zone_strengths`, or `traced_zones` while the sticks are deflected."""
+        """Return the strengths at `now_s`, by `traced_zones` if there is a course on a map, else by `zone_strengths`.
+
+        The other arguments are those of these two functions.
+        """
         horizon_s = self._settings.horizon_s
         zones = zone_strengths(field, horizon_m, self._travels, other_travel, moving, horizon_s)
         if aside is not None:
             if aside is not self._traced:
                 self._traced = aside
                 self._zones = traced_zones(aside, field, self._travels, other_travel, horizon_s, forth=forth)
-            # A map has only the onset of full strength: objects to be touched are felt straight ahead.
+            # A map has only the onset of full strength, so an object to be touched is felt straight ahead only.
             touched = field.slow_m[-1] > field.fast_m[-1]
             zones = self._zones.at_least(zones, _TOUCHED) if touched else self._zones
         self.beyond_horizon += zones.beyond_horizon
@@ -97,7 +101,7 @@ class RenderedTrigger:
         return self._strengths
 
     def release(self) -> None:
-        """Drop all strengths at once."""
+        """Set all strengths to 0 at once."""
         self._levels = [0.0] * ZONE_COUNT
         self._show(FREE_TRIGGER)
 
@@ -112,17 +116,20 @@ class RenderedTrigger:
 
     @property
     def free_travel(self) -> float:
-        """Calibrated travel, 0 to 1, at which it stiffens, as the controller reports travel."""
+        """Calibrated travel, 0 to 1, at which the first zone with a strength above 0 begins; 1 if there is none."""
         return self._travel.travel(min(self._strengths.count(0) / ZONE_COUNT / SENSED_TRAVEL, 1.0))
 
 
 class TriggerRendering:
-    """Rendering of both triggers, and of the motors for danger where the stick leads and for an object set down."""
+    """Rendering of both triggers and the motors.
+
+    The left motor warns of objects where the sticks lead; the right one pulses when a held object is set down.
+    """
 
     def __init__(
         self, settings: RenderingSettings, calibration: TravelCalibration, *, swap_sides: bool = False
     ) -> None:
-        """swap_sides: the robot side's L2 is rendered on R2, and its R2 on L2."""
+        """swap_sides: render the robot side's L2 on the controller's R2, and its R2 on the controller's L2."""
         self.l2 = RenderedTrigger(settings, calibration.l2)
         self.r2 = RenderedTrigger(settings, calibration.r2)
         self._swap_sides = swap_sides
@@ -137,11 +144,11 @@ class TriggerRendering:
         now_s: float,
         aside: CourseOnMap | None = None,
     ) -> Feel:
-        """Render both triggers and the motors at `now_s`; RELEASED at once for None.
+        """Render both triggers and the motors at `now_s`; RELEASED, without a gradual fall, if `felt` is None.
 
-        pulled: present calibrated travel of the trigger that retreats and of the one that advances. known: δ and w by
-        our commands under way; None for the robot side's. aside: the sticks' course, rendered instead of the zones
-        straight ahead.
+        pulled: present calibrated travel of the trigger that retreats, and of the one that advances. known: δ and w by
+        our commands under way; None to use the robot side's. aside: course by the sticks on the map; None to render
+        what is straight ahead.
         """
         if felt is None:
             self.l2.release()
@@ -160,10 +167,10 @@ class TriggerRendering:
         return Feel(l2=l2, r2=r2, rumble=Rumble(felt.rumble, _PULSE if now_s < self._pulse_ends_s else 0.0))
 
     def zones(self) -> dict[str, Any]:
-        """Return the run's figures of the controller's own triggers."""
+        """Return, for each of the controller's triggers, its first stiff zone and its maximum strength in the run."""
         both = {"l2": self.l2, "r2": self.r2}
         return {name: {"first_stiff": one.first_stiff, "max": one.max_strength} for name, one in both.items()}
 
     def summary(self) -> dict[str, Any]:
-        """Return the other figures of the run."""
+        """Return `beyond_horizon` of each of the controller's triggers."""
         return {"l2": {"beyond_horizon": self.l2.beyond_horizon}, "r2": {"beyond_horizon": self.r2.beyond_horizon}}

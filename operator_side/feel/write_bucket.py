@@ -1,8 +1,7 @@
-"""Token bucket for writes to a controller: at most 100 in any second, latest wins, releases at once.
+"""Token bucket for writes to a controller: at most 100 in any second. A release never waits.
 
-A write costs one token. Setting a part that was off costs one more, in advance, for its release: so a release never
-waits. Earlier writes delay a change by at most the refill of four tokens (a twentieth of a
-second).
+A write costs one token. A write that switches a part on costs one more, which pays for the part's release in advance.
+A change waits at most until four tokens are refilled (a twentieth of a second); then the newest values are written.
 """
 
 import dataclasses
@@ -13,23 +12,23 @@ from operator_side.controller.feel import RELEASED, Feel
 MOST_WRITES_PER_S: Final = 100
 _PARTS: Final = ("l2", "r2", "rumble")
 _BURST: Final = 10.0
-"""Capacity in tokens: after a rest a change is felt without delay."""
+"""Capacity of the bucket in tokens, so that after a pause a change is written without delay"""
 _REFILL_PER_S: Final = MOST_WRITES_PER_S - _BURST - len(_PARTS)
-"""Refill rate: a second may begin with a full bucket, and with a paid release for each part."""
+"""Tokens refilled a second: fewer than 100, as a second may begin with a full bucket and paid releases."""
 
 
 class WriteBucket:
-    """Choice of the parts to write now; a part that goes off never waits."""
+    """Chooses the parts to write now; switching a part off never waits."""
 
     def __init__(self) -> None:
         self._left = _BURST
         self._last_s: float | None = None
 
     def next(self, written: Feel | None, wanted: Feel, now_s: float) -> Feel | None:
-        """Return the state after a write now; None for no write.
+        """Return the state that a write at `now_s` should set; None if nothing should be written.
 
-        written: state by the last write; None if unknown: then RELEASED is written regardless of tokens. wanted:
-        desired state. Without enough tokens only the parts that go off are written; call again with the newest.
+        written: state after the last write; if None (unknown), the result is RELEASED, regardless of tokens. wanted:
+        desired state. Without enough tokens only parts to be switched off are written; call again for the others.
         """
         if self._last_s is not None:
             self._left = min(self._left + max(now_s - self._last_s, 0.0) * _REFILL_PER_S, _BURST)

@@ -1,12 +1,13 @@
-"""Strength of each of a trigger's ten zones, from the distances ahead at the speed that the zone commands (§4.2).
+"""Strength of each of a trigger's ten zones, from the distance in which the gripper can stop at that zone (§4.2).
 
-A released trigger is free. Its first stiff zone shows how far it may be pulled before a person who feels it, and
-releases it one reaction later, comes too near:
+A zone z commands the speed u. D_z is the distance to standstill if the operator feels the zone, and releases the
+trigger one reaction h later:
 
-    u = (x_z - x_other) v_max                                  x_z: the calibrated travel at the zone's middle
-    D_z = δ + u h + u²/2a + max(0, w - u)²/2a                  δ, w along the trigger: Displacement
+    u = (x_z - x_other) v_max                                  x_z: calibrated travel at the zone's middle
+    D_z = δ + u h + u²/2a + max(0, w - u)²/2a                  δ, w: Displacement along the trigger's direction
 
-A zone's strength is the number of the field's onset distances up to D_z, never less than that of the zone before.
+A zone's strength is the number of onset distances that are at most D_z, and never less than the strength of the zone
+before. So the first stiff zone shows how far the trigger may be pulled before the gripper comes too near.
 """
 
 from bisect import bisect_right
@@ -25,12 +26,12 @@ class Zones(NamedTuple):
     """Strengths of one trigger's ten zones."""
 
     strengths: Strengths
-    """Never falling with travel"""
+    """Strength of each zone, 0 to 8; it never falls from a zone to the next"""
     beyond_horizon: int
-    """Number of zones that are full because D exceeds the horizon."""
+    """Number of zones with full strength because D_z exceeds the horizon."""
 
     def at_least(self, others: "Zones", most: int) -> "Zones":
-        """Raise each zone to its strength in `others`, or to `most` if that is lower."""
+        """Raise each zone's strength to its strength in `others` or to `most`, whichever is lower; never reduce it."""
         strengths = (max(mine, min(other, most)) for mine, other in zip(self.strengths, others.strengths, strict=True))
         return Zones(tuple(strengths), max(self.beyond_horizon, others.beyond_horizon))
 
@@ -39,13 +40,16 @@ FREE: Final = Zones(FREE_TRIGGER, 0)
 
 
 def zone_travels(travel: TriggerTravel) -> tuple[float, ...]:
-    """Return the calibrated travel at the middle of each mechanical zone; 1 beyond a full pull."""
+    """Return the calibrated travel at the middle of each zone; 1 for zones beyond a full pull."""
     middles = ((zone + 0.5) / ZONE_COUNT for zone in range(ZONE_COUNT))
     return tuple(travel.travel(min(middle / SENSED_TRAVEL, 1.0)) for middle in middles)
 
 
 def moving_along(update: StiffnessUpdate, known: Displacement | None) -> tuple[Displacement, Displacement]:
-    """Return δ and w along L2 and along R2: from `known`, along R2 by our commands, else the robot side's."""
+    """Return the Displacement along L2's direction and along R2's.
+
+    known: Displacement along R2's direction by our commands; None to use the robot side's in `update`.
+    """
     if known is None:
         speed_m_s = update.speed_m_s
         return Displacement(update.l2.displacement_m, -speed_m_s), Displacement(update.r2.displacement_m, speed_m_s)
@@ -53,7 +57,7 @@ def moving_along(update: StiffnessUpdate, known: Displacement | None) -> tuple[D
 
 
 def needed_m(field: TriggerField, speed_m_s: float, moving: Displacement, horizon_s: float = HORIZON_S) -> float:
-    """Compute D, the distance to feel ahead, if the trigger commands `speed_m_s`, 0 or more."""
+    """Compute D_z of this file for a zone that commands `speed_m_s`, 0 or more."""
     excess_m_s = max(0.0, moving.speed_m_s - speed_m_s)
     stopping_m = (speed_m_s**2 + excess_m_s**2) / (2.0 * field.acceleration_m_s2)
     return moving.displacement_m + speed_m_s * horizon_s + stopping_m
@@ -67,15 +71,16 @@ def zone_strengths(
     moving: Displacement,
     horizon_s: float = HORIZON_S,
 ) -> Zones:
-    """Compute the zones with middles at `travels`, with the other trigger at `other_travel`.
+    """Compute the strengths of the zones.
 
-    horizon_m: horizon of `field`; a zone whose D exceeds it is full. horizon_s: h, from feeling to the arm's command.
-    A zone that commands no motion along the trigger, as the other one is pulled farther, is free.
+    travels: calibrated travel at the middle of each zone. other_travel: that of the other trigger; zones up to it
+    command no motion along this trigger's direction and are free. horizon_m: horizon of `field`; a zone whose D_z
+    exceeds it has full strength. horizon_s: reaction h.
     """
     full_m_s = field.full_speed_m_s
     fastest_m_s = max(0.0, (travels[-1] - other_travel) * full_m_s)
     excess_m_s = max(0.0, moving.speed_m_s)
-    # No zone needs more than its fastest speed and the whole excess together.
+    # No zone's D_z exceeds the one with the fastest zone's speed and the whole excess speed together.
     most_m = moving.displacement_m + fastest_m_s * horizon_s
     most_m += (fastest_m_s**2 + excess_m_s**2) / (2.0 * field.acceleration_m_s2)
     if most_m <= horizon_m and most_m < field.fast_m[0] and most_m < field.slow_m[0]:

@@ -1,1 +1,1 @@
-"""From the controller's state to an intent: travels, sticks, buttons."""
+"""From a controller's state to the operator's intent: calibrated travels, sticks and buttons."""

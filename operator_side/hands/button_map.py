@@ -1,4 +1,4 @@
-"""Purpose of each button: the one table for reading, help and docs/controls.md."""
+"""Button map: the one table of buttons and their actions, with which help and docs/controls.md must agree."""
 
 from collections.abc import Mapping
 from enum import Enum
@@ -9,7 +9,7 @@ from operator_side.controller.state import Button
 
 
 class Action(Enum):
-    """Purpose of a button."""
+    """Action of a button."""
 
     RUN = "hold to run"
     ARM = "arm"
@@ -31,10 +31,10 @@ BUTTON_OF: Final[Mapping[Action, Button]] = MappingProxyType(
         Action.HAND_OVER: Button.CREATE,
     }
 )
-"""The button map."""
+"""Button for each action, with the sides not swapped."""
 _SWAPPED_BUTTON_OF: Final[Mapping[Action, Button]] = MappingProxyType({**BUTTON_OF, Action.RUN: Button.R1})
 
 
 def button_of(*, swap_sides: bool) -> Mapping[Action, Button]:
-    """Return `BUTTON_OF`; with left and right swapped, R1 takes L1's place."""
+    """Return the button for each action; swap_sides puts hold-to-run on R1 instead of L1."""
     return _SWAPPED_BUTTON_OF if swap_sides else BUTTON_OF

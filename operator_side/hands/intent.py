@@ -1,4 +1,4 @@
-"""From the controller's state to the operator's intent: calibrated travel, sticks without drift, named buttons."""
+"""From a controller's state to the operator's intent: calibrated travel, sticks without drift, named buttons."""
 
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
@@ -12,24 +12,24 @@ _DEFAULT_CALIBRATION: Final = TravelCalibration()
 
 @dataclass(frozen=True)
 class OperatorIntent:
-    """Intent of the operator's hands at one moment. Buttons are levels: true while held."""
+    """What the operator's inputs command at one time. Buttons are levels: true while held."""
 
     l2: float = 0.0
-    """Calibrated travel, 0 to 1, of the trigger that retreats: L2, unless the sides are swapped."""
+    """Calibrated travel, 0 to 1, of the trigger that moves the gripper back: L2, unless the sides are swapped."""
     r2: float = 0.0
-    """Calibrated travel, 0 to 1, of the trigger that advances."""
+    """Calibrated travel, 0 to 1, of the trigger that moves the gripper forward."""
     lateral: Stick = (0.0, 0.0)
-    """Deflection of the stick that moves across, the left one: right and up positive, within the unit circle."""
+    """Deflection of the stick that moves the gripper across, the left one: right and up positive, length at most 1."""
     turning: Stick = (0.0, 0.0)
-    """Deflection of the stick that turns, the right one."""
+    """Deflection of the stick that turns the gripper, the right one, likewise."""
     run: bool = False
     arm: bool = False
     emergency_stop: bool = False
     next_target: bool = False
-    """Level; a step is its change from false to true."""
+    """True while the button is held; each change from false to true selects the next target."""
     hand_over: bool = False
     gripper: Literal[-1, 0, 1] = 0
-    """-1 opens, 1 closes, 0 holds; both buttons at once hold."""
+    """-1 opens the gripper, 1 closes it, 0 leaves it, also while both buttons are held."""
     raw: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
     """Raw travel of the controller's own L2 and R2, 0 to 1 each, uncalibrated and never swapped."""
 
@@ -39,7 +39,7 @@ class OperatorIntent:
         return self.l2 == 0.0 and self.r2 == 0.0
 
     def resting(self) -> "OperatorIntent":
-        """Return the same intent without motion and arming; the other buttons stay."""
+        """Return the same intent without triggers, sticks, gripper and arming; the other buttons stay."""
         rest = (0.0, 0.0)
         return replace(self, l2=0.0, r2=0.0, lateral=rest, turning=rest, gripper=0, arm=False)
 
@@ -47,7 +47,7 @@ class OperatorIntent:
 def operator_intent(
     state: ControllerState, calibration: TravelCalibration = _DEFAULT_CALIBRATION, *, swap_sides: bool = False
 ) -> OperatorIntent:
-    """Apply the calibration and the button map to `state`; swap_sides swaps left and right.
+    """Make the intent from `state` by the calibration and the button map. swap_sides: exchange left and right.
 
     While the emergency stop is held, every other button counts as not pressed.
     """

@@ -1,4 +1,4 @@
-"""The newest intent of the hands, until it expires."""
+"""Newest intent of the operator, until it expires."""
 
 from typing import Final
 
@@ -7,36 +7,36 @@ from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import TravelCalibration
 
 INTENT_EXPIRES_S: Final = 0.1
-"""Age of the newest state after which nothing is sent, so that the robot stops, in seconds."""
+"""Age of the controller's newest state, in seconds, after which no command is sent, so that the arm stops"""
 
 
 class Hands:
-    """The newest intent of the hands."""
+    """Newest intent of the operator, from a controller's states."""
 
     def __init__(self, calibration: TravelCalibration, *, swap_sides: bool) -> None:
         self.calibration = calibration
         self.intent: OperatorIntent | None = None
         """Newest intent; None before the first state, and once the controller is lost"""
         self.lost_s: float | None = None
-        """Time at which the controller was lost; None once the arm has stopped since"""
+        """Time at which the controller was lost; None before a loss, and once the arm has stopped after it"""
         self._swap_sides = swap_sides
         self._read_s = 0.0
 
     def read(self, state: ControllerState, now_s: float) -> OperatorIntent:
-        """Take one state and return its intent."""
+        """Take a controller's state and return the intent made from it."""
         self.intent = intent = operator_intent(state, self.calibration, swap_sides=self._swap_sides)
         self._read_s = now_s
         return intent
 
     def lose(self, now_s: float) -> None:
-        """Forget the intent: the controller was lost."""
+        """Forget the intent, as the controller was lost."""
         self.intent, self.lost_s = None, now_s
 
     def see(self, *, armed: bool, now_s: float) -> None:
-        """Note whether the arm has stopped since the controller was lost."""
+        """Take a report whether the arm is armed; if not, the arm has stopped since the controller was lost."""
         if not armed and self.lost_s is not None and now_s > self.lost_s:
             self.lost_s = None
 
     def present(self, now_s: float) -> OperatorIntent | None:
-        """Return the intent unless it has expired."""
+        """Return the intent; None if it has expired or there is none."""
         return None if now_s - self._read_s > INTENT_EXPIRES_S else self.intent

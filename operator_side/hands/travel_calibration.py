@@ -1,4 +1,4 @@
-"""Calibration of one controller's triggers and sticks: raw travel to calibrated travel."""
+"""Calibration of one controller: raw travel and stick positions to calibrated travel and deflections."""
 
 import math
 from dataclasses import dataclass, field
@@ -8,17 +8,17 @@ from operator_side.controller.feel import SENSED_TRAVEL, ZONE_COUNT
 from operator_side.controller.state import Stick
 
 LARGEST_REST: Final = 0.3
-"""Largest distance of a stick's rest from its centre; beyond it the stick is broken, or held."""
+"""Maximum distance of a stick's rest position from its centre; farther away the stick is broken, or held"""
 LEAST_SPAN: Final = 0.2
-"""Least raw travel between released and fully pulled: with less, a few counts would be full speed."""
+"""Minimum raw travel between released and fully pulled; with less, a few counts of the sensor would be full speed"""
 _ROUNDING: Final = 1e-9
 _LEAST_MEANT: Final = 1e-3
-"""Least intended deflection of a stick; a smaller one is rest."""
+"""Deflection below which a stick counts as at rest"""
 
 
 @dataclass(frozen=True)
 class TriggerTravel:
-    """Used part of one trigger's raw travel."""
+    """Part of one trigger's raw travel that is used: from dead zone to saturation."""
 
     dead_zone: float = 0.05
     """Raw travel up to which a trigger is released."""
@@ -38,12 +38,12 @@ class TriggerTravel:
         return min(max((raw - self.dead_zone) / (self.saturation - self.dead_zone), 0.0), 1.0)
 
     def raw(self, travel: float) -> float:
-        """Return the raw travel of a calibrated one, 0 to 1; for 0 the end of the dead zone."""
+        """Return the raw travel that gives the calibrated `travel`, 0 to 1; for 0, the end of the dead zone."""
         return min(self.dead_zone + travel * (self.saturation - self.dead_zone), self.saturation)
 
     @property
     def reachable_zones(self) -> int:
-        """Number of the effects' ten zones that a full pull enters; those beyond are not felt."""
+        """Number of the ten zones that a full pull of the trigger enters; zones beyond are never felt."""
         return max(1, math.ceil(ZONE_COUNT * SENSED_TRAVEL * self.saturation - _ROUNDING))
 
 
@@ -52,7 +52,7 @@ class StickRest:
     """Rest position and dead zone of one stick."""
 
     x: float = 0.0
-    """Rest position, right positive: worn sticks do not return to the centre."""
+    """Rest position, right positive; worn sticks do not return to the centre."""
     y: float = 0.0
     """Rest position, up positive."""
     dead_zone: float = 0.1
@@ -65,7 +65,7 @@ class StickRest:
             raise ValueError(f"dead_zone = {self.dead_zone}; valid: 0 to below 1 minus the distance of its rest")
 
     def deflection(self, raw: Stick) -> Stick:
-        """Return the deflection from rest without the dead zone: its radius ends at 1 in every direction."""
+        """Return the deflection from rest: 0 in the dead zone, then growing to length 1 in every direction."""
         x, y = raw[0] - self.x, raw[1] - self.y
         radius = math.hypot(x, y)
         if radius <= self.dead_zone:
@@ -77,7 +77,7 @@ class StickRest:
         return min(max(x * scale, -1.0), 1.0), min(max(y * scale, -1.0), 1.0)
 
     def raw(self, deflection: Stick) -> Stick:
-        """Return the raw position, within the unit circle, of a stick centred at 0 that gives this deflection."""
+        """Return the raw position, of length at most 1, that gives `deflection` for a stick that rests at (0, 0)."""
         radius = math.hypot(*deflection)
         if radius < _LEAST_MEANT:
             return 0.0, 0.0
@@ -87,7 +87,7 @@ class StickRest:
 
 @dataclass(frozen=True)
 class TravelCalibration:
-    """Calibration of one controller's own triggers and sticks, whatever each is used for."""
+    """Calibration of one controller's triggers and sticks, named as on the controller, before sides are swapped."""
 
     l2: TriggerTravel = field(default_factory=TriggerTravel)
     r2: TriggerTravel = field(default_factory=TriggerTravel)
@@ -98,4 +98,4 @@ class TravelCalibration:
 IDENTITY: Final = TravelCalibration(
     TriggerTravel(0.0, 1.0), TriggerTravel(0.0, 1.0), StickRest(dead_zone=0.0), StickRest(dead_zone=0.0)
 )
-"""Calibration of a controller without play or noise: raw travel is calibrated travel."""
+"""Calibration that changes nothing: raw travel is calibrated travel."""

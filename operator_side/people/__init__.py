@@ -1,1 +1,1 @@
-"""Scripted person who pulls, feels and looks."""
+"""Scripted person who operates a simulated controller: pulls triggers, feels them, and sees the screen."""

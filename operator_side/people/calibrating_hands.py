@@ -1,4 +1,4 @@
-"""Hands for a calibration, on a simulated controller."""
+"""Scripted person who calibrates a simulated controller."""
 
 import math
 from typing import Final
@@ -12,7 +12,7 @@ _TURN_S: Final = 1.5
 
 
 class CalibratingHands:
-    """Hands that follow each step: pull, release, move the sticks."""
+    """Scripted person who follows each step of a calibration: rest, pull and release, move the sticks."""
 
     def __init__(self, device: SimulatedDualSense) -> None:
         self._device = device
@@ -20,11 +20,11 @@ class CalibratingHands:
         self._since_s = 0.0
 
     def act(self, step: Step, now_s: float) -> None:
-        """Act at `now_s` as `step` asks."""
+        """Press the triggers or move the sticks at `now_s` as `step` requires."""
         if step is not self._step:
             self._step, self._since_s = step, now_s
         elapsed_s = now_s - self._since_s
-        # Released in the first half of each period: the first pull follows a moment of thought.
+        # Released in the first half of each period, so that the first pull begins after a pause.
         pulling = elapsed_s % _PULL_S > 0.5 * _PULL_S
         force_n = NORMAL_FINGER_FORCE_N if pulling else 0.0
         self._device.set_finger_force(force_n * (step is Step.PULL_L2), force_n * (step is Step.PULL_R2))

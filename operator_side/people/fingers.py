@@ -1,4 +1,4 @@
-"""Hands of the person on the controller: forces by habit, and what the fingers feel."""
+"""Fingers of the scripted person: the forces that they apply, and the resistance that they feel."""
 
 import math
 from collections import deque
@@ -22,29 +22,29 @@ from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.settings import PersonSettings
 
 _SAME_CUE_S: Final = 0.5
-"""Gap within which a returning cue is the same one, believed or not as before, in seconds."""
+"""Seconds within which a cue that returns counts as the same cue, believed or not as before"""
 
 
 class Fingers:
-    """Fingers that pull and push as intended, with hold-to-run held, and feel how much a trigger resists."""
+    """Fingers that apply forces to triggers and sticks, hold hold-to-run, and feel how much a trigger resists."""
 
     def __init__(self, device: SimulatedDualSense, calibration: TravelCalibration, *, swap_sides: bool) -> None:
         self._device = device
         self._calibration = calibration
         self._swap_sides = swap_sides
-        # Triggers without stiffness under the same finger: known by habit.
+        # Free triggers under the same force: the travel that the person expects by habit.
         self._free = (SimulatedTrigger(), SimulatedTrigger())
         self._forces_n = (0.0, 0.0)
         self._now_s: float | None = None
 
     def let_pass(self, now_s: float) -> None:
-        """Let time pass until `now_s`, with the present forces."""
+        """Move the expected, free triggers until `now_s` under the present forces."""
         for trigger in self._free:
             trigger.advance(0.0 if self._now_s is None else now_s - self._now_s)
         self._now_s = now_s
 
     def resisted_share(self) -> float:
-        """Return the share of the finger's force by which a trigger resists beyond its spring; the greater, 0 to 1."""
+        """Return the share of the finger's force, 0 to 1, that the stiffer trigger resists beyond its spring."""
         shares = [
             SPRING_RISE_N * (free.travel - travel) / force_n
             for free, travel, force_n in zip(self._free, self._device.travel, self._forces_n, strict=True)
@@ -53,10 +53,10 @@ class Fingers:
         return max(0.0, *shares) if shares else 0.0
 
     def do(self, advance: float, stick: Vector2, buttons: AbstractSet[Button] = frozenset()) -> None:
-        """Pull R2 (advance > 0) or L2 to the intended travel, 0 to 1; hold-to-run is always held.
+        """Press R2 (advance > 0) or L2 (advance < 0), the stick, the buttons, and hold-to-run.
 
-        Swapped sides exchange all. By habit the fingers apply the force that a free trigger would take, whatever the
-        trigger does.
+        |advance| is the intended travel, 0 to 1. The force is the one that a free trigger would need for this travel,
+        whatever the trigger's resistance is. With swapped sides, left and right are exchanged.
         """
         meant = min(1.0, abs(advance))
         trigger = int((advance > 0) != self._swap_sides)
@@ -69,7 +69,7 @@ class Fingers:
         self._device.set_finger_force(*self._forces_n)
         for free, pressed_n in zip(self._free, self._forces_n, strict=True):
             free.set_finger_force(pressed_n)
-        # A hand learns a stick's dead zone.
+        # The person knows the stick's dead zone, and deflects it by as much more.
         side = "right" if self._swap_sides else "left"
         self._device.set_sticks(**{side: getattr(self._calibration, f"{side}_stick").raw(stick)})
         run = button_of(swap_sides=self._swap_sides)[Action.RUN]
@@ -77,13 +77,16 @@ class Fingers:
 
 
 def within_unit_circle(x: float, y: float) -> Vector2:
-    """Return the stick position nearest to (x, y)."""
+    """Return the point within the unit circle that is nearest to (x, y)."""
     radius = max(1.0, math.hypot(x, y))
     return (x / radius, y / radius)
 
 
 class Cue:
-    """Cue that is felt: acted on from a reaction after its begin to a reaction after its end, if believed."""
+    """Cue that the fingers feel, such as rumble.
+
+    If the person believes it, they act on it from one reaction after its begin to one reaction after its end.
+    """
 
     def __init__(self, settings: PersonSettings, generator: np.random.Generator) -> None:
         self._trust = settings.trust
@@ -97,7 +100,7 @@ class Cue:
         self._acted_on = False
 
     def acted_on(self, now_s: float, present: bool) -> bool:
-        """Return whether the hand acts on the cue at `now_s`; present: whether it is felt now."""
+        """Return whether the person acts on the cue at `now_s`. present: whether the cue is felt now."""
         if present != self._present:
             self._present = present
             if not present:
@@ -105,7 +108,7 @@ class Cue:
             elif now_s - self._ended_s > _SAME_CUE_S:
                 self._believed = bool(self._generator.random() < self._trust)
             due_s = now_s + float(self._generator.lognormal(self._log_mean, self._log_sd))
-            # A later cue does not overtake an earlier one.
+            # The reaction to a later change does not come before that to an earlier one.
             due_s = max(due_s, self._to_come[-1][0] if self._to_come else due_s)
             self._to_come.append((due_s, present and self._believed))
         while self._to_come and self._to_come[0][0] <= now_s:

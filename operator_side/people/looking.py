@@ -1,4 +1,4 @@
-"""Judgement of the screen over time: a target that comes no nearer, an object that sinks no more."""
+"""What the scripted person concludes from the screen over time: a target comes no nearer, an object sinks no more."""
 
 import math
 from collections import deque
@@ -8,49 +8,51 @@ from typing import Final
 from common.protocol.messages import Telemetry
 
 _NO_FURTHER_S: Final = 2.5
+"""Seconds without progress after which a target counts as coming no nearer"""
 _PROGRESS_M: Final = 0.003
-"""Least motion that the eye sees, in metres."""
+"""Smallest motion that the person sees, in metres"""
 _STANDS_S: Final = 0.5
+"""Seconds over which an object's sinking is judged"""
 
 
 @dataclass(frozen=True)
 class Glance:
-    """Input of a phase's decisions."""
+    """What the person sees and knows at one time; input of each phase's decisions."""
 
     now_s: float
     view: Telemetry
     gain: float
-    """Gain of the correction of a seen error, in 1/s"""
+    """Gain, in 1/s: commanded speed for each metre of a seen error"""
     lag_s: float
-    """Time from a motion of the hand to its seen outcome, as far as the person expects it"""
+    """Time, in seconds, that the person expects from a motion of the hand until they see its outcome"""
 
 
 class StalledApproach:
-    """Detector of a target that has come no nearer for long, which the person takes for as near as it gets."""
+    """Detects that a target has come no nearer for some time, so that the person takes it as reached."""
 
     def __init__(self, now_s: float) -> None:
         self._nearest_m, self._nearer_s = math.inf, now_s
 
     def see(self, distance_m: float, look: Glance) -> bool:
-        """Take in the distance that seems left; return the judgement."""
+        """Take the distance that seems left; return whether the target has come no nearer for some time."""
         if distance_m < self._nearest_m - _PROGRESS_M:
             self._nearest_m, self._nearer_s = distance_m, look.now_s
         return look.now_s - self._nearer_s > _NO_FURTHER_S + look.lag_s
 
 
 class StalledDescent:
-    """Detector of an object that had begun to sink, and has not sunk for a moment."""
+    """Detects that an object that was sinking does not sink any more, so that it stands."""
 
     def __init__(self) -> None:
         self._heights: deque[tuple[float, float]] = deque()
         self._sank = False
 
     def see(self, height_m: float, slowest_m_s: float, look: Glance) -> bool:
-        """Take in the height; return the judgement. An object sinks at `slowest_m_s` or faster until it stands."""
+        """Take the height; return whether the object stands. Before that it sinks at least at `slowest_m_s`."""
         self._heights.append((look.now_s, height_m))
         while self._heights[0][0] < look.now_s - _STANDS_S:
             self._heights.popleft()
         share = (self._heights[0][1] - height_m) / (slowest_m_s * _STANDS_S)
-        # A small sag before lowering does not count.
+        # A slight sinking before lowering does not count.
         self._sank |= share > 0.5
         return self._sank and share < 0.2

@@ -1,11 +1,11 @@
-"""Scripted person who sees late, steers with a person's limits, and feels the triggers with their fingers.
+"""Scripted person who sees with delay, steers with a person's limits, and feels the triggers with their fingers.
 
 They see only the screen, `visual_reaction_s` late, and the controller's warning light. They act only through the
-controller: a finger applies a force, and spring and effect decide how far the trigger yields. So haptics act on this
-person mechanically and at once: a stiff trigger travels less under the same force, and they never push harder.
-They may also believe cues, a trigger that yields less than usual and rumble. Then they go gently from a reaction
-later, or release the object where a pulse signals that it stands.
-Figures: the operator's table of facts (McRuer's crossover model; reaction times).
+controller: a finger applies a force, and spring and strengths decide how far the trigger yields. So haptics act on this
+person mechanically and at once: a stiff trigger travels less under the same force, and the person never pushes harder.
+They may also believe cues: a trigger that yields less than usual, and rumble. One reaction after such a cue they go on
+gently. One reaction after a pulse that signals that the held object stands, they release the object.
+Sources of the figures: McRuer's crossover model; measured reaction times.
 
     rest ─▶ arm ─▶ advance ─▶ grasp ─▶ lift ─▶ carry ─▶ lower ─▶ let go ─▶ draw back ─▶ done
                      ▲          │ nothing held
@@ -30,31 +30,31 @@ from operator_side.people.settings import PersonSettings
 from operator_side.people.submove import MoveAndWait
 
 FULL_TRIGGER_M_S = 0.25
-"""Speed of a fully pulled trigger, as the person has learnt it."""
+"""Speed that full travel of a trigger commands, as the person has learnt"""
 FULL_STICK_M_S = 0.1
-"""Speed of a fully deflected stick, as the person has learnt it."""
+"""Speed that full deflection of a stick commands, as the person has learnt"""
 GENTLY_M_S: Final = 0.025
-"""Speed after a cue, and when setting things down."""
+"""Speed after a cue, and when an object is set down"""
 _CARRY_M_S: Final = 0.05
-"""Speed of carrying, with care."""
+"""Maximum speed with a held object"""
 _PEAK_M_S: Final = 0.2
 _PEAK_ACROSS_M_S: Final = 0.08
-"""The greatest speeds of single moves: along the tool axis and across it."""
+"""Maximum speeds of a move in move-and-wait: along the tool axis (first) and across it (second)"""
 _DROPPED_S = 0.5
-"""Time without the target in the fingers after which they believe it, in seconds."""
+"""Seconds without a held object on the screen after which the person believes that it was dropped"""
 _CALM_S = 0.5
-"""Time for which the hands rest after the controller's warning light, in seconds."""
+"""Seconds for which the person keeps triggers and sticks at rest after the controller's warning light"""
 _CLEAR_M: Final = 0.01
 _CLEARS_S: Final = 3.0
-"""Rise before they draw back, and the longest time that they try."""
+"""Rise before the person draws back (first, in metres), and maximum time for it (second, in seconds)"""
 _BACK_M: Final = 0.1
-"""Distance that they draw back from an object set down."""
+"""Distance by which the person draws back from an object that was set down, in metres"""
 
 _REST: Final[Vector2] = (0.0, 0.0)
 
 
 class SimulatedOperator:
-    """Person who drives a `SimulatedDualSense` to the target, grasps it, lifts it and sets it down."""
+    """Scripted person who drives the gripper to the target, grasps it, lifts it, carries it and sets it down."""
 
     _ALIGNED_M = 0.006
     _REACHED_M = 0.008
@@ -90,12 +90,12 @@ class SimulatedOperator:
 
     @property
     def doing(self) -> Doing:
-        """Present phase; NO_TARGET instead of ADVANCING without a target."""
+        """Present phase; NO_TARGET while the person would advance but sees no target."""
         aimless = self.phase is Doing.ADVANCING and self._view is not None and self._view.target_in_tool_m is None
         return Doing.NO_TARGET if aimless else self.phase
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Look at the screen and move the hands. delay_s: round trip that the person is used to."""
+        """See the screen, and operate the controller. delay_s: round trip to which the person has adapted."""
         if self._since_s is None:
             self._since_s = now_s
         if screen is not None and (not self._seen or self._seen[-1][1] is not screen):
@@ -111,12 +111,15 @@ class SimulatedOperator:
         if self._view.state != "armed" and self.phase not in (Doing.RESTING, Doing.ARMING, Doing.DONE):
             self._enter(Doing.RESTING, now_s)
         lag_s = self._settings.visual_reaction_s + (delay_s if self._settings.adapts_to_delay else 0.0)
-        # Crossover frequency in 1/s: as fast as the delay in the loop allows, at most 4.5.
+        # Crossover frequency in 1/s: as high as the delay in the loop allows, at most 4.5.
         gain = min(4.5, (math.pi / 2 - self._settings.phase_margin_rad) / lag_s) if lag_s > 0.0 else 4.5
         getattr(self, f"_{self.phase}")(Glance(now_s, self._view, gain, lag_s))
 
     def _feel(self, now_s: float) -> None:
-        """Go gently until the next phase, from a reaction after a cue: along by stiffness, across by rumble."""
+        """Feel the cues. One reaction after a cue the person goes gently until the next phase.
+
+        Stiffness makes them go gently along the tool axis, rumble across it.
+        """
         self._fingers.let_pass(now_s)
         stiff = self._stiff.acted_on(now_s, self._fingers.resisted_share() > self._settings.noticeable_force)
         rumbles = self._rumble.acted_on(now_s, self._device.rumble.left > 0.0)
@@ -138,7 +141,7 @@ class SimulatedOperator:
         return look.now_s - (look.now_s if self._since_s is None else self._since_s)
 
     def _resting(self, look: Glance) -> None:
-        """Rest the hands for the second of health that arming requires."""
+        """Keep all inputs at rest for the second that arming requires."""
         self._fingers.do(0.0, _REST)
         if self._elapsed_s(look) > 1.2 + self._settings.visual_reaction_s:
             self._enter(Doing.ARMING, look.now_s)
@@ -172,7 +175,7 @@ class SimulatedOperator:
         if settled and aligned and (abs(depth_m) < self._REACHED_M or self._nearing.see(depth_m, look)):
             self._enter(Doing.GRASPING, look.now_s)
             return
-        # The farther off the line, the slower; far off, they centre first.
+        # The farther the target is off the tool axis, the slower the approach; far off, they only centre it.
         eagerness = max(0.0, 1.0 - off_m / (3 * self._ALIGNED_M))
         if self._settings.aiming == "move-and-wait":
             if self._moves.free(look.now_s, look.lag_s):
@@ -195,13 +198,13 @@ class SimulatedOperator:
             self._enter(Doing.RETREATING if self._attempt < self._settings.attempts else Doing.DONE, look.now_s)
 
     def _retreating(self, look: Glance) -> None:
-        """Open, draw back a little, and look again."""
+        """Open the gripper, draw back a little, and aim again."""
         self._fingers.do(-0.4, _REST, {Button.SQUARE})
         if self._elapsed_s(look) > 1.0:
             self._aim(look.now_s)
 
     def _dropped(self, look: Glance) -> bool:
-        """Return whether they have given up the object, as it is no longer between the fingers."""
+        """Return whether the person has given up the object, because it is no longer held."""
         if look.view.holding:
             self._holding_s = look.now_s
         if look.now_s - self._holding_s <= _DROPPED_S:
@@ -210,16 +213,16 @@ class SimulatedOperator:
         return True
 
     def _lifting(self, look: Glance) -> None:
-        """Move against gravity, for any direction of the tool."""
+        """Move upwards, whatever the direction of the tool is."""
         up = look.view.up_in_tool
         if not self._dropped(look) and math.dist(look.view.tool_position_m, self._from) > self._settings.lift_m:
             self._from = look.view.tool_position_m
             self._enter(Doing.CARRYING, look.now_s)
-        # Half speed, with care.
+        # At half speed, for care.
         self._fingers.do(0.5 * up[2], (0.5 * up[0], -0.5 * up[1]), {Button.CROSS})
 
     def _carrying(self, look: Glance) -> None:
-        """Move back towards the robot, level; a tool that points straight up or down has no back."""
+        """Move back towards the robot, horizontally; do not move if the tool points straight up or down."""
         if self._dropped(look):
             return
         up = look.view.up_in_tool
@@ -235,7 +238,7 @@ class SimulatedOperator:
         self._go((speed * back[0], speed * back[1], speed * back[2]), {Button.CROSS})
 
     def _lowering(self, look: Glance) -> None:
-        """Lower to the expected height, gently near it and after a cue, until the object is felt or seen to stand."""
+        """Lower the object until it is felt or seen to stand: gently after a cue and near the expected height."""
         if self._dropped(look):
             return
         height_m = look.view.tool_position_m[2]
@@ -247,7 +250,7 @@ class SimulatedOperator:
         self._go((x, y, z), {Button.CROSS})
 
     def _letting_go(self, look: Glance) -> None:
-        """Open, and rise a little, as they have pressed it down."""
+        """Open the gripper, and rise a little, as the person has pressed the object down."""
         risen_m = look.view.tool_position_m[2] - self._from[2]
         if not look.view.holding and (risen_m > _CLEAR_M or self._elapsed_s(look) > _CLEARS_S + look.lag_s):
             self._from = look.view.tool_position_m
@@ -266,7 +269,10 @@ class SimulatedOperator:
         self._fingers.do(0.0, _REST, {Button.CROSS} if look.view.holding else set())
 
     def _go(self, velocity_m_s: Vector3, buttons: set[Button] | None = None) -> None:
-        """Move the tool at this velocity in its own frame (y down the screen), or slower where they go gently."""
+        """Move the tool at this velocity, limited where the person goes gently.
+
+        The velocity is in the tool's frame, whose y axis points down on the screen.
+        """
         across, along = (GENTLY_M_S if gently else math.inf for gently in (self._gently_across, self._gently_along))
         x, y, z = (min(max(v, -most), most) for v, most in zip(velocity_m_s, (across, across, along), strict=True))
         stick = within_unit_circle(x / FULL_STICK_M_S, -y / FULL_STICK_M_S)

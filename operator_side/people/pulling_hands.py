@@ -1,4 +1,4 @@
-"""Hands that arm the robot and then pull as specified, without regard to the scene."""
+"""Scripted person who arms the robot and then pulls as specified, whatever happens in the scene."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from operator_side.hands.button_map import BUTTON_OF, Action
 from operator_side.hands.travel_calibration import StickRest
 
 _REST_S = 1.2
-"""Rest of the triggers, longer than the second of health that arming requires."""
+"""Seconds of rest before arming; arming requires one second"""
 _PRESS_S = 0.2
 _PATIENCE_S = 3.0
-"""Time without arming after which they press again, in seconds."""
+"""Seconds without becoming armed after which the person rests and presses the arming button again"""
 _GRIP_S = 0.3
-"""Time for which an object is held before the pull, in seconds."""
+"""Seconds for which an object is held before the pull begins"""
 _ASIDE_S: Final = 1.5
-"""Duration of the deflection, in seconds: 150 mm across, or 43°, at full deflection."""
+"""Seconds for which the sticks are deflected: full deflection then moves 150 mm across, or turns by 43°"""
 _STICK: Final = StickRest()
 
 Phase = Literal["rest", "arm", "grip", "pull"]
@@ -32,7 +32,7 @@ _DOING: Final[dict[Phase, Doing]] = {
 
 @dataclass(frozen=True)
 class Hands:
-    """Forces and sticks of both hands at one moment; sticks raw, -1 to 1."""
+    """Forces on the triggers, in newtons, and raw positions of the sticks, -1 to 1, at one time."""
 
     r2_n: float = 0.0
     l2_n: float = 0.0
@@ -41,13 +41,13 @@ class Hands:
 
 
 Pull = Callable[[float], Hands]
-"""Function from the seconds since the pull began to the hands"""
+"""Function that returns the Hands at a time, in seconds since the pull began"""
 
 
 def constant_force(force_n: float, across: Vector2 = (0.0, 0.0), turning: Vector2 = (0.0, 0.0)) -> Pull:
-    """Make a pull of R2 with `force_n` for good; at first the sticks are deflected, too, each by 0 to 1.
+    """Make a pull of R2 with the constant force `force_n`, with the sticks deflected during the first 1.5 s.
 
-    The sticks rest after 1.5 s: a tool that turned for longer would leave its arm's reach.
+    across, turning: deflections, -1 to 1. The sticks then rest, as a longer turn would leave the arm's workspace.
     """
     straight = Hands(r2_n=force_n)
     aside = Hands(r2_n=force_n, left_stick=_STICK.raw(across), right_stick=_STICK.raw(turning))
@@ -55,10 +55,10 @@ def constant_force(force_n: float, across: Vector2 = (0.0, 0.0), turning: Vector
 
 
 class PullingHands:
-    """Hands on a simulated controller: rest ─▶ arm ─▶ (grip ─▶) pull."""
+    """Scripted person at a simulated controller who rests, arms the robot, grips if asked to, and pulls."""
 
     def __init__(self, device: SimulatedDualSense, pull: Pull, *, grip: bool = False) -> None:
-        """grip: close the gripper first, and pull once it holds something."""
+        """grip: close the gripper before the pull, and pull once it holds an object."""
         self.phase: Phase = "rest"
         self.pull_began_s: float | None = None
         self._device = device
@@ -73,7 +73,7 @@ class PullingHands:
         return _DOING[self.phase]
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Act at `now_s` on the screen's state of arming and gripping alone."""
+        """Operate the controller at `now_s`. Of the screen, only arming and holding count."""
         del delay_s
         if self._since_s is None or screen is None:
             self._since_s = now_s

@@ -1,4 +1,4 @@
-"""Choice of the hands on the simulated controller: the person of the scripted task, or a finger that only pulls."""
+"""Choice of the scripted person at the simulated controller: one who does a whole task, or one who only pulls."""
 
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.travel_calibration import TravelCalibration
@@ -17,7 +17,7 @@ def simulated_hands(
     *,
     swap_sides: bool = False,
 ) -> SimulatedHands:
-    """Make the hands that `settings` select, on `device`."""
+    """Make the scripted person that `settings` select, at the controller `device`."""
     if settings.pull_n is not None:
         return PullingHands(device, constant_force(settings.pull_n))
     return SimulatedOperator(device, settings, seed, calibration, swap_sides=swap_sides)

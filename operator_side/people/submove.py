@@ -1,4 +1,4 @@
-"""Moves of a person who moves and waits: each is as smooth as possible, and not corrected on its way."""
+"""Moves of a person who moves and waits; each move has minimum jerk and is not corrected while it lasts."""
 
 import math
 from typing import Final
@@ -6,37 +6,39 @@ from typing import Final
 from common.protocol.messages import Vector3
 
 _LEAST_S: Final = 0.4
+"""Minimum duration of a move, in seconds"""
 _PEAK: Final = 1.875
-"""Ratio of a minimum-jerk move's greatest speed to its mean"""
+"""Ratio of a minimum-jerk move's maximum speed to its mean speed"""
 
 
 class MoveAndWait:
-    """Moves in turn; each is planned only once the outcome of the last one can be seen.
+    """One move after another; each begins only once the outcome of the move before it can be seen.
 
-    A move is by minimum jerk: v(s) = 30 s²(1 - s)² / T, s = t / T (Flash and Hogan 1985).
+    Speed of a move of duration T, as a share of its distance: v = 30 s²(1 - s)² / T, s = t / T (minimum jerk; Flash
+    and Hogan 1985).
     """
 
     def __init__(self) -> None:
         self.forget()
 
     def forget(self) -> None:
-        """Reset: no move, and nothing to wait for."""
+        """Reset, so that there is no move and no outcome to wait for."""
         self._move: tuple[float, float, Vector3] | None = None
-        """Begin, duration, and displacement in the tool frame"""
+        """Begin, duration, and displacement in the tool's frame; None without a move"""
         self._paused_s = -math.inf
 
     def break_off(self, now_s: float) -> None:
-        """End the present move, and wait for its outcome."""
+        """End the present move at `now_s`, and wait for its outcome."""
         self._move, self._paused_s = None, now_s
 
     def free(self, now_s: float, lag_s: float) -> bool:
-        """Return whether no move is in progress and the last one's outcome is seen, `lag_s` after its end."""
+        """Return whether the next move may begin: `lag_s` after the end of the last one, when its outcome is seen."""
         if self._move is not None and now_s >= self._move[0] + self._move[1]:
             self.break_off(now_s)
         return self._move is None and now_s - self._paused_s > lag_s
 
     def velocity_m_s(self, now_s: float) -> Vector3:
-        """Return the velocity of the present move, in the tool frame."""
+        """Return the velocity of the present move, in the tool's frame."""
         if self._move is None:
             return (0.0, 0.0, 0.0)
         began_s, lasts_s, (x, y, z) = self._move
@@ -45,7 +47,7 @@ class MoveAndWait:
         return (shape * x, shape * y, shape * z)
 
     def begin(self, now_s: float, by_m: Vector3, across_m_s: float, along_m_s: float) -> None:
-        """Begin the quickest move within `across_m_s` (x, y) and `along_m_s` (z)."""
+        """Begin the quickest move by `by_m`, with speeds up to `across_m_s` in x, y and `along_m_s` in z."""
         x, y, z = by_m
         lasts_s = max(_LEAST_S, _PEAK * max(math.hypot(x, y) / across_m_s, abs(z) / along_m_s))
         self._move = now_s, lasts_s, by_m

@@ -1,1 +1,1 @@
-"""Messages to the robot side: commands, lease, tuning wishes, and their sending."""
+"""Commands and tuning requests to the robot side and their sending; lease and stiffness from it."""

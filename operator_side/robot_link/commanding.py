@@ -1,4 +1,4 @@
-"""Messages to the robot side: the hands' intent, or a stop pressed elsewhere, as commands."""
+"""Messages to the robot side: commands, made from the operator's intent or an emergency stop, and Hellos."""
 
 import math
 from operator import attrgetter
@@ -11,15 +11,15 @@ from common.silence import LONGEST_HELD_S, MOTION_PERIOD_S
 from operator_side.hands.intent import OperatorIntent
 
 STOP_HELD_S: Final = 0.2
-"""Least duration of a stop that was pressed away from the controller, in seconds."""
+"""Minimum time, in seconds, for which a stop pressed elsewhere than on the controller is held"""
 HEARTBEAT_PERIOD_S: Final = 0.2
-"""Period of Hellos while nothing else is sent: the first opens the session, later ones show that we are alive."""
+"""Seconds between Hellos while no command is sent. The first opens the session; later ones keep it open."""
 _NOTICED: Final = 0.01
-"""Largest change of a travel or a stick that may wait; the triggers' own noise is less."""
+"""Maximum change of a travel or a deflection that need not be sent at once; sensor noise is below it"""
 _LATEST_S: Final = LONGEST_HELD_S - MOTION_PERIOD_S / 2.0
-"""Time after which a command is sent: in the turn nearest to `LONGEST_HELD_S`, early or late."""
+"""Seconds since the last command after which the next is sent: in the turn nearest to `LONGEST_HELD_S`"""
 STOPPING: Final = OperatorIntent(emergency_stop=True)
-"""Intent while the stop is held, whatever the hands do."""
+"""Intent while a stop is held, whatever the controller's inputs are"""
 
 _BUTTONS: Final = ("run", "arm", "emergency_stop", "next_target", "hand_over")
 _NAMES: Final = ("l2", "r2", "lateral", "turning", *_BUTTONS)
@@ -32,11 +32,14 @@ class ToRobot(NamedTuple):
 
     payload: bytes
     everywhere: bool = False
-    """Send over every connection, as it must arrive soon; else over the next in turn."""
+    """Whether to send over every connection, because the message is urgent; otherwise over the next one in turn"""
 
 
 class StopButton:
-    """Emergency stop besides the controller's: held for a while, and until the robot side reports `stopped`."""
+    """Emergency stop pressed elsewhere than on the controller.
+
+    It counts as held for at least STOP_HELD_S, and until the robot side reports `stopped`.
+    """
 
     def __init__(self) -> None:
         self.presses = 0
@@ -44,42 +47,43 @@ class StopButton:
         self._holds = False
 
     def press(self, now_s: float) -> None:
-        """Note that it is pressed, or still is."""
+        """Note that the stop is pressed, or still held."""
         self.presses += not self._holds
         self._pressed_s, self._holds = now_s, True
 
     def holds(self, now_s: float, state: MotionState | None) -> bool:
-        """Return whether it counts as held at `now_s`. state: the robot's newest known one, None for unknown."""
+        """Return whether the stop counts as held at `now_s`. state: newest state of the arm; None if unknown."""
         if self._holds and now_s - self._pressed_s >= STOP_HELD_S and state == "stopped":
             self._holds = False
         return self._holds
 
     def forget(self) -> None:
-        """Release it: another operator owns the robot, and the stop is theirs."""
+        """Release the stop, as another operator has the lease now and must stop the arm themselves."""
         self._holds = False
 
 
 class HeldCommand:
-    """Command that the robot side holds until the next one (zero-order hold), and the time at which that is due.
+    """Last command sent, which the robot side holds until the next one (zero-order hold); decides when the next is due.
 
-    A change of travel that no finger makes on purpose may wait for the next command, 16 ms at most.
+    A change of travel or deflection of at most 0.01 is sent with the next command, at most 16 ms later.
     """
 
     def __init__(self, *, full_rate: bool = False) -> None:
-        """full_rate: send every command."""
+        """full_rate: send a command in every turn of the loop."""
         self._full_rate = full_rate
         self.forget()
 
     def forget(self) -> None:
-        """Note that the robot side holds no command of ours: send the next one at once."""
+        """Note that the robot side holds no command of ours, so that the next one is sent at once."""
         self._pressed: tuple[float, ...] = ()
         self._moved: tuple[float, ...] = ()
         self._sent_s = -math.inf
 
     def due(self, intent: OperatorIntent, token: int, now_s: float) -> ToRobot | None:
-        """Return the message, still without payload; None if the command may wait.
+        """Return a message without payload, for the caller to fill; None if the command may wait.
 
-        Due at once: a button, another token, a travel or stick by more than 0.01, and rest, which is sent exactly.
+        A command is due at once if a button or the lease's token has changed, if a travel or deflection has changed by
+        more than 0.01, or if all have come to rest.
         """
         pressed = (*_PRESSED(intent), intent.gripper, token)
         moved = (intent.l2, intent.r2, *intent.lateral, *intent.turning)
@@ -92,10 +96,10 @@ class HeldCommand:
 
 
 class Commands:
-    """Source of commands from the intent, else of a Hello each period."""
+    """Makes the messages to the robot side: commands from the intent, and Hellos while there are none."""
 
     def __init__(self, link: LinkEnd, compensation: Compensation, *, full_rate: bool) -> None:
-        """full_rate: as HeldCommand's."""
+        """full_rate: send a command in every turn of the loop."""
         self.sent = 0
         self.stop_button = StopButton()
         self.held = HeldCommand(full_rate=full_rate)
@@ -103,7 +107,7 @@ class Commands:
         self._hello_s = -math.inf
 
     def due(self, intent: OperatorIntent, token: int, now_s: float) -> tuple[ToRobot, MotionCommand] | None:
-        """Return the message to send now, and its command; None if it may wait."""
+        """Return the message to send now, and the command in it; None if the command may wait."""
         if (leaving := self.held.due(intent, token, now_s)) is None:
             return None
         meant = dict(zip(_NAMES, _MEANT(intent), strict=True)) | {"gripper": float(intent.gripper), "token": token}

@@ -9,41 +9,42 @@ from common.status.codes import LinkState
 from operator_side.robot_link.newest import overtakes
 
 NOTICE_EXPIRES_S: Final = 0.5
-"""Age at which a notice of the lease expires, in seconds."""
+"""Age at which a LeaseNotice expires, in seconds"""
 REPORT_EXPIRES_S: Final = 2.0
-"""Age at which a report of the link expires, in seconds."""
+"""Age at which a LinkReport expires, in seconds"""
 _NEW_EPOCH_S: Final = 5.0
-"""Time after a new epoch in which a notice of an end may still be about the epoch before, in seconds."""
+"""Seconds after we begin an epoch in which a notice that the session has ended may be about the epoch before"""
 _REMEMBERED: Final = 100
+"""Maximum length of the history"""
 
 
 class LeaseState:
-    """Lease and link as last heard."""
+    """Lease and link as the robot side last reported them."""
 
     def __init__(self) -> None:
         self.lease: LeaseNotice | None = None
-        """Newest notice; None before the first and once it has expired."""
+        """Newest LeaseNotice; None before the first and once it has expired."""
         self.stop_reason: str | None = None
-        """Reason of the newest notice by which the arm must not move; becoming ready to arm keeps it."""
+        """Reason in the newest notice that the arm is stopped or disarmed; None before the first such notice."""
         self.history: list[str] = []
-        """Our standings in turn, the latest ones."""
+        """Latest session states of this operator, oldest first; "owner" while it had the lease"""
         self.other_version: str | None = None
-        """Error of the robot side's messages while they are of another version; else None"""
+        """Error text while the robot side's messages have another protocol version; else None"""
         self._heard_s = self._reported_s = 0.0
         self._report: LinkReport | None = None
         self._anew_s = -math.inf
 
     @property
     def owns(self) -> bool:
-        """Whether our commands count."""
+        """Whether we have the lease, so that our commands count."""
         return self.lease is not None and self.lease.session in OWNING
 
     def follow(self, notice: LeaseNotice, now_s: float) -> bool:
-        """Take a notice; return whether we must start a new epoch, because the robot side forgot us."""
+        """Take a notice; return whether we must begin a new epoch, because the robot side has ended our session."""
         restarted = now_s - self._anew_s < _NEW_EPOCH_S
         known = None if self.lease is None else self.lease.session
         if restarted and notice.session is SessionState.ENDED and known not in (None, SessionState.ENDED):
-            return False  # the epoch before, by a slower connection
+            return False  # about the epoch before: it came over a slower connection
         standing = "owner" if notice.session in OWNING else str(notice.session)
         if not self.history or self.history[-1] != standing:
             self.history = [*self.history, standing][-_REMEMBERED:]
@@ -56,12 +57,15 @@ class LeaseState:
         return True
 
     def note(self, report: LinkReport, now_s: float) -> None:
-        """Take a report of the link; one that was overtaken is dropped."""
+        """Take a LinkReport; drop it if a newer one has arrived."""
         if overtakes(report.header, None if self._report is None else self._report.header):
             self._report, self._reported_s = report, now_s
 
     def status_fields(self, now_s: float, *, linked: bool, heard: bool) -> dict[str, Any]:
-        """Return a status's fields about the link. linked: stiffness arrives; heard: some has arrived before."""
+        """Return the fields of OperatorStatus about the link.
+
+        linked: stiffness messages arrive. heard: at least one has arrived before.
+        """
         link, reason = self._link(linked=linked, heard=heard)
         fields: dict[str, Any] = {"link": link, "link_reason": reason}
         if self.lease is not None:
@@ -84,10 +88,10 @@ class LeaseState:
         return LinkState.LOST if heard else LinkState.WAITING, None
 
     def expire(self, now_s: float) -> None:
-        """Forget the lease once the last notice is too old."""
+        """Forget the lease if the newest notice has expired."""
         if now_s - self._heard_s > NOTICE_EXPIRES_S:
             self.lease = None
 
     def forget(self) -> None:
-        """Forget the lease, as it was another robot side's."""
+        """Forget the lease, as the robot side has restarted."""
         self.lease = self.stop_reason = None

@@ -1,4 +1,4 @@
-"""Sending of messages: through the emulated link to the sockets, with a measure of the queue before it."""
+"""Sends messages through the emulated link to the sockets, and measures their queueing delay."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -13,7 +13,7 @@ from operator_side.robot_link.commanding import ToRobot
 
 
 class Sending:
-    """Sender without rate control: commands are few, and nothing here can yield to them."""
+    """Sender of messages to the robot side, without rate control: there are only small, urgent messages."""
 
     def __init__(self, link: LinkSpec, sockets: OperatorSockets) -> None:
         self._link = link
@@ -24,23 +24,23 @@ class Sending:
         self._budget: Budget[str] = Budget()
 
     def push(self, messages: Iterable[ToRobot], now_s: float) -> None:
-        """Queue the messages of the core and of the console."""
+        """Put messages of the core and of the console into the emulated link."""
         for message in messages:
             self._budget.spend("haptics", len(message.payload), now_s)
             self.line.push(now_s, message, len(message.payload))
 
     def measure(self, queue: OutgoingQueue, now_s: float) -> None:
-        """Take in the echoes that have arrived. queue: the one before our messages."""
+        """Update the queueing delay. queue: measurement of the queue that our messages wait in, from echoes."""
         self._budget.hear(queue, now_s)
         self._budget.take(now_s)
 
     def send(self, now_s: float) -> bool:
-        """Send the due messages; False if no connection took one of them."""
+        """Send the messages that leave the emulated link now; return False if any was taken by no connection."""
         taken = [self._sockets.send(one.payload, everywhere=one.everywhere) for one in self.line.pop(now_s)]
         return all(taken)
 
     def tune(self, words: str) -> None:
-        """Emulate the link of `words` from now on."""
+        """Emulate the link `words`, in netem's words, from now on."""
         self._link = tuned_link(self._link, words)
         self.line.change(self._link.profile("to_robot"))
 
@@ -52,10 +52,10 @@ class Sending:
 
     @property
     def queue_ms(self) -> float:
-        """Queueing delay of our messages now, in milliseconds."""
+        """Present queueing delay of our messages, in milliseconds."""
         return self._budget.status()["queue_ms"]
 
     def summary(self) -> dict[str, Any]:
-        """Return `link`, as it was emulated, and `rate`."""
+        """Return the run's figures: `link`, the emulated link, and `rate`, sending rate and queueing delay."""
         link = link_summary("to_robot", {"haptics": self.line})
         return {"link": link, "rate": {"operator": self._budget.summary()}}

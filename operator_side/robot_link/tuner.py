@@ -1,4 +1,4 @@
-"""Tuning wishes of the person at this side, repeated until the robot side has received them."""
+"""Tuning requests of this operator (another P or link), repeated until the robot side has received them."""
 
 import math
 from collections import deque
@@ -11,19 +11,21 @@ from common.protocol.messages import LeaseNotice, Tune
 from operator_side.robot_link.lease_state import LeaseState
 
 _REPEATED_S: Final = 0.1
+"""Seconds between repetitions of a request"""
 _REMEMBERED: Final = 1000
+"""Maximum number of requests in the summary"""
 
 
 class Tuner:
-    """The newest wish; one for P and one for the link are merged."""
+    """Newest tuning request. Requests for P and for the link that are both still unreceived are merged."""
 
     def __init__(self) -> None:
         self.refused = 0
-        """Number of refused wishes."""
+        """Number of refused requests."""
         self.why = ""
-        """Reason for the last refusal, in one line; empty once a wish is accepted."""
+        """Reason why the last request was refused, in one line; empty if it was accepted."""
         self.link: str | None = None
-        """Link of the last wish; None before the first."""
+        """Link in the last accepted request that had one; None before the first."""
         self._number = 0
         self._probability: float | None = None
         self._words: str | None = None
@@ -32,7 +34,10 @@ class Tuner:
         self._asked: deque[dict[str, Any]] = deque(maxlen=_REMEMBERED)
 
     def ask(self, probability: float | None, link: str | None, standing: LeaseState, now_s: float) -> None:
-        """Take a wish. Refuse it whole if the run does not permit it, or if P or link is invalid."""
+        """Take a request for another P or link; None leaves a value unchanged.
+
+        The whole request is refused if the run does not permit tuning, or if P or link is invalid.
+        """
         lease = standing.lease
         try:
             if lease is None or not standing.owns or not lease.may_tune:
@@ -57,17 +62,17 @@ class Tuner:
         self._asked.append({"at_s": now_s, "probability": probability, "link": link})
 
     def due(self, lease: LeaseNotice | None, link_end: LinkEnd, now_s: float) -> Tune | None:
-        """Return the message to send now; None without a wish, or once the robot side has received it."""
+        """Return the message to send now; None if none is due, or the robot side has received the request."""
         if lease is None or not lease.may_tune or self._number <= lease.tuned or now_s - self._sent_s < _REPEATED_S:
             return None
         self._sent_s = now_s
         return Tune(link_end.stamp(now_s), self._number, self._probability, self._words)
 
     def take_link(self) -> str | None:
-        """Return the link wished for since the last call, for this side's own line; None for none."""
+        """Return the link requested since the last call, for this side to emulate; None if none was."""
         words, self._own = self._own, None
         return words
 
     def summary(self) -> dict[str, Any]:
-        """Return the wishes, with their times on this machine's clock, and the number refused."""
+        """Return the accepted requests, with their times on this machine's clock, and the number of refused ones."""
         return {"asked": list(self._asked), "refused": self.refused}

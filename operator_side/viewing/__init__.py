@@ -1,1 +1,1 @@
-"""Views of this side for a person: facts of the core, the terminal, the console and its pages."""
+"""Views of a run for a person at the operator side: facts from the core, shown in the terminal or on console pages."""

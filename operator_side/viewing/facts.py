@@ -1,6 +1,6 @@
 """Facts of a run at one moment, as the operator side knows them.
 
-Source of the console, the terminal view and the recording.
+The console, the terminal view and the recording are made from these facts.
 """
 
 from enum import StrEnum
@@ -21,45 +21,46 @@ class TriggerFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     travel: float | None
     """Calibrated travel, 0 to 1; None without a controller"""
     raw: float | None
-    """Raw travel as the controller reports it, 0 to 1: the zones divide it"""
+    """Raw travel as the controller reports it, 0 to 1; None without a controller"""
     zones: Ten
-    """Strength of each tenth of the travel as last written, 0 to 8"""
+    """Strength of each of the ten zones as last written to the controller, 0 to 8"""
     meets: int
-    """Strength at the finger's present travel, 0 to 8"""
+    """Strength of the zone at the present travel, 0 to 8"""
     free: float
-    """Calibrated travel at which it stiffens, 0 to 1"""
+    """Calibrated travel, 0 to 1, at which the first zone with a strength above 0 begins"""
     stiffness: float | None
-    """s(δ) by the robot side, 0 to 1; None without a field"""
+    """Stiffness s(δ) of §4.2, computed by the robot side, 0 to 1; None without a stiffness field"""
     needed_m: float | None
-    """D at the present travel, the distance to feel ahead; None without a field"""
+    """Distance D_z (`feel/zones.py`) that must be felt ahead at the present travel; None without a field"""
     fast_m: tuple[float, ...]
-    """Onset distances of the eight strengths; empty without a field"""
+    """Onset distances of the eight strengths, for fast zones (45 mm/s or more); empty without a field"""
     slow_m: tuple[float, ...]
+    """Onset distances of the eight strengths, for slow zones (below 45 mm/s); empty without a field"""
 
 
 class DelayFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Delay in one direction of the link, over the last second."""
 
     asked: str
-    """Emulated profile in the grammar's words; empty for none, or if the other side emulates it"""
+    """Delay profile that this side emulates, in netem's words; empty if it emulates none"""
     mean_ms: float | None
     p99_ms: float | None
     newest_ms: float | None
 
 
 class HandsFacts(msgspec.Struct, frozen=True):
-    """Facts for a page that drives, or that must say why it cannot."""
+    """Facts for a console page: whether it may drive the arm, and which page does."""
 
     may_drive: bool
-    """Whether a page may drive: not while a real controller does"""
+    """Whether pages may drive the arm; False if a real controller drives"""
     driver: str | None
-    """Word that identifies the page that drives; None for none"""
+    """Word by which the driving page identifies itself; None if no page drives"""
     person: bool
-    """Whether there is a scripted person to continue"""
+    """Whether a page may hand the controls back to a scripted person"""
     tuning_refused: str
-    """Reason why the last tuning wish was refused; empty if it was not"""
+    """Reason why the last request to change P or the link was refused; empty if it was not"""
     link_asked: str | None
-    """Link of this side's last tuning wish, in netem's words; None before the first"""
+    """Link that this side last asked to emulate, in netem's words; None before the first request"""
     counts: float = 1.0
     """Share of a page's motion that counts, 0 to 1: less while the pictures are old"""
     reset_first: bool = False
@@ -76,10 +77,10 @@ class PictureFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SceneFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Overlap and tick times of the robot side's scene."""
+    """Overlap, and the robot side's tick times."""
 
     overlap_mm3: float
-    """Overlap of the trigger that has more ahead"""
+    """Overlap with all objects along the trigger for which the sum is larger"""
     tick_us: float
     tick_p99_us: float
     overruns: int
@@ -89,9 +90,9 @@ class OperatorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Facts of the operator side at one moment."""
 
     now_s: float
-    """Time on this machine's monotonic clock, which is the console's, too"""
+    """Time on this machine's monotonic clock, which the console reads, too"""
     offset_s: float | None
-    """Robot side's clock minus ours: a stamp of the robot side minus this is our time; None while unknown"""
+    """Clock offset: the robot side's clock minus ours; None while unknown"""
     status: OperatorStatus
     screen: Telemetry | None
     """Newest telemetry of the robot side"""
@@ -100,38 +101,42 @@ class OperatorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rumble: float
     """Stronger motor's drive as last written, 0 to 1"""
     advancing: Literal["L2", "R2"]
-    """Trigger that advances"""
+    """Trigger that moves the gripper forward"""
     to_operator: DelayFacts
     to_robot: DelayFacts
-    """Estimate: the round trip less the delay to here, or half the round trip if that is unknown"""
+    """Estimate: the round trip less the delay to the operator; half the round trip if that delay is unknown"""
     round_trip_ms: float | None
     field_age_ms: float | None
-    """Time since the newest stiffness arrived; None before the first"""
+    """Time since the newest stiffness message arrived; None before the first"""
     hands: Hands
+    """Owner of the controls: a controller, a scripted person or a browser"""
     may_tune: bool
     """Whether this operator may change P and the emulated link"""
     probability: float | None
-    """P of the robot side; None while unknown"""
+    """Probability P of eq. 10, as the robot side uses it; None while unknown"""
     page: HandsFacts | None = None
-    """None if pages can neither drive nor stop"""
+    """Facts for console pages; None if pages can neither drive nor stop the arm"""
     pictures: PictureFacts | None = None
     scene: SceneFacts | None = None
     robot: RobotStatus | None = None
-    """Given where both sides' statuses are known: in the demo, and in a recording of both"""
+    """Robot side's status, where both sides run in one process or recording; else None"""
 
 
 class ShownKind(StrEnum):
-    """Kinds of messages to a page."""
+    """Kind of a message to a console page."""
 
     RUN = "run"
-    """Constants of a run"""
+    """Constants of a run: title, and whether it is live"""
     FACTS = "facts"
     SCENE = "scene"
     NOTE = "note"
     PLAYER = "player"
-    """Position in a recording"""
+    """Position in a recording, its length, speed and pause"""
+    ENDED = "ended"
+    """The run has ended normally"""
     END = "end"
-    """End of a round: the next message follows once the page has taken all up to here"""
+    """End of a batch: the next batch follows once the page has confirmed this one"""
 
 
 FACTS_PERIOD_S = 1.0 / 30.0
+"""Period of facts to the console and the recording, in seconds"""

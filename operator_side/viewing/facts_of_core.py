@@ -1,4 +1,4 @@
-"""Facts from the core: computed only while somebody watches."""
+"""Compute the facts of the operator side from its core, only while they are shown or recorded."""
 
 import math
 from collections.abc import Iterable
@@ -25,11 +25,11 @@ _TAIL: Final = 0.99
 
 
 class Surroundings(msgspec.Struct, frozen=True):
-    """Facts that the core does not know."""
+    """Facts that the core does not have and the process adds."""
 
     hands: Hands
     asked_to_robot: str = ""
-    """Profile that this side emulates, in the grammar's words"""
+    """Delay profile that this side emulates towards the robot, in netem's words"""
     page: HandsFacts | None = None
     pictures: PictureFacts | None = None
 
@@ -37,7 +37,10 @@ class Surroundings(msgspec.Struct, frozen=True):
 def operator_facts(
     core: OperatorSide, status: OperatorStatus, around: Surroundings, now_s: float, scene: SceneFacts | None = None
 ) -> OperatorFacts:
-    """Compute the facts of `now_s`. status: `core.status(now_s)`, with the process's fields."""
+    """Compute the facts at `now_s`.
+
+    status: `core.status(now_s)`, completed with the fields that only the process knows.
+    """
     felt, written, lease = core.stiffness, core.haptics.written, core.lease
     pulled = [status.l2_pulled, status.r2_pulled]
     order = -1 if core.settings.swap_sides else 1
@@ -90,7 +93,10 @@ def operator_facts(
 
 
 def _back(there_s: float | None, both_s: float | None) -> float | None:
-    """Estimate the delay to the robot: the round trip less the delay to here, or half of it if that is unknown."""
+    """Estimate the delay to the robot: the round trip less the delay from the robot.
+
+    If the delay from the robot is unknown, half the round trip.
+    """
     if both_s is None:
         return None
     return both_s / 2.0 if there_s is None else max(0.0, both_s - there_s)

@@ -1,4 +1,4 @@
-"""Viewers of a run at this side: the console, and the requests to the robot side to render for it."""
+"""Feed the console and the terminal view, and ask the robot side for the pictures and the scene that they show."""
 
 import contextlib
 import math
@@ -22,24 +22,29 @@ from operator_side.viewing.facts_of_core import Surroundings, operator_facts
 from operator_side.viewing.pages.driving_page import DrivingPage
 
 _WATCH_PERIOD_S: Final = 0.25
+_EXPECT_PERIOD_S: Final = 10.0
+"""Seconds between Watch messages while no page is visible"""
 _TELEMETRY_TOPIC: Final = b"telemetry"
 
 
 def view_topics(settings: OperatorSettings) -> tuple[bytes, ...]:
-    """Return the topics to subscribe to: pictures only with a console."""
+    """Return the topics to subscribe to.
+
+    Telemetry always; the scene with the console, `--tui` or `--status facts`; pictures only with the console.
+    """
     scene = (SCENE_TOPIC,) if settings.console or settings.tells_facts else ()
     return (_TELEMETRY_TOPIC, *scene, *((VIDEO_TOPIC,) if settings.console else ()))
 
 
 class SceneFigures:
-    """Overlap and tick times of the robot side's scene."""
+    """Newest overlap and tick times from the robot side's scene messages."""
 
     def __init__(self) -> None:
         self.newest: SceneFacts | None = None
         """Newest figures; None before the first"""
 
     def take(self, payload: bytes) -> None:
-        """Take a payload of the topic `scene`; ignore shapes, which are large, and invalid ones."""
+        """Take a payload of the topic `scene`. Shapes, which are large, and invalid payloads are ignored."""
         with contextlib.suppress(RemoteProtocolError):
             if claims_to_be("scene", payload) and isinstance(state := decode_view(payload), SceneState):
                 by_trigger = zip(*((l2, r2) for _, l2, r2 in state.overlaps), strict=True)
@@ -48,7 +53,7 @@ class SceneFigures:
 
 
 class Viewing:
-    """Feed of the viewers; without one it requests nothing."""
+    """Feed of the console, the terminal view and the recording; views are requested only while somebody watches."""
 
     def __init__(
         self,
@@ -59,7 +64,7 @@ class Viewing:
         console: Console | None,
         recording: SideRecording | None = None,
     ) -> None:
-        """surroundings: those of a time. pages: receives the messages of the console's pages."""
+        """surroundings: called with a time for its Surroundings. pages: gets the messages of the console's pages."""
         self.console = console
         self._pages = pages
         self._recording = recording
@@ -70,17 +75,20 @@ class Viewing:
         self._joining = {topic: Joining(VIEW_MAXIMUM_BYTES) for topic in (VIDEO_TOPIC, SCENE_TOPIC)}
         self._reported: str | None = None
         self._asked = False
-        """Whether the newest Watch requests a whole picture"""
+        """Whether the newest Watch message reported lacking H.264 pictures, so that whole ones come"""
         self._watch_s = self._facts_s = -math.inf
+        self.has_shown_picture = False
+        """Whether a picture has been sent to a page"""
+        self._open_pages = 0
 
     def note(self, text: str) -> None:
-        """Show a lasting line on the status and on the console."""
+        """Show a line that stays, in the status and on the console."""
         self._status.note(text)
         if self.console is not None:
             self.console.note(text)
 
     def take(self, topic: bytes, payload: bytes, now_s: float) -> bool:
-        """Take a view payload for viewers, once its pieces are joined; False for one of the core."""
+        """Take a payload, and show it once its pieces are joined; return False if its topic is not a view's."""
         of, is_piece, _ = topic.partition(PIECE)
         if of not in self._joining:
             return False
@@ -93,19 +101,24 @@ class Viewing:
             self._pages.pictures.take(payload, now_s)
         if self.console is not None:
             self.console.view(payload, video=topic == VIDEO_TOPIC)
+            self.has_shown_picture |= topic == VIDEO_TOPIC and self.console.pages > 0
         return True
 
     def requests(self, now_s: float) -> list[bytes]:
-        """Return the messages to send now: the views that are watched, while any is."""
+        """Return the Watch message if one is due now; rarely one is due while nobody watches."""
         if self.console is not None:
             self._hear(self.console, now_s)
         pages = self.console is not None and self.console.pages > 0
         lacks = None if self.console is None else self.console.lacks
         stands_still = lacks is not None and any(lacks) and not self._asked
-        if not (pages or self._status.wants_facts) or (now_s - self._watch_s < _WATCH_PERIOD_S and not stands_still):
+        watches = pages or self._status.wants_facts
+        if not watches and (self.console is None or self.console.address is None):
+            return []
+        # While nobody watches, a Watch only lets the robot side keep its drawing process ready.
+        if now_s - self._watch_s < (_WATCH_PERIOD_S if watches else _EXPECT_PERIOD_S) and not (pages and stands_still):
             return []
         self._watch_s, self._asked = now_s, lacks is not None and any(lacks)
-        watch = Watch(self._core.link.stamp(now_s), overview=pages, first_person=pages, scene=True, lacks=lacks)
+        watch = Watch(self._core.link.stamp(now_s), overview=pages, first_person=pages, scene=watches, lacks=lacks)
         if self._recording is not None:
             self._recording.noted.append((Kind.WATCHED, now_s, b""))
         return [encode(watch)]
@@ -116,17 +129,22 @@ class Viewing:
             page, said = console.words.popleft()
             if said is None:
                 self._pages.close(page, now_s)
+            elif said.pop("again", False):
+                self._status.event("again")
             else:
                 self._pages.receive(page, said, now_s)
 
     def facts_due(self, now_s: float) -> bool:
-        """Return whether to call `show`."""
+        """Return whether `show` is due. Also show the console's notes and its new address."""
         shown = self.console is not None and self._looks_at_console(self.console)
         return (shown or self._recording is not None) and now_s - self._facts_s >= FACTS_PERIOD_S
 
     def _looks_at_console(self, console: Console) -> bool:
         for text in console.take_notes():
             self._status.note(text)
+        if console.pages != self._open_pages:
+            self._open_pages = console.pages
+            self._status.event("pages", count=console.pages)
         if console.address not in (None, self._reported):
             self._reported = console.address
             if not self._status.event("console", address=self._reported):
@@ -134,7 +152,7 @@ class Viewing:
         return console.pages > 0
 
     def show(self, status: OperatorStatus, now_s: float) -> None:
-        """Show and record the facts of `now_s`. status: with the process's fields."""
+        """Show the facts at `now_s` on the console, and record them. status: as of `operator_facts`."""
         self._facts_s = now_s if now_s - self._facts_s > 2 * FACTS_PERIOD_S else self._facts_s + FACTS_PERIOD_S
         facts = operator_facts(self._core, status, self._surroundings(now_s), now_s)
         if self.console is not None:
@@ -143,7 +161,7 @@ class Viewing:
             self._recording.facts(now_s, facts)
 
     def tell(self, status: OperatorStatus, now_s: float) -> None:
-        """Print the status of `now_s`, and the facts if the status wants them."""
+        """Show the status at `now_s`, with the facts for `--tui` or `--status facts`."""
         self._status.show(now_s, operator=status)
         if self._status.wants_facts:
             around, scene = self._surroundings(now_s), self._figures.newest

@@ -1,4 +1,4 @@
-"""Traffic between two clocks in virtual time, through both ends of a link, beside the truth."""
+"""Simulated traffic between two sides with different clocks, and the true offset and delays to compare with."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ Shape = Literal["normal", "exponential"]
 
 @dataclass(frozen=True)
 class Way:
-    """One direction's delays in seconds: normal about `base_s`, or exponential above it; `loss` is a share."""
+    """Delays of one direction, in seconds: normal about `base_s`, or exponential above it. loss: share of messages."""
 
     shape: Shape
     base_s: float
@@ -39,31 +39,31 @@ class Way:
 
 @dataclass(frozen=True)
 class Scenario:
-    """Link and two clocks."""
+    """Delays of both directions of a link, and how the two clocks differ."""
 
     to_robot: Way
     to_operator: Way
     skew: float
-    """Relative rate by which the operator's clock gains on the robot's."""
+    """Seconds that the operator's clock gains on the robot's in one second"""
     asymmetry_s: float = 0.0
-    """Least delay to the robot minus that to the operator, in seconds."""
+    """Minimum delay to the robot minus minimum delay to the operator, in seconds"""
 
 
 @dataclass(frozen=True)
 class OperatorClock:
-    """Operator's clock as a function of the robot's, which shows the true time."""
+    """The operator's clock, as a function of the robot's clock, which counts as the true time."""
 
     ahead_s: float
     skew: float
 
     def reads(self, true_s: float) -> float:
-        """Return the reading at `true_s`."""
+        """Return what this clock shows at the true time `true_s`."""
         return true_s * (1.0 + self.skew) + self.ahead_s
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """One end's estimate of the other's clock at an arrival, beside the truth."""
+    """Errors of one side's estimates when a message arrives: of the other clock's offset and of the one-way delay."""
 
     side: Literal["robot", "operator"]
     at_s: float
@@ -73,7 +73,7 @@ class Estimate:
 
 
 class Traffic:
-    """Two ends that send at their real rates for `duration_s`; iterate to run them."""
+    """Both ends of a link, which send at their real rates for `duration_s`; iterating runs them."""
 
     def __init__(self, scenario: Scenario, seed: int, duration_s: float) -> None:
         generator = np.random.default_rng([seed, 4])

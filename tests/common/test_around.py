@@ -1,4 +1,4 @@
-"""Map from around: refusals of impossible values, rounding to shorter distances, and comparison."""
+"""Map of onset distances at places that sticks may reach: refused values, rounding downwards, comparison."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Ranges declared once, in a field's type hint."""
+"""Ranges that are declared only in a field's type hint: values outside are refused."""
 
 import dataclasses
 import importlib
@@ -85,11 +85,11 @@ NEEDS: dict[type, tuple[float, ...]] = {
     **{Chance: (0.5,), Rate: (1.0,), Outage: (1.0, 1.0), RandomLoss: (0.5,), GilbertElliott: (0.5, 0.5)},
     Firmware: (0, 0, 0),
 }
-"""Arguments without a default."""
+"""Values for the fields of a class that have no default"""
 
 
 def ranges(hint: Any) -> Iterator[tuple[type, Meta]]:
-    """Yield the type and range of a field, and of a tuple's items."""
+    """Yield type and range of a field by its type hint; for a tuple, those of its items."""
     kind, *rest = get_args(hint) if get_args(hint) else (hint,)
     if get_origin(hint) is Annotated and (metas := [one for one in rest if isinstance(one, Meta)]):
         yield kind, metas[0]

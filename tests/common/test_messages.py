@@ -1,4 +1,4 @@
-"""Messages on the wire: unchanged by a round trip, valid MessagePack, and refused whole for a bad field."""
+"""Messages are unchanged by encoding and decoding, are valid MessagePack, and are refused whole for one bad field."""
 
 import math
 import struct
@@ -121,7 +121,7 @@ def packed_by_msgpack(message: Message) -> bytes:
 
 
 def said(message: Message) -> dict[str, Any]:
-    """Flatten the message's values by name."""
+    """Return the message's values by name, those of nested structures included."""
     found: dict[str, Any] = {}
     for name, value in msgspec.structs.asdict(message).items():
         is_field = isinstance(value, TriggerField | Around)
@@ -243,7 +243,7 @@ def test_every_kind_of_them_was_measured() -> None:
 
 
 def survives(hostile: bytes) -> AnyMessage | None:
-    """Return None for refused bytes; otherwise the message, checked to be valid throughout."""
+    """Decode bytes; return None if they are refused, else the message, which must encode and decode unchanged."""
     try:
         message = decode(hostile)
     except RemoteProtocolError:
@@ -359,7 +359,10 @@ def test_what_is_checked_by_hand_is_refused_when_made(valid: Any, changes: dict[
 
 
 def declared() -> list[tuple[Any, str, Any]]:
-    """Return the values just outside each range that a message class declares."""
+    """Return values that fields with a declared range must refuse, as (message, field, value).
+
+    Texts and integers are just outside the range; floats are NaN or infinite.
+    """
     found: list[tuple[Any, str, Any]] = []
     samples = [VIEWS[0], VALID[0], control.Tune(HEADER, 1), control.LeaseNotice(HEADER, "armed", "", 1, 0)]  # type: ignore[arg-type]
     for sample in samples:

@@ -1,4 +1,4 @@
-"""Table of the session: its promises for every state, and docs/session.md, which shows the same table."""
+"""Table of the session's states: what must hold in each state, and docs/session.md, which shows the same table."""
 
 import re
 

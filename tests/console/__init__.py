@@ -1,1 +1,1 @@
-"""Console in a real browser, fed by a real run: `python -m tests.console`."""
+"""Tests of the console's page in a real browser, with data of a real run: `python -m tests.console`."""

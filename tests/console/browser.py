@@ -1,4 +1,4 @@
-"""Chromium without a screen, and a page in it whose every error is kept."""
+"""Chromium without a screen, and pages in it; every error of a page is kept."""
 
 import base64
 import io
@@ -22,7 +22,7 @@ _ARGUMENTS: Final = (
 SMALL: Final = (1280, 720)
 LARGE: Final = (1920, 1080)
 _LIMIT_MS: Final = 60_000
-"""Limit of one step in milliseconds, for a busy machine."""
+"""Time limit of one step of the browser in milliseconds, long enough for a busy machine"""
 _DRAWS_SCENE: Final = "button#drawn[aria-pressed={}]"
 _BRIGHTNESS: Final = (0.2126, 0.7152, 0.0722)
 _FAKE_GAMEPAD: Final = """
@@ -32,7 +32,7 @@ navigator.getGamepads = () => [window.pretended, null, null, null];
 
 
 class Browser:
-    """One browser; each page has a separate context, like another person's."""
+    """One browser. Each page has a separate context, as if another person had opened it."""
 
     def __init__(self, chromium: Any, out: Path) -> None:
         self._chromium = chromium
@@ -48,9 +48,10 @@ class Browser:
         gamepad: bool = False,
         script: str = "",
     ) -> Iterator["Page"]:
-        """Yield `address` open at `size`; any error of the page fails at the context's end.
+        """Yield a page that shows `address` in a window of `size`; at the end, fail if the page had any error.
 
-        scene: with the drawn scene, which without a graphics processor takes most of a core. script: runs first.
+        scene: leave the scene drawn, which takes most of a core without a graphics processor. gamepad: let
+        `Page.pretend_gamepad` work. script: JavaScript that runs before the page's own.
         """
         context = self._chromium.new_context(viewport={"width": size[0], "height": size[1]})
         context.set_default_timeout(_LIMIT_MS)
@@ -72,12 +73,12 @@ class Browser:
 
 
 class Page:
-    """Person at a page. `raw`: Playwright's page, for everything else."""
+    """A page, as a person uses it. `raw` is Playwright's page, for what this class does not offer."""
 
     def __init__(self, raw: Any, out: Path) -> None:
         self.raw = raw
         self.complaints: list[str] = []
-        """Errors on its console and uncaught ones; a check that expects some clears them."""
+        """Errors that the page logged or did not catch. A test that expects errors clears this list."""
         self._out = out
         self._tools = raw.context.new_cdp_session(raw)
         raw.on("console", lambda said: self.complaints.append(said.text) if said.type == "error" else None)
@@ -88,11 +89,11 @@ class Page:
         return str(self.raw.text_content(selector) or "").strip()
 
     def ask(self, script: str, argument: object = None) -> Any:
-        """Evaluate a piece of JavaScript."""
+        """Evaluate a piece of JavaScript in the page, and return its value."""
         return self.raw.evaluate(script, argument)
 
     def wait(self, script: str, what: str, limit_s: float = 20.0) -> None:
-        """Wait until a piece of JavaScript is true; AssertionError otherwise."""
+        """Wait until a piece of JavaScript is true; AssertionError after `limit_s`. what: its name in this error."""
         # Evaluated from here: the page's policy forbids Playwright's own waiting within the page.
         try:
             wait_until(what, lambda: bool(self.ask(script)), limit_s)
@@ -101,7 +102,7 @@ class Page:
             raise
 
     def wait_for_text(self, selector: str, words: str, limit_s: float = 20.0) -> None:
-        """Wait until an element has these words, in any case."""
+        """Wait until an element contains `words`, in upper or lower case."""
         script = f"document.querySelector({selector!r})?.textContent.toLowerCase().includes({words.lower()!r})"
         self.wait(script, f"{words!r} in {selector}", limit_s)
 
@@ -110,11 +111,14 @@ class Page:
         return np.asarray(Image.open(io.BytesIO(self.shot(selector))).convert("RGB"))
 
     def picture(self, name: str) -> None:
-        """Keep a picture of the page for people."""
+        """Write a picture of the page to a file, for people to look at."""
         (self._out / f"{name}.png").write_bytes(self.shot())
 
     def shot(self, selector: str | None = None) -> bytes:
-        """Return a PNG by Chromium's own tool: Playwright's would wait for the fonts of a busy scene."""
+        """Return a PNG of an element or of the whole page.
+
+        Chromium itself makes the picture: Playwright would wait for fonts, which takes long beside a busy scene.
+        """
         clip = {}
         if selector is not None:
             box = self.raw.locator(selector).bounding_box()
@@ -128,7 +132,7 @@ class Page:
 
     @contextmanager
     def held(self, *keys: str) -> Iterator[None]:
-        """Hold these keys down."""
+        """Hold these keys down during the context."""
         for key in keys:
             self.raw.keyboard.down(key)
         try:
@@ -138,11 +142,11 @@ class Page:
                 self.raw.keyboard.up(key)
 
     def blur(self) -> None:
-        """Take the focus from the window, as when a person goes to another one."""
+        """Take the focus from the window, as when a person goes to another window."""
         self.ask("window.dispatchEvent(new Event('blur'))")
 
     def hide(self) -> None:
-        """Hide the tab, as when a person goes to another one."""
+        """Hide the tab, as when a person goes to another tab."""
         self.ask(
             """() => {
             Object.defineProperty(document, 'visibilityState', { value: 'hidden', configurable: true });
@@ -152,7 +156,7 @@ class Page:
         )
 
     def pretend_gamepad(self, axes: tuple[float, ...], buttons: tuple[float, ...]) -> None:
-        """Simulate a gamepad in these positions, in the browser's standard order, until changed."""
+        """Simulate a gamepad with these axes and buttons, in the browser's standard order, until the next call."""
         script = """([axes, values]) => {
             const buttons = values.map((value) => ({ value, pressed: value > 0.5, touched: value > 0 }));
             const before = window.pretended;
@@ -166,19 +170,19 @@ class Page:
 
 
 def brightness(pixels: np.ndarray[Any, np.dtype[np.uint8]]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Return the brightness (height, width), 0 to 255: the picture without colours."""
+    """Return the brightness (height, width) of each pixel, 0 to 255, without regard to colour."""
     made: np.ndarray[Any, np.dtype[np.float64]] = pixels.astype(np.float64) @ np.asarray(_BRIGHTNESS)
     return made
 
 
 def border(pixels: np.ndarray[Any, np.dtype[np.uint8]], width: int = 8) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    """Return the outermost pixels (n, 3) of the page's upper edge, without corners."""
+    """Return the pixels (n, 3) of a strip along the page's upper edge, without the corners."""
     return pixels[:width, 4 * width : -4 * width].reshape(-1, 3)
 
 
 @contextmanager
 def browser(out: Path) -> Iterator[Browser]:
-    """Yield Chromium; its pictures go to `out`. Skip the test if unavailable."""
+    """Yield Chromium, which writes pictures to the folder `out`; skip the test if there is no browser."""
     program = provided_browser()
     provide_playwright()
     from playwright.sync_api import sync_playwright  # noqa: PLC0415  # not part of our environment

@@ -1,4 +1,7 @@
-"""One browser for all, and demos with a console: their person needs half a minute for the task, then rests."""
+"""One browser for all tests, and demos with a console.
+
+The scripted person of a demo needs half a minute for the task, and then rests.
+"""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -14,26 +17,26 @@ _OUT = Path("console-pictures")
 
 @pytest.fixture(scope="session", name="browser")
 def chromium() -> Iterator[Browser]:
-    """Chromium; its pictures go to console-pictures/."""
+    """Chromium, which writes pictures to the folder console-pictures/."""
     with browser(_OUT.absolute()) as opened:
         yield opened
 
 
 @pytest.fixture(scope="module")
 def link(request: pytest.FixtureRequest) -> Sequence[str]:
-    """Arguments of the demos: a module without a link has `LINK = ()`."""
+    """Arguments by which the demo emulates a link. A test module may set its own as `LINK`."""
     return getattr(request.module, "LINK", _LINK)
 
 
 @pytest.fixture(scope="module")
 def demo(link: Sequence[str]) -> Iterator[Run]:
-    """One demo for a whole module."""
+    """Demo that runs through all tests of a module."""
     with running(link) as run:
         yield run
 
 
 @pytest.fixture
 def fresh_demo(link: Sequence[str]) -> Iterator[Run]:
-    """Demo whose person has just begun."""
+    """Demo for one test, whose scripted person has just begun the task."""
     with running(link) as run:
         yield run

@@ -1,4 +1,4 @@
-"""Film of the console's page: a recorded demo, a picture at a time, however slowly a machine draws."""
+"""Film of the console's page: replays a recorded demo and takes one picture after another, even on a slow machine."""
 
 import io
 import time
@@ -20,7 +20,7 @@ from tests.helpers.machines.waiting import wait_until
 _DURATION_S: Final = 20.0
 _PERIOD_S: Final = 0.1
 _DRAWN_S: Final = 0.3
-"""Time that the scene, another site's page, needs to draw."""
+"""Seconds that the scene gets to draw: as another site's page, it cannot be asked whether it has finished"""
 _START_S: Final = 60.0
 _SIZE: Final = (960, 540)
 _QUALITY: Final = 40
@@ -30,11 +30,14 @@ WebGLRenderingContext.prototype.getParameter = function (name) {
   return name === 0x9246 ? "patient" : asked.call(this, name);
 };
 """
-"""Script for a page that draws by software: it would ask for four drawings a second; this one has time for all."""
+"""Script that makes the page believe in a graphics processor.
+
+Without one, the page would draw the scene only four times a second. A film has time for every drawing.
+"""
 
 
 def make_film(folder: Path, paths: Sequence[Path]) -> None:
-    """Film 20 s of a demo at 10 pictures a second, as a WebP."""
+    """Record 20 s of a demo, and film its replay at 10 pictures a second, as a WebP."""
     (path,) = paths
     recording = folder / "film.mcap"
     record_demo(recording, _DURATION_S)

@@ -1,4 +1,7 @@
-"""Hands of the page alone: real keys in a real browser, judged by the operator side, in virtual time."""
+"""Driving controls of the console's page by themselves, in virtual time.
+
+Keys are pressed in a real browser. The operator side's code turns what the page sends into an intent. No run exists.
+"""
 
 import functools
 import threading
@@ -56,7 +59,7 @@ class _Handler(SimpleHTTPRequestHandler):
 
 @contextmanager
 def served() -> Iterator[str]:
-    """Yield the address of the page."""
+    """Serve a page that has only the console's driving and tuning controls; yield its address."""
     server = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(_Handler, directory=str(_PLACE)))
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()
@@ -70,17 +73,20 @@ def served() -> Iterator[str]:
 
 @dataclass
 class HandsAlone:
-    """Page, and an operator side whose robot arms on request. Time passes only by `let_pass`."""
+    """The page, and a stand-in for its operator side and for a robot that arms on request.
+
+    Time passes only in `let_pass`.
+    """
 
     page: Page
     person: bool = False
     pages: DrivingPage = field(default_factory=DrivingPage)
     facts: dict[str, Any] = field(default_factory=dict)
-    """Changes to the facts of a robot that is owned from here and permits tuning"""
+    """Changes to the facts that the page gets; by default this operator has the lease, and tuning is permitted"""
     now_ms: float = 0.0
     state: str = "disarmed"
     hears: bool = True
-    """Whether messages from the page arrive, and facts come"""
+    """Whether messages of the page arrive, and the page gets facts; False: a silent link to the page"""
     messages: list[dict[str, Any]] = field(default_factory=list)
     intent: OperatorIntent | None = None
 
@@ -103,7 +109,7 @@ class HandsAlone:
             self.messages.append(message)
             self.pages.receive(1, message, now_s)
         if self.pages.rejected:
-            raise AssertionError(f"the page sent what is no message: {self.messages[-1]}")
+            raise AssertionError(f"the page sent an invalid message: {self.messages[-1]}")
         if self.pages.stopping(now_s):
             self.state = "stopped"
         screen: Telemetry = msgspec.structs.replace(VIEW, state=self.state)
@@ -139,37 +145,37 @@ class HandsAlone:
         } | self.facts
 
     def drive(self) -> None:
-        """Run until hold-to-run counts."""
+        """Press the button by which this page takes over; return when the page is ready to drive."""
         self.page.raw.click("#drive")
         self.let_pass(1.3)
         self.expect("Ready")
 
     def run(self) -> None:
-        """Run until this page moves the arm: Space is held."""
+        """Take over, then hold Space, which is hold-to-run, until this page drives."""
         self.drive()
         self.page.raw.keyboard.down("Space")
         self.let_pass(0.2)
         self.expect("You drive")
 
     def expect(self, words: str) -> None:
-        """Assert that the page says these words of the hands."""
+        """Assert that these words are in the page's line about who drives."""
         if words not in (said := self.page.text("#hands_state")):
             raise AssertionError(f"the page says {said!r}, not {words!r}; {self.pages.doing}, {self.state}")
 
     @property
     def pulled(self) -> tuple[float, float]:
-        """Meaning of the triggers: retreat and advance."""
+        """Travels of L2 (retreat) and R2 (advance) in the newest intent."""
         return (0.0, 0.0) if self.intent is None else (self.intent.l2, self.intent.r2)
 
     @property
     def runs(self) -> bool:
-        """Return whether hold-to-run is held."""
+        """Whether hold-to-run is held, by the newest intent."""
         return self.intent is not None and self.intent.run
 
 
 @contextmanager
 def hands_alone(browser: Browser, *, person: bool = False, may_drive: bool = True) -> Iterator[HandsAlone]:
-    """Yield the page open in a new browser context, at time 0."""
+    """Yield the page in a new browser context, with a clock that only `let_pass` advances."""
     with served() as address, browser.page("about:blank", gamepad=True) as page:
         page.raw.clock.install(time=0)
         page.raw.goto(address)

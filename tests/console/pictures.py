@@ -1,4 +1,4 @@
-"""Remake the documents' pictures of real runs, into docs/: `python -m tests.console.pictures [PART...]`."""
+"""Make the pictures of real runs in docs/ again: `python -m tests.console.pictures [PART...]`."""
 
 import sys
 import tempfile
@@ -20,12 +20,12 @@ PARTS: Final[Mapping[str, tuple[Sequence[str], Callable[[Path, Sequence[Path]], 
     "recording": (["console/terminal.svg", "recording/run.png"], make_pictures_of_recording),
     "film": (["console/demo.webp"], make_film),
 }
-"""Files of each part within docs/, the only content of their folders."""
+"""Files within docs/ of each part, and the function that makes them"""
 _TRIES: Final = 3
 
 
 def main(names: Sequence[str]) -> int:
-    """Make the parts; return 0 if all were made, or if no browser is available, as the last line says."""
+    """Make the parts `names`, or all parts. Return 0 if all were made, or if no browser is available; otherwise 1."""
     for name in names or PARTS:
         files, make = PARTS[name]
         paths = [DOCS / file for file in files]

@@ -22,7 +22,7 @@ _LOOK_S: Final = 0.1
 
 
 def make_first_minute(folder: Path, paths: Sequence[Path]) -> None:
-    """Keep opened, near the target, carrying, driven from the page, stopped: five PNG of 1280x720."""
+    """Write five PNG of 1280x720: page opened; near the target; carrying; driven from the page; stopped."""
     opened, near, carrying, driving, stopped = paths
     with browser(folder) as one, running(()) as run, one.page(run.address, scene=True) as page:
         _settle(page)
@@ -45,7 +45,10 @@ def make_first_minute(folder: Path, paths: Sequence[Path]) -> None:
 
 
 def _settle(page: Page) -> None:
-    """Let the person wait until all is drawn, which takes long without a graphics processor; then let them continue."""
+    """Take over from the scripted person until all is drawn, then let the person continue.
+
+    Without a graphics processor the drawing takes long.
+    """
     page.wait("document.querySelector('#drive:enabled') !== null", "a button to drive by", 60.0)
     page.ask("document.querySelector('#drive').click()")
     page.wait("!document.querySelector('#give_back').hidden", "the person's hands off", 60.0)
@@ -61,7 +64,10 @@ def _settle(page: Page) -> None:
 
 
 def _keep_stiffest(page: Page, run: Run, folder: Path, path: Path) -> None:
-    """Keep the moment of the approach when R2 resists most: sampling is too slow to wait for one."""
+    """Write the picture, taken during the approach, in which R2 resists most.
+
+    Pictures take too long to wait for a given resistance.
+    """
     most = 0
     run.wait_until("near", lambda run: max(run.facts[-1]["r2"]["zones"]) > 0, 60.0)
     while _doing(run) in ("advancing", "grasping"):
@@ -78,7 +84,7 @@ def _doing(run: Run) -> str:
 
 
 def _keep(page: Page, folder: Path, path: Path) -> None:
-    """Keep the present page, in few colours."""
+    """Write a picture of the present page, reduced to 256 colours."""
     page.picture(path.stem)
     with Image.open(folder / path.name) as whole:
         whole.convert("RGB").quantize(_COLORS, dither=Image.Dither.NONE).save(path, optimize=True)

@@ -1,4 +1,4 @@
-"""Pictures of a recorded demo: its plot, and the terminal view at one of its moments."""
+"""Pictures of a recorded demo: its plot, and the terminal view at one time of the run."""
 
 import copy
 import io
@@ -25,11 +25,11 @@ _COLUMNS, _ROWS = 80, 24
 _COLORS: Final = 256
 _STIFF: Final = 4
 _FONT: Final = re.compile(r"@font-face \{.*?\}", re.DOTALL)
-"""Fonts of Rich's own style, which would be loaded from the network."""
+"""Fonts in the SVG of the library Rich: they are removed, as a viewer would load them from the network"""
 
 
 def make_pictures_of_recording(folder: Path, paths: Sequence[Path]) -> None:
-    """Run and record a demo in `folder`, and draw it: the terminal view as an SVG, and its plot as a PNG."""
+    """Run a demo and record it in `folder`; write the terminal view as an SVG, and the plot of the run as a PNG."""
     terminal, plot = paths
     recording, drawn = folder / "demo.mcap", folder / "demo.png"
     events = record_demo(recording, _DURATION_S)
@@ -47,7 +47,7 @@ def record_demo(recording: Path, duration_s: float) -> list[dict[str, Any]]:
 
 
 def _feelahead(*arguments: str) -> str:
-    """Run a command and return its output; AssertionError with its last words if it failed."""
+    """Run a `feelahead` command and return its output; AssertionError with its last output if it fails."""
     command = [sys.executable, "-P", "-m", "feelahead", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT_S, check=False, cwd=ROOT)
     if done.returncode != 0:
@@ -56,7 +56,7 @@ def _feelahead(*arguments: str) -> str:
 
 
 def _near(events: Sequence[dict[str, Any]]) -> Screen:
-    """Return the terminal view at the last moment of the approach when R2 resists clearly."""
+    """Return the terminal view at the last time of the approach at which R2 resists clearly."""
     # A recording holds the operator side's view alone; a demo's terminal view gets the facts of both sides.
     screen, found = Screen(), None
     for event in events:
@@ -73,7 +73,7 @@ def _near(events: Sequence[dict[str, Any]]) -> Screen:
 
 
 def _draw_terminal(screen: Screen, path: Path) -> None:
-    """Write the screen as an SVG."""
+    """Write the terminal view as an SVG."""
     console = Console(record=True, file=io.StringIO(), width=_COLUMNS, height=_ROWS, force_terminal=True)
     console.print(rich.screen.Screen(screen.lines(0.0, _COLUMNS)))
     title = "feelahead demo --tui"

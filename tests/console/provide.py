@@ -1,4 +1,4 @@
-"""Real browser and its driver: Debian's Chromium, and Playwright by a lock in a separate folder."""
+"""Browser and its driver: Debian's Chromium, and Playwright of a locked version, installed in a separate folder."""
 
 import hashlib
 import platform
@@ -16,7 +16,7 @@ _NAMES: Final = ("chromium", "chromium-browser", "google-chrome")
 
 
 def provided_browser() -> str:
-    """Find a Chromium; in CI, root gets Debian's. Skip the test if unavailable."""
+    """Find Chromium, or install Debian's if in CI as root; skip the test if neither is possible."""
     found = next(filter(None, map(shutil.which, _NAMES)), None)
     if found is None:
         install((_NAMES[0], "fonts-dejavu-core"), _NAMES[0])

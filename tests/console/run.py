@@ -1,4 +1,4 @@
-"""Real run with a console: both sides as the demo starts them, and its events meanwhile."""
+"""A real demo with a console, both sides included, and the events that the demo prints."""
 
 import os
 import signal
@@ -15,27 +15,27 @@ from tests.helpers.machines.waiting import wait_until
 Event = dict[str, Any]
 STATE: Final = "document.body.dataset.state"
 DRAWN: Final = "['overview', 'first_person'].every((view) => document.getElementById(view).dataset.frames > 2)"
-"""Script: both cameras' pictures have come."""
+"""JavaScript condition: pictures of both cameras have come"""
 _START_S: Final = 300.0
-"""Limit of the start in seconds: the first one compiles the overlap kernels."""
+"""Time limit of the demo's start in seconds: the first start on a machine compiles the kernels"""
 _KEPT: Final = 400
 
 
 class Run:
-    """Demo, and its newest facts."""
+    """Running demo, and the newest facts that it printed."""
 
     def __init__(self, demo: StartedSide) -> None:
         self._demo = demo
         self.address = ""
-        """Address of the console, with its token."""
+        """Address of the console, with the token that opens it"""
         self.process_ids: dict[str, int] = {}
-        """Process ids by side."""
+        """Process id of each side, by the side's name"""
         self.facts: deque[Event] = deque(maxlen=_KEPT)
-        """Newest last, ten a second."""
+        """Facts that the console shows, ten a second, newest last"""
         self.notes: list[str] = []
 
     def look(self) -> None:
-        """Read its new events."""
+        """Read the demo's new events."""
         for event in self._demo.events():
             kind = event["event"]
             if kind == "console":
@@ -49,7 +49,7 @@ class Run:
         self._demo.check()
 
     def wait_until(self, what: str, holds: Callable[["Run"], object], limit_s: float = 30.0) -> float:
-        """Wait, and return the seconds it took; AssertionError if it does not come."""
+        """Wait until `holds` is true; return the seconds it took. AssertionError with `what` after `limit_s`."""
         began_s = time.monotonic()
 
         def looked() -> bool:
@@ -61,7 +61,7 @@ class Run:
 
     @property
     def status(self) -> Event:
-        """Status in the newest facts."""
+        """Status of the operator side in the newest facts."""
         return dict(self.facts[-1]["status"]) if self.facts else {}
 
     @contextmanager
@@ -76,7 +76,7 @@ class Run:
 
 @contextmanager
 def running(arguments: Sequence[str]) -> Iterator[Run]:
-    """Yield a demo with a console and a link."""
+    """Start a demo; yield it once its console has an address and the link between its sides is up."""
     command = [sys.executable, "-P", "-m", "feelahead", "demo", "--status", "facts", "--duration", "3600", *arguments]
     with StartedSide("demo", command) as demo:
         run = Run(demo)

@@ -1,4 +1,4 @@
-"""Gate: another web site is refused, even with the token."""
+"""The console refuses pages of other web sites, even if they know its token."""
 
 import http.server
 import threading
@@ -17,7 +17,7 @@ _PAGE = b"<!doctype html><title>another site</title><p>another site</p>"
 
 
 def test_another_site_is_refused(browser: Browser, demo: Run) -> None:
-    """A page of another origin that knows the whole address gets neither content nor a WebSocket nor a frame."""
+    """Such a page knows the whole address, but gets no content, no WebSocket and no frame of the console."""
     with _another_site() as elsewhere, browser.page(elsewhere) as page:
         script = """async (address) => {
             const live = address.replace('http', 'ws') + 'live';

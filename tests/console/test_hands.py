@@ -1,4 +1,4 @@
-"""The keyboard drives a real run, releases, and stops it; test_hands_alone.py covers everything else."""
+"""The keyboard drives the arm in a real run, releases R2 and stops the arm; test_hands_alone.py tests all else."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ pytestmark = [pytest.mark.console, pytest.mark.processes]
 
 
 def test_space_drives(browser: Browser, demo: Run) -> None:
-    """Space held arms and runs, a pull moves, and releasing its key ends the pull."""
+    """Holding Space arms the arm and lets it move. A key pulls R2, and releasing the key releases R2."""
     with browser.page(demo.address) as page:
         take_over(page, demo)
         with page.held("Space"):
@@ -25,7 +25,7 @@ def test_space_drives(browser: Browser, demo: Run) -> None:
 
 
 def test_escape_stops(browser: Browser, fresh_demo: Run) -> None:
-    """Esc stops each driver: here the scripted person, while another element of the page has the focus."""
+    """Esc stops whoever drives: here the scripted person, while another element of the page has the focus."""
     with browser.page(fresh_demo.address) as page:
         fresh_demo.wait_until("armed", is_armed, 60.0)
         page.press("Tab")
@@ -38,7 +38,7 @@ def test_escape_stops(browser: Browser, fresh_demo: Run) -> None:
 
 
 def take_over(page: Page, run: Run) -> None:
-    """Let the page ask to drive, and rest its keys until it may."""
+    """Ask to drive from the page, and press no key until the page may drive."""
     page.wait("document.querySelector('#drive:enabled') !== null", "a button to drive by", 20.0)
     page.raw.click("#drive")
     run.wait_until("the page's hands", lambda run: _newest(run)["hands"] == "browser", 10.0)

@@ -1,4 +1,4 @@
-"""Keys, pointers and a gamepad at the page alone, in virtual time: what moves the controller and what releases it."""
+"""Keys, pointer and gamepad of the page by themselves, in virtual time: what pulls the triggers, what releases them."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final
@@ -16,7 +16,7 @@ _AXES: Final = (0.0, 0.0, 0.0, 0.0)
 
 
 def test_keys_ramp_up_and_let_go_at_once(browser: Browser) -> None:
-    """Space arms and runs; W grows to the level over 0.6 s, and is 0 with the next message after its release."""
+    """Space arms and is hold-to-run. W pulls R2 to the chosen level within 0.6 s; its release frees R2 at once."""
     with hands_alone(browser) as alone:
         alone.run()
         keyboard = alone.page.raw.keyboard
@@ -44,7 +44,7 @@ def test_keys_ramp_up_and_let_go_at_once(browser: Browser) -> None:
 
 
 def test_every_key_does_what_it_says(browser: Browser) -> None:
-    """Each key, in any layout, moves what the page says, and nothing else."""
+    """Each key, by its place on the keyboard, changes the input that the page names for it, and no other."""
     with hands_alone(browser) as alone:
         alone.run()
         keyboard = alone.page.raw.keyboard
@@ -99,7 +99,7 @@ ENDS: Final[Mapping[str, Callable[[HandsAlone], object]]] = {
 
 @pytest.mark.parametrize("end", ENDS.values(), ids=ENDS)
 def test_whatever_takes_the_keys_lets_go(browser: Browser, end: Callable[[HandsAlone], object]) -> None:
-    """Keys that are still down count no more, nor does one pressed again too soon, however long it is held."""
+    """Keys that are still down no longer count. A key pressed again too soon does not count however long it is held."""
     with hands_alone(browser) as alone:
         alone.run()
         keyboard = alone.page.raw.keyboard
@@ -120,7 +120,7 @@ def test_whatever_takes_the_keys_lets_go(browser: Browser, end: Callable[[HandsA
 
 
 def test_driving_begins_on_purpose_and_after_a_rest(browser: Browser) -> None:
-    """Keys do nothing before the button; Enter on it begins; keys that are down then delay the beginning."""
+    """Keys do nothing before the button is pressed. Enter presses it. Keys that are down then delay the driving."""
     with hands_alone(browser) as alone:
         keyboard = alone.page.raw.keyboard
         keyboard.down("Space")
@@ -155,7 +155,7 @@ def test_driving_begins_on_purpose_and_after_a_rest(browser: Browser) -> None:
 
 
 def test_escape_is_sent_until_it_is_confirmed(browser: Browser) -> None:
-    """Esc stops in a field, also for an observer, and is sent until the state confirms it."""
+    """Esc works even in a text field and for an observer. The page sends the stop until the arm's state confirms it."""
     with hands_alone(browser) as alone:
         alone.page.raw.focus("#field")
         alone.facts = {"status": {"state": "armed", "link": "up", "owner": "armed"}}
@@ -179,7 +179,7 @@ def test_escape_is_sent_until_it_is_confirmed(browser: Browser) -> None:
 
 
 def test_pointer_and_gamepad_drive(browser: Browser) -> None:
-    """A pointer drags, and a gamepad's travel counts as it is; both release at once."""
+    """A pointer pulls by dragging; a gamepad's travel is taken as it is. Both release at once."""
     with hands_alone(browser) as alone:
         alone.drive()
         mouse, box = alone.page.raw.mouse, alone.page.raw.locator("#grip_advance").bounding_box()
@@ -214,7 +214,7 @@ def test_pointer_and_gamepad_drive(browser: Browser) -> None:
 
 
 def test_what_cannot_be_done_is_said(browser: Browser) -> None:
-    """A real controller drives, another page drives, tuning is not permitted: each in words."""
+    """The page says in words that a real controller or another page drives, or that tuning is not permitted."""
     with hands_alone(browser, may_drive=False) as alone:
         alone.expect("A real controller drives")
         assert alone.page.ask("document.getElementById('drive').disabled"), "the button can be pressed"
@@ -239,7 +239,7 @@ def test_what_cannot_be_done_is_said(browser: Browser) -> None:
 
 
 def test_sliders_tune(browser: Browser) -> None:
-    """Keys move the sliders, the wish is sent once they rest, and the present value is shown beside it."""
+    """Keys move the sliders. The wish is sent once they rest, and the page shows the present value beside it."""
     with hands_alone(browser) as alone:
         keyboard = alone.page.raw.keyboard
         alone.let_pass(2.5)

@@ -1,4 +1,4 @@
-"""Everything fits at the smallest promised size and at a large one, and works by keyboard alone."""
+"""The page fits into the smallest promised window and a large one, and can be used by keyboard alone."""
 
 from typing import Final
 
@@ -37,7 +37,7 @@ _TINY: Final = """() => [...document.querySelectorAll('body *')].filter((one) =>
 
 @pytest.mark.parametrize("size", [SMALL, LARGE])
 def test_nothing_overflows(browser: Browser, demo: Run, size: tuple[int, int]) -> None:
-    """1280x720 and 1920x1080: no scroll bars of the page, no words cut, both views large."""
+    """At 1280x720 and 1920x1080 the page has no scroll bars, no word is cut, and both views are large."""
     with browser.page(demo.address, size, scene=True) as page:
         page.wait(DRAWN, "drawn both views")
         width, height = page.ask("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]")
@@ -71,7 +71,7 @@ def test_small_windows_cut_nothing_and_keep_stop_and_triggers_in_view(browser: B
 
 
 def test_keyboard_reaches_everything(browser: Browser, demo: Run) -> None:
-    """Tab reaches everything usable, each with a visible mark, and is never trapped."""
+    """The Tab key reaches every control, shows where the focus is, and is never trapped."""
     with browser.page(demo.address) as page:
         page.wait(DRAWN, "drawn both views")
         names = page.ask(_FOCUSABLE)

@@ -1,4 +1,4 @@
-"""A lost link is unmistakable, also without colours."""
+"""The page shows a lost link unmistakably, even to those who see no colours."""
 
 import time
 from typing import Any, Final
@@ -14,11 +14,11 @@ pytestmark = [pytest.mark.console, pytest.mark.processes]
 
 _ASKED_S: Final = 1.0
 _LIMIT_S: Final = 4.0
-"""Limit in seconds, for a busy machine; the printed line gives the time taken."""
+"""Time limit in seconds, long enough for a busy machine; the test prints the time taken"""
 
 
 def test_frozen_robot_is_unmistakable(browser: Browser, demo: Run) -> None:
-    """kill -STOP of the robot side: words, border and both views say so, and everything comes back."""
+    """While the robot side's process is stopped, words, border and both views show it; then everything comes back."""
     with browser.page(demo.address) as page:
         page.wait(DRAWN, "drawn both views")
         page.wait(f"{STATE} == 'armed'", "armed", 60.0)
@@ -49,7 +49,7 @@ def test_frozen_robot_is_unmistakable(browser: Browser, demo: Run) -> None:
 
 
 def _fresh_view(page: Page) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    """Return the overview at a fresh moment: on a busy machine it may be stale now and then."""
+    """Return the pixels of the overview at a time when it is not stale, as a busy machine may delay it."""
     end_s = time.monotonic() + 60.0
     while time.monotonic() < end_s:
         page.wait("document.querySelector('#overview:not([data-age=fresh])') === null", "a fresh view", 60.0)
@@ -60,7 +60,7 @@ def _fresh_view(page: Page) -> np.ndarray[Any, np.dtype[np.uint8]]:
 
 
 def test_silent_operator_side_is_unmistakable(browser: Browser, demo: Run) -> None:
-    """kill -STOP of the operator side, which feeds the console."""
+    """The process of the operator side, which sends the page its data, is stopped by kill -STOP."""
     with browser.page(demo.address) as page:
         page.wait(DRAWN, "drawn both views")
         with demo.frozen("operator"):

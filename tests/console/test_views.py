@@ -1,4 +1,4 @@
-"""The page draws both views, the scene, triggers and words, and they are true."""
+"""The page draws both views, the scene and the triggers as the run has them."""
 
 import re
 import time
@@ -16,18 +16,18 @@ VIEWS: Final = ("overview", "first_person")
 _OLDEST_MS: Final = 500.0
 _PATIENCE_S: Final = 60.0
 _LEAST_DETAIL: Final = 8.0
-"""Least standard deviation of a picture's colours: an empty one has none."""
+"""Minimum standard deviation of a picture's colours: it is 0 in an empty picture"""
 
 
 def test_both_views_move(browser: Browser, fresh_demo: Run) -> None:
-    """Both cameras' pictures are drawn, are not empty, change, and show their age."""
+    """The pictures of both cameras are drawn, not empty, and change; the page shows their age."""
     with browser.page(fresh_demo.address) as page:
         page.wait(DRAWN, "drawn both views")
         for view in VIEWS:
             before = page.pixels(f"#{view} canvas")
             assert before.std() > _LEAST_DETAIL
             _wait_for_change(page, view, before)
-        # Ages on a busy machine are for a benchmark; at some moment both must be fresh.
+        # A busy machine may delay pictures, so it is enough if both are fresh at some time.
         end_s = time.monotonic() + _PATIENCE_S
         while _oldest_ms(page) >= _OLDEST_MS:
             assert time.monotonic() < end_s
@@ -35,7 +35,7 @@ def test_both_views_move(browser: Browser, fresh_demo: Run) -> None:
 
 
 def test_scene_is_drawn(browser: Browser, fresh_demo: Run) -> None:
-    """The scene is not empty, beside the page's words about it."""
+    """The drawing of the scene is not empty."""
     with browser.page(fresh_demo.address, scene=True) as page:
         page.wait("!document.querySelector('#scene iframe').hidden", "a scene", _PATIENCE_S)
         end_s = time.monotonic() + _PATIENCE_S
@@ -45,7 +45,7 @@ def test_scene_is_drawn(browser: Browser, fresh_demo: Run) -> None:
 
 
 def test_triggers_agree(browser: Browser, fresh_demo: Run) -> None:
-    """The zones' numbers and heights equal those that the operator side wrote."""
+    """Numbers and bars of the ten zones show the strengths that the operator side wrote to the controller."""
     with browser.page(fresh_demo.address) as page:
         page.wait("document.querySelectorAll('#r2 .zones b').length == 10", "drawn the zones")
         fresh_demo.wait_until("armed", lambda run: run.status.get("state") == "armed", 60.0)
@@ -87,7 +87,7 @@ def _wait_for_change(page: Page, view: str, before: Any) -> None:
 
 
 def _oldest_ms(page: Page) -> float:
-    """Return the greatest age that either view shows within two seconds."""
+    """Return the third-greatest of 40 ages that the two views show within two seconds: two may be exceptions."""
     ages = []
     for _ in range(20):
         for view in VIEWS:

@@ -1,1 +1,1 @@
-"""Both sides and the router in containers, built and run for real: `python -m tests.containers`."""
+"""Tests that build and run containers of both sides and the router: `python -m tests.containers`."""

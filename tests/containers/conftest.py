@@ -25,13 +25,13 @@ _PATIENCE_S: Final = 60.0
 
 @pytest.fixture(scope="session")
 def engine() -> Iterator[Engine]:
-    """Running engine; otherwise, in CI and as root, a new one that ends with the tests."""
+    """The machine's running container engine; if there is none, in CI as root, a new one until the tests end."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield Engine(_PROJECT)
     except ConfigurationError as missing:
         if os.environ.get("CI") != "true" or os.geteuid() != 0:
-            pytest.skip(f"{missing} (with CI=true, root gets one of Debian's)")
+            pytest.skip(f"{missing} (run as root with CI=true, the tests install Debian's)")
         install(("docker.io", "iptables"), "dockerd")
         install(("docker-compose",), "docker-compose")
         yield from _own_engine(cache_folder("containers"))
@@ -39,7 +39,7 @@ def engine() -> Iterator[Engine]:
 
 @pytest.fixture(scope="session")
 def compose(engine: Engine) -> Iterator[Compose]:
-    """Containers of both sides and the router, from images alone, and removed afterwards."""
+    """Built images of both sides and the router; all containers, networks and volumes are removed at the end."""
     options = dict.fromkeys(("ROBOT_OPTIONS", "OPERATOR_OPTIONS"), "--status json")
     settings = {"LINK": _LINK, "FEELAHEAD_BASE": _base_image(engine), "FEELAHEAD_IMAGES": engine.project, **options}
     one = Compose(engine, settings)
@@ -55,7 +55,7 @@ def compose(engine: Engine) -> Iterator[Compose]:
 
 
 def _base_image(engine: Engine) -> str:
-    """Return a base image, made of Debian's packages if none is available."""
+    """Return the name of the images' base image; it is made of Debian packages if none can be found or pulled."""
     for image, get in (
         (_OFFICIAL, ("image", "inspect")),
         (_OWN, ("image", "inspect")),
@@ -72,7 +72,7 @@ def _base_image(engine: Engine) -> str:
 
 
 def _own_engine(cache: Path) -> Iterator[Engine]:
-    """Yield a daemon with separate files and socket; its bridge is removed with it."""
+    """Start a Docker daemon with separate files and socket; end it afterwards, and remove the bridge that it made."""
     had_bridge = Path("/sys/class/net/docker0").exists()
     place = {name: str(cache / name) for name in ("docker.sock", "data", "exec", "pid")}
     words = [
@@ -88,7 +88,7 @@ def _own_engine(cache: Path) -> Iterator[Engine]:
         try:
             _wait_for_daemon(daemon, environment, cache / "log")
             yield Engine(_PROJECT, environment)
-            # Layers of older versions of the images.
+            # Remove the layers of older versions of the images.
             _tidy("docker", "image", "prune", "--force", "--filter", "until=168h", environment=environment)
         finally:
             daemon.terminate()

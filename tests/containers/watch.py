@@ -1,4 +1,4 @@
-"""Containers of a run, and their events."""
+"""Containers of a run, and the events that their programs print."""
 
 import json
 import os
@@ -15,20 +15,20 @@ Event = dict[str, Any]
 
 @dataclass(frozen=True)
 class Compose:
-    """Run on an engine."""
+    """Container engine, and the settings with which compose.yaml is run on it."""
 
     engine: Engine
     settings: Mapping[str, str]
-    """Variables of compose.yaml."""
+    """Variables of compose.yaml and their values"""
 
     def existing(self, which: str) -> set[str]:
-        """Return the containers, networks and volumes that match a filter of the engine."""
+        """Return the ids of containers, networks and volumes that match `which`, a filter in Docker's syntax."""
         kinds = (("ps", "--all"), ("network", "ls"), ("volume", "ls"))
         return {one for kind in kinds for one in self.engine.docker(*kind, "--quiet", "--filter", which).split()}
 
 
 class Watched:
-    """One service's container, from its beginning."""
+    """Container of one service, with all events since the container began."""
 
     def __init__(self, engine: Engine, service: str) -> None:
         self._engine = engine
@@ -45,7 +45,7 @@ class Watched:
         return said
 
     def wait_for(self, what: str, holds: Callable[[Event], bool], limit_s: float = 60.0) -> list[Event]:
-        """Return its events up to the first that holds; AssertionError if none does in time."""
+        """Return the new events up to the first for which `holds` is true; AssertionError after `limit_s`."""
         heard: list[Event] = []
 
         def found() -> bool:
@@ -61,15 +61,15 @@ class Watched:
         return heard
 
     def kill(self) -> None:
-        """Kill its first process with kill -9, as the system would when memory runs out."""
+        """Kill the container's first process with kill -9, as the system would when memory runs out."""
         os.kill(int(self._engine.inspect(self.container)["State"]["Pid"]), signal.SIGKILL)
 
 
 def state_is(*states: str) -> Callable[[Event], bool]:
-    """Return a test whether a status has one of these states of the arm."""
+    """Return a function that checks whether an event is a status with one of these states of the arm."""
     return lambda event: event.get("event") == "status" and event.get("state") in states
 
 
 def link_up(event: Event) -> bool:
-    """Return whether a status has a link."""
+    """Return whether an event is a status with the link up."""
     return event.get("event") == "status" and event.get("link") == "up"

@@ -1,4 +1,4 @@
-"""Small arms in MJCF that the tests write to files, each different from the built-in one in one respect."""
+"""Small robot arms in MJCF, unlike the built-in arm, which tests write to files and load as a user's own model."""
 
 from pathlib import Path
 
@@ -92,7 +92,7 @@ def planar_arm(
     extra_bottom: str = COUPLING,
     mirrored: bool = False,
 ) -> Path:
-    """Write the planar arm to `path`/arm.xml and return that file."""
+    """Write the MJCF of a planar arm with two joints to `path`/arm.xml, with these parts, and return that file."""
     file = path / "arm.xml"
     file.write_text(
         PLANAR_ARM.format(

@@ -1,4 +1,4 @@
-"""Hands that follow the calibration's steps on a controller with a chosen wear."""
+"""Simulated user who follows the steps of a controller's calibration; the test chooses how worn the controller is."""
 
 import math
 from collections.abc import Callable
@@ -15,18 +15,18 @@ _PULL_S = 0.8
 
 @dataclass(frozen=True)
 class Wear:
-    """Reports of a controller at rest and at the end of its travel, with uniform noise to either side."""
+    """Values that a worn controller reports: triggers at rest and at full pull, with uniform noise of ±`noise`."""
 
     l2: tuple[float, float] = (0.0, 1.0)
     r2: tuple[float, float] = (0.0, 1.0)
     left: tuple[Stick, Stick] = ((0.0, 0.0), (0.0, 0.0))
-    """Resting position before and after the first movement."""
+    """Resting position of the stick, before and after its first movement."""
     right: tuple[Stick, Stick] = ((0.0, 0.0), (0.0, 0.0))
     noise: float = 0.0
 
 
 PullDepth = Callable[[str, int], float]
-"""Function from trigger and number of the pull to its depth, as a share of the full travel."""
+"""Function of a trigger's name and the number of the pull; returns the pull's depth as a share of the full travel."""
 
 
 def fully(trigger: str, number: int) -> float:
@@ -35,7 +35,7 @@ def fully(trigger: str, number: int) -> float:
 
 
 class Hands:
-    """Hands that follow the procedure's steps."""
+    """Simulated user: pulls a trigger or turns the sticks, as the present step of the calibration asks."""
 
     def __init__(self, wear: Wear, depth: PullDepth = fully, seed: int = 0) -> None:
         self.procedure = CalibrationProcedure()
@@ -49,7 +49,7 @@ class Hands:
         self._moved = False
 
     def run(self, longest_s: float = 200.0) -> CalibrationProcedure:
-        """Run until the procedure is done, for at most `longest_s`."""
+        """Run the calibration until it is done, but at most `longest_s` of virtual time."""
         while self.procedure.step is not Step.DONE and self.now_s < longest_s:
             before = self.procedure.step
             self.procedure.feed(self._state(), self.now_s)

@@ -1,4 +1,4 @@
-"""Exchanges of stamps between two clocks of known offset."""
+"""Simulated exchanges of time stamps between two clocks whose true offset is known."""
 
 from collections.abc import Callable
 
@@ -10,12 +10,12 @@ Clock = Callable[[float], float]
 
 
 def ahead(by_s: float, skew: float = 0.0) -> Clock:
-    """Return a peer's clock as a function of ours."""
+    """Return a peer's clock, as a function of our time: `by_s` ahead of ours at 0, and faster by the share `skew`."""
     return lambda now_s: now_s * (1.0 + skew) + by_s
 
 
 def exchange(offset: ClockOffset, start_s: float, there_s: float, held_s: float, back_s: float, clock: Clock) -> float:
-    """Run one exchange with a peer that has `clock`; return the time of the answer's receipt by our clock."""
+    """Give `offset` one exchange with a peer that has `clock`; return when the answer arrives, by our clock."""
     peer_received_s, peer_sent_s = clock(start_s + there_s), clock(start_s + there_s + held_s)
     received_s = start_s + there_s + held_s + back_s
     offset.update(start_s, peer_sent_s, peer_sent_s - peer_received_s, received_s)
@@ -30,7 +30,7 @@ def talk(
     start_s: float = 0.0,
     period_s: float = 0.004,
 ) -> float:
-    """Run an exchange each `period_s`, received in order of arrival; return the last receipt by our clock."""
+    """Give `offset` an exchange each `period_s`, in the answers' order of arrival; return our time at the last one."""
     sent_s = start_s + period_s * np.arange(there_s.size)
     received_s = sent_s + there_s + 0.001 + back_s
     for k in np.argsort(received_s):

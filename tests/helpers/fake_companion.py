@@ -1,4 +1,4 @@
-"""Companion that renders nothing and acts as a test says, with Cameras in front of it."""
+"""Stand-in for the companion process that renders pictures: the test itself answers the robot side's `Cameras`."""
 
 import socket
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from robot_side.viewing.settings import CamerasSettings
 
 
 class FakeCompanion:
-    """Both ends of a channel, and the other end's received messages."""
+    """Stand-in for a companion: `channel` is the robot side's end, `other` the companion's, which the test uses."""
 
     def __init__(self) -> None:
         ours, theirs = socket.socketpair()
@@ -33,13 +33,13 @@ class FakeCompanion:
         self.other.send(encode(message))
 
     def picture(self, order: Order, content: bytes = b"\xff\xd8", number: int = 0, *, whole: bool = True) -> None:
-        """Send a picture as JPEG, or with a `number` as H.264."""
+        """Send a picture to the robot side: a JPEG if `number` is 0, else the H.264 step of that number."""
         size = (320, 240) if order.halved else (640, 480)
         self.answer(Picture(order.view, order.captured_s, *size, content, 0.003, number, whole))
 
 
 class Desk:
-    """Cameras, their started companions, and their notes to a person."""
+    """The robot side's `Cameras`, the stand-in companions that they have started, and their notes to a person."""
 
     def __init__(self, scene: Scene, settings: CamerasSettings | None = None) -> None:
         self.scene = scene

@@ -1,4 +1,8 @@
-"""Stand-in for hidapi that behaves as measured: `[]` and OSError, -1 on a dead write, [] on a silent read."""
+"""Stand-in for hidapi that fails as the real library was measured to fail.
+
+A read without a waiting report returns []. After the controller is unplugged, a read raises OSError, and a write
+returns -1.
+"""
 
 import zlib
 from dataclasses import dataclass, field
@@ -13,13 +17,13 @@ from operator_side.dualsense.reports.transport import Transport
 ADDRESS = "a4:5e:60:01:02:03"
 FIRMWARE = Firmware(hardware_version=0x0616, firmware_version=0x0110002A, update_version=0x0630)
 SIMPLE_REPORT = bytes.fromhex("01 80808080 080000 0000")
-"""First report over Bluetooth: nothing touched."""
+"""Short report that a controller sends over Bluetooth until a feature report has been read; nothing is touched."""
 USB, BLUETOOTH = Transport.USB, Transport.BLUETOOTH
 
 
 @dataclass
 class FakeHandle:
-    """One controller, and the handle on it."""
+    """Simulated controller, which is also hidapi's open handle for it."""
 
     transport: Transport = USB
     address: str = ADDRESS
@@ -28,7 +32,7 @@ class FakeHandle:
     answers: bool = True
     """Whether the controller answers feature reports."""
     garbled: int = 0
-    """Number of feature reports that arrive over Bluetooth with a wrong bit."""
+    """Number of the next feature reports that arrive with a wrong bit."""
     silent: bool = False
     plugged_in: bool = True
     waiting: list[bytes] = field(default_factory=list)
@@ -94,7 +98,7 @@ class FakeHandle:
 
 
 class FakeBackend:
-    """System's controllers by product id and path; reopening one gives the same controller."""
+    """All controllers of the system, by product id and then path. A path always opens the same controller."""
 
     def __init__(self, found: dict[int, dict[bytes, FakeHandle]]) -> None:
         self.found = found
@@ -108,7 +112,7 @@ class FakeBackend:
 
 
 class _Unopened(FakeHandle):
-    """Handle that becomes the controller's own when opened."""
+    """Handle that is not yet open: `open_path` turns it into the `FakeHandle` of the controller at that path."""
 
     def __init__(self, backend: FakeBackend) -> None:
         super().__init__()
@@ -128,5 +132,5 @@ class _Unopened(FakeHandle):
 
 
 def valid_checksum(report: bytes) -> bool:
-    """Return whether hardware would accept an output report over Bluetooth; computed apart from our own code."""
+    """Return whether the CRC-32 of an output report over Bluetooth is right, without use of the tested code."""
     return zlib.crc32(b"\xa2" + report[:-4]) == int.from_bytes(report[-4:], "little")

@@ -1,4 +1,4 @@
-"""Kernel's end of /dev/uhid, in virtual time, and a controller of the simplest kind."""
+"""Stand-in for the kernel behind /dev/uhid, in virtual time, and the simplest possible simulated controller."""
 
 import struct
 from collections import deque
@@ -15,7 +15,7 @@ FEATURE, OUT = 0, 1
 
 
 def said(kind: int, payload: bytes = b"") -> bytes:
-    """Return an event as the kernel gives it, padded to the longest."""
+    """Return the bytes of an event from the kernel, padded to the length of the longest event."""
     return (struct.pack("=I", kind) + payload).ljust(EVENT_LENGTH, b"\0")
 
 
@@ -29,11 +29,11 @@ def get_report(request: int, report_id: int, kind: int = FEATURE) -> bytes:
 
 @dataclass
 class FakeKernel(UhidFile):
-    """File that the loop reads, waits for and writes; a wait advances the clock."""
+    """Stand-in for the file /dev/uhid: gives the events of `to_say`, keeps written ones. A wait advances the clock."""
 
     clock: VirtualClock
     to_say: deque[tuple[float, bytes]] = field(default_factory=deque)
-    """(time, event), in order."""
+    """Events that the kernel sends, as (time in seconds, event), earliest first"""
     heard: list[tuple[float, bytes]] = field(default_factory=list)
     refuses_from_s: float = float("inf")
 
@@ -58,7 +58,7 @@ class FakeKernel(UhidFile):
 
 
 class PlainController(SimulatedDualSense):
-    """Controller whose report counts the readings; it accepts output 2 and has feature 5."""
+    """Controller whose input report counts the reads. It accepts output report 2 and answers feature report 5."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Messages from a robot side, and strengths made of them, for many tests."""
+"""Messages as a robot side sends them, and strengths of a trigger's zones, for many tests."""
 
 import struct
 from typing import Any
@@ -12,13 +12,13 @@ from operator_side.controller.feel import Strengths
 
 
 def onsets(*metres: float) -> OnsetDistances:
-    """Return eight distances; the last given one fills the rest."""
+    """Return eight onset distances: the given ones, with the last one repeated."""
     whole: OnsetDistances = (*metres, *(metres[-1],) * (8 - len(metres)))  # type: ignore[assignment]
     return whole
 
 
 def field(fast_m: OnsetDistances, slow_m: OnsetDistances | None = None, **changes: Any) -> TriggerField:
-    """Return a field with these distances, v_max = 0.25 m/s and a = 3 m/s² unless changed."""
+    """Return a trigger's field with these onset distances. Unless changed, v_max is 0.25 m/s and a is 3 m/s²."""
     return msgspec.structs.replace(uniform_field(0), fast_m=fast_m, slow_m=slow_m or fast_m, **changes)
 
 
@@ -31,7 +31,7 @@ def felt(
     state: MotionState = "armed",
     stands: bool = False,
 ) -> StiffnessUpdate:
-    """Return an update with the same strength, 0 to 8, in every zone of each trigger, whatever hands and arm do."""
+    """Return an update that gives each zone of a trigger the same strength, `l2` or `r2` (0 to 8), at every speed."""
     return StiffnessUpdate(
         *(header, uniform_field(l2), uniform_field(r2), 0.0, FAR_M, rumble, state),
         stands=stands,
@@ -39,7 +39,7 @@ def felt(
 
 
 def telemetry(header: Header, **changes: Any) -> Telemetry:
-    """Return telemetry of a disarmed tool at the origin that points downwards, unless changed."""
+    """Return telemetry of a disarmed robot side. Unless changed, the tool is at the origin and points downwards."""
     still = Telemetry(
         *(header, "disarmed", (0.0, 0.0, 0.0), None, None, (0.0, -1.0, 0.0), 0.0),
         *(0.0, False, 0.0, 0.0, 0.0),
@@ -48,7 +48,7 @@ def telemetry(header: Header, **changes: Any) -> Telemetry:
 
 
 def scene_state(header: Header, version: int = 1) -> SceneState:
-    """Return a scene of one link, one object and no sphere, all in one place."""
+    """Return a scene of one link and one object, both at the same pose, and without spheres of the gripper."""
     pose = (0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0)
     row, terms = struct.pack("<7f", *pose), EnlargementTerms(0.01, 0.0, 0.001, 0.003, 0.002, 2.3, 0.1, 0.02)
     return SceneState(
@@ -58,5 +58,5 @@ def scene_state(header: Header, version: int = 1) -> SceneState:
 
 
 def feedback(position: int, strength: int) -> Strengths:
-    """Return strengths that are constant from zone `position` to the end of the travel."""
+    """Return the strengths of ten zones: 0 before zone `position`, `strength` from there to the end of the travel."""
     return (0,) * position + (strength,) * (10 - position)

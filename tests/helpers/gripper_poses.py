@@ -1,4 +1,4 @@
-"""Grippers of a few spheres or of boxes, on a freely flying tool, for tests of contact distances."""
+"""Grippers of a few spheres or of boxes, on a tool that moves freely, for tests of contact distances."""
 
 from functools import cache
 
@@ -32,7 +32,7 @@ BOX_HALF_SIZES_M = np.array(
 )
 OPENING_M = 0.085
 FRONT_M = 0.018
-"""Reach of the foremost sphere beyond the tool point: 15 mm, and 3 mm that it stands out."""
+"""Distance from the tool point to the front of the spheres: 15 mm of fingertip, and 3 mm by which spheres protrude."""
 
 
 @cache
@@ -47,7 +47,10 @@ def free_pose(
     tool_position_m: npt.ArrayLike = (0.0, 0.0, 0.0),
     tool_rotation: FloatArray | None = None,
 ) -> GripperPose:
-    """Return spheres fixed to a tool whose six joints are its velocity and angular velocity in the world frame."""
+    """Return a gripper of spheres, fixed to a tool that moves freely.
+
+    The six joint velocities are the tool's linear and angular velocity in the world frame.
+    """
     position = np.asarray(tool_position_m, dtype=np.float64)
     rotation = np.eye(3) if tool_rotation is None else tool_rotation
     radii = np.asarray(radii_m, dtype=np.float64)
@@ -68,7 +71,7 @@ def gripper_pose(
     tool_rotation: FloatArray | None = None,
     stand_out_m: float = 0.003,
 ) -> GripperPose:
-    """Return the built-in gripper in its 246 spheres, or in fewer that stand out farther."""
+    """Return the built-in gripper, covered by 246 spheres, or by fewer if `stand_out_m` is more than 3 mm."""
     cover = cover_gripper(stand_out_m)
     order = near_order(cover.centers_m, 6)
     return free_pose(cover.centers_m[order], cover.radii_m[order], cover.box[order] > 0, tool_position_m, tool_rotation)

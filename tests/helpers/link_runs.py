@@ -1,4 +1,4 @@
-"""Messages sent through an emulated line at even times, and their deliveries."""
+"""Messages sent through an emulated link at constant intervals, and their deliveries."""
 
 import itertools
 import math
@@ -13,7 +13,7 @@ PERIOD_S = 1e-3
 
 
 class Run:
-    """Deliveries of messages sent every millisecond: a list of (time of delivery, number)."""
+    """Deliveries of `count` messages, sent each `period_s`: a list of (time of delivery, number of the message)."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Closed meshes, convex or not."""
+"""Closed meshes for tests: convex ones and others."""
 
 from itertools import permutations
 
@@ -37,7 +37,10 @@ def grid_tetrahedra(size: int) -> tuple[FloatArray, IntArray]:
 
 
 def surface_of(tetrahedra: IntArray) -> IntArray:
-    """Return the outward triangles (t, 3) of positively oriented tetrahedra: the faces that only one has."""
+    """Return the outward triangles (t, 3) of a body of tetrahedra: the faces that belong to only one of them.
+
+    The tetrahedra are positively oriented.
+    """
     faces: dict[tuple[int, ...], IntArray] = {}
     for tetrahedron in tetrahedra:
         for face in tetrahedron[TETRAHEDRON_TRIANGLES]:
@@ -48,7 +51,7 @@ def surface_of(tetrahedra: IntArray) -> IntArray:
 
 
 def round_mesh(subdivisions: int) -> tuple[FloatArray, IntArray]:
-    """Make an octahedron with `subdivisions` triangles along each edge, its vertices moved to the unit sphere."""
+    """Make an octahedron with `subdivisions` triangles along each edge, and move its vertices to the unit sphere."""
     numbers: dict[tuple[int, int, int], int] = {}
     triangles = []
     for signs in np.ndindex(2, 2, 2):
@@ -67,8 +70,11 @@ def round_mesh(subdivisions: int) -> tuple[FloatArray, IntArray]:
 
 
 def cup() -> tuple[FloatArray, IntArray]:
-    """Return vertices (v, 3) in m and triangles (t, 3) of a block of 3³ cubes without its middle and upper middle cube.
-    The mouth opens upward, 40 mm wide and 80 mm deep, between walls and over a floor of 40 mm."""
+    """Make a cup: a block of 3³ cubes without the middle cube and the cube above it. Each cube measures 40 mm.
+
+    Return vertices (v, 3) in metres and triangles (t, 3). The mouth opens upward, 40 mm wide and 80 mm deep; the walls
+    and the floor are 40 mm thick.
+    """
     places, tetrahedra = grid_tetrahedra(3)
     middles = np.floor(places[tetrahedra].mean(axis=1))
     mouth = (middles[:, 0] == 1.0) & (middles[:, 1] == 1.0) & (middles[:, 2] >= 1.0)

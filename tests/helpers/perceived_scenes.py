@@ -1,4 +1,4 @@
-"""Small scenes of perceived objects, for the tests of the robot side's pipeline."""
+"""Small scenes of perceived objects, for tests of the robot side."""
 
 from collections.abc import Sequence
 
@@ -17,7 +17,7 @@ _FIVE_TETRAHEDRA = np.array([[0, 4, 2, 1], [6, 4, 2, 7], [5, 4, 1, 7], [3, 2, 1,
 
 
 class Scene:
-    """Objects, each of one or more primitives, in the order of their addition."""
+    """Builder of perceived objects: `add` begins an object, and the other methods add primitives to it."""
 
     def __init__(self) -> None:
         self.roles: list[Role] = []
@@ -108,7 +108,10 @@ def random_rotation(rng: np.random.Generator) -> FloatArray:
 def random_scene(
     rng: np.random.Generator, of_each_kind: int, extent_m: float = 1.0, meshes: int = 0
 ) -> PerceivedObjects:
-    """Return objects of every kind, and `meshes`, each of one primitive, within `extent_m` of the origin."""
+    """Return `of_each_kind` spheres, boxes, tetrahedra and half-spaces, and `meshes` meshes, each as one object.
+
+    Their centres are at random within ±`extent_m` on each axis.
+    """
     scene = Scene()
     for _ in range(of_each_kind):
         center = rng.uniform(-extent_m, extent_m, 3)

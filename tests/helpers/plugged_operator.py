@@ -2,8 +2,9 @@
 
     python plugged_operator.py FOLDER [feelahead-operator's flags]
 
-FOLDER/hidraw3 is a FIFO for the writes to the controller. While FOLDER/plugged exists, the controller is plugged in.
-FOLDER/broken makes reading it fail as no driver should. While FOLDER/hangs exists, no write returns.
+FOLDER/hidraw3 is a FIFO that gets the writes to the controller. While FOLDER/plugged exists, the controller is plugged
+in. While FOLDER/broken exists, reads and writes raise an error that no driver should raise. While FOLDER/hangs exists,
+no write returns.
 """
 
 import os
@@ -24,7 +25,7 @@ REPORT_PERIOD_S = 0.004
 
 
 class PluggedHandle(FakeHandle):
-    """Controller that exists while a file does."""
+    """Controller that is plugged in while the file FOLDER/plugged exists."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -61,7 +62,7 @@ class PluggedHandle(FakeHandle):
 
 
 class PluggedBackend:
-    """System's controllers: one or none."""
+    """The system's controllers: one while FOLDER/plugged exists, otherwise none."""
 
     def enumerate(self, vendor_id: int, product_id: int) -> list[dict[str, Any]]:
         del vendor_id

@@ -1,4 +1,4 @@
-"""Python processes with readable output and errors."""
+"""Python processes whose output and errors a test can read."""
 
 import os
 import subprocess
@@ -7,7 +7,7 @@ import sys
 from tests.helpers.repository import ROOT
 
 LIMIT_S = 600.0
-"""Time limit in seconds, long enough for a busy machine."""
+"""Time limit of a process in seconds, long enough for a busy machine"""
 
 
 def start(*arguments: str, **environment: str) -> "subprocess.Popen[str]":
@@ -23,7 +23,7 @@ def start(*arguments: str, **environment: str) -> "subprocess.Popen[str]":
 
 
 def ended(*arguments: str, **environment: str) -> tuple[int, str, str]:
-    """Run such a process to its end; return its exit code, output and errors."""
+    """Start Python as `start` does and wait for its end; return its exit code, output and errors."""
     with start(*arguments, **environment) as process:
         said, complaint = process.communicate(timeout=LIMIT_S)
     return process.returncode, said, complaint

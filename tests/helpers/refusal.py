@@ -1,4 +1,4 @@
-"""Text of a refusal."""
+"""Text of the error with which a function refuses a setting."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,7 +9,7 @@ from common.errors import ConfigurationError
 
 
 def refusal(call: Callable[..., object], *arguments: Any) -> str:
-    """Return the one line in which `call` refuses its arguments; fail on none or several."""
+    """Return the text of the ConfigurationError that `call` raises; fail if there is none or it has several lines."""
     with pytest.raises(ConfigurationError) as caught:
         call(*arguments)
     assert "\n" not in str(caught.value)

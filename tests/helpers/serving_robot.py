@@ -15,11 +15,11 @@ from robot_side.operators.safety import Safety, SafetySettings
 from tests.helpers.felt import telemetry
 
 LEASE_S = 59.0
-"""Lease in seconds, long enough for a silent owner to keep it."""
+"""Duration of a lease in seconds, so long that a silent owner keeps the lease"""
 
 
 class ServingRobot:
-    """Robot side that answers and publishes telemetry."""
+    """Robot side in a thread, as a context: it answers messages and publishes telemetry, unless told otherwise."""
 
     def __init__(
         self,
@@ -69,4 +69,4 @@ class ServingRobot:
                 self.sockets.publish(b"telemetry", encode(telemetry(self.session.view_header(now_s))))
 
     def tick(self, now_s: float) -> None:
-        """Hook of a test for additional work in a turn at `now_s`."""
+        """Do nothing; a test may override this method, which each turn of the thread calls."""

@@ -1,4 +1,4 @@
-"""Simulated person with a controller, before a screen that shows a test's views of an imaginary robot."""
+"""Simulated person with a simulated controller, who sees telemetry that the test makes up."""
 
 import math
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ TICK_S, FRAME_S = 0.004, 0.02
 CALIBRATION = TravelCalibration()
 GRASP_M = 0.02
 CLEAR_SIGHTED = PersonSettings(depth_error_sd_m=0.0, grasp_depth_m=GRASP_M)
-"""Person who judges distances rightly, so that the target is seen where it is."""
+"""Person who makes no error in judging distances, and so sees the target where it is"""
 VIEW = telemetry(
     Header(epoch=1, sequence=1, sent_s=0.0),
     tool_position_m=(0.5, 0.0, 0.3),
@@ -44,7 +44,7 @@ def armed(target_in_tool_m: Vector3 | None = IN_REACH, **changes: Any) -> Teleme
 
 @dataclass(frozen=True)
 class Hands:
-    """State of the hands after one tick."""
+    """The simulated person's inputs after one tick: forces on the triggers in newtons, sticks and buttons."""
 
     now_s: float
     phase: Doing
@@ -56,7 +56,7 @@ class Hands:
 
 
 class WatchedDualSense(SimulatedDualSense):
-    """Controller that remembers the hands' actions."""
+    """Simulated controller that keeps the newest forces, sticks and buttons."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -78,7 +78,7 @@ class WatchedDualSense(SimulatedDualSense):
 
 
 class Desk:
-    """Person with a controller before a screen that shows the test's views."""
+    """Simulated person with a controller, before a screen that shows the telemetry of the test."""
 
     def __init__(self, settings: PersonSettings = CLEAR_SIGHTED, seed: int = 0, start_s: float = 0.0) -> None:
         self.device = WatchedDualSense()
@@ -101,7 +101,7 @@ class Desk:
         return done
 
     def watch(self, screen: Telemetry | None, duration_s: float, delay_s: float = 0.0) -> list[Hands]:
-        """Show the same picture for a while, as a stream of frames."""
+        """Show the same telemetry for `duration_s`, as a stream of frames; return the person's inputs in each tick."""
         seen = []
         frames = self._frames(screen)
         for _ in range(round(duration_s / TICK_S)):
@@ -109,7 +109,7 @@ class Desk:
         return seen
 
     def until(self, phase: Doing, screen: Telemetry, at_most_s: float, delay_s: float = 0.0) -> float:
-        """Watch until the person reaches `phase`; return the time it took."""
+        """Show `screen` until the person is in `phase`; return the seconds taken. AssertionError after `at_most_s`."""
         start_s, frames = self.now_s, self._frames(screen)
         while self.person.phase != phase:
             assert self.now_s - start_s <= at_most_s, f"still in {self.person.phase} after {at_most_s} s"
@@ -117,7 +117,7 @@ class Desk:
         return self.now_s - start_s
 
     def arm(self, screen: Telemetry | None = None) -> None:
-        """Run up to the advance, from where the person sees `screen`."""
+        """Run until the person has armed the arm and begins to advance; once armed, the person sees `screen`."""
         self.until(Doing.ARMING, VIEW, 3.0)
         self.until(Doing.ADVANCING, screen or armed((0.0, 0.0, 0.3)), 1.0)
 

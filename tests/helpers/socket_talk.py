@@ -9,7 +9,7 @@ from common.sockets.robot import RobotSockets
 
 EPHEMERAL = "tcp://127.0.0.1:0"
 PATIENT_S = 60.0
-"""Heartbeat time-out in seconds that a busy machine does not exceed."""
+"""Time-out in seconds that even a busy machine does not exceed"""
 ROUNDS = 6000
 """Number of waits of 10 ms after which a test gives up."""
 
@@ -29,7 +29,7 @@ def receive_one(robot: RobotSockets) -> tuple[bytes, bytes]:
 
 
 def greet(robot: RobotSockets, operator: OperatorSockets) -> bytes:
-    """Connect over every connection; return the robot side's name of `operator`."""
+    """Send until all connections of `operator` are up; return the name that the robot side has for `operator`."""
     connections = len(operator._connections)
     for _ in range(ROUNDS):
         if not operator.send(b"hello"):
@@ -44,7 +44,7 @@ def greet(robot: RobotSockets, operator: OperatorSockets) -> bytes:
 
 
 def publish_until_seen(robot: RobotSockets, operator: OperatorSockets, topic: bytes) -> None:
-    """Publish until the subscription has reached the robot side and a message has come back."""
+    """Publish on `topic` until the subscription is active and a message has reached the operator side."""
     for _ in range(ROUNDS):
         robot.publish(topic, b"probe")
         if operator.wait(0.01):
@@ -53,7 +53,7 @@ def publish_until_seen(robot: RobotSockets, operator: OperatorSockets, topic: by
 
 
 def drain_until(received: Callable[[], list[bytes]], wait: Callable[[float], bool], last: bytes) -> list[bytes]:
-    """Return all messages up to `last`; over several connections it may overtake others."""
+    """Return all messages received until `last` has come; on several connections `last` may overtake others."""
     messages: list[bytes] = []
     for _ in range(ROUNDS):
         messages += received()
@@ -64,7 +64,7 @@ def drain_until(received: Callable[[], list[bytes]], wait: Callable[[float], boo
 
 
 def drain_all(received: Callable[[], list[bytes]], wait: Callable[[float], bool], expected: list[bytes]) -> None:
-    """Wait until each of `expected` has arrived, in any order, and nothing else."""
+    """Receive as many messages as `expected` has; assert that they are these, in any order."""
     messages: list[bytes] = []
     for _ in range(ROUNDS):
         messages += received()

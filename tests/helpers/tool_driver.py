@@ -1,4 +1,4 @@
-"""Drive a simulated arm's tool as the robot side does: from encoder readings, tick by tick."""
+"""Motion of a simulated arm's tool in tests, as the robot side commands it: from encoder readings, tick by tick."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,14 +20,14 @@ VALID_S = 0.05
 
 @dataclass
 class ToolDriver:
-    """Arm in its scene, and the time of its last commands."""
+    """Simulated arm in its scene, which a test moves in virtual time `now_s`."""
 
     scene: Scene
     arm: MujocoArm
     kinematics: MujocoKinematics
     now_s: float = 100.0
     contacts: set[tuple[str, str]] = field(default_factory=set)
-    """Every contact of the gripper so far."""
+    """All contacts during `go_to` so far"""
 
     @staticmethod
     def load(model_path: Path | None = None, site: str | None = None, encoder: Encoder | None = None) -> "ToolDriver":
@@ -50,7 +50,7 @@ class ToolDriver:
         return self.arm.state(self.now_s)
 
     def move(self, twist: FloatArray, duration_s: float) -> FloatArray:
-        """Command `twist` (6,) and return the true path of the tool, one row a tick."""
+        """Command `twist` (6,) for `duration_s`; return the tool's true positions, one row for each tick."""
         path = [self.tool_m()]
         for _ in range(round(duration_s / PERIOD_S)):
             self._command(self.pose(self.wait(PERIOD_S)), twist)
@@ -70,7 +70,7 @@ class ToolDriver:
             self.contacts |= truth.observe().contacts
 
     def grip(self, closing: float, duration_s: float) -> ArmState:
-        """Close (+1) or open (-1) the gripper."""
+        """Close (+1) or open (-1) the gripper for `duration_s`; return the last state."""
         for _ in range(round(duration_s / PERIOD_S)):
             self.arm.command_gripper(closing, self.now_s + VALID_S)
             state = self.wait(PERIOD_S)

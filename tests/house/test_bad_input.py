@@ -1,4 +1,4 @@
-"""Bad input of each command gives one clear line with the value and the valid ones, and exit code 2."""
+"""Each command answers bad input with one clear line, which has the value and what is valid, and with exit code 2."""
 
 import shlex
 import socket

@@ -1,4 +1,4 @@
-"""Commands in the documents exist and parse, and the examples are true."""
+"""The commands in the documents exist and accept their arguments, and the examples run."""
 
 import re
 import shlex
@@ -19,7 +19,7 @@ import robot_side.main
 from common.command.command_line import load_toml
 from feelahead.commands import keys
 from feelahead.commands.bench_and_try import bench, try_out
-from feelahead.commands.demo import DemoSettings
+from feelahead.commands.demo.settings import DemoSettings
 from operator_side.settings import OperatorSettings
 from robot_side.settings import RobotSettings
 from tests.helpers.repository import DATA, ROOT
@@ -27,7 +27,7 @@ from tests.two_hosts.guide import steps
 
 README = "README.md"
 TO_BE_TYPED = [README, "docs/two-machines.md", "docs/systemd/README.md"]
-"""Documents whose indented lines are all commands."""
+"""Documents in which each indented line is a command to be typed, except for files' content"""
 DOCUMENTS = [
     README,
     "CONTRIBUTING.md",
@@ -40,7 +40,7 @@ COMMANDS = {
 }
 OTHERS = re.compile("cd|cp|echo|git|install|journalctl|mkdir|nft|python3|systemctl|systemd-sysusers|ufw")
 NOT_TYPED = ("advancing  L2/R2 pull", "FEELAHEAD_")
-"""Prefixes of lines that a program prints, or that are in a file."""
+"""Starts of indented lines that are no commands: a program prints them, or they are in a file"""
 KEY = "5a" * 32
 PLACEHOLDERS = {
     r"\bROBOT-KEY\b|\bOPERATOR-KEY\b": KEY,
@@ -52,16 +52,16 @@ PLACEHOLDERS = {
     r"--(config|peer-header) \S+": "",  # files that must be there
 }
 TAILS = {"allow": ["anna", KEY], "revoke": ["anna"], "make": ["robot"], "show": ["robot"]}
-"""Arguments for actions of `feelahead keys` that the text names alone."""
+"""Arguments to add to an action of `feelahead keys` where a document names the action without them"""
 
 
 class ParsedError(Exception):
-    """Signal that the arguments are valid: stop here."""
+    """Raised once a command's parser has accepted its arguments, so that the command does not run."""
 
 
 @pytest.fixture
 def parse(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every command ends as soon as its own parser has accepted its arguments."""
+    """Let each command end with ParsedError as soon as its parser has accepted its arguments."""
     cli, parse_args = tyro.cli, keys._Parser.parse_args
 
     def only_tyro(*arguments: Any, **options: Any) -> None:
@@ -78,7 +78,7 @@ def parse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def indented(name: str) -> list[str]:
-    """Return the commands of a document's indented blocks, without blocks that are a file's content."""
+    """Return the commands in a document's indented blocks; blocks that show a file's content are left out."""
     names: dict[str, str] = {}
     blocks = [one for one in Document.read(ROOT / name).blocks() if not one.startswith(("from ", "import ", "<"))]
     lines = [line for block in blocks if not is_toml(block) for line in typed(block, names)]
@@ -106,7 +106,7 @@ def filled(command: str) -> list[str]:
 
 
 def require_known(split: Sequence[str]) -> None:
-    """Raise AssertionError or ConfigurationError for a missing command, or one that would refuse its arguments."""
+    """Raise AssertionError or ConfigurationError if a command does not exist or would refuse its arguments."""
     if list(split[:2]) == ["make", "demo"]:
         split = ["feelahead", "demo", *words(" ".join(word.removeprefix("ARGS=") for word in split[2:]))]
     program, *arguments = split
@@ -173,7 +173,7 @@ def test_the_python_in_the_readme_runs() -> None:
 
 
 def test_the_guide_for_two_machines_is_in_order_and_the_readme_says_the_same() -> None:
-    """`make test-two-hosts` follows the guide."""
+    """Only the order and the texts of the commands are checked here; `make test-two-hosts` runs them."""
     said = [(step.where, step.command.split(maxsplit=3)[:3]) for step in steps()]
     made = [(where, split[2]) for where, split in said if split[:2] == ["feelahead", "keys"]]
     assert made == [("robot", "make"), ("operator", "make"), ("robot", "allow")]
@@ -192,13 +192,13 @@ _AN_OPTION = re.compile(r"\[--[^\]]*\]")
 
 @dataclass(frozen=True)
 class Document:
-    """Markdown of one file."""
+    """Text of a Markdown file."""
 
     text: str
 
     @classmethod
     def read(cls, path: Path) -> "Document":
-        """Read the file."""
+        """Read the document in the file `path`."""
         return cls(path.read_text(encoding="utf-8"))
 
     def blocks(self) -> list[str]:
@@ -211,10 +211,10 @@ class Document:
 
 
 def typed(block: str, names: dict[str, str]) -> list[str]:
-    """Return the typed lines of a block, one a command: those after `$ ` if there are any, else all.
+    """Return the commands of a block: its lines after `$ ` if there are any, otherwise all lines.
 
-    `names` of one capital letter are variables: they are replaced, and stored where they are assigned. Options in
-    brackets are left out.
+    names: values of variables, whose names are one capital letter. They replace the variables, and a block's own
+    assignments are added to them. Options in brackets are left out.
     """
     lines = [line for line in block.replace("\\\n", " ").splitlines() if line.strip()]
     if any(line.startswith("$ ") for line in lines):

@@ -1,4 +1,7 @@
-"""No function changes a module's top-level state: state has an owner. Caches of pure functions are exempt."""
+"""No function changes a variable at the top of a module: each state belongs to an object.
+
+Caches of pure functions are exempt.
+"""
 
 import ast
 from collections.abc import Iterator
@@ -16,7 +19,7 @@ CHANGES = {
 
 
 def changed(tree: ast.Module) -> set[str]:
-    """Return the names at a module's top that its functions change."""
+    """Return the names of top-level variables that functions of the module change."""
     top = {name for line in tree.body for name in _named(line)}
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
     return {name for function in functions for name in _changed_by(function) if name in top}

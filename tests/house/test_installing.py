@@ -1,4 +1,4 @@
-"""The wheel, each extra alone, and the commands without any, in separate environments."""
+"""The wheel installs and its commands run, in separate environments: with each extra by itself, and with none."""
 
 import json
 import re
@@ -36,7 +36,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def constraints(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Versions of the lock, without its hashes: a wheel built just now has none in it."""
+    """File with the versions of the lock, without hashes: with these, pip would demand one for the new wheel, too."""
     pins = re.findall(r"^[a-z0-9][^\s\\]*==[^\\]*", (ROOT / "requirements.lock").read_text(), flags=re.MULTILINE)
     assert len(pins) > 50
     path = tmp_path_factory.mktemp("constraints") / "constraints.txt"
@@ -46,14 +46,14 @@ def constraints(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def base(wheel: Path, constraints: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Bin folder of an environment without extras."""
+    """Bin folder of an environment in which the wheel is installed without extras."""
     bin_folder = installed("", wheel, constraints, tmp_path_factory.mktemp("base"))
     absent(bin_folder, "mujoco", "numba", "hid", "hidraw", "viser", "mcap", "matplotlib", "pyarrow")
     return bin_folder
 
 
 def built(source: Path, folder: Path) -> Path:
-    """Build and return the wheel of a checkout or an sdist."""
+    """Build a wheel from `source`, a checkout or an sdist; return the wheel's path."""
     made = run(sys.executable, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation", "-w", folder, source)
     assert made.returncode == 0, made.stderr
     return next(folder.glob("*.whl"))
@@ -104,10 +104,10 @@ def test_what_works_without_extras(base: Path, tmp_path: Path, arguments: list[s
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        ("feelahead-robot", "pip install 'feelahead[robot]'"),
-        ("feelahead demo --duration 1", "pip install 'feelahead[robot]'"),
-        ("feelahead bench overlap", "pip install 'feelahead[robot,experiments,bench]'"),
-        ("feelahead try haptics", "pip install 'feelahead[robot,operator]'"),
+        ("feelahead-robot", "pip install '.[robot]'"),
+        ("feelahead demo --duration 1", "pip install '.[robot]'"),
+        ("feelahead bench overlap", "pip install '.[robot,experiments,bench]'"),
+        ("feelahead try haptics", "pip install '.[robot,operator]'"),
         ("feelahead-operator --device hid --duration 0.5", "hidapi"),
     ],
 )
@@ -136,7 +136,7 @@ def test_the_operator_side_alone(wheel: Path, constraints: Path, tmp_path: Path)
 
 @pytest.mark.parametrize("extra", EXTRAS)
 def test_an_extra_can_be_had_alone(base: Path, wheel: Path, constraints: Path, tmp_path: Path, extra: str) -> None:
-    """In the locked versions, and without packages that only a side needs."""
+    """The extra installs in the locked versions, and without packages that only other extras need."""
     report = tmp_path / "report.json"
     install = (base / "python", "-m", "pip", "install", "-q", "-c", constraints)
     tried = run(*install, "--dry-run", "--report", report, wanted(wheel, extra))

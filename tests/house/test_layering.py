@@ -1,6 +1,6 @@
-"""The architecture, executable: the imports allowed to each room, and the places that may touch the outside world.
+"""The architecture as a test: which rooms (folders) may import which, and which may use outside libraries or a clock.
 
-The tree is read as text, so that lazy imports count, too. docs/architecture.md explains each room.
+The source is parsed but not run, so that imports within functions count, too. docs/architecture.md explains each room.
 """
 
 import ast
@@ -129,9 +129,9 @@ ARROWS = """
         feelahead/lab feelahead/both_sides feelahead/recordings
     feelahead: common/* feelahead/commands/*
 """
-"""Each room with the rooms that it may import: `X` is the files directly in folder X, or file X if it has its own row,
-`X/*` also those further down.
+"""One row for each room: the room, and the rooms that it may import.
 
+`X` means the files directly in folder X, or the file X if it has a row. `X/*` means also the files in X's subfolders.
 A file or folder without a row belongs to the room around it.
 """
 
@@ -172,7 +172,7 @@ LIBRARIES = {
         "feelahead/commands",
     ),
 }
-"""Each library (or clock) with the rooms and files that may import it."""
+"""Rooms and files that may import each library, or use a clock"""
 
 
 def _read_arrows() -> dict[str, tuple[str, ...]]:
@@ -185,7 +185,7 @@ ALLOWED = _read_arrows()
 
 @cache
 def modules() -> Mapping[str, Path]:
-    """Return every module of ours with its file."""
+    """Return the file of each module of this project, by the module's name."""
     found = {}
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
@@ -195,7 +195,10 @@ def modules() -> Mapping[str, Path]:
 
 
 def imports(path: Path) -> Iterator[str]:
-    """Yield the imports of `path`; a text that is a module's name counts, as the module may be imported by it."""
+    """Yield the modules that the file `path` imports.
+
+    A string that is the name of a module counts, too, as it may be used to import the module.
+    """
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -209,7 +212,7 @@ def imports(path: Path) -> Iterator[str]:
 
 
 def room_of(path: Path) -> str:
-    """Return the innermost room of ARROWS in which `path` is; without a row, the package."""
+    """Return the innermost room of ARROWS that contains `path`; the package if no row does."""
     name = path.relative_to(ROOT)
     return next((room.as_posix() for room in (name, *name.parents) if room.as_posix() in ALLOWED), name.parts[0])
 

@@ -1,4 +1,4 @@
-"""Units of docs/systemd: systemd accepts them, and the commands accept their command lines."""
+"""The unit files in docs/systemd: systemd accepts them, and our commands accept the command lines in them."""
 
 import re
 import shutil
@@ -18,14 +18,14 @@ UNITS = ROOT / "docs" / "systemd"
 INSTALLED = "/opt/feelahead/bin/"
 ANALYZE = shutil.which("systemd-analyze")
 EXPOSURE = {"feelahead-robot": 2.0, "feelahead-operator": 7.0}
-"""Highest exposure, from 0 to 10, by systemd's own measure."""
+"""Highest allowed exposure of each unit, from 0 to 10, as systemd-analyze measures it"""
 
 needs_systemd = pytest.mark.skipif(ANALYZE is None, reason="systemd-analyze is not installed here")
 
 
 @pytest.fixture
 def keys(tmp_path: Path) -> KeyFolder:
-    """Folder with both sides' keys, each allowed by the other."""
+    """Folder with the keys of both sides, in which the robot side allows the operator side's key."""
     folder = KeyFolder(tmp_path / "keys")
     for side in ("robot", "operator"):
         folder.write_pair(side, *make_key_pair())
@@ -34,7 +34,7 @@ def keys(tmp_path: Path) -> KeyFolder:
 
 
 def analyzed(name: str, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run systemd-analyze on the unit, with its program replaced by an existing one."""
+    """Run systemd-analyze on a unit whose program is replaced by one that exists on this machine."""
     text = (UNITS / f"{name}.service").read_text().replace(f"{INSTALLED}{name}", sys.executable)
     unit = folder / f"{name}.service"
     unit.write_text(text)
@@ -62,7 +62,10 @@ def test_systemd_finds_nothing_wrong_and_little_left_open(name: str, tmp_path: P
 
 
 def command_line(name: str, **replaced: str) -> list[str]:
-    """Return the unit's ExecStart as systemd would split it, with its Environment, overridden by `replaced`."""
+    """Return the words of a unit's ExecStart, split as systemd does.
+
+    Variables get the values of the unit's Environment, or of `replaced`.
+    """
     text = (UNITS / f"{name}.service").read_text()
     variables = dict(
         pair.split("=", 1) for line in re.findall(r"^Environment=(.*)$", text, re.MULTILINE) for pair in line.split()
@@ -91,14 +94,14 @@ def test_a_side_takes_its_flags(keys: KeyFolder, side: str, given: dict[str, str
     words = command_line(f"feelahead-{side}", **given)
     line = [word.replace(f"{folder}/feelahead/keys", str(keys.path)) for word in words]
     assert line != words
-    # The last of a repeated flag holds.
+    # If a flag is repeated, the last one counts.
     command = [sys.executable, "-P", "-m", f"{side}_side", *line, "--duration", "0.5", "--status", "none"]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
 
 
 def test_what_a_unit_writes_to_is_what_it_may() -> None:
-    """Machine code and covers are kept below the only writable folder."""
+    """The robot side keeps compiled kernels and gripper covers in the only folder that its unit may write to."""
     text = (UNITS / "feelahead-robot.service").read_text()
     assert "CacheDirectory=feelahead\n" in text
     assert "NUMBA_CACHE_DIR=%C/feelahead/kernels XDG_CACHE_HOME=%C\n" in text  # covers: $XDG_CACHE_HOME/feelahead

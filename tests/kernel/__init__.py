@@ -1,1 +1,1 @@
-"""Stock Debian kernel in QEMU, whose own hid-playstation drives our virtual controller: `make test-kernel`."""
+"""Tests of our virtual controller and a stock Debian kernel's driver hid-playstation, in QEMU: `make test-kernel`."""

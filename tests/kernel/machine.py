@@ -1,4 +1,4 @@
-"""Virtual machine: QEMU in software, the host's root over 9p, and two serial lines."""
+"""Virtual machine in QEMU, emulated in software. It has two serial lines, and reads the host's files over 9p."""
 
 import os
 import selectors
@@ -12,13 +12,13 @@ from tests.kernel.ramdisk import RESULT_MARK
 
 
 class MachineError(AssertionError):
-    """Failure of the machine to give a result; the text says how far it came."""
+    """The virtual machine gave no result; the text says whether it ended or took too long."""
 
 
 def run_machine(parts: Parts, ramdisk: Path, console: Path, limit_s: float) -> int:
-    """Boot, print each line of the test program, and return its exit code.
+    """Boot the virtual machine, print each line of the test program in it, and return the program's exit code.
 
-    The kernel's own messages go to the file `console`. MachineError when there is no exit code after `limit_s`.
+    The kernel's own messages go to the file `console`. MachineError if no exit code has come after `limit_s`.
     """
     command = [
         str(parts.qemu),
@@ -45,7 +45,7 @@ def run_machine(parts: Parts, ramdisk: Path, console: Path, limit_s: float) -> i
 
 
 def follow(machine: "subprocess.Popen[bytes]", limit_s: float, say: Callable[[str], None]) -> int:
-    """Pass each line to `say` until the one with the exit code; return that code."""
+    """Pass each output line to `say`, until the line with the exit code comes; return that code."""
     stream = machine.stdout
     assert stream is not None
     end_s = time.monotonic() + limit_s

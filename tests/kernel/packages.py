@@ -1,4 +1,4 @@
-"""QEMU, a kernel and busybox as Debian packages, unpacked into a folder; nothing is installed on the system."""
+"""QEMU, a kernel and busybox of Debian packages, unpacked into a folder; nothing is installed on the system."""
 
 import os
 import shutil
@@ -21,17 +21,17 @@ class Parts:
 
     qemu: Path
     qemu_environment: dict[str, str]
-    """Environment in which QEMU finds its libraries."""
+    """Environment variables by which QEMU finds its libraries"""
     firmware: Path | None
-    """Folder of QEMU's firmware; None if QEMU finds it itself."""
+    """Folder with QEMU's firmware; None if QEMU is installed on the system and finds the firmware itself"""
     kernel: Path
     modules: Path
-    """Kernel's own folder under lib/modules."""
+    """Folder of this kernel's modules, under lib/modules"""
     busybox: Path
 
 
 def provide() -> Parts:
-    """Find the parts, or download and unpack them; skip the test if unavailable."""
+    """Return the parts of the virtual machine, downloaded if needed; skip the test if they cannot be had."""
     return unpacked("kernel", _packages, _found)
 
 

@@ -1,4 +1,4 @@
-"""Initial ramdisk: busybox, the needed modules, and a script that switches to the host's files."""
+"""Initial ramdisk of the virtual machine: busybox, kernel modules, and a script that switches to the host's files."""
 
 import gzip
 import lzma
@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Final
 
 WANTED: Final = ("virtio_pci", "9pnet_virtio", "9p", "hid_generic", "hid_playstation", "uhid", "evdev")
-"""Modules; their dependencies are added."""
+"""Kernel modules that the tests need; `module_order` adds their dependencies"""
 RESULT_MARK: Final = "kernel test: exit code "
-"""Prefix of the line with the test program's exit code."""
+"""Start of the output line that gives the test program's exit code"""
 WRITABLE: Final = "/dev/shm"  # noqa: S108  # the guest's own, in memory
-"""Writable folder of the guest."""
+"""The only folder that programs in the virtual machine can write, in its memory"""
 
 _FOLDER, _EXECUTABLE = 0o040755, 0o100755
 
@@ -42,9 +42,9 @@ poweroff -f
 
 
 def module_order(folder: Path, wanted: Iterable[str] = WANTED) -> dict[str, Path]:
-    """Return the files of the modules in `folder` that `wanted` needs, by name, each after its dependencies.
+    """Return the files, by module name, of `wanted` and all their dependencies, each after its own dependencies.
 
-    Built-in modules are left out; FileNotFoundError for a module that is neither there nor built in.
+    Modules built into the kernel are left out. FileNotFoundError for a module that is neither built in nor in `folder`.
     """
     files = {_name(path.name): path for path in folder.rglob("*.ko*")}
     built_in = {_name(line.rsplit("/", 1)[-1]) for line in (folder / "modules.builtin").read_text().splitlines()}
@@ -65,7 +65,7 @@ def module_order(folder: Path, wanted: Iterable[str] = WANTED) -> dict[str, Path
 
 
 def read_module(path: Path) -> bytes:
-    """Return the module's bytes, unpacked where Debian packs them."""
+    """Return the bytes of a module, decompressed if Debian has compressed it."""
     content = path.read_bytes()
     return lzma.decompress(content) if path.suffix == ".xz" else content
 
@@ -75,7 +75,7 @@ def _name(file: str) -> str:
 
 
 def _depends(module: bytes) -> list[str]:
-    """Return the dependencies that a module lists."""
+    """Return the names of the modules that a module lists as its dependencies."""
     found = re.search(rb"(?:^|\0)depends=([^\0]*)\0", module)
     return [name.replace("-", "_") for name in found[1].decode().split(",") if name] if found else []
 

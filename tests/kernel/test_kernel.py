@@ -1,4 +1,4 @@
-"""Stock Debian kernel in QEMU, in which pytest runs the tests of `inside/`: `make test-kernel`."""
+"""Boot a stock Debian kernel in QEMU, and let pytest run the tests of `inside/` there: `make test-kernel`."""
 
 import compileall
 import os
@@ -17,13 +17,13 @@ pytestmark = [pytest.mark.kernel, pytest.mark.processes]
 
 _INSIDE = Path(__file__).parent / "inside"
 _FILES = ("operator_side.py", "command.py", "gamepad.py", "driver.py", "device.py")
-"""Files of tests; the last two leave a controller plugged in."""
+"""Test files in the order in which they run; the last two leave a controller plugged in"""
 _LIMIT_S = 1500.0
 _LAST_WORDS = 25
 
 
 def test_its_own_driver_and_ours_drive_a_controller(tmp_path: Path) -> None:
-    """INSIDE in the environment: arguments for the pytest inside, such as -k; its report is printed."""
+    """The environment variable INSIDE may hold arguments for the pytest inside, such as -k. Its report is printed."""
     parts = provide()
     command = [
         # An operator side with raised priority would leave an emulated processor to nobody else.

@@ -1,1 +1,1 @@
-"""The kernel's own netem, in User-Mode Linux, beside our emulation of it: `make test-netem`."""
+"""Tests that compare our emulation of links with the kernel's netem, run in User-Mode Linux: `make test-netem`."""

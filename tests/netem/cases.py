@@ -1,4 +1,4 @@
-"""Links that are measured in the machine and compared outside of it."""
+"""Links that are measured in the virtual machine, and compared with our emulation outside."""
 
 from dataclasses import dataclass
 
@@ -7,25 +7,25 @@ from common.emulation.clauses import LinkModel
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One link, in words for netem and for us."""
+    """One link, in netem's words, and the kind of messages sent through it."""
 
     name: str
     netem: str
     model: LinkModel = "datagram"
     messages: int = 6000
     judged: bool = True
-    """Whether a difference fails; False: shown alone, as the model is known to differ."""
+    """Whether a difference fails the test; False: it is only printed, as our model is known to differ"""
 
     @property
     def file(self) -> str:
-        """File of its recording."""
+        """Name of the file with this case's recording."""
         return f"{self.name}.csv"
 
 
 _NORMAL = "delay 20ms 5ms distribution normal"
 
 PATH_CASE = Case("path", "delay 20ms", messages=2000)
-"""Case that measures the path's own delay, which is not netem's."""
+"""Case for the delay that the path has besides netem's"""
 CASES = (
     Case("normal", _NORMAL),
     Case("uniform", "delay 20ms 5ms"),

@@ -1,4 +1,4 @@
-"""Messages through the router, one each millisecond: datagrams one way, ZeroMQ's streams both ways."""
+"""Messages sent through the router, one each millisecond, and recorded: as UDP datagrams, or over ZeroMQ and TCP."""
 
 import socket
 import struct
@@ -11,7 +11,7 @@ from tests.netem.cases import PAYLOAD_BYTES, PERIOD_NS
 from tests.netem.namespaces import RECEIVER, enter
 
 Recording = list[tuple[int, int | None]]
-"""Times of sending and arrival of each message, in nanoseconds; None: lost."""
+"""Time of sending and time of arrival of each message, in nanoseconds; arrival None: lost"""
 
 _PORT = 5555
 _SO_TIMESTAMPNS = 35
@@ -21,12 +21,12 @@ _NUMBER = struct.Struct("<q")
 _STAMP = struct.Struct("<qq")
 _PADDING = bytes(PAYLOAD_BYTES - _NUMBER.size)
 _WARM_UP = 1000
-"""Number of messages at a stream's start that do not count: TCP opens its window with them."""
+"""Number of messages at the start of a stream that are left out, as TCP still opens its window"""
 _LAST_MS = 5000
 
 
 def exchange_datagrams(count: int) -> Recording:
-    """Send UDP one way; the kernel stamps arrivals, so that no process need wake for them."""
+    """Send `count` UDP datagrams one way. The kernel stamps arrivals, so that no process need wake for them."""
     enter("receiver")
     receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     receiver.bind((RECEIVER, _PORT))
@@ -58,7 +58,7 @@ def exchange_datagrams(count: int) -> Recording:
 
 
 def exchange_stream(count: int) -> Recording:
-    """Send from DEALER to ROUTER over TCP, whose acknowledgements return through the router."""
+    """Send `count` messages from a DEALER to a ROUTER socket over TCP; its acknowledgements pass netem, too."""
     enter("receiver")
     there: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     router = _unbounded(there.socket(zmq.ROUTER))

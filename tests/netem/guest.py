@@ -1,4 +1,4 @@
-"""Program inside the machine that records netem's effect on messages."""
+"""Program that runs inside the virtual machine, and records how netem delays and loses messages."""
 
 import csv
 import ctypes
@@ -12,11 +12,11 @@ from tests.netem.exchanges import Recording, exchange_datagrams, exchange_stream
 from tests.netem.namespaces import join_namespaces, set_netem
 
 _FINIT_MODULE = 313
-"""Number of the system call on x86_64; insmod need not be installed."""
+"""Number of the system call finit_module on x86_64, used because insmod may not be installed"""
 
 
 def main(folder: Path, modules: Sequence[str], names: Sequence[str]) -> int:
-    """Record each case of `names` into `folder`."""
+    """Load the kernel's modules, and record each of the cases `names` into a file in `folder`."""
     for module in modules:
         _load(module)
     join_namespaces()

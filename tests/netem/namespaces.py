@@ -13,7 +13,7 @@ _CLONE_NEWNET: Final = 0x40000000
 
 
 def join_namespaces() -> None:
-    """Make the three namespaces; needs root in a private machine."""
+    """Make the three namespaces and connect them; needs root, in a virtual machine that has no others."""
     for name in ("router", *_ENDS):
         _ip(f"netns add {name}")
         _ip(f"-n {name} link set dev lo up")
@@ -30,7 +30,7 @@ def join_namespaces() -> None:
 
 
 def set_netem(words: str) -> None:
-    """Set netem on both directions of the router's output."""
+    """Apply netem with these words to both interfaces on which the router sends: one for each direction."""
     for name in _ENDS:
         # Another qdisc first: netem replaced by netem would keep its table.
         _run(["tc", "-n", "router", "qdisc", "replace", "dev", f"to-{name}", "root", "pfifo"])
@@ -38,7 +38,10 @@ def set_netem(words: str) -> None:
 
 
 def enter(name: str) -> None:
-    """Move this thread, and those that it starts, into a namespace: sockets belong where they were made."""
+    """Move this thread into a network namespace.
+
+    Threads that it starts from now on are in this namespace, too. A socket stays in the namespace where it was made.
+    """
     libc = ctypes.CDLL(None, use_errno=True)
     descriptor = os.open(f"/run/netns/{name}", os.O_RDONLY)
     try:

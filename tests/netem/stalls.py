@@ -1,7 +1,7 @@
-"""Messages of a recording that the host delayed, while the machine's only processor was not running.
+"""Find messages of a recording that were delayed because the host did not run the virtual machine's only processor.
 
-Stalls show in the sending, planned for every millisecond. Messages that arrive while a sending is overdue may have been
-due earlier. Leaving them out favours no delay: the host's stalls are independent of netem's draws.
+Messages are to be sent each millisecond, so a stall shows as a late sending. A message that arrives meanwhile may have
+been due earlier. Leaving such messages out does not bias the delays: stalls are independent of netem's random draws.
 """
 
 import numpy as np
@@ -10,11 +10,11 @@ from common.arrays import BoolArray
 from feelahead.lab.link.samples import LinkSample
 
 LATE_S = 0.5e-3
-"""Lateness in seconds from which a sending is overdue: an idle machine sends within 0.2 ms."""
+"""Seconds by which a sending must be late to count as a stall: an idle machine is late by at most 0.2 ms"""
 
 
 def stalled(sample: LinkSample, period_s: float) -> BoolArray:
-    """Return whether (n,) each message was sent just before the machine stalled, or arrived while it did."""
+    """Return, for each message (n,), whether it was sent just before the machine stalled, or arrived during a stall."""
     numbers = np.arange(sample.sent_s.size)
     planned_s = numbers * period_s + float(np.min(sample.sent_s - numbers * period_s))
     overdue = sample.sent_s - planned_s > LATE_S

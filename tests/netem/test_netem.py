@@ -1,4 +1,4 @@
-"""The kernel's netem in User-Mode Linux, beside our model with the same send times."""
+"""Compare the kernel's netem, recorded in User-Mode Linux, with our model for the same times of sending."""
 
 import dataclasses
 from pathlib import Path
@@ -25,11 +25,14 @@ from tests.netem.uml import provide, run_machine
 pytestmark = [pytest.mark.netem, pytest.mark.processes]
 
 ATTEMPTS = 3
-"""Number of recordings after a miss: one run in a hundred is beyond a band of 99 %, and a busy host spoils some."""
+"""Maximum number of recordings of a case; one that agrees is enough.
+
+One run in a hundred is beyond a band of 99 % by chance, and a busy host spoils some.
+"""
 SEEDS, PAIRS = 20, 100
 STREAM_MEAN_MS, STREAM_SD_MS = 2.0, 1.0
 QUIET_SHARE = 0.05
-"""Share of messages delayed by the host above which a miss says nothing."""
+"""Maximum share of messages delayed by the host at which a difference is judged at all"""
 HEADERS_BYTES = 42
 
 
@@ -55,9 +58,9 @@ def test_ours_is_like_the_kernels(case: Case, tmp_path: Path) -> None:
 
 
 def missed_goals(case: Case, sample: LinkSample, path_s: float) -> tuple[list[str], int]:
-    """Return the differences of model and recording, and the number of messages left out for stalls of the host.
+    """Return where model and recording differ too much, and the number of messages left out for stalls of the host.
 
-    Datagrams took `path_s` besides netem's delay.
+    path_s: delay of a datagram besides netem's.
     """
     profile = LinkProfile.parse(case.netem, 0, case.model)
     size_bytes = PAYLOAD_BYTES + HEADERS_BYTES
@@ -89,5 +92,5 @@ def missed_goals(case: Case, sample: LinkSample, path_s: float) -> tuple[list[st
 
 
 def _figures_ms(sample: LinkSample) -> FloatArray:
-    """Return mean, standard deviation and 99 % quantile of the delays, in ms."""
+    """Return mean, standard deviation and 99 % quantile of the delays, in milliseconds."""
     return 1e3 * np.array([sample.mean_s, sample.sd_s, np.quantile(sample.arrived_s, 0.99)])

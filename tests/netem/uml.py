@@ -1,4 +1,4 @@
-"""User-Mode Linux: a kernel with netem as a process of ours, on the host's files, which it cannot write."""
+"""User-Mode Linux: a Linux kernel with netem that runs as an ordinary process. It can read the host's files only."""
 
 import contextlib
 import os
@@ -40,17 +40,17 @@ sleep 10
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Parts of the machine."""
+    """Parts of the User-Mode Linux machine."""
 
     kernel: Path
     modules: Path
-    """Folder of the kernel's modules."""
+    """Folder with the modules of this kernel"""
     environment: dict[str, str]
-    """Environment in which `ip` and `tc`, their libraries and tables are found."""
+    """Environment variables by which `ip`, `tc`, and their libraries and tables are found"""
 
 
 def provide() -> Parts:
-    """Return the installed parts, or downloaded ones; skip the test if unavailable."""
+    """Return the parts installed on the system, or else downloaded ones; skip the test if they cannot be had."""
     try:
         return _found(Path("/"))
     except FileNotFoundError:
@@ -83,9 +83,9 @@ def _first(root: Path, *places: str) -> Path:
 
 @contextlib.contextmanager
 def _alone() -> Iterator[None]:
-    """Keep children to one processor, with real-time priority if permitted.
+    """Let child processes run on one processor only, with real-time priority if permitted.
 
-    The machine's parts wake each other all the time: on two processors a run takes three times as long.
+    The machine's processes wake each other all the time: on two processors a run takes three times as long.
     """
     processors = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {max(processors)})
@@ -99,7 +99,7 @@ def _alone() -> Iterator[None]:
 
 
 def run_machine(parts: Parts, folder: Path, cases: Sequence[Case]) -> None:
-    """Boot and record `cases` into `folder`; skip the test if it does not boot here."""
+    """Boot the machine and record `cases` into `folder`; skip the test if the machine does not boot here."""
     said: list[str] = []
     modules = [str(path) for path in module_order(parts.modules, _MODULES).values()]
     variables = parts.environment | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1", "LANG": "C.UTF-8"}

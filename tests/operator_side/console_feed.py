@@ -1,4 +1,4 @@
-"""Content for a console: an arm that sways before a table, as both sides would report it."""
+"""Made-up content for a console: an arm that sways before a table, as the two sides would report it."""
 
 import math
 from typing import Literal
@@ -26,12 +26,12 @@ from operator_side.viewing.console.console import Console
 from operator_side.viewing.facts import FACTS_PERIOD_S, DelayFacts, OperatorFacts, TriggerFacts
 
 OFFSET_S = 1000.0
-"""Lead of the robot side's clock, in seconds."""
+"""Robot side's clock minus ours, in seconds"""
 STILL = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 OBJECTS = ("table", "mug", "bottle", "box", "lamp")
 WAYS = (0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, 0.09)
 ADVANCES_ALONG_X = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
-"""Orientation with the tool's z axis along the world's x."""
+"""Quaternion (w, x, y, z) that turns the tool's z axis to the world's x axis"""
 
 
 def header(now_s: float, sequence: int = 1) -> Header:
@@ -72,7 +72,7 @@ def facts(now_s: float, state: MotionState = "armed", advancing: Literal["L2", "
 
 
 class Pictures:
-    """Changing pictures of 640 x 480 and about 25 kB."""
+    """Changing JPEG pictures of 640 x 480 pixels and about 25 kB each."""
 
     def __init__(self) -> None:
         generator = np.random.default_rng(0)
@@ -87,7 +87,7 @@ class Pictures:
                 self._jpegs[view, step] = simplejpeg.encode_jpeg(np.ascontiguousarray(pixels), quality=75)
 
     def frame(self, view: ViewName, now_s: float, step: int, captured_s: float | None = None) -> bytes:
-        """Encode the next picture; `captured_s`: on this machine's clock, now unless given."""
+        """Encode picture number `step`. captured_s: time on this machine's clock; `now_s` if None."""
         taken_s = (now_s if captured_s is None else captured_s) + OFFSET_S
         jpeg = self._jpegs[view, step % 8]
         return encode(VideoFrame(header(now_s), view=view, captured_s=taken_s, width=640, height=480, jpeg=jpeg))
@@ -157,7 +157,7 @@ def state(now_s: float, version: int = 1) -> bytes:
 
 
 class Feed:
-    """Feed of a console with everything at 30 Hz, by `step`."""
+    """Feeds a console with facts, pictures and scene 30 times a second; `step` must be called often."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -166,7 +166,7 @@ class Feed:
         self._next_s = 0.0
 
     def step(self, now_s: float) -> None:
-        """Feed what is due."""
+        """Send everything to the console if it is due at `now_s`."""
         self._console.receive()
         if now_s < self._next_s:
             return

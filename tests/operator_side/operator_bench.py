@@ -1,4 +1,4 @@
-"""Operator side in virtual time, with its inputs and outputs in a test's hands."""
+"""Operator side in virtual time, whose inputs a test gives and whose outputs it reads."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from tests.helpers.felt import felt
 
 
 class Bench:
-    """Operator side with a simulated controller, and the robot side's end of the link in the test's hands."""
+    """Operator side with a simulated controller; the test sends the robot side's messages."""
 
     def __init__(self, **options: Any) -> None:
         self.side = OperatorSide(2, "clock", CoreSettings(**options))
@@ -31,11 +31,11 @@ class Bench:
         return encode(felt(self.robot.stamp(self.now_s), r2=r2, rumble=rumble, state=state))
 
     def feel(self, r2: int, state: MotionState = "armed", rumble: float = 0.0) -> None:
-        """Receive a field of the same strength everywhere."""
+        """Let the operator side receive a field with the same strengths in all zones."""
         self._take(self.stiffness(r2, state, rumble))
 
     def feel_field(self, update: StiffnessUpdate) -> None:
-        """Receive this field."""
+        """Let the operator side receive this stiffness message, and write the effects to the controller."""
         self._take(encode(update))
 
     def _take(self, payload: bytes) -> None:
@@ -52,7 +52,7 @@ class Bench:
         self.side.read_state(state, self.now_s)
 
     def hands(self, *buttons: Button, **state: Any) -> None:
-        """Read the state of a controller with these buttons held."""
+        """Let the operator side read a controller's state with these buttons held."""
         self.side.read_state(ControllerState(pressed=frozenset(buttons), **state), self.now_s)
 
     def payloads(self) -> list[bytes]:

@@ -1,4 +1,4 @@
-"""Robot side's end of the link without a robot: it grants the lease, and its fields have the given strength."""
+"""Stand-in for a robot side: grants the lease and sends stiffness with strengths that the test sets."""
 
 from common.clock import MonotonicClock, clock_domain
 from common.errors import RemoteProtocolError
@@ -11,12 +11,12 @@ from common.sockets.robot import RobotSockets
 from tests.helpers.felt import felt
 
 TICK_PERIOD_S = 1e-3
-"""Period of the robot side, in seconds."""
+"""Period of the stiffness messages, in seconds"""
 _NOTICE_PERIOD_S = 0.05
 
 
 class StiffnessSource:
-    """Counterpart of one operator side on loopback, in real time."""
+    """Stand-in for a robot side, for one operator side on this machine, in real time."""
 
     def __init__(self) -> None:
         self.l2 = 0
@@ -52,11 +52,11 @@ class StiffnessSource:
 
     @property
     def connected(self) -> bool:
-        """Return whether an operator side has said Hello."""
+        """Return whether an operator side has sent a Hello."""
         return self._peer is not None
 
     def run(self, duration_s: float) -> None:
-        """Answer, and send a stiffness every millisecond, for `duration_s`."""
+        """For `duration_s`, answer messages and send stiffness every millisecond."""
         self._pacer.restart(self._clock.now())
         end_s = self._clock.now() + duration_s
         while (now_s := self._clock.now()) < end_s:

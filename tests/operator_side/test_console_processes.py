@@ -1,4 +1,4 @@
-"""feelahead-operator with a console: its address, its end, and what the run loses with it."""
+"""Process feelahead-operator with a console: its address, its end, and a run that continues without it."""
 
 import os
 import signal

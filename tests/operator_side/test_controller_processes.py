@@ -1,4 +1,4 @@
-"""Real operator process with a controller that is plugged in, unplugged, and left with stiff triggers."""
+"""Process feelahead-operator: a controller is plugged in and unplugged; the process hangs or is killed."""
 
 import json
 import os
@@ -27,7 +27,7 @@ ATTEMPTS = 20
 
 
 class World:
-    """Operator process, its controller, and the robot side's end of its link."""
+    """Operator side's process, its controller as a FIFO, and a stand-in for the robot side."""
 
     def __init__(self, folder: Path, *flags: str, plugged_in: bool = True) -> None:
         self._folder = folder
@@ -62,11 +62,11 @@ class World:
             marker.unlink(missing_ok=True)
 
     def until(self, condition: Callable[[], bool]) -> None:
-        """Run the robot side until `condition` holds."""
+        """Run the stand-in for the robot side until `condition` is true."""
         self._until(condition, lambda: self.source.run(0.02))
 
     def until_in_silence(self, condition: Callable[[], bool]) -> None:
-        """Wait until `condition` holds, without a message from the robot side."""
+        """Wait until `condition` is true, while the robot side sends nothing."""
         self._until(condition, lambda: select.select([self._controller], [], [], 0.02))
 
     def _until(self, condition: Callable[[], bool], go_on: Callable[[], object]) -> None:
@@ -91,12 +91,12 @@ class World:
         self.until(self.is_stiff)
 
     def is_stiff(self) -> bool:
-        """Return whether R2's last command was stiff."""
+        """Return whether the last report that set R2 made it stiff."""
         commanded = [report.r2 for report in self.written if report.r2 is not None]
         return bool(commanded) and commanded[-1] != FREE_TRIGGER
 
     def hang(self) -> None:
-        """Stop it while the triggers are stiff; retry if a busy machine had it release them just before."""
+        """Suspend the process while the triggers are stiff; retry if it released them just before."""
         for _ in range(ATTEMPTS):
             self.stiffen()
             self.process.send_signal(signal.SIGSTOP)
@@ -108,18 +108,18 @@ class World:
         raise AssertionError(f"let go of by itself {ATTEMPTS} times; {self.written[-3:]}")
 
     def end(self) -> tuple[int, str]:
-        """Wait for its end; return its exit code and its errors."""
+        """Wait until the process ends; return its exit code and standard error."""
         code = self.process.wait(LIMIT_S)
         self._reader.join(LIMIT_S)
         assert self.process.stderr is not None
         return code, self.process.stderr.read()
 
     def until_released(self) -> None:
-        """Wait until the last write is a full release."""
+        """Wait until the last write releases triggers and motors, while the robot side sends nothing."""
         self.until_in_silence(self.is_released)
 
     def is_released(self) -> bool:
-        """Return whether the last write is a full release, perhaps with the usual light."""
+        """Return whether the last write releases triggers and motors, whatever light it sets."""
         return bool(self.written) and replace(self.written[-1], light=None) == RELEASED
 
     def _look(self) -> None:
@@ -156,7 +156,7 @@ def stiff(report: Feel) -> bool:
 
 
 def tells_all(report: Feel) -> bool:
-    """Return whether the report is RELEASED, or RELEASED merged with the next write."""
+    """Return whether the report sets all parts and releases L2, as the first write or that merged with the next."""
     return report.l2 == FREE_TRIGGER and report.r2 is not None and report.rumble is not None
 
 
@@ -182,7 +182,7 @@ def test_an_exception_releases_them_too(world: World, tmp_path: Path) -> None:
     assert code == 1
     assert "as no driver should" in complaint
     (tmp_path / "broken").unlink()
-    # The loop's last write fails with the driver; the watchdog opens the device separately.
+    # The loop's last write fails with the driver, but the watchdog has opened the device by itself.
     world.until_released()
 
 
@@ -206,7 +206,7 @@ def test_without_a_controller_it_says_so_and_commands_nothing_until_one_appears(
         assert world.notes()[1] == "controller: DualSense on USB (a4:5e:60:01:02:03)"
         assert "feelahead calibrate" in world.notes()[2]
         assert world.written[0] == RELEASED
-        # On a machine that stalls a field may expire, which only the light shows.
+        # On a machine that stalls, stiffness may expire, which only the light shows.
         assert {(report.l2, report.r2) for report in world.written[1:]} <= {(None, None)}
 
 

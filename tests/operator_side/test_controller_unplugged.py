@@ -1,4 +1,4 @@
-"""Controller unplugged in mid-run, both sides in virtual time: the arm stops, and moves again only on purpose."""
+"""Controller unplugged during a run, both sides in virtual time: the arm stops until it is armed again."""
 
 from collections.abc import Callable
 
@@ -18,11 +18,11 @@ pytestmark = pytest.mark.long
 PLACE = b"usb"
 GAP_S = 0.1
 RAMP_S = 0.3
-"""Time in seconds in which the arm comes to rest from any speed of this run."""
+"""Seconds in which the arm comes to rest from any speed of this run"""
 
 
 class Run:
-    """Run with the person's hands on a controller with a plug."""
+    """Run of both sides with a scripted person, whose controller the test can unplug."""
 
     def __init__(self, link: str = "") -> None:
         self.both = Loopback(LoopbackSettings(RobotSettings(link=link), OperatorSettings(link=link)))
@@ -38,7 +38,7 @@ class Run:
         self.system.devices[PLACE] = self.both.device
 
     def let_go_of_the_person(self) -> None:
-        """Freeze the person's hands, so that only the test moves them."""
+        """Stop the scripted person, so that only the test operates the controller."""
         self.both.person.tick = lambda *_: None  # type: ignore[method-assign]
 
     def wait(self, duration_s: float) -> None:
@@ -65,7 +65,7 @@ class Run:
 
 
 def advancing(link: str = "") -> Run:
-    """Run until the arm moves and something is felt."""
+    """Return a run in which the arm moves and a trigger is stiff."""
     run = Run(link)
     run.until(lambda: not run.both.device.released, 12.0)
     assert run.state == "armed"
@@ -99,7 +99,7 @@ def test_plugged_in_again_it_resumes_disarmed_and_is_armed_on_purpose() -> None:
     run.plug_in()
     commands = run.commands
     run.wait(LOOK_PERIOD_S + 2.0)
-    # The hands hold the trigger and the run button as before: that counts for nothing.
+    # Trigger and hold-to-run are still held as before, which must not move the arm.
     assert run.both.connection.state is ConnectionState.CONNECTED
     assert run.commands > commands
     assert run.state == "disarmed"

@@ -1,4 +1,4 @@
-"""Table of --device."""
+"""Table of the controllers that --device selects."""
 
 from pathlib import Path
 from typing import get_args

@@ -1,4 +1,4 @@
-"""Operator side by examples: writes, messages, views and counts; test_core_states.py covers its states."""
+"""Core of the operator side, by examples: writes, messages, views, counts; test_core_states.py tests the states."""
 
 from collections.abc import Callable
 from typing import Any
@@ -25,7 +25,7 @@ def bench() -> Bench:
 
 
 def sent(bench: Bench, kind: type[AnyMessage], for_s: float = 0.0) -> list[Any]:
-    """Return messages of this kind over `for_s`; the robot side is silent."""
+    """Return the messages of this kind that are sent during `for_s`, while the robot side sends nothing."""
     found = []
     for _ in range(1 + round(for_s / 0.004)):
         found += [message for message in map(decode, bench.payloads()) if isinstance(message, kind)]
@@ -38,7 +38,7 @@ def test_another_calibration_changes_what_is_read_and_what_is_felt(bench: Bench)
     bench.hands(r2=0.55)
     assert bench.commands()[0].r2 == pytest.approx(0.5, abs=0.02)
     bench.feel(6)
-    # Before the fourth zone nothing is commanded.
+    # Zones before the fourth command no motion.
     assert bench.device.strengths[1] == (0,) * 3 + (6,) * 7
 
 

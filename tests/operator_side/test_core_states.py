@@ -1,6 +1,6 @@
-"""In any order of events: triggers free without a field, and motion only by the armed driver.
+"""Core of the operator side in any order of events: free triggers without stiffness, motion only with the lease.
 
-`Core` states the rules in a few lines, with the limits as numbers, and compares them with the operator side each turn.
+`Core` has the rules in a few lines, with limits as numbers. In each turn it checks that the operator side follows them.
 """
 
 import math
@@ -38,7 +38,7 @@ STATES: tuple[MotionState, ...] = ("armed", "armed", "disarmed", "stopped")
 
 
 def meant(l2: float, r2: float, deflected: bool, held: frozenset[Button]) -> dict[str, Any]:
-    """Return the command of these hands."""
+    """Return the fields of the command that these inputs must give."""
     stop = Button.CIRCLE in held
     lateral, turning = ((1.0, 0.0), (0.0, 1.0)) if deflected else ((0.0, 0.0), (0.0, 0.0))
     return {
@@ -53,7 +53,7 @@ def meant(l2: float, r2: float, deflected: bool, held: frozenset[Button]) -> dic
 
 
 class Core(RuleBasedStateMachine):
-    """Operator side, controller, and a robot side that says anything."""
+    """Operator side, its controller, and a robot side that may send any message at any time."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -76,7 +76,7 @@ class Core(RuleBasedStateMachine):
         goes_on=st.sampled_from(GOES_ON),
     )
     def pass_time(self, seconds: float, hung: bool, goes_on: str) -> None:
-        """Advance time; `goes_on` is sent again afterwards. `hung`: the loop takes no turn before the next event."""
+        """Advance time. goes_on: messages and inputs repeated afterwards. hung: no turn before the next event."""
         self.bench.now_s += seconds
         self.hung, self.waited = hung, True
         if "lease" in goes_on and self.lease is not None:
@@ -106,7 +106,7 @@ class Core(RuleBasedStateMachine):
         if session is SessionState.ENDED:
             anew = self.bench.now_s - self.anew_s < 5.0
             if anew and self.lease is not None and self.lease.session is not SessionState.ENDED:
-                return  # of the last epoch
+                return  # about the epoch before
             self.anew_s = self.anew_s if anew else self.bench.now_s
         self.lease, self.heard_s = notice, self.bench.now_s
         if not self.owns:
@@ -116,7 +116,7 @@ class Core(RuleBasedStateMachine):
 
     @rule(data=st.data())
     def hear_something_old(self, data: st.DataObject) -> None:
-        """Receive a message again, or an overtaken one: nothing changes."""
+        """Receive an earlier message again, which must change nothing."""
         if self.older:
             self.bench.side.receive(data.draw(st.sampled_from(self.older)), self.bench.now_s)
 
@@ -135,7 +135,7 @@ class Core(RuleBasedStateMachine):
 
     @rule(event=st.sampled_from(["unplugged", "stop pressed on a page", "robot side restarted"]))
     def happen(self, event: str) -> None:
-        """Run a rare event."""
+        """Let a rare event happen."""
         if event == "unplugged":
             self.bench.side.controller_lost(self.bench.now_s)
             self.hands, self.held, self.lost_s = None, None, self.bench.now_s
@@ -175,7 +175,7 @@ class Core(RuleBasedStateMachine):
 
     @invariant()
     def each_turn(self) -> None:
-        """Take a turn of the loop."""
+        """Take a turn of the loop, and compare with the rules."""
         if self.hung:
             self.hung = False
             return

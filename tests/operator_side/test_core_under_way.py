@@ -1,4 +1,4 @@
-"""Triggers with our own commands under way, and with the robot side's prediction where these are unknown."""
+"""Rendering by our own commands under way, and by the robot side's displacement where they are unknown."""
 
 from typing import Any
 
@@ -16,11 +16,11 @@ from tests.operator_side.operator_bench import Bench
 PERIOD_S = 0.004
 FREE = (0,) * 10
 LEFT_M = 0.1
-"""Distance too long for a hand without earlier commands: at full speed it needs 85 mm."""
+"""Distance to the wall. Without commands under way it is not felt, as full speed needs 85 mm"""
 
 
 class Driving(Bench):
-    """R2 pulled all the way in a moment, without earlier commands."""
+    """Bench on which R2 is pulled all the way at once, with no commands before."""
 
     def __init__(self, compensation: Compensation = "operator") -> None:
         super().__init__(compensation=compensation)
@@ -39,7 +39,7 @@ class Driving(Bench):
             self.send(1.0, *(buttons or (Button.L1,)))
 
     def report(self, **changes: Any) -> StiffnessUpdate:
-        """Return the report of a wall ahead of R2, by a robot side that heard nothing after `echo_s`."""
+        """Return a stiffness message with a wall ahead of R2, from a robot side without commands after `echo_s`."""
         wall = field(onsets(LEFT_M), displacement_m=changes.pop("displacement_m", 0.0))
         header = msgspec.structs.replace(
             self.robot.stamp(self.now_s), echo_sent_s=self.echo_s, echo_held_s=0.0, last_sent_s=None, last_held_s=None
@@ -76,7 +76,7 @@ def test_ending_commands_means_stop() -> None:
         bench.notice(SessionState.ARMED)
         assert bench.commands() == []
     bench.feel_field(bench.report())
-    # Its last command counted until its stop was seen, 0.2 s later: δ = 0.25 * 0.296 = 74 mm, w = 0.
+    # The last command counts until the end of commands is noted, 0.2 s later: δ = 0.25 * 0.296 = 74 mm, w = 0.
     assert bench.r2 == (0,) * 3 + (8,) * 7
     assert bench.without_history == 0
 

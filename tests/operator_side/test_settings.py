@@ -1,4 +1,4 @@
-"""Operator side's settings: from a file and from flags, and every refusal in one line."""
+"""Settings of the operator side: from a file and from flags; each refusal is one line."""
 
 import math
 from pathlib import Path

@@ -1,6 +1,7 @@
-"""Both halves of the law together: the place where a finger stops before a wall does not depend on the link.
+"""Delay compensation in a whole loop: where a constant force stops before a wall does not depend on the link.
 
-The robot side is an arm on a line that reports its exact distance from a wall; everything else is as shipped.
+A stand-in for the robot side is an arm on a line, which reports its exact distance from a wall. The operator side is
+the real one.
 """
 
 import math
@@ -26,12 +27,12 @@ AHEAD_M, RAMP_M, HORIZON_M = 0.3, 0.012, 0.6
 
 
 def line(delay_s: float, jitter_s: float, seed: int) -> DelayLine[bytes]:
-    """Return one direction of a link: a steady delay, or one with jitter."""
+    """Return the delay line for one direction of the link."""
     return DelayLine(LinkProfile.parse(f"delay {1e3 * delay_s:g}ms {1e3 * jitter_s:g}ms", seed=seed))
 
 
 class Approach:
-    """Finger of constant force on R2 from one second on, and an arm on a line before a wall."""
+    """Operator side whose R2 a finger presses with a constant force, and an arm on a line before a wall."""
 
     def __init__(self, delay_s: float, jitter_s: float = 0.0, compensation: Compensation = "operator") -> None:
         self.side = OperatorSide(2, "clock", CoreSettings(compensation=compensation))
@@ -44,7 +45,7 @@ class Approach:
         self.tick = 0
 
     def pull(self, force_n: float, duration_s: float) -> FloatArray:
-        """Pull for `duration_s`; return the speed at each step (n,)."""
+        """Press R2 with `force_n` for `duration_s`; return the arm's speed after each step (n,)."""
         self.device.set_finger_force(0.0, force_n)
         speeds = []
         for _ in range(round(duration_s / STEP_S)):
@@ -83,7 +84,7 @@ class Approach:
             self.back.push(now_s, encode(message))
 
     def _ahead(self, now_s: float) -> StiffnessUpdate:
-        """Return the profile of a wall: a sphere's overlap grows with the square of the distance."""
+        """Return the stiffness message for the wall: overlap grows with the square of the distance."""
         begin_m = [self.left_m - RAMP_M * (1.0 - math.sqrt((strength - 0.5) / 8)) for strength in range(1, 9)]
         wall = field(
             onsets(*(min(metres, HORIZON_M) for metres in begin_m)),
@@ -103,7 +104,7 @@ class Approach:
 
 
 def begun(delay_ms: float, jitter_ms: float = 0.0) -> Approach:
-    """Return an approach with the link up and our commands known to the robot side."""
+    """Return an approach after one second, in which the link has come up and commands have arrived."""
     approach = Approach(1e-3 * delay_ms, 1e-3 * jitter_ms)
     approach.pull(0.0, 1.0)
     return approach
@@ -114,8 +115,8 @@ def begun(delay_ms: float, jitter_ms: float = 0.0) -> Approach:
 def test_a_finger_of_two_newtons_stops_at_the_same_place_whatever_the_link(delay_ms: int, jitter_ms: int) -> None:
     approach = begun(delay_ms, jitter_ms)
     speeds = approach.pull(2.0, 8.0)
-    # Strength 6 in the first zone holds 2 N. It begins 12 (1 - sqrt(5.5 / 8)) = 2.0 mm before the wall.
-    # The zone's own 4.5 mm/s need 1.4 mm.
+    # Strength 6 in the first zone stops a finger of 2 N. It begins 12 (1 - sqrt(5.5 / 8)) = 2.0 mm before the wall.
+    # The 4.5 mm/s that the zone commands need 1.4 mm.
     assert 1e3 * approach.left_m == pytest.approx(3.3, abs=0.2)
     assert speeds.max() > 0.1
     assert np.abs(speeds[-500:]).max() < 1e-3

@@ -1,11 +1,11 @@
-"""Arm that delegates to another one, as a base for overrides."""
+"""Base class of arms that differ from another arm in one respect."""
 
 from common.arrays import FloatArray
 from robot_side.arm.port import Arm, ArmState
 
 
 class PassedOnArm(Arm):
-    """Arm that behaves as `arm`."""
+    """Arm that passes all calls on to `arm`; subclasses override some."""
 
     joint_count = 0
 

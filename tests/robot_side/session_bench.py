@@ -1,4 +1,4 @@
-"""Robot side in virtual time with operators in our hands; every message arrives at once."""
+"""Robot side in virtual time, with operators that the test controls; each message arrives at once."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -31,35 +31,35 @@ TICK_S = 0.001
 COMMAND_PERIOD_TICKS = 4
 _HELLO_PERIOD_TICKS = 200
 QUICK = RobotSettings(safety=SafetySettings(healthy_s=0.1))
-"""Settings that arm after a tenth of a second; a longer time would test nothing more."""
+"""Settings with which the arm can be armed after 0.1 s of commands: a longer time would test nothing more"""
 CRUISE = 0.4
 """Travel of R2 at which the built-in arm advances at 0.1 m/s."""
 
 
 class ArmWatch(Listener):
-    """Record of the commands to the arm and its measured speed."""
+    """Listener that notes commands to the arm and the arm's measured speed."""
 
     def __init__(self) -> None:
         self.speeds_rad_s: list[tuple[float, float]] = []
-        """(time, largest joint speed) of each state."""
+        """(time, speed of the fastest joint) of each state"""
         self.told_to_move = 0
-        """Number of commands that were not to stand still."""
+        """Number of commands to move, with a joint velocity other than 0"""
 
     def on_tick(self, tick: Tick) -> None:
-        """Note a tick's state, and then its command."""
+        """Note the state and the command of a tick."""
         if tick.measured is not None:
             self.note(tick.measured)
         if tick.found is not None and tick.found.commanded_rad_s is not None:
             self.told_to_move += bool(np.any(tick.found.commanded_rad_s))
 
     def note(self, state: ArmState) -> None:
-        """Note a measured state."""
+        """Note the speed in a measured state, unless it was noted before."""
         if not self.speeds_rad_s or state.time_s > self.speeds_rad_s[-1][0]:
             self.speeds_rad_s.append((state.time_s, float(np.abs(state.joint_velocities_rad_s).max())))
 
 
 class Operator:
-    """One operator's end of the link."""
+    """An operator's end of the link, and the messages that it has received."""
 
     def __init__(self, epoch: int, peer: bytes) -> None:
         self.link = LinkEnd("operator", epoch, "clock")
@@ -69,17 +69,17 @@ class Operator:
 
     @property
     def token(self) -> int:
-        """Token of the lease as last heard; 0 before."""
+        """Token of the lease by the newest notice; 0 before the first."""
         return 0 if self.notice is None else self.notice.token
 
     @property
     def state(self) -> SessionState:
-        """State of the session as last heard."""
+        """State of the session by the newest notice."""
         return SessionState.UNKNOWN if self.notice is None else self.notice.session
 
     @property
     def felt(self) -> list[StiffnessUpdate]:
-        """Every stiffness received."""
+        """All stiffness messages received."""
         return [message for message in self.inbox if isinstance(message, StiffnessUpdate)]
 
     def take(self, message: StiffnessUpdate | Hello | LeaseNotice, now_s: float) -> None:
@@ -90,18 +90,18 @@ class Operator:
             self.notice = message
 
     def command(self, now_s: float, header: Header | None = None, **fields: Any) -> bytes:
-        """Return a motion command with the triggers released and the run button down, except for `fields`."""
+        """Return a motion command with released triggers and pressed hold-to-run; `fields` replace its values."""
         content: dict[str, Any] = {"l2": 0.0, "r2": 0.0, "run": True, "token": self.token} | fields
         return encode(MotionCommand(header or self.link.stamp(now_s), **content))
 
 
 class Bench:
-    """Robot side, messages to each operator, and the arm's motion."""
+    """Robot side under test, its operators, and a record of the arm's motion."""
 
     def __init__(
         self, settings: RobotSettings = QUICK, parts: RobotParts | None = None, listeners: Sequence[Listener] = ()
     ) -> None:
-        """parts: in place of those from the settings."""
+        """Make a robot side from `parts`; without them, from the settings."""
         self.watch = ArmWatch()
         parts = parts or build_parts(settings, 1, "clock")
         self.arm, self.robot = parts.arm, RobotSide(parts, [self.watch, *listeners])
@@ -116,7 +116,7 @@ class Bench:
 
     @property
     def state(self) -> str:
-        """State of the robot side."""
+        """State of the robot side's safety: disarmed, armed or stopped."""
         return self.robot.session.safety.state
 
     @property
@@ -126,34 +126,34 @@ class Bench:
 
     @property
     def tool_m(self) -> FloatArray:
-        """Tool's position (3,) in telemetry, 25 ticks from now."""
+        """Tick 25 times, so that telemetry comes; return the tool's position (3,) in it."""
         self.tick(25)
         return np.array(self.views[-1].tool_position_m)
 
     def operator(self, epoch: int, peer: bytes = b"operator") -> Operator:
-        """Return another, silent operator; it receives what goes to `peer`."""
+        """Return a new operator that sends nothing yet, and receives what is sent to `peer`."""
         operator = self.operators[peer] = Operator(epoch, peer)
         return operator
 
     def join(self, epoch: int, peer: bytes = b"operator") -> Operator:
-        """Return another operator that says Hello, and hears its state."""
+        """Return a new operator that has sent a Hello and received its state."""
         operator = self.operator(epoch, peer)
         self.say_hello(operator)
         self.tick()
         return operator
 
     def say_hello(self, operator: Operator) -> None:
-        """Let a Hello of the operator arrive."""
+        """Let a Hello of the operator arrive at the robot side."""
         self.robot.receive(operator.peer, encode(operator.link.hello(self.now_s)), self.now_s)
 
     def send(self, operator: Operator, **fields: Any) -> bytes:
-        """Let a command of the operator arrive; return its payload."""
+        """Let a command of the operator arrive at the robot side; return the command's bytes."""
         payload = operator.command(self.now_s, **fields)
         self.robot.receive(operator.peer, payload, self.now_s)
         return payload
 
     def tick(self, count: int = 1) -> None:
-        """Tick `count` times, a millisecond each; messages of the robot side arrive at once."""
+        """Tick `count` times, a millisecond each; the robot side's messages reach the operators at once."""
         for _ in range(count):
             self.ticks += 1
             for outgoing in self.robot.tick(self.now_s):
@@ -167,11 +167,11 @@ class Bench:
             self.robot.observe(self.now_s)
 
     def silence(self, duration_s: float) -> None:
-        """Tick without messages from operators."""
+        """Tick for `duration_s` without messages from operators."""
         self.tick(round(duration_s / TICK_S))
 
     def drive(self, duration_s: float, operator: Operator, **fields: Any) -> None:
-        """Send a command each 4 ms, the first after a tick; waiting participants say Hello each 200 ms."""
+        """Tick for `duration_s`, with a command each 4 ms; observers send a Hello each 200 ms."""
         for step in range(round(duration_s / TICK_S)):
             self.tick()
             if step % COMMAND_PERIOD_TICKS == 0:
@@ -182,13 +182,13 @@ class Bench:
                         self.say_hello(other)
 
     def arm_it(self, operator: Operator) -> None:
-        """Send released triggers for the healthy time, then the button; RuntimeError if that does not arm."""
+        """Command released triggers for the healthy time, then press the button; RuntimeError if that does not arm."""
         self.drive(self.robot.session.safety.settings.healthy_s + 0.05, operator)
         self.drive(0.02, operator, arm=True)
         if self.state != "armed":
             raise RuntimeError(f"the robot side is {self.state}; expected: armed")
 
     def cruise(self, operator: Operator, duration_s: float = 0.3) -> None:
-        """Arm, and advance at an even speed."""
+        """Arm the arm, and pull R2 so that the tool advances at an even speed."""
         self.arm_it(operator)
         self.drive(duration_s, operator, r2=CRUISE)

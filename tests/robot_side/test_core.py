@@ -1,4 +1,4 @@
-"""Robot side as its peers see it, with the simulated arm in virtual time."""
+"""Messages, status and figures of the whole robot side, with the simulated arm, in virtual time."""
 
 from dataclasses import replace
 
@@ -93,7 +93,7 @@ def test_the_status_says_who_pulls_how_far_everything_is_and_why_it_stopped(benc
 
 
 class Listening(Listener):
-    """Listener that keeps the law's situations."""
+    """Listener that keeps the law's input of each tick."""
 
     def __init__(self) -> None:
         self.heard: list[Situation] = []
@@ -142,7 +142,7 @@ def test_what_the_law_finds_is_what_is_sent(bench: Bench, listening: Listening) 
 
 
 def told_m_s(operator: Operator) -> float:
-    """Return the speed given to the newest command, as last heard."""
+    """Return the speed that the newest command got, by the operator's newest stiffness message."""
     told = operator.felt[-1].told_m_s
     assert told is not None
     return told
@@ -191,7 +191,7 @@ def test_full_speed_is_reckoned_with_until_the_operator_has_echoed(bench: Bench,
     felt = bench.operators[b"operator"].felt
     assert felt[0].r2.displacement_m == pytest.approx(felt[0].r2.full_speed_m_s, rel=0.05)
     assert listening.heard[-1].loop_age_known
-    # From the worst case it falls slowly.
+    # The assumed loop age falls slowly from the initial one, which is the worst case.
     assert 0.1 < listening.heard[-1].loop_age_s < 0.9
     assert abs(felt[-1].r2.displacement_m) < 0.01
     assert operator.felt == []

@@ -1,4 +1,4 @@
-"""Reported motion of a command equals the arm's command."""
+"""The motion that the robot side reports for an operator's command equals the motion that it commands to the arm."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ PARTS = build_parts(RobotSettings(), 1, "clock")
 
 
 class ToldArm(Arm):
-    """Arm that keeps its commands."""
+    """Arm that keeps the commands it gets."""
 
     joint_count = PARTS.arm.joint_count
 

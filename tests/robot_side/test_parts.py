@@ -1,4 +1,4 @@
-"""From settings to a robot side: the law and its table, the gripper's cover, and the notes to a person."""
+"""Parts of a robot side, made from settings: the law with its table, the gripper's cover, and notes to a person."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""A held object makes contact, with the simulated arm: downward motion ends, and its release moves nothing."""
+"""A held object is set down by the simulated arm: downward motion ends at the contact, and release moves nothing."""
 
 from dataclasses import replace
 from typing import Any
@@ -17,14 +17,14 @@ SETTINGS = replace(QUICK, model=DATA / "place_held.xml", site="tool")
 
 
 class Forgetful(PassedOnArm):
-    """Arm that does not measure loads."""
+    """Arm that measures no joint loads."""
 
     def state(self, now_s: float) -> ArmState:
         return replace(self.arm.state(now_s), joint_loads_nm=None)
 
 
 class Placing(Bench):
-    """Tool that points down and holds a box 10 mm above a table."""
+    """Robot side whose tool points down and holds a box 10 mm above a table."""
 
     def __init__(self, *, measures: bool = True) -> None:
         parts = build_parts(SETTINGS, 1, "clock")
@@ -50,7 +50,7 @@ class Placing(Bench):
 
     @property
     def pressed_n(self) -> float:
-        """Return the force on the table in newtons."""
+        """Force with which the held box is pressed on the table, in newtons."""
         assert self.robot.newest is not None
         carried = carried_n(self.robot.newest[1].pose.tool_jacobian, self.simulated.state(self.now_s).joint_loads_nm)
         assert carried is not None

@@ -1,4 +1,4 @@
-"""First moments of the robot side's process: strangers at its ports, a port in use."""
+"""Start of the robot side's process: with strangers who connect at once, and with a port that is in use."""
 
 import contextlib
 import json
@@ -29,7 +29,7 @@ def free_port() -> int:
 
 
 class Crowd(threading.Thread):
-    """Client that connects as early and often as possible, and keeps its connections."""
+    """Thread that connects to a port as soon and as often as possible, and keeps the connections open."""
 
     def __init__(self, port: int) -> None:
         super().__init__(daemon=True)

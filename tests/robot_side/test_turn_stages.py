@@ -1,4 +1,4 @@
-"""A core with timed steps acts as a plain one, and counts physics and sensing."""
+"""Timing the stages of a tick does not change what the robot side does, and counts physics and sensing."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_each_stage_has_its_help() -> None:
 
 
 class Ticking:
-    """Processor clock that advances by a microsecond at each reading."""
+    """Stand-in for the processor clock that advances by a microsecond with each reading."""
 
     def __init__(self) -> None:
         self._reads = 0

@@ -1,4 +1,4 @@
-"""Real robot side with a viewer: pictures, a killed companion, and a slow link for video."""
+"""Real robot side that sends views: pictures arrive, also after its rendering process is killed, and on a slow link."""
 
 import os
 import signal
@@ -32,12 +32,12 @@ def viewed(*arguments: str) -> Iterator[tuple[SideProcess, Viewer]]:
 
 
 def look_until(viewer: Viewer, enough: Callable[[Seen], bool], **what: Any) -> Seen:
-    """Look in short stretches until one shows enough."""
+    """Receive views for one second at a time, until `enough` is true of a second's messages; return these."""
     for _ in range(round(PATIENCE_S)):
         seen = look([viewer], 1.0, **what)
         if enough(seen):
             return seen
-    return pytest.fail("nothing to be seen")
+    return pytest.fail("the awaited views did not come")
 
 
 def frames(seen: Seen) -> list[VideoFrame]:
@@ -45,13 +45,13 @@ def frames(seen: Seen) -> list[VideoFrame]:
 
 
 def said_of_cameras(robot: SideProcess) -> list[str]:
-    """Return the notes to a person about cameras since the last call."""
+    """Return the notes about cameras that the robot side has printed since the last call."""
     texts = [str(event.get("text")) for event in robot.events()]
     return [text for text in texts if text.startswith("cameras: ")]
 
 
 def works_here(robot: SideProcess, viewer: Viewer) -> None:
-    """Skip the test if nothing can be rendered, with the robot side's reason."""
+    """Return once both cameras send pictures; skip the test if the robot side says why it cannot render."""
     for _ in range(round(PATIENCE_S)):
         if frames(look([viewer], 1.0, overview=True, first_person=True)):
             return

@@ -1,1 +1,1 @@
-"""The guide docs/two-machines.md, followed on two machines in network namespaces, and the faults of a LAN."""
+"""Tests that follow the guide docs/two-machines.md on two simulated machines, and then cause the faults of a LAN."""

@@ -1,4 +1,4 @@
-"""Both hosts as the guide sets them up, for every test."""
+"""Both hosts, set up by the commands of the guide, for all tests of this folder."""
 
 import signal
 import tempfile
@@ -14,7 +14,7 @@ from tests.two_hosts.lan import Lan, is_armed
 
 @pytest.fixture(scope="session")
 def guided() -> Iterator[Lan]:
-    """Both sides armed, after following the guide by its own lines."""
+    """LAN with both sides running and armed, after the guide's commands."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with two_machines() as machines, tempfile.TemporaryDirectory(prefix="feelahead-hosts-") as folder:
         lan = Lan(*machines, Path(folder))
@@ -32,7 +32,7 @@ def guided() -> Iterator[Lan]:
 
 @pytest.fixture
 def lan(guided: Lan, request: pytest.FixtureRequest) -> Lan:
-    """The guided LAN; after a failed test, the network is restored and both sides restart."""
+    """The LAN of `guided`. After a failed test, the network is restored and both sides restart before the next test."""
     if request.session.testsfailed > guided.mended:
         guided.mended = request.session.testsfailed
         guided.mend()

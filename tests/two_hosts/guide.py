@@ -1,4 +1,4 @@
-"""docs/two-machines.md as a program: indented lines are commands; the paragraph before names the machine."""
+"""Run the guide docs/two-machines.md: its indented lines are commands, for the machine that the text before names."""
 
 import re
 import shlex
@@ -26,18 +26,18 @@ _USUAL_FIREWALL: Final = (
 
 @dataclass(frozen=True)
 class Step:
-    """One command of the guide."""
+    """One command of the guide, and the machine on which it is to be run."""
 
     where: Literal["robot", "operator"]
     command: str
 
     def filled_in(self, words: Mapping[str, str]) -> str:
-        """Replace the words in capitals; KeyError for one that the guide has not given yet."""
+        """Return the command with values for its placeholders; KeyError for one without a value so far."""
         return _PLACEHOLDER.sub(lambda match: words[match[0]], self.command)
 
 
 def steps(path: Path = GUIDE) -> list[Step]:
-    """Return the guide's commands, in order; AssertionError for one without a machine."""
+    """Return the guide's commands in order; AssertionError if the text does not name the machine of a command."""
     found: list[Step] = []
     named: list[str] = []
     paragraph = ""
@@ -57,18 +57,18 @@ def steps(path: Path = GUIDE) -> list[Step]:
 
 
 def follow(lan: Lan) -> None:
-    """Follow the guide up to the starts, which are kept for `lan.start`."""
+    """Run the guide's commands, except those that start a side: these are kept for `lan.start`."""
     hosts = {"robot": lan.robot_host, "operator": lan.operator_host}
     if shutil.which("nft") is not None:
         lan.robot_host.run(_USUAL_FIREWALL)
     for step in steps():
         _do(lan, hosts[step.where], step)
-    assert lan.doctor, "no line looks at the way"
+    assert lan.doctor, "the guide has no command that checks the path (feelahead doctor --connect)"
     assert lan.starts.keys() == hosts.keys()
 
 
 def _do(lan: Lan, host: Host, step: Step) -> None:
-    """Run the command on its host, or only check it if it would change this machine."""
+    """Run a command on its host. A command that would change the real machine is only checked."""
     match shlex.split(step.command):
         case ["pip", "install", wanted]:
             assert wanted == f".[{step.where}]"
@@ -98,4 +98,4 @@ def _do(lan: Lan, host: Host, step: Step) -> None:
         case [program, *_] if program == f"feelahead-{step.where}":
             lan.starts[step.where] = step.filled_in(lan.words)
         case _:
-            raise AssertionError(f"{step.command}: say here how to check this")
+            raise AssertionError(f"{step.command}: unknown command; add here how to check it")

@@ -1,4 +1,4 @@
-"""Two hosts on a cable, each with a separate home, clock and names, and the sides that run on them."""
+"""Two hosts on one cable, and the sides that run on them. Each host has its own home folder, clock and host names."""
 
 import contextlib
 import os
@@ -25,9 +25,9 @@ PATIENCE_S = 60.0
 ATTEMPTS = 3
 MOST_GAP_MS = 1000.0
 NAME = "robot.lan"
-"""Robot's name on the operator's host."""
+"""Host name by which the operator's host finds the robot's"""
 NOBODY = "198.18.0.99"
-"""Address without a machine."""
+"""IP address in the LAN that no machine has"""
 _CLOCK_AHEAD_S = 100_000
 _MODULES = {"feelahead-robot": "robot_side", "feelahead-operator": "operator_side"}
 
@@ -36,17 +36,17 @@ Status = dict[str, Any]
 
 @dataclass(frozen=True)
 class Host:
-    """User's account on one of the machines."""
+    """A user's account on one of the two machines."""
 
     machine: Machine
     home: Path
     clock: tuple[str, ...] = ()
-    """Command prefix that gives programs there a separate monotonic clock."""
+    """Command prefix by which programs of this account get a separate monotonic clock; empty: the machine's"""
     also: dict[str, str] = field(default_factory=dict)
-    """Additional environment variables."""
+    """Additional environment variables of programs"""
 
     def surroundings(self) -> list[str]:
-        """Return the command prefix that runs a program there."""
+        """Return the command prefix that runs a program on this machine, as this user."""
         self.home.mkdir(exist_ok=True)
         folders = {f"XDG_{kind}_HOME": f"{self.home}/{place}" for kind, place in _FOLDERS}
         variables = {
@@ -59,11 +59,11 @@ class Host:
         return [*self.machine.surroundings, *self.clock, "env", *(f"{name}={value}" for name, value in given.items())]
 
     def user(self, name: str) -> "Host":
-        """Return another user on the same machine."""
+        """Return the account of another user on the same machine."""
         return replace(self, home=self.home.with_name(f"{self.home.name}-{name}"))
 
     def run(self, command: str, *, codes: tuple[int, ...] = (0,)) -> str:
-        """Run a shell command there; AssertionError if it ends with another code."""
+        """Run a shell command as this user, and return its output; AssertionError for an exit code not in `codes`."""
         done = subprocess.run(
             [*self.surroundings(), "sh", "-c", command],
             capture_output=True,
@@ -80,24 +80,24 @@ _FOLDERS = (("CONFIG", ".config"), ("CACHE", ".cache"), ("DATA", ".local/share")
 
 
 class Side:
-    """One running side, and its events."""
+    """One running side, and the statuses and notes that it has printed."""
 
     def __init__(self, command: str, host: Host, more: tuple[str, ...] = ()) -> None:
-        """`command` is a line of the guide that starts a side; `more`: the test's additional arguments."""
+        """command: line of the guide that starts a side. more: additional arguments of the test."""
         program, *arguments = shlex.split(command.replace("~/", f"{host.home}/"))
         self.name = program.removeprefix("feelahead-")
         self.process = SideProcess(_MODULES[program], self.name, [*arguments, *more], host.surroundings())
         self.said: list[Status] = []
-        """All statuses, the newest last."""
+        """All statuses, newest last"""
         self.notes: list[str] = []
 
     @property
     def status(self) -> Status:
-        """Newest status."""
+        """Newest status; empty before the first."""
         return self.said[-1] if self.said else {}
 
     def listen(self) -> None:
-        """Read its new events; SideFailedError if it has failed."""
+        """Read the side's new events; SideFailedError if the side has failed."""
         for event in self.process.events():
             if event["event"] == "status":
                 self.said.append(event)
@@ -107,7 +107,7 @@ class Side:
 
 
 class Lan:
-    """Both hosts and the present sides, started by the guide's commands."""
+    """Both hosts, and the sides that run now, started by the guide's commands."""
 
     def __init__(self, robot: Machine, operator: Machine, folder: Path) -> None:
         clock = ("unshare", "--time", "--monotonic", str(_CLOCK_AHEAD_S), "--boottime", str(_CLOCK_AHEAD_S))
@@ -117,28 +117,31 @@ class Lan:
         self.robot_host = Host(robot, folder / "robot", clock if self.own_clocks else ())
         self.operator_host = Host(operator, folder / "operator")
         self.starts: dict[str, str] = {}
-        """Command lines of the guide that start the sides."""
+        """Command line of the guide that starts each side, by the side's name"""
         self.doctor: str | None = None
-        """Command line of the guide that checks the path."""
+        """Command line of the guide that checks the path to the robot side"""
         self.words: dict[str, str] = {"ROBOT": NAME}
-        """Values of the guide's words in capitals."""
+        """Values of the guide's placeholders, which are words in capitals"""
         self._addresses = (robot.address, operator.address)
         self._sides: dict[str, Side] = {}
         self.mended = 0
-        """Number of the session's failures at the last `mend`."""
+        """Number of tests that had failed by the last `mend`"""
         operator.own_files.mkdir(parents=True)
         (operator.own_files / "resolv.conf").write_text(f"nameserver {NOBODY}\n")
         self.tell_name(robot.address)
 
     def tell_name(self, address: str | None) -> None:
-        """Set the robot's address on the operator's host; None: unknown, and no name server answers."""
+        """Set the address that the operator's host has for the robot's name.
+
+        None: the name cannot be resolved, as no name server answers.
+        """
         names = "127.0.0.1 localhost\n" + (f"{address} {NAME}\n" if address else "")
         # In place: the running programs have this very file as /etc/hosts.
         with (self.operator_host.machine.own_files / "hosts").open("w", encoding="ascii") as hosts:
             hosts.write(names)
 
     def ask_doctor(self, code: int, words: str) -> None:
-        """Assert that the doctor ends with this code and prints these words."""
+        """Run `feelahead doctor`; assert that it ends with exit code `code` and prints `words`."""
         assert self.doctor is not None
         assert words in self.operator_host.run(self.doctor, codes=(code,))
 
@@ -146,16 +149,16 @@ class Lan:
 
     @property
     def robot(self) -> Side:
-        """Running robot side."""
+        """The running robot side."""
         return self._sides["robot"]
 
     @property
     def operator(self) -> Side:
-        """Running operator side."""
+        """The running operator side."""
         return self._sides["operator"]
 
     def start(self, name: str, host: Host | None = None, *more: str, called: str | None = None) -> Side:
-        """Start a side as the guide does, named `called` if one exists already."""
+        """Start the side `name` by the guide's command. called: name of a second operator side."""
         ours = self.robot_host if name == "robot" else self.operator_host
         flags = () if name == "robot" else ("--device=simulated",)
         side = Side(self.starts[name], host or ours, (*flags, *more))
@@ -163,32 +166,32 @@ class Lan:
         return side
 
     def end(self, called: str) -> None:
-        """End it as Ctrl-C does; AssertionError unless it ends well."""
+        """End a side as Ctrl-C does; AssertionError unless its exit code is 0."""
         with self._sides.pop(called).process as process:
             code = process.stop()
         assert code == 0, f"the {called} side ended with code {code}"
 
     def kill(self, called: str) -> None:
-        """End it with kill -9."""
+        """Kill a side with kill -9."""
         with self._sides.pop(called).process as process:
             os.kill(process.process_id, signal.SIGKILL)
 
     def restart(self, host: Callable[[Host], Host] = lambda host: host) -> None:
-        """Restart both sides, the robot side first, with a fresh scene; `host` may change their surroundings."""
+        """End all sides, then start both again, with a new scene. `host` may change the accounts that run them."""
         self.end_all()
         self.start("robot", host(self.robot_host))
         self.until("robot", "it listens", bool)
         self.start("operator", host(self.operator_host))
 
     def end_all(self) -> None:
-        """End every side, by force if necessary."""
+        """End all sides, by force if necessary."""
         with contextlib.ExitStack() as stack:
             for side in self._sides.values():
                 stack.enter_context(side.process)
         self._sides.clear()
 
     def mend(self) -> None:
-        """Restore the network after a failed row, and restart both sides."""
+        """Restore the network after a failed test, and restart both sides."""
         for host, address in zip((self.robot_host, self.operator_host), self._addresses, strict=True):
             host.machine.plug_in()
             host.machine.set_link("mtu", "1500")
@@ -199,7 +202,7 @@ class Lan:
         self.until("operator", "the link is up", lambda status: status["link"] == "up")
 
     def swallow(self, everything: bool) -> None:
-        """Let the robot's host drop all incoming packets silently, or accept them again."""
+        """True: let the robot's host drop all incoming packets without an answer; False: accept them again."""
         run = self.robot_host.run
         if everything:
             run("nft add table inet swallow")
@@ -210,12 +213,12 @@ class Lan:
     # Waiting
 
     def listen(self) -> None:
-        """Read the new events of all sides."""
+        """Read new events of all sides."""
         for side in list(self._sides.values()):
             side.listen()
 
     def until(self, called: str, what: str, condition: Callable[[Status], bool], limit_s: float = PATIENCE_S) -> Status:
-        """Return the first status from now on for which `condition` holds; AssertionError if none comes."""
+        """Return the side's first status from now on for which `condition` holds; AssertionError after `limit_s`."""
         self.listen()
         side = self._sides[called]
         seen = len(side.said)
@@ -229,7 +232,7 @@ class Lan:
         return wait_until(f"{called}: {what}", found, limit_s, instead=lambda: _short(side.status))
 
     def watch(self, for_s: float) -> Iterator[None]:
-        """Let time pass and read events; the caller checks in between."""
+        """Read events for `for_s`; yield after each reading, so that the caller can check."""
         end_s = time.monotonic() + for_s
         while time.monotonic() < end_s:
             time.sleep(0.1)
@@ -237,7 +240,7 @@ class Lan:
             yield
 
     def moving(self) -> None:
-        """Wait until the person has the arm armed and moves it; a person who is done starts again."""
+        """Wait until the scripted person moves the arm; a person who has finished the task is started again."""
         for attempt in range(4):
             status = self.until("operator", "armed and moving", lambda status: is_done(status) or is_moving(status))
             if is_moving(status):
@@ -247,10 +250,10 @@ class Lan:
                 self.start("operator")
             else:
                 self.restart()
-        raise AssertionError("the person is done each time before anything moves")
+        raise AssertionError("the scripted person finished each time before the arm moved")
 
     def back(self) -> None:
-        """Wait until the link is up, disarmed, with hands at rest; then armed again."""
+        """Wait until the link is up again; assert that the arm is disarmed then; wait until it is armed again."""
         began_s = time.monotonic()
         status = wait_until("operator: the link is up", self._first_after_the_loss, PATIENCE_S)
         print(f"back after {time.monotonic() - began_s:.1f} s")
@@ -261,7 +264,10 @@ class Lan:
         self.until("robot", "armed again", is_armed)
 
     def _first_after_the_loss(self) -> Status | None:
-        """Return the first status after the link's return, even if read late: a second later the arm may be armed."""
+        """Return the operator side's first status with the link up again; None if there is none yet.
+
+        It is found even if it is read late, when the arm may be armed again: that takes a second.
+        """
         self.listen()
         said = self.operator.said
         lost = max((place for place, status in enumerate(said) if status["link"] != "up"), default=-1)
@@ -269,7 +275,7 @@ class Lan:
 
 
 def is_armed(status: Status) -> bool:
-    """Return whether the arm may move, by this side's knowledge."""
+    """Return whether the arm is armed, by this status."""
     return bool(status["state"] == "armed")
 
 
@@ -278,7 +284,9 @@ def _is_armed_and_shown(status: Status) -> bool:
 
 
 def gap_ms(stop: Status) -> float:
-    """Return the silence after which the robot side stopped the arm; fail for another reason, and beyond a second.
+    """Return the milliseconds without a command after which the robot side stopped the arm.
+
+    Fail if the arm stopped for another reason, or only after a second.
 
     100 ms are promised, and 20 more at worst, but only a quiet machine keeps them.
     """
@@ -289,12 +297,12 @@ def gap_ms(stop: Status) -> float:
 
 
 def is_moving(status: Status) -> bool:
-    """Return whether the arm is commanded to move."""
+    """Return whether the arm is armed and a trigger is pulled, by this status."""
     return is_armed(status) and max(status["L2_pulled"] or 0.0, status["R2_pulled"] or 0.0) > 0.05
 
 
 def is_done(status: Status) -> bool:
-    """Return whether the scripted person has finished."""
+    """Return whether the scripted person has finished the task or found no target."""
     return status.get("person") in (Doing.DONE, Doing.NO_TARGET)
 
 

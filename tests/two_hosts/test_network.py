@@ -1,4 +1,4 @@
-"""Faults of a network on a link: cables, addresses, firewalls, small packets, name servers."""
+"""Faults of the network between both sides: cable, addresses, firewall, packet size, name server."""
 
 import re
 import shutil
@@ -12,7 +12,7 @@ from tests.two_hosts.lan import ATTEMPTS, Lan, gap_ms, is_armed
 pytestmark = [pytest.mark.two_hosts, pytest.mark.processes]
 
 _MOST_SEGMENT = 536
-"""Largest segment in bytes: 576 without the headers of IP and TCP."""
+"""Maximum TCP segment in bytes: packets of 576 bytes without the headers of IP and TCP"""
 _STILL_MM = 2.0
 _SETTLES_S = 0.5
 
@@ -36,7 +36,7 @@ def test_a_cable_pulled(lan: Lan, pause_s: float) -> None:
 
 @pytest.mark.parametrize("side", ["operator", "robot"])
 def test_an_address_that_changes(lan: Lan, side: str) -> None:
-    """The robot's machine is known by name."""
+    """The link returns by itself: the operator side knows the robot's machine by its name."""
     lan.moving()
     began_s = time.monotonic()
     if side == "operator":
@@ -51,7 +51,7 @@ def test_an_address_that_changes(lan: Lan, side: str) -> None:
 
 
 def test_a_network_that_swallows_everything(lan: Lan) -> None:
-    """Nothing answers, not even with a refusal: connections are attempted again all the same."""
+    """Packets get no answer, not even a refusal. The operator side must still try again to connect."""
     if shutil.which("nft") is None:
         pytest.skip("no nft here (apt install nftables)")
     lan.moving()
@@ -62,7 +62,7 @@ def test_a_network_that_swallows_everything(lan: Lan) -> None:
 
 
 def test_packets_of_576_bytes(lan: Lan) -> None:
-    """At both ends, for existing connections and for new handshakes."""
+    """Both machines' limit of packet size falls to 576 bytes, under open connections and before new ones."""
     hosts = (lan.robot_host, lan.operator_host)
     for host in hosts:
         host.machine.set_link("mtu", "576")
@@ -79,7 +79,10 @@ def test_packets_of_576_bytes(lan: Lan) -> None:
 
 
 def test_a_name_server_that_is_silent(lan: Lan) -> None:
-    """Views reconnect after a revocation, control continues; both sides end in time, one of them while resolving."""
+    """With a name server that does not answer, control goes on while views reconnect after a revocation.
+
+    Both sides also end in time, the operator side while it waits for the name server.
+    """
     key = lan.words["OPERATOR-KEY"][:-4]
 
     def undisturbed(attempt: int) -> bool:
@@ -98,7 +101,7 @@ def test_a_name_server_that_is_silent(lan: Lan) -> None:
 
 
 def once_in(lan: Lan, tried: Callable[[int], bool], undo: Callable[[], None]) -> None:
-    """Retry an action that another process on a busy machine may disturb."""
+    """Try an action `ATTEMPTS` times at most, as a busy machine may spoil it; `undo` follows each failure."""
     for attempt in range(ATTEMPTS):
         if tried(attempt):
             return
@@ -109,7 +112,7 @@ def once_in(lan: Lan, tried: Callable[[int], bool], undo: Callable[[], None]) ->
 
 
 def stopped(lan: Lan, for_s: float) -> None:
-    """Wait until the arm is stopped and the triggers are free; assert that it stays so for `for_s`."""
+    """Wait until the arm is stopped and the triggers are free; assert that the arm stays so, and still, for `for_s`."""
     stop = lan.until("robot", "the arm is stopped", lambda status: not is_armed(status))
     lan.until("operator", "the triggers are free", lambda status: status["triggers_released"] is True)
     lan.until("operator", "it is blind", lambda status: status["feel"] == "blind")
@@ -124,7 +127,7 @@ def stopped(lan: Lan, for_s: float) -> None:
 
 
 def all_flows(lan: Lan) -> None:
-    """Wait until stiffness and telemetry reach the operator side."""
+    """Wait until the operator side gets stiffness and telemetry, and a trigger becomes stiff."""
     lan.until("operator", "stiffness and telemetry", lambda status: status["R2"] is not None and "target" in status)
     lan.moving()
     lan.until("operator", "a stiff trigger", lambda status: (status["R2"] or 0.0) + (status["L2"] or 0.0) > 0.0)

@@ -1,4 +1,4 @@
-"""Second operators, and sides that die, start in the other order, or have their wall clock set."""
+"""A second operator; and sides that are killed, started in the other order, or get another wall-clock time."""
 
 import json
 import time
@@ -85,7 +85,7 @@ def test_the_operator_side_first(lan: Lan) -> None:
 
 
 def test_a_wall_clock_stepped_by_an_hour_and_back(lan: Lan) -> None:
-    """For the two processes alone, while the arm moves."""
+    """Only both sides' processes see the changed wall clock; the arm must go on moving."""
     libraries = sorted(Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"))
     if not libraries:
         pytest.skip("no libfaketime here (apt install libfaketime)")
@@ -101,7 +101,7 @@ def test_a_wall_clock_stepped_by_an_hour_and_back(lan: Lan) -> None:
         return replace(host, also=faked)
 
     def step(offset_s: int) -> int:
-        """Set the offset; return the time that a program there sees."""
+        """Shift the wall clock of both sides by `offset_s`; return the time, in seconds, that it now shows."""
         partial = offset.with_suffix(".new")
         partial.write_text(f"+{offset_s}\n", encoding="ascii")
         partial.replace(offset)

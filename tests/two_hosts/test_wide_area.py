@@ -1,4 +1,4 @@
-"""Both sides over the kernel's TCP with delay, rate and queue: no queueing of their own, and no stops."""
+"""Both sides over the kernel's TCP with delay, loss, rate and queue: they fill no queue, and the arm does not stop."""
 
 import subprocess
 import sys
@@ -33,7 +33,7 @@ _RESTING_KBIT_S = 200.0
     ],
 )
 def test_armed_without_a_stop_and_without_a_queue(trial: Trial) -> None:
-    """In the best of three: other programs and the machine's host add to ages, and can stop the arm."""
+    """One run in three must succeed: other programs on the machine make messages older, and can stop the arm."""
     faults = []
     for _ in range(ATTEMPTS):
         outcome = run_trial(trial)

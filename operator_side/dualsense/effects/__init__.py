@@ -1,1 +1,1 @@
-"""Trigger effects, and their bytes."""
+"""Trigger effects of a DualSense, and their encoding in bytes."""

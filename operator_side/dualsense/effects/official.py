@@ -1,7 +1,7 @@
 """Trigger effects that feelahead commands: strengths of ten zones, encoded exactly in eleven bytes.
 
-Strengths encode as one of two official codes, never as a debug code. Sources: Nielk1's notes on trigger
-effects, revision 6; dualsensectl has the same.
+Strengths are encoded with one of two official effect codes, never with a debug code. Sources: Nielk1's notes on
+trigger effects, revision 6; dualsensectl has the same.
 """
 
 from typing import Final
@@ -11,15 +11,18 @@ from operator_side.controller.feel import FREE_TRIGGER, ZONE_COUNT, Strengths
 EFFECT_LENGTH: Final = 11
 """Length of an encoded effect, in bytes: the code and ten parameters."""
 DEBUG_CODES: Final = frozenset({0xFC, 0xFD, 0xFE})
-"""Codes that must never reach a controller: they corrupt a trigger until it is reset."""
+"""Effect codes that must never reach a controller, as they corrupt a trigger until it is reset"""
 _OFF_CODE: Final = 0x05
 _FEEDBACK_CODE: Final = 0x21
 COMMANDED_CODES: Final = frozenset({_OFF_CODE, _FEEDBACK_CODE})
-"""Codes that a report to a controller may hold."""
+"""Only effect codes that a report to a controller may contain: off, and feedback"""
 
 
 def encode_effect(strengths: Strengths) -> bytes:
-    """Encode as the code, a mask of the stiff zones, and three bits a zone for the strength less one; off for none."""
+    """Encode strengths: effect code, bit mask of the stiff zones, and three bits for each zone's strength minus 1.
+
+    Strengths that are all 0 are encoded as the effect `off`.
+    """
     mask = fields = 0
     for zone, strength in enumerate(strengths):
         if strength:
@@ -30,7 +33,7 @@ def encode_effect(strengths: Strengths) -> bytes:
 
 
 def decode_effect(encoded: bytes) -> Strengths | None:
-    """Decode the eleven bytes of an effect; None for another program's, which no strengths encode to."""
+    """Decode the eleven bytes of an effect; None for an effect that `encode_effect` never makes."""
     strengths = FREE_TRIGGER
     if encoded[0] == _FEEDBACK_CODE:
         mask, fields = int.from_bytes(encoded[1:3], "little"), int.from_bytes(encoded[3:7], "little")

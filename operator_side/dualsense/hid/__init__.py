@@ -1,1 +1,1 @@
-"""Real controllers: finding, opening, reading, writing, and releasing them on every exit."""
+"""Real controllers: finding, opening, reading, writing, and releasing them however the program ends."""

@@ -1,4 +1,4 @@
-"""Real DualSense over HID: the only file that imports hidapi, and only during a search for a controller."""
+"""Real DualSense over HID. Only this file imports hidapi, and only when a controller is searched for."""
 
 import contextlib
 import os
@@ -27,20 +27,20 @@ HidBackend = Any
 """A module of hidapi, `hidraw` or `hid`"""
 
 _INSTALL: Final = "pip install --force-reinstall hidapi"
-"""Forced, to replace another package's module; by its own name, as feelahead may run from a folder."""
+"""Remedy: reinstalls hidapi over another package's module. It works also if feelahead itself is not installed."""
 
 _READ_LENGTH: Final = 128  # longer than any report, so that none is cut
 _MAX_DRAINED: Final = 64  # size of the kernel's hidraw queue; more is left for the next read
 _FIRST_REPORT_MS: Final = 100
 _FIRST_REPORT_ATTEMPTS: Final = 5
 _FEATURE_ATTEMPTS: Final = 3
-"""Attempts to read a feature, which may be garbled by radio (Linux hid-playstation repeats, too)."""
+"""Number of attempts to read a feature report, as radio may garble one (Linux hid-playstation also repeats)"""
 
 
 def load_backend() -> HidBackend:
-    """Import hidapi; NoDriverError if it is missing, broken or shadowed by the other package called `hid`.
+    """Import hidapi; NoDriverError if hidapi is missing or broken, or if another package has replaced its module.
 
-    hidapi's wheel has two modules: `hidraw` for the kernel's hidraw devices, and `hid`, which uses libusb instead.
+    Of the two modules of hidapi's wheel, this imports `hidraw`, for the kernel's hidraw devices; `hid` uses libusb.
     """
     try:
         import hidraw as module  # noqa: PLC0415
@@ -60,23 +60,23 @@ def load_backend() -> HidBackend:
 
 @dataclass(frozen=True)
 class Identity:
-    """Facts that a controller reports about itself; None for missing ones."""
+    """Facts that a controller reports about itself; None for those that it does not report."""
 
     transport: Transport
     address: str | None
-    """Bluetooth address, "aa:bb:cc:dd:ee:ff", the same on USB."""
+    """Bluetooth address, "aa:bb:cc:dd:ee:ff", which the controller also reports on USB"""
     firmware: Firmware | None
     first_report: bytes
-    """Input report that reveals the transport."""
+    """Input report whose id and length show the transport"""
 
 
 class HidDualSense:
-    """Port on an open controller, on USB or Bluetooth: one thread may read, another one write."""
+    """Open DualSense on USB or Bluetooth, as a `Controller`. One thread may read while another one writes."""
 
     def __init__(self, backend: HidBackend, path: bytes) -> None:
-        """Open it and read its facts, which takes a few reports' time; DeviceError names the fault.
+        """Open the controller at `path` and read its facts, which takes the time of a few reports.
 
-        On Bluetooth, this also switches it to full reports.
+        On Bluetooth, this also makes the controller send full reports. DeviceError gives the fault and the remedy.
         """
         self._reading, self._writing = _open(backend, path)
         try:
@@ -96,13 +96,13 @@ class HidDualSense:
 
     @property
     def released(self) -> bool:
-        """Whether the effects written neither hold nor rumble; False after a write that failed."""
+        """Whether the last effects written neither resist nor rumble; False after a failed write."""
         return self._released
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Return the newest report's state, or None without a new one; never waits. DeviceError if it is gone.
+        """Return the state in the newest valid report, without waiting; None if none has come since the last call.
 
-        A bad report is ignored.
+        DeviceError if the controller is gone.
         """
         del now_s  # a real controller has its own clock
         self._require_open()
@@ -122,9 +122,9 @@ class HidDualSense:
         return None
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Send an output report in this controller's framing; DeviceError if the controller is gone.
+        """Send an output report that sets the effects of `feel`; DeviceError if the controller is gone.
 
-        ValueError, and nothing sent, if build_output_report refuses: no debug effect code passes.
+        ValueError from `build_output_report`, and nothing is sent, if the report would have a forbidden effect code.
         """
         del now_s
         self._require_open()
@@ -135,7 +135,7 @@ class HidDualSense:
         self._released = self._commanded.releases
 
     def close(self) -> None:
-        """Switch off effects, rumble and a warning light if any were written and the controller answers; close it."""
+        """Switch off resistance, rumble and a warning light, if anything was written, and close the controller."""
         if self._closed:
             return
         self._closed = True
@@ -144,7 +144,7 @@ class HidDualSense:
                 _write(self._writing, self._packed(self._commanded.farewell))
                 self._released = True
         except DeviceError:
-            pass  # it is gone: nothing can be written
+            pass  # the controller is gone: nothing can be written
         finally:
             self._close_handles()
 
@@ -163,10 +163,10 @@ class HidDualSense:
 
 
 def _open(backend: HidBackend, path: bytes) -> tuple[HidHandle, HidHandle]:
-    """Return the handles to read and to write by.
+    """Open the controller twice; return the handle to read from and the handle to write to.
 
-    hidapi keeps the text of the last failure with each handle and frees it with every call. So one handle must not be
-    read and written concurrently (background_writes.py). Both are opened now, while the path is this controller's.
+    Two handles are needed, because two threads use them (background_writes.py): hidapi keeps an error text with each
+    handle and frees it in every call. Both are opened now, as the path may belong to another device later.
     """
     handles: list[HidHandle] = []
     for _ in range(2):
@@ -191,8 +191,8 @@ def _write(handle: HidHandle, report: bytes) -> None:
 
 
 def _ask(handle: HidHandle, path: bytes) -> Identity:
-    """Read the controller's facts; OSError if it goes away meanwhile."""
-    # Bluetooth starts with short reports; this ends them, so it comes before the first one is awaited.
+    """Read the controller's facts; OSError if the controller disappears meanwhile."""
+    # On Bluetooth a controller first sends short reports; reading a feature makes it send full ones.
     _feature(handle, FIRMWARE_ID, bytes)
     first_report = _first_report(handle, path)
     try:
@@ -211,7 +211,7 @@ def _ask(handle: HidHandle, path: bytes) -> Identity:
 
 
 def _first_report(handle: HidHandle, path: bytes) -> bytes:
-    """Return the first full report, or a simple one if nothing else comes."""
+    """Return the first full input report, or a simple one if no full one comes; DeviceError if none comes."""
     newest = b""
     for _ in range(_FIRST_REPORT_ATTEMPTS):
         newest = bytes(handle.read(_READ_LENGTH, _FIRST_REPORT_MS)) or newest
@@ -226,7 +226,7 @@ def _first_report(handle: HidHandle, path: bytes) -> bytes:
 
 
 def _feature(handle: HidHandle, report_id: int, parse: Callable[[bytes], Read]) -> Read | None:
-    """Read a feature by `parse`; None without a valid answer."""
+    """Read a feature report and decode it by `parse`; None without a valid answer after several attempts."""
     for _ in range(_FEATURE_ATTEMPTS):
         try:
             return parse(bytes(handle.get_feature_report(report_id, FEATURE_LENGTHS[report_id])))
@@ -236,7 +236,7 @@ def _feature(handle: HidHandle, report_id: int, parse: Callable[[bytes], Read]) 
 
 
 def _not_opened(path: bytes, reason: str) -> DeviceError:
-    """Make the error for a controller that the system does not let us open."""
+    """Make the error for a controller that cannot be opened, with the remedy."""
     name = os.fsdecode(path)
     denied = os.path.exists(name) and not os.access(name, os.R_OK | os.W_OK)  # noqa: PTH110  # hidapi's names need not be paths
     if denied or "permission denied" in reason.lower():
@@ -251,5 +251,5 @@ def _not_opened(path: bytes, reason: str) -> DeviceError:
 
 
 def _gone(reason: str) -> DeviceError:
-    """Make the error for a controller that has just gone."""
+    """Make the error for a controller that no longer answers, with the remedy."""
     return DeviceError(f"the controller is gone ({reason}): plug it in again, or press its PS button")

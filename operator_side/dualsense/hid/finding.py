@@ -1,4 +1,4 @@
-"""Choice among the connected controllers: the one from before, on USB rather than Bluetooth."""
+"""Choice among connected controllers: first the previously used one, and USB rather than Bluetooth."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -12,37 +12,37 @@ from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.dualsense.reports.transport import Transport
 
 LOOKS_FOR_THE_SAME: Final = 3
-"""Number of searches in a row for the controller from before alone; then another one will do."""
+"""Number of searches that accept only the previously used controller; the next search accepts any"""
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """Place of a controller in the system."""
+    """Device node of a controller in the system, and the controller's model."""
 
     path: bytes
     model: str
 
 
 def sightings(backend: HidBackend) -> list[Sighting]:
-    """List every place once, in the system's order; open nothing."""
+    """List the device nodes of all connected controllers, each once, in the system's order, without opening them."""
     listed = (
         Sighting(found["path"], model)
         for product_id, model in PRODUCT_IDS.items()
         for found in backend.enumerate(SONY_VENDOR_ID, product_id)
     )
-    # The system lists a controller for each of its HID usages.
+    # The system lists a controller once for each of its HID usages.
     return list(dict.fromkeys(one for one in listed if isinstance(one.path, bytes) and one.path))
 
 
 class Finder:
-    """Searches in turn for the controller from before: another is taken only if that one does not return."""
+    """Searches for the previously used controller; takes another one only if several searches do not find it."""
 
     def __init__(self, backend: HidBackend) -> None:
         self._backend = backend
         self._looks = 0
 
     def __call__(self, preferred: str | None) -> OpenController:
-        """Call `find_controller`, with `others` False for the first searches in a row that find nothing."""
+        """Search once by `find_controller`; accept only `preferred` until LOOKS_FOR_THE_SAME searches have failed."""
         self._looks += 1
         found = find_controller(self._backend, preferred, others=self._looks > LOOKS_FOR_THE_SAME)
         self._looks = 0
@@ -50,11 +50,11 @@ class Finder:
 
 
 def find_controller(backend: HidBackend, preferred: str | None = None, *, others: bool = True) -> OpenController:
-    """Open the controller of address `preferred`, else the first; NoDeviceError or DeviceError gives the reason.
+    """Open the controller with the address `preferred`, or another one; NoDeviceError or DeviceError if none.
 
-    Of a controller on USB and on Bluetooth at once, USB is taken. With `preferred`, another one is taken only if
-    `others` allows it and none refuses to be opened. The refusing one may be the preferred: the system grants
-    permission a moment after a controller appears.
+    A controller that is connected by USB and Bluetooth at once is opened on USB. If `preferred` is given, another
+    controller is taken only if `others` is True and every connected controller could be opened. One that could not may
+    be the preferred one, as the system grants permission a moment after a controller appears.
     """
     seen = sightings(backend)
     if not seen:
@@ -90,7 +90,7 @@ def find_controller(backend: HidBackend, preferred: str | None = None, *, others
 
 
 def _none_found() -> NoDeviceError:
-    """Make the error for no controller, or none that the system shows."""
+    """Make the error for no connected controller, with the remedies."""
     wanted = " or ".join(f"{name} ({SONY_VENDOR_ID:04X}:{product:04X})" for product, name in PRODUCT_IDS.items())
     return NoDeviceError(
         f"no {wanted} found: connect one by a USB cable that carries data, or by Bluetooth (hold Create and PS until"

@@ -1,4 +1,4 @@
-"""Control of the watchdog: start it, set the controller to release if this process is killed or hangs, replace it."""
+"""Control of the watchdog process, which releases the controller if the operator side is killed or hangs."""
 
 import contextlib
 import os
@@ -9,14 +9,14 @@ from typing import Final
 
 _WATCHDOG = Path(__file__).with_name("release_watchdog.py")
 _END_TIMEOUT_S = 2.0
-"""Limit on the watchdog's end, in seconds: it takes milliseconds, but more on a busy machine."""
+"""Seconds to wait for the watchdog's end before it is killed; usually it takes milliseconds"""
 MOST_REPLACEMENTS: Final = 3
-"""Limit on replacements: a cause that ended this number of watchdogs will end the next one, too."""
+"""Maximum number of times that an ended watchdog is replaced, as the cause would end the next one, too"""
 _LEFT_ALONE: Final = "should this one be killed or hang now, the triggers stay as stiff as they are"
 
 
 class ReleaseGuard:
-    """Watchdog process for the time of the context."""
+    """Watchdog process that runs while the context is open."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
@@ -32,7 +32,7 @@ class ReleaseGuard:
     def __exit__(self, *_: object) -> None:
         if self._process is None:
             return
-        # It holds a controller only if that could not be released: it tries once more.
+        # If the controller could not be released, the watchdog still holds it, and tries again when its input closes.
         if self._process.stdin is not None:
             self._process.stdin.close()
         try:
@@ -49,7 +49,7 @@ class ReleaseGuard:
         return self._process is not None and self._process.poll() is None
 
     def take_notes(self) -> list[str]:
-        """Replace an ended watchdog, which takes a few milliseconds; return notes for a person, each once."""
+        """Replace the watchdog if it has ended, which takes a few milliseconds; return new notes for the status."""
         if self._process is None or self._given_up:
             return []
         if self.running:
@@ -71,7 +71,7 @@ class ReleaseGuard:
         return ["the watchdog process has ended; another one has taken its place"]
 
     def hold(self, path: bytes, release: bytes) -> None:
-        """Have `release` written to the controller at `path` if this process dies from now on."""
+        """Let the watchdog write `release` to the controller at `path` if this process dies or hangs from now on."""
         self._held = (path, release)
         self._say(f"hold {path.hex()} {release.hex()}")
 
@@ -81,22 +81,22 @@ class ReleaseGuard:
         self._say("let-go")
 
     def beat(self) -> None:
-        """Report that an effect is on and this process runs; without a further beat in time, it hangs."""
+        """Report that an effect is on and this process runs; it counts as hanging if no beat or `rest` follows."""
         self._say("beat")
 
     def rest(self) -> None:
-        """Report that no effect is on: no beat is due until the next one."""
+        """Report that no effect is on, so that no beat is due."""
         self._say("rest")
 
     def _say(self, line: str) -> None:
         if self._process is None or self._process.stdin is None:
             return
-        # The run continues without a watchdog; `running` is False.
+        # If the watchdog has ended, the run continues without one; `running` is False.
         with contextlib.suppress(OSError):
             self._process.stdin.write(f"{line}\n".encode("ascii"))
 
     def _refusals(self) -> list[str]:
-        """Read the answers since the last call, without waiting."""
+        """Read the watchdog's answers since the last call, without waiting; return a note if it refused."""
         if self._process is None or self._process.stdout is None:
             return []
         self._answers += self._process.stdout.read(4096) or b""
@@ -111,7 +111,7 @@ def _started() -> subprocess.Popen[bytes]:
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         bufsize=0,
-        # A Ctrl-C in the terminal must not reach it before us.
+        # A Ctrl-C in the terminal must not reach the watchdog.
         start_new_session=True,
     )
     for stream in (process.stdin, process.stdout):

@@ -1,17 +1,19 @@
-"""Release the triggers after the operator side was killed: a small process that outlives it for a moment.
+"""Watchdog: a small process that releases the triggers if the operator side is killed or hangs.
 
-    hold PATH REPORT    a controller is in use: when everything else fails, write REPORT to it (both in hexadecimal)
-    let-go              it is no longer in use, or has been released already
-    beat                an effect is on, or about to be: the next beat follows within SILENCE_S, or `rest` does
-    rest                no effect is on: no beat is due until the next one
+The operator side writes these lines to the watchdog's standard input:
 
-These lines come on the standard input. If it closes while a controller is held, the writer has died without a word
-(kill -9, a crash): the report is written and the process ends. If beats stop, the writer hangs (kill -STOP, a write
-that never returns): the report is written, once for each silence.
-Each `hold` is answered on the standard output: `held`, or `refused` if the controller cannot be opened.
+    hold PATH REPORT    a controller is in use: write REPORT to PATH to release it (both in hexadecimal)
+    let-go              the controller is no longer in use, or has been released already
+    beat                an effect is on, or about to be; the next beat or `rest` follows within SILENCE_S
+    rest                no effect is on; no beat is due
 
-The process runs as a bare file with `python -I -S`, to start in some 10 ms and to stay small. It imports only modules
-that Python has loaded anyway.
+If the input closes while a controller is held, the operator side has died (kill -9, a crash): the watchdog writes the
+report and ends. If beats stop, the operator side hangs (kill -STOP, a write that never returns): the watchdog writes
+the report once, and waits for further lines. It answers each `hold` on its standard output: `held`, or `refused` if the
+controller cannot be opened.
+
+The file is run by `python -I -S`, to start in some 10 ms and to need little memory. It imports only modules that Python
+has loaded anyway.
 """
 
 import os
@@ -21,25 +23,25 @@ import sys
 import time
 
 SILENCE_S = 0.2
-"""The longest time without a beat while an effect is on."""
+"""Maximum time without a beat while an effect is on, in seconds"""
 _ATTEMPTS = 3
-"""Attempts to write: a transfer can fail once, while a controller that is gone refuses each at once."""
+"""Number of attempts to write the report: a transfer may fail once. If the controller is gone, each fails at once"""
 
 
 class Target:
-    """The controller, opened early: its path may be another device's later."""
+    """Controller to release, opened when it is held, as its path may belong to another device later."""
 
     def __init__(self, path: bytes, report: bytes) -> None:
         self._report = report
         try:
-            # Non-blocking, whatever is at that path; a write still waits where the kernel must.
+            # Opening must not block, whatever is at that path; a write may still wait in the kernel.
             self._file = os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
         except OSError:
             self._file = -1  # no remedy: the operator side has no better access
         self.usable = self._file >= 0
 
     def release(self) -> None:
-        """Write the report."""
+        """Write the report that releases the controller; ignore errors."""
         for _ in range(_ATTEMPTS):
             try:
                 os.write(self._file, self._report)
@@ -58,17 +60,17 @@ class Watch:
     """Controller that is held, and the deadline of the next beat."""
 
     def __init__(self, answer_file: int) -> None:
-        """answer_file: where each `hold` is answered."""
+        """answer_file: file descriptor to which the answer to each `hold` is written."""
         self._answer_file = answer_file
         self._target: Target | None = None
         self._deadline_s: float | None = None
 
     def patience_s(self, now_s: float) -> float | None:
-        """Return the time left for the next beat; None for no limit."""
+        """Return the seconds left until the next beat must come; None if no beat is due."""
         return None if self._deadline_s is None else max(0.0, self._deadline_s - now_s)
 
     def follow(self, line: bytes, now_s: float) -> None:
-        """Execute a line; ignore an unknown one."""
+        """Execute one line of the input; ignore an unknown one."""
         words = line.split()
         if words == [b"beat"]:
             self._deadline_s = now_s + SILENCE_S
@@ -81,7 +83,7 @@ class Watch:
             self._take(Target(path, report))
 
     def release(self) -> None:
-        """Write the report, if a controller is held, and wait for no beat of this silence any more."""
+        """Write the report, if a controller is held; no beat is due until beats begin again."""
         self._deadline_s = None
         if self._target is not None:
             self._target.release()
@@ -99,7 +101,7 @@ class Watch:
 
 
 def watch(input_file: int, answer_file: int) -> None:
-    """Execute the lines until they end; release what is held then, and whenever beats stop."""
+    """Execute the lines of the input until it closes. Release the controller then, and whenever beats stop."""
     watched = Watch(answer_file)
     unfinished = b""
     while True:
@@ -112,17 +114,17 @@ def watch(input_file: int, answer_file: int) -> None:
         *lines, unfinished = (unfinished + chunk).split(b"\n")
         for line in lines:
             watched.follow(line, time.monotonic())
-    # An incomplete line does not count.
+    # An incomplete last line is ignored.
     watched.release()
 
 
 def _readable(file: int, patience_s: float | None) -> bool:
-    """Wait for input or its end; False if nothing came in time."""
+    """Wait until the file has input or is closed; return False if neither happens within `patience_s`."""
     return bool(select.select([file], [], [], patience_s)[0])
 
 
 def main() -> None:
-    """Run the watchdog; ignore the signals that stop the operator side, which ends us by closing the pipe."""
+    """Run the watchdog. Signals that stop the operator side are ignored: closing the input ends the watchdog."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     os.set_blocking(sys.stdout.fileno(), False)  # lose an answer rather than block

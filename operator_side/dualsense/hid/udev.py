@@ -1,7 +1,7 @@
-"""Udev rule that lets the person at a Linux machine use the controller: text, place, and command to load it.
+"""Udev rule that permits a person logged in at a Linux machine to use the controller, and commands to install it.
 
-`uaccess` grants the device to the person at the machine; rules for that must come before 73-seat-late.rules. Over
-USB the ids are attributes of the device; over Bluetooth they are only in the name of its parent.
+The tag `uaccess` grants the device to the person at the machine; such a rule's file must sort before
+73-seat-late.rules. Over USB the ids are attributes of the device; over Bluetooth they are only in its parent's name.
 """
 
 from typing import Final
@@ -26,5 +26,5 @@ RULES: Final = tuple(
 
 
 def installing_command() -> str:
-    """Return shell lines that install the rule and load it, to be copied as they are."""
+    """Return shell commands that install the rules and load them, to be copied into a shell."""
     return "\n".join((f"sudo tee {RULE_FILE} << 'END'", *RULES, "END", RELOAD))

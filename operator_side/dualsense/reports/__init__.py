@@ -1,1 +1,1 @@
-"""Codec of the controller's input, output and feature reports."""
+"""Encoding and decoding of a DualSense's input, output and feature reports."""

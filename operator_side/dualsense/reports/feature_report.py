@@ -1,4 +1,4 @@
-"""Feature reports, read once: calibration (0x05), address (0x09), firmware (0x20).
+"""Feature reports, which a driver reads once: calibration (0x05), address (0x09) and firmware (0x20).
 
 On Bluetooth their last four bytes are a checksum. Layout: Linux hid-playstation and the controllers wiki.
 """
@@ -14,7 +14,7 @@ CALIBRATION_ID: Final = 0x05
 ADDRESS_ID: Final = 0x09
 FIRMWARE_ID: Final = 0x20
 FEATURE_LENGTHS: Final = {CALIBRATION_ID: 41, ADDRESS_ID: 20, FIRMWARE_ID: 64}
-"""Lengths in bytes, with the id"""
+"""Length of each feature report in bytes, its id included"""
 
 _VERSIONS: Final = struct.Struct("<II")
 _HARDWARE, _UPDATE = 24, 44
@@ -30,15 +30,15 @@ def _checked(report: bytes, report_id: int, transport: Transport) -> bytes:
 
 
 def _finished(report_id: int, content: bytes, transport: Transport) -> bytes:
-    """Return the report of `content`, padded with zeros, with its checksum on Bluetooth."""
+    """Make a feature report from id and content: padded with zeros, and with a checksum on Bluetooth."""
     report = (bytes((report_id,)) + content).ljust(FEATURE_LENGTHS[report_id], b"\0")
     return report if transport is Transport.USB else sealed(Seed.FEATURE, report[:-CHECKSUM_LENGTH])
 
 
 def build_calibration(transport: Transport) -> bytes:
-    """Make feature report 0x05 of error-free motion sensors, which hid-playstation reads at its start.
+    """Make feature report 0x05, for motion sensors without errors; hid-playstation reads it when it starts.
 
-    Gyroscope: bias 0, 8640 counts either way at 540 degrees a second. Accelerometer: 8192 counts for one gravity.
+    Gyroscope: bias 0, ±8640 counts at ±540 degrees a second. Accelerometer: 8192 counts for one gravity.
     """
     gyro, acceleration = (8640, -8640) * 3, (8192, -8192) * 3
     return _finished(CALIBRATION_ID, struct.pack("<17h", 0, 0, 0, *gyro, 540, 540, *acceleration), transport)
@@ -47,7 +47,7 @@ def build_calibration(transport: Transport) -> bytes:
 def parse_address(report: bytes, transport: Transport = Transport.USB) -> str:
     """Read the controller's Bluetooth address, "aa:bb:cc:dd:ee:ff", from feature report 0x09.
 
-    It is the same on USB and on Bluetooth. RemoteProtocolError for another id, length or checksum.
+    The address is the same on USB and on Bluetooth. RemoteProtocolError for another id, length or checksum.
     """
     return _checked(report, ADDRESS_ID, transport)[6:0:-1].hex(":")
 
@@ -58,12 +58,12 @@ def build_address(address: str, transport: Transport = Transport.USB) -> bytes:
 
 
 class Firmware(NamedTuple):
-    """Versions of a controller: words of 32 bits, and one of 16."""
+    """Versions of a controller's hardware and firmware (32 bits each) and of its update (16 bits)."""
 
     hardware_version: int
     firmware_version: int
     update_version: int
-    """Version by which to expect features of the firmware."""
+    """Version by which drivers decide which features the firmware has"""
 
     @classmethod
     def parse(cls, report: bytes, transport: Transport = Transport.USB) -> Self:

@@ -1,6 +1,6 @@
-"""Codec of input reports: USB's 0x01 and Bluetooth's 0x31.
+"""Encoding and decoding of input reports: 0x01 on USB, 0x31 on Bluetooth.
 
-The driver decodes them, the simulated controller encodes them. Layout: Linux hid-playstation, SDL and the controllers
+The driver decodes them; the simulated controller encodes them. Layout: Linux hid-playstation, SDL and the controllers
 wiki, which agree. Touch, motion and the triggers' own feedback are not decoded, as nothing here uses them.
 """
 
@@ -22,15 +22,15 @@ from operator_side.dualsense.reports.transport import (
     transport_of_input,
 )
 
-# Sticks 0-3, triggers 4-5, sequence 6, buttons 7-9, accelerometer's y 23-24, sensor timestamp 27-30, touch points at 32
-# and 36, battery 52, sockets 53: offsets in the common block.
+# Offsets in the common block: sticks 0-3, triggers 4-5, sequence 6, buttons 7-9, accelerometer's y 23-24, sensor
+# timestamp 27-30, touch points at 32 and 36, battery 52, sockets 53.
 _COMMON: Final = struct.Struct("<7B3B13xh2xIxB3xB15xBB")
 _GRAVITY: Final = 8192
 _NOT_TOUCHED: Final = 0x80
 _USB_DATA_AND_POWER: Final = 0x18
 _SENSOR_TICKS_PER_S: Final = 3_000_000
 _HAS_STATE: Final = 0x01
-"""Flag in the second byte of Bluetooth's report, below a sequence number: it holds the controller's state (wiki)."""
+"""Flag in the low bits of a Bluetooth report's second byte: the report has the controller's state (wiki)"""
 
 _HAT_DIRECTIONS: Final = (
     frozenset({Button.UP}),
@@ -42,7 +42,7 @@ _HAT_DIRECTIONS: Final = (
     frozenset({Button.LEFT}),
     frozenset({Button.UP, Button.LEFT}),
 )
-"""Directions clockwise from up; any other number is HID's null state, no direction"""
+"""Buttons of the directional pad for each code 0 to 7, clockwise from up; any other code means none"""
 _HAT_NONE: Final = 8
 _DIRECTIONS: Final = frozenset({Button.UP, Button.RIGHT, Button.DOWN, Button.LEFT})
 
@@ -67,29 +67,31 @@ _BUTTON_BITS: Final = {
     Button.LEFT_PADDLE: 22,
     Button.RIGHT_PADDLE: 23,
 }
-"""Bit numbers in the three bytes as one little-endian number; the low nibble is the directional pad's hat"""
+"""Bit of each button in the three button bytes, read as one little-endian number.
+
+Bits 0 to 3 are the code of the directional pad."""
 
 
 def _axis(byte: int) -> float:
-    """Convert a stick's byte: 0 to -1, 128 to 0, 255 to 1; the halves differ by one step."""
+    """Convert a stick's byte to -1 to 1: 0 to -1, 128 to 0, 255 to 1. The negative half has one step more."""
     return (byte - 128) / (127 if byte > 128 else 128)
 
 
 def byte_of_axis(axis: float) -> int:
-    """Return the byte nearest to an axis, -1 to 1."""
+    """Return the stick's byte nearest to `axis`, -1 to 1."""
     return 128 + round(axis * (127 if axis > 0.0 else 128))
 
 
 @lru_cache(maxsize=4096)
 def pressed_of(code: int) -> frozenset[Button]:
-    """Decode the three bytes as one number; cached, as hands hold few combinations."""
+    """Decode the three button bytes, given as one number; cached, as few combinations occur."""
     pressed = {button for button, bit in _BUTTON_BITS.items() if code >> bit & 1}
     hat = code & 0x0F
     return frozenset(pressed | _HAT_DIRECTIONS[hat] if hat < len(_HAT_DIRECTIONS) else pressed)
 
 
 def code_of(pressed: frozenset[Button]) -> int:
-    """Encode the three bytes as one number. pressed: no two opposite directions."""
+    """Encode buttons as the three button bytes, in one number. pressed: without opposite directions."""
     directions = pressed & _DIRECTIONS
     code = _HAT_DIRECTIONS.index(directions) if directions else _HAT_NONE
     for button in pressed - _DIRECTIONS:
@@ -110,7 +112,7 @@ _BATTERY_CODES: Final = {state: code for code, state in _BATTERY_STATES.items()}
 
 @lru_cache
 def _battery(byte: int) -> Battery:
-    """Decode the battery's byte: a step is ten per cent, taken at its middle (hid-playstation)."""
+    """Decode the battery's byte. Charge has steps of ten per cent; a step's middle is returned (hid-playstation)."""
     state = _BATTERY_STATES.get(byte >> 4, BatteryState.UNKNOWN)
     if state is BatteryState.FULL:
         return Battery(1.0, state)
@@ -126,9 +128,9 @@ def _battery_byte(battery: Battery) -> int:
 
 
 def parse_input_report(report: bytes) -> ControllerState:
-    """Decode an input report of either transport; every one of valid id, length and checksum can be decoded.
+    """Decode a full input report of either transport.
 
-    RemoteProtocolError for any other report, and for the simple ones at the start of Bluetooth.
+    RemoteProtocolError for another id, length or checksum, and for the simple reports with which Bluetooth starts.
     """
     start = INPUT_FRAMING[_checked_transport(report)].start
     left_x, left_y, right_x, right_y, l2, r2, _, *buttons, _, _, _, _, battery, _ = _COMMON.unpack_from(report, start)
@@ -156,10 +158,11 @@ def _checked_transport(report: bytes) -> Transport:
 def build_input_report(
     state: ControllerState, transport: Transport = Transport.USB, sequence: int = 0, sensor_time_s: float = 0.0
 ) -> bytes:
-    """Make the full input report of a controller in `state`, rounded to the wire's steps.
+    """Make the full input report of a controller in `state`: 64 bytes on USB, 78 with the checksum on Bluetooth.
 
-    64 bytes on USB, 78 with the checksum on Bluetooth. The controller lies flat, its pad untouched. sequence: 0 to 255,
-    one more with each report on USB, on Bluetooth always 1 (controllers wiki). sensor_time_s: the controller's clock.
+    Values are rounded to the report's steps. The controller lies flat, and its touchpad is not touched. sequence: 0 to
+    255; one more with each report on USB, always 1 on Bluetooth (controllers wiki). sensor_time_s: time on the
+    controller's clock.
     """
     framing, (left_x, left_y), (right_x, right_y) = INPUT_FRAMING[transport], state.left_stick, state.right_stick
     report = bytearray(framing.length)

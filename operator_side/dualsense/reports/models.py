@@ -1,4 +1,4 @@
-"""Models of controllers, and their ids."""
+"""Supported models of controllers, with vendor and product ids."""
 
 from enum import Enum
 from typing import Final
@@ -7,17 +7,17 @@ SONY_VENDOR_ID: Final = 0x054C
 
 
 class Model(Enum):
-    """Model of a controller; the value is its product id on USB and Bluetooth."""
+    """Model of a controller. The value is its product id, the same on USB and Bluetooth."""
 
     DUALSENSE = 0x0CE6
     EDGE = 0x0DF2
-    """DualSense with two more keys and two paddles, otherwise the same to a program."""
+    """DualSense with two function keys and two paddles; otherwise a program sees no difference"""
 
     @property
     def title(self) -> str:
-        """Name for people."""
+        """Name of the model, as shown to the operator."""
         return "DualSense" if self is Model.DUALSENSE else "DualSense Edge"
 
 
 PRODUCT_IDS: Final = {model.value: model.title for model in Model}
-"""Names for people by product id"""
+"""Name of each model, keyed by product id"""

@@ -1,7 +1,7 @@
-"""Codec of output reports: USB's 0x02, Bluetooth's 0x31.
+"""Encoding and decoding of output reports: 0x02 on USB, 0x31 on Bluetooth.
 
-A report has a flag for each part of the controller that it sets; a part without its flag stays as it is. Only the flags
-of the parts that `Feel` sets are used: the other lights, the mute key and the sound stay the system's.
+A report has a flag for each part of the controller that it sets; parts without a flag stay unchanged. Only the flags of
+triggers, motors and light bar are used: other lights, the mute key and sound are left to the operating system.
 Layout: Linux hid-playstation, SDL and Nielk1's notes, which agree.
 """
 
@@ -33,17 +33,17 @@ _OTHER_MARK, _OTHER_START = 0x02, 2
 
 # Offsets in the common block
 _FLAGS_0, _FLAGS_1, _MOTOR_RIGHT, _MOTOR_LEFT, _R2_EFFECT, _L2_EFFECT, _FLAGS_2, _LIGHTBAR = 0, 1, 2, 3, 10, 21, 38, 44
-# Of the three bytes of flags
+# Bits in the three bytes of flags
 _CLASSIC_RUMBLE, _SELECT_RUMBLE, _SET_R2_EFFECT, _SET_L2_EFFECT = 0x01, 0x02, 0x04, 0x08
 _SET_LIGHTBAR, _CLASSIC_RUMBLE_V2 = 0x04, 0x04
 
 
 def build_output_report(feel: Feel, transport: Transport = Transport.USB, sequence: int = 0) -> bytes:
-    """Make the report that sets what `feel` holds: 48 bytes on USB, 78 with the checksum on Bluetooth.
+    """Make the report that sets the effects of `feel`: 48 bytes on USB, 78 with the checksum on Bluetooth.
 
-    sequence: on Bluetooth, one more with each report; four bits of it are sent. Bluetooth has two framings in use; this
-    is that of Linux hid-playstation, whose authors make the controller. ValueError if the packed bytes hold a code
-    other than the two of official.py.
+    sequence: used on Bluetooth; one more with each report, of which four bits are sent. Two framings are in use on
+    Bluetooth; this is that of Linux hid-playstation, whose authors make the controller. ValueError if the report would
+    contain an effect code other than the two of official.py.
     """
     framing = OUTPUT_FRAMING[transport]
     report = bytearray(framing.length)
@@ -53,7 +53,7 @@ def build_output_report(feel: Feel, transport: Transport = Transport.USB, sequen
     report[framing.start : framing.start + _COMMON_LENGTH] = _common_block(feel)
     for flag, place in ((_SET_L2_EFFECT, _L2_EFFECT), (_SET_R2_EFFECT, _R2_EFFECT)):
         code = report[framing.start + place]
-        # The last check before the wire, on the bytes that are sent.
+        # Last check before sending, on the very bytes that are sent.
         if len(report) != framing.length or (code not in COMMANDED_CODES if report[framing.start] & flag else code):
             raise ValueError(f"report holds the effect code 0x{code:02x}; valid: 0x05, 0x21")
     return bytes(report) if transport is Transport.USB else sealed(Seed.OUTPUT, bytes(report[:-CHECKSUM_LENGTH]))
@@ -76,11 +76,11 @@ def _common_block(feel: Feel) -> bytearray:
 
 
 def parse_output_report(report: bytes) -> Feel:
-    """Decode an output report of either transport; flags for other parts of the controller are ignored.
+    """Decode an output report of either transport; parts of the controller other than those of `Feel` are ignored.
 
-    USB: 48 to 64 bytes. Bluetooth: 78 bytes in either framing. Another program's effect decodes as a free trigger.
-    RemoteProtocolError for another id, length, framing or checksum, and for a debug code in either trigger's place even
-    if its flag is not set.
+    USB: 48 to 64 bytes. Bluetooth: 78 bytes in either framing. A trigger effect that feelahead never sends is decoded
+    as a free trigger. RemoteProtocolError for another id, length, framing or checksum, and for a debug effect code for
+    either trigger, even if the trigger's flag is not set.
     """
     block = _block_of(report)
     flags = block[_FLAGS_0]
@@ -96,7 +96,10 @@ def parse_output_report(report: bytes) -> Feel:
 
 
 def encoded_effects(report: bytes) -> tuple[bytes | None, bytes | None]:
-    """Return the eleven bytes of L2's and of R2's effect, of any program; None if not set. As `parse_output_report`."""
+    """Return the eleven bytes of L2's and of R2's effect, whatever they are; None for an effect that is not set.
+
+    RemoteProtocolError as `parse_output_report`.
+    """
     return _effects(_block_of(report))
 
 
@@ -110,7 +113,7 @@ def _block_of(report: bytes) -> bytes:
 
 
 def _effects(block: bytes) -> tuple[bytes | None, bytes | None]:
-    """Return the encoded effects of L2 and R2; None for one that is not set."""
+    """Return the encoded effects of L2 and R2; None for an effect that is not set."""
     l2, r2 = (
         block[place : place + EFFECT_LENGTH] if block[_FLAGS_0] & flag else None
         for place, flag in ((_L2_EFFECT, _SET_L2_EFFECT), (_R2_EFFECT, _SET_R2_EFFECT))
@@ -119,7 +122,7 @@ def _effects(block: bytes) -> tuple[bytes | None, bytes | None]:
 
 
 def transport_of_output(report: bytes) -> Transport:
-    """Return the transport by the report's id and length; RemoteProtocolError for any other id or length."""
+    """Return the transport for which the report's id and length are valid; RemoteProtocolError if there is none."""
     usb, bluetooth = OUTPUT_FRAMING[Transport.USB], OUTPUT_FRAMING[Transport.BLUETOOTH]
     if report and report[0] == usb.report_id and usb.length <= len(report) <= _USB_MAX_LENGTH:
         return Transport.USB
@@ -132,7 +135,10 @@ def transport_of_output(report: bytes) -> Transport:
 
 
 def _common_start(report: bytes) -> int:
-    """Return the start of the common block; a Bluetooth report's second byte shows the framing."""
+    """Return the offset of the common block; on Bluetooth the report's second byte tells the framing.
+
+    RemoteProtocolError for an invalid id, length, checksum or framing.
+    """
     transport = transport_of_output(report)
     if transport is Transport.USB:
         return OUTPUT_FRAMING[transport].start

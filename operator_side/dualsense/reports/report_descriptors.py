@@ -1,6 +1,6 @@
 """Report descriptors (HID 1.11) of a DualSense: ids, lengths and fields of the reports.
 
-Both were accepted, byte for byte, by Linux hid-playstation.
+Linux hid-playstation accepted both descriptors below, byte for byte.
 """
 
 from typing import Final

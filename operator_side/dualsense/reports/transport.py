@@ -1,8 +1,9 @@
-"""Transports and their reports: ids, lengths, the place of the common block, the checksum.
+"""USB and Bluetooth reports: ids, lengths, offset of the common block, and checksum.
 
-USB and Bluetooth carry the same block of fields, on Bluetooth one byte further in and with a checksum at the end.
-Layout: Linux hid-playstation, SDL and the controllers wiki, which agree. The reports themselves reveal the transport:
-a virtual controller's bus type and interface number do not (measured over uhid).
+Both transports carry the same block of fields, the common block. On Bluetooth it begins later in the report, and a
+checksum ends the report. Layout: Linux hid-playstation, SDL and the controllers wiki, which agree. The transport is
+told from the reports' ids and lengths, as bus type and interface number are wrong for a virtual controller (measured
+over uhid).
 """
 
 import zlib
@@ -14,7 +15,7 @@ from common.errors import RemoteProtocolError
 
 
 class Transport(Enum):
-    """Carrier of the reports."""
+    """Connection over which the reports come."""
 
     USB = "USB"
     BLUETOOTH = "Bluetooth"
@@ -22,7 +23,7 @@ class Transport(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Framing:
-    """Kind of report: id, length in bytes with the id, and start of the common block."""
+    """Report's id, length in bytes with the id, and offset of the common block."""
 
     report_id: int
     length: int
@@ -33,8 +34,9 @@ INPUT_FRAMING: Final = {Transport.USB: Framing(0x01, 64, 1), Transport.BLUETOOTH
 OUTPUT_FRAMING: Final = {Transport.USB: Framing(0x02, 48, 1), Transport.BLUETOOTH: Framing(0x31, 78, 3)}
 
 _SIMPLE_KINDS: Final = ((0x01, 10), (0x01, 78))
-"""Ids and lengths of the short reports with which Bluetooth starts, until a feature is read or an effect written.
-Some systems pad each to the longest one (SDL)."""
+"""Ids and lengths of the simple reports that Bluetooth sends until a feature is read or an effect written.
+
+Some systems pad each report to the length of the longest, 78 bytes (SDL)."""
 _INPUT_KINDS: Final = {
     (0x01, 64): Transport.USB,
     (0x31, 78): Transport.BLUETOOTH,
@@ -43,7 +45,7 @@ _INPUT_KINDS: Final = {
 
 
 def transport_of_input(report: bytes) -> Transport:
-    """Return the transport by an input report's id and length; RemoteProtocolError for any other id or length."""
+    """Return the transport for which an input report's id and length are valid; RemoteProtocolError if none."""
     transport = _INPUT_KINDS.get((report[0], len(report))) if report else None
     if transport is None:
         raise RemoteProtocolError(
@@ -54,37 +56,37 @@ def transport_of_input(report: bytes) -> Transport:
 
 
 def is_simple_report(report: bytes) -> bool:
-    """Return whether it is one of the short reports with which Bluetooth starts, which nothing here reads."""
+    """Return whether `report` is one of the simple reports with which Bluetooth starts, which nothing here decodes."""
     return report[:1] == b"\x01" and (0x01, len(report)) in _SIMPLE_KINDS
 
 
 def described(report: bytes) -> str:
-    """Return a report's id and length, for an error's text."""
+    """Return the report's id and length as text, for an error message."""
     return f"id 0x{report[0]:02x}, {len(report)} bytes" if report else "no bytes"
 
 
-# Every Bluetooth report ends in a CRC-32 (zlib's) over an unsent byte and the report (hid-playstation).
+# Every Bluetooth report ends in a CRC-32 (zlib's) over one byte that is not sent, and the report (hid-playstation).
 
 CHECKSUM_LENGTH: Final = 4
 
 
 class Seed(IntEnum):
-    """The unsent byte: the Bluetooth HID header of each kind of report."""
+    """Byte with which the checksum begins, though it is not sent: Bluetooth HID header of each kind of report."""
 
     INPUT = 0xA1
     OUTPUT = 0xA2
     FEATURE = 0xA3
-    """Seed of a feature that was read."""
+    """For a feature report that was read"""
 
 
 _STARTS: Final = {seed: zlib.crc32(bytes([seed])) for seed in Seed}
-"""CRC-32 of the header byte alone, from which a report's continues"""
+"""CRC-32 of each Seed byte alone, from which a report's CRC-32 is continued"""
 _RESIDUE: Final = 0x2144DF1C
-"""CRC-32 of any content followed by its own CRC-32"""
+"""CRC-32 of any content followed by its own CRC-32; it is the same for every content"""
 
 
 def checksum(seed: Seed, content: bytes) -> int:
-    """Return the CRC-32 of a report without its last four bytes."""
+    """Return the checksum of a report whose bytes before the checksum are `content`."""
     return zlib.crc32(content, _STARTS[seed])
 
 
@@ -94,7 +96,7 @@ def sealed(seed: Seed, content: bytes) -> bytes:
 
 
 def check(seed: Seed, report: bytes) -> None:
-    """Raise RemoteProtocolError unless the report ends in its checksum."""
+    """Raise RemoteProtocolError unless the report ends in its valid checksum."""
     if zlib.crc32(report, _STARTS[seed]) != _RESIDUE or len(report) <= CHECKSUM_LENGTH:
         found = int.from_bytes(report[-CHECKSUM_LENGTH:], "little")
         valid = checksum(seed, report[:-CHECKSUM_LENGTH])

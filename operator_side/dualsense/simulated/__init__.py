@@ -1,1 +1,1 @@
-"""Controller without hardware, with a model of the triggers."""
+"""Simulated DualSense, with a mechanical model of the triggers and of the fingers on them."""

@@ -1,4 +1,4 @@
-"""Simulated DualSense: the same port as a real one, with a simulated person's hands on it."""
+"""Simulated DualSense, with the same interface as a real one; methods set forces, sticks and buttons."""
 
 import math
 from typing import Final
@@ -23,26 +23,26 @@ from operator_side.dualsense.reports.transport import Transport
 from operator_side.dualsense.simulated.trigger_model import STRENGTH_STEP_N, SimulatedTrigger
 
 INPUT_REPORT_PERIOD_S: Final = 0.004
-"""Period of input reports: about 250 a second on USB (SDL)."""
+"""Period of input reports, in seconds: about 250 a second, as on USB (SDL)"""
 SIMULATED_ADDRESS: Final = "02:00:00:00:0c:e6"
-"""Locally administered address, which no real controller has."""
+"""Locally administered address, so that no real controller has it"""
 SIMULATED_FIRMWARE: Final = Firmware(hardware_version=0x0413, firmware_version=0x0110_0224, update_version=0x0224)
-"""Invented, but new enough for the rumble of present Linux hid-playstation (2.21, so 0x0215)."""
+"""Invented versions; hid-playstation's newer rumble mode needs an update version of at least 2.21 (0x0215)"""
 
 _ROUNDING_OF_TICKS = 1e-6
-"""Tolerance for a `now_s` of exactly n periods, in floating point."""
+"""Tolerance, in periods, so that rounding of `now_s` does not miss a report that is just due"""
 _BLUETOOTH_SEQUENCE = 1
-"""Constant sequence number of the common block on Bluetooth (controllers wiki)."""
+"""Sequence number in the common block, constant on Bluetooth (controllers wiki)"""
 _TRIGGER_BUTTONS: Final = frozenset({Button.L2, Button.R2})
 _EDGE_BUTTONS: Final = frozenset({Button.LEFT_FUNCTION, Button.RIGHT_FUNCTION, Button.LEFT_PADDLE, Button.RIGHT_PADDLE})
 
 
 class SimulatedDualSense:
-    """Port without hardware, in virtual or real time: `now_s` is its only clock.
+    """Simulated DualSense, in virtual or real time: `now_s` is its only clock.
 
-    It wakes at the first `now_s` and makes an input report at once, then one each period. A value from a `set_*`
-    method holds from the last `now_s` until the next one; at first nobody touches it. Forces are those of
-    trigger_model: assumptions. On Bluetooth it sends full reports from the start.
+    At the first `now_s` it makes an input report, then one each period. A value given to a `set_*` method holds from
+    the last `now_s` until it is set again; at first nothing is touched. Forces are the assumptions of trigger_model.py.
+    On Bluetooth it sends full reports from the start.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class SimulatedDualSense:
         address: str = SIMULATED_ADDRESS,
         strength_step_n: float = STRENGTH_STEP_N,
     ) -> None:
-        """strength_step_n: resistance that one strength of an effect adds, an eighth of the strongest.
+        """strength_step_n: force that each step of strength, 0 to 8, adds to a trigger's resistance.
 
         ValueError for an invalid address.
         """
@@ -75,25 +75,26 @@ class SimulatedDualSense:
         self._newest_report = -1
         self._unread: bytes | None = None
         self.commanded = RELEASED
-        """All effects in force; None for parts never set."""
+        """Present effects; a part is None if it was never set."""
         self._apply(RELEASED)
 
-    # The hands
+    # Inputs by a person
 
     def set_finger_force(self, l2_n: float, r2_n: float) -> None:
-        """Press the triggers with constant forces; ValueError for a negative or non-finite one."""
+        """Press L2 and R2 with constant forces from now on; ValueError for a negative or non-finite force."""
         self._l2.set_finger_force(l2_n)
         self._r2.set_finger_force(r2_n)
 
     def set_sticks(self, left: Stick = (0.0, 0.0), right: Stick = (0.0, 0.0)) -> None:
-        """Hold the sticks at (x, y), -1 to 1 each, right and up positive; ValueError beyond."""
+        """Hold the sticks at (x, y), -1 to 1 each, right and up positive; ValueError for values out of range."""
         if (left, right) != (self._held.left_stick, self._held.right_stick):
             self._held = replace(self._held, left_stick=left, right_stick=right)
 
     def set_buttons(self, pressed: frozenset[Button]) -> None:
         """Hold these buttons and no others.
 
-        ValueError for L2 and R2, which follow the fingers' force, and for the Edge's on a controller without them.
+        ValueError for L2 and R2, which the triggers' travel presses, and for function keys or paddles unless the model
+        is a DualSense Edge.
         """
         if pressed & _TRIGGER_BUTTONS:
             raise ValueError("pressed has L2 or R2; valid: any other button, and set_finger_force for these")
@@ -103,7 +104,7 @@ class SimulatedDualSense:
             self._held = replace(self._held, pressed=pressed)
 
     def hands_off(self) -> None:
-        """Release everything."""
+        """Release triggers, sticks and buttons."""
         self.set_finger_force(0.0, 0.0)
         self.set_sticks()
         self.set_buttons(frozenset())
@@ -117,12 +118,12 @@ class SimulatedDualSense:
 
     @property
     def strengths(self) -> tuple[Strengths, Strengths]:
-        """Strengths in force, L2 and R2."""
+        """Present strengths of L2's and of R2's zones."""
         return self._l2.strengths, self._r2.strengths
 
     @property
     def released(self) -> bool:
-        """Whether both triggers are free."""
+        """Whether neither trigger has a strength above 0 in any zone."""
         return self.strengths == (FREE_TRIGGER, FREE_TRIGGER)
 
     @property
@@ -130,30 +131,33 @@ class SimulatedDualSense:
         """Present drive of the motors."""
         return self.commanded.rumble or Rumble()
 
-    # The port
+    # Interface of `Controller` (operator_side/controller/port.py)
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Return the newest report's state, in the wire's steps; None until the next one is due. As `read_report`."""
+        """Return the state in the newest input report, rounded as in the report; None if there is no new report.
+
+        Errors are those of `read_report`.
+        """
         report = self.read_report(now_s)
         return None if report is None else parse_input_report(report)
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Apply `feel` from `now_s` on; DeviceError if it is closed."""
+        """Apply `feel` from `now_s` on; DeviceError if the controller is closed."""
         self._require_open()
         self._advance(now_s)
         self._apply(feel)
 
     def close(self) -> None:
-        """Switch off effects, rumble and a warning light; `read` and `write` raise DeviceError from then on."""
+        """Switch off resistance, rumble and a warning light; from then on `read` and `write` raise DeviceError."""
         self._apply(self.commanded.farewell)
         self._closed = True
 
-    # The wire, for a system to which this controller is offered
+    # Reports as bytes, for an operating system to which this controller is offered
 
     def read_report(self, now_s: float) -> bytes | None:
-        """Return the newest input report, of the state at its own time; None until the next one is due.
+        """Return the newest input report, with the state at the time when it was due; None if there is no new report.
 
-        ValueError if `now_s` runs backwards or is not finite; DeviceError if it is closed.
+        ValueError if `now_s` runs backwards or is not finite; DeviceError if the controller is closed.
         """
         self._require_open()
         self._advance(now_s)
@@ -161,7 +165,7 @@ class SimulatedDualSense:
         return report
 
     def take_report(self, report: bytes, now_s: float) -> None:
-        """Apply an output report; ValueError, and nothing changed, if it cannot be decoded."""
+        """Apply an output report; if it cannot be decoded, change nothing and raise ValueError."""
         self._require_open()
         try:
             if transport_of_output(report) is not self.transport:
@@ -172,9 +176,9 @@ class SimulatedDualSense:
         self.write(feel, now_s)
 
     def get_feature(self, report_id: int) -> bytes:
-        """Answer a feature report: calibration 0x05, address 0x09, firmware 0x20.
+        """Return a feature report: calibration 0x05, address 0x09 or firmware 0x20.
 
-        DeviceError for another id, and if it is closed.
+        DeviceError for another id, or if the controller is closed.
         """
         self._require_open()
         if report_id not in self._features:
@@ -192,7 +196,7 @@ class SimulatedDualSense:
         self._r2.set_strengths(self.commanded.r2 or FREE_TRIGGER)
 
     def _advance(self, now_s: float) -> None:
-        """Let time pass until `now_s`, and make the newest input report that has come due."""
+        """Move the triggers until `now_s`, and make the newest input report that is due."""
         if not math.isfinite(now_s):
             raise ValueError(f"now_s = {now_s}; valid: a finite number")
         if now_s < self._now_s:
@@ -217,7 +221,7 @@ class SimulatedDualSense:
         return build_input_report(self._state(), self.transport, sequence, number * INPUT_REPORT_PERIOD_S)
 
     def _state(self) -> ControllerState:
-        """Return the present values of the sensors."""
+        """Return the present state: sticks and buttons as set, triggers by their travel."""
         triggers = {Button.L2: self._l2, Button.R2: self._r2}
         moved = {button for button, trigger in triggers.items() if round(trigger.sensed_travel * 255) > 0}
         return replace(

@@ -1,7 +1,7 @@
-"""Mechanics of a finger on an adaptive trigger: its rest position, and its speed towards it.
+"""Mechanics of a finger that presses a trigger: the travel at which it stops, and how fast it gets there.
 
-Travel here is mechanical, 0 at rest to 1 at the stop. Every force is an assumption: no public measurement of the
-DualSense's trigger forces exists. A steadily pressing finger feels the whole range of effects.
+Travel in this file is mechanical, 0 at rest to 1 at the stop. Every force is an assumption, as no public measurement of
+the DualSense's trigger forces exists. A normal finger's force lies within the range of the effects.
 """
 
 import math
@@ -10,16 +10,18 @@ from typing import Final
 from operator_side.controller.feel import FREE_TRIGGER, MAX_STRENGTH, SENSED_TRAVEL, ZONE_COUNT, Strengths
 
 SPRING_PRELOAD_N: Final = 0.5
-"""Force at which the trigger begins to move (assumed)."""
+"""Force at which the trigger begins to move, in newtons (assumed)"""
 SPRING_RISE_N: Final = 4.0
-"""Additional force at the end of the travel, growing linearly (assumed)."""
+"""Force that the spring adds from rest to the end of the travel, growing linearly (assumed)"""
 STRENGTH_STEP_N: Final = 0.25
-"""Resistance that one strength of an effect adds within its zone (assumed)."""
+"""Force that each step of strength, 0 to 8, adds within its zone (assumed)"""
 FINGER_TIME_CONSTANT_S: Final = 0.04
-"""Time constant of a finger's approach to the equilibrium of forces (assumed)."""
+"""Time constant with which a finger approaches the equilibrium of forces, in seconds (assumed)"""
 NORMAL_FINGER_FORCE_N: Final = 3.7
-"""Force of a normal pull (assumed). Against the bare spring it rests at 80 % of the travel, reported as full. Against
-the strongest effect it rests at 30 %, reported as 40 %: it overcomes any stiffness."""
+"""Force of a normal pull of a trigger (assumed).
+
+Against the spring alone the finger stops at 80 % of the travel, reported as a full pull. Against strength 8 in all
+zones it stops at 30 %, reported as 40 %: a normal pull overcomes any stiffness."""
 
 
 def equilibrium_travel(
@@ -27,9 +29,9 @@ def equilibrium_travel(
 ) -> float:
     """Return the travel, 0 to 1, at which a finger that presses from rest with a constant force stops.
 
-    It is the first travel at which spring and effect together hold the force. The effect is constant within a zone, so
-    the result may be a stiffer zone's boundary. It never grows with any strength, and never falls with the force.
-    zone_strengths: ten, 0 to 8. ValueError for a negative or non-finite force or step.
+    There the spring and the strength of the zone balance the force for the first time. Resistance jumps between zones,
+    so the result may be the boundary of a stiffer zone. The result never grows with a strength, and never falls with
+    the force. zone_strengths: ten, 0 to 8. ValueError for a negative or non-finite force or step.
     """
     for name, value in (("finger_force_n", finger_force_n), ("strength_step_n", strength_step_n)):
         if not (math.isfinite(value) and value >= 0.0):
@@ -49,18 +51,18 @@ def zone_of(travel: float) -> int:
 
 
 class SimulatedTrigger:
-    """Trigger and the finger on it, relaxing exponentially towards the equilibrium travel.
+    """Trigger and the finger on it, whose travel approaches the equilibrium travel exponentially.
 
-    Force and effect are constant between the calls that set them. `advance` is exact: one long step and many short ones
-    agree to rounding.
+    Force and strengths are constant between the calls that set them. `advance` is exact: one long step and many short
+    steps give the same travel, except for rounding.
     """
 
     def __init__(self, strength_step_n: float = STRENGTH_STEP_N) -> None:
-        """strength_step_n: resistance of one strength; with 0 effects are shown and not felt."""
+        """strength_step_n: force that each step of strength adds; with 0, effects are stored but not felt."""
         self.strengths = FREE_TRIGGER
-        """Strengths in force; `set_strengths` changes them."""
+        """Present strengths of the zones; `set_strengths` changes them."""
         self.travel = 0.0
-        """Mechanical travel, 0 to 1."""
+        """Present mechanical travel, 0 to 1."""
         self._strength_step_n = strength_step_n
         self._finger_force_n = 0.0
         self._equilibrium = 0.0
@@ -71,17 +73,17 @@ class SimulatedTrigger:
         return min(self.travel / SENSED_TRAVEL, 1.0)
 
     def set_finger_force(self, finger_force_n: float) -> None:
-        """Press with a constant force from now on; ValueError for a negative or non-finite one."""
+        """Press with a constant force from now on; ValueError for a negative or non-finite force."""
         self._equilibrium = equilibrium_travel(finger_force_n, self.strengths, self._strength_step_n)
         self._finger_force_n = finger_force_n
 
     def set_strengths(self, strengths: Strengths) -> None:
-        """Resist by `strengths` from now on."""
+        """Resist with these strengths of the zones from now on."""
         self.strengths = strengths
         self._equilibrium = equilibrium_travel(self._finger_force_n, strengths, self._strength_step_n)
 
     def advance(self, step_s: float) -> None:
-        """Let `step_s` pass; ValueError for a negative or non-finite step."""
+        """Move the trigger during `step_s`; ValueError for a negative or non-finite step."""
         if not (math.isfinite(step_s) and step_s >= 0.0):
             raise ValueError(f"step_s = {step_s}; valid: finite, 0 or more")
         remaining = math.exp(-step_s / FINGER_TIME_CONSTANT_S)

@@ -1,1 +1,1 @@
-"""Simulated controller offered to every program on a Linux machine."""
+"""Simulated controller that every program on a Linux machine can use, offered through the kernel's uhid."""

@@ -1,7 +1,7 @@
-"""Simulated controller offered to Linux through /dev/uhid: its side of the protocol, bytes only, without I/O.
+"""The uhid protocol by which a simulated controller is offered to Linux: bytes in, bytes out, without I/O.
 
-Each read and each write is one `struct uhid_event` of linux/uhid.h: a type and, packed, its content. The kernel pads
-short writes with zeros, and a reader does the same with short reads. Integers are in the machine's byte order.
+Each read from and each write to /dev/uhid is one `struct uhid_event` of linux/uhid.h: a type, then packed content. The
+kernel pads short writes with zeros; we pad short reads likewise. Integers are in the machine's byte order.
 """
 
 import struct
@@ -24,12 +24,12 @@ _REPORT_MAX_LENGTH: Final = 4096
 BUS: Final = {Transport.USB: 0x03, Transport.BLUETOOTH: 0x05}
 _FEATURE_REPORT, _OUTPUT_REPORT = 0, 1
 _INPUT_OUTPUT_ERROR: Final = 5
-"""EIO, which hidraw and drivers report for an answer with an error"""
+"""Error code EIO in an answer, which hidraw and drivers pass on to programs"""
 _VERSION, _COUNTRY = 0x0100, 0
 
 
 class _Type(IntEnum):
-    """enum uhid_event_type, without obsolete and ignored ones."""
+    """Types of events that are used here, from enum uhid_event_type."""
 
     DESTROY = 1
     START = 2
@@ -44,7 +44,7 @@ class _Type(IntEnum):
 
 
 _TYPE = struct.Struct("=I")
-# Name, physical place, unique id; the descriptor's size, bus; vendor, product, version, country.
+# Name, physical location, unique id; the descriptor's size, bus; vendor, product, version, country.
 _CREATE = struct.Struct("=I128s64s64sHHIIII")
 _INPUT = struct.Struct("=IH")
 _OUTPUT_TAIL = struct.Struct("=HB")  # size and kind, after the full length of the data
@@ -56,21 +56,21 @@ _SET_REPLY = struct.Struct("=IIH")
 
 @dataclass(frozen=True, slots=True)
 class UhidIdentity(Limited):
-    """Identity of a DualSense, for the kernel."""
+    """Identity with which a simulated DualSense appears to the kernel."""
 
     transport: Transport = Transport.USB
     model: Model = Model.DUALSENSE
     unique_id: Annotated[str, Meta(max_length=63)] = ""
-    """A Bluetooth address; drivers may refuse a second device with the same one."""
+    """Bluetooth address; drivers may refuse a second device with the same address"""
 
     @property
     def name(self) -> str:
-        """Name that the kernel shows."""
+        """Name of the device that the kernel shows."""
         maker = "Sony Interactive Entertainment " if self.transport is Transport.USB else ""
         return f"{maker}{self.model.title} Wireless Controller"
 
     def create(self) -> bytes:
-        """Make UHID_CREATE2: the device appears."""
+        """Make the event UHID_CREATE2, by which the device appears."""
         descriptor = USB_DESCRIPTOR if self.transport is Transport.USB else BLUETOOTH_DESCRIPTOR
         texts = (text.encode() for text in (self.name, "feelahead/virtual-dualsense", self.unique_id))
         numbers = (SONY_VENDOR_ID, self.model.value, _VERSION, _COUNTRY)
@@ -84,34 +84,34 @@ class UhidCounts:
     inputs: int = 0
     outputs: int = 0
     refused: int = 0
-    """Reports that the controller refused, and questions that it could not answer"""
+    """Number of reports and requests that the controller refused"""
     features: int = 0
 
 
 class UhidController:
-    """Controller on one file of /dev/uhid: each method returns the bytes to write to it."""
+    """Simulated controller on an open /dev/uhid. Methods return the bytes that the caller must write to that file."""
 
     def __init__(self, controller: SimulatedDualSense, identity: UhidIdentity) -> None:
         self.counts = UhidCounts()
         self.driven = False
-        """Whether a driver has taken the device"""
+        """Whether a kernel driver uses the device"""
         self._controller = controller
         self._identity = identity
 
     def plug_in(self) -> bytes:
-        """Make the device appear. The kernel asks for its features next, so call `handle` soon."""
+        """Return the event that makes the device appear. The kernel then requests features, so call `handle` soon."""
         return self._identity.create()
 
     def unplug(self) -> bytes:
-        """Make UHID_DESTROY: the device disappears; `plug_in` may follow."""
+        """Return the event UHID_DESTROY, by which the device disappears; `plug_in` may follow."""
         self.driven = False
         return _TYPE.pack(_Type.DESTROY)
 
     def handle(self, event: bytes, now_s: float) -> bytes | None:
-        """Take an event of the kernel; return the answer, if it wants one. ValueError for an impossible length.
+        """Take an event of the kernel; return the answer, or None if the event needs none.
 
-        The kernel waits up to 5 s for the answer with a question's number. All else is ignored: a program opened or
-        closed the device, or a newer kernel sent an unknown event.
+        The kernel waits up to 5 s for an answer, which has the request's number. Other events are ignored: a program
+        opens or closes the device, or a newer kernel sends an unknown event. ValueError for an impossible length.
         """
         if not _TYPE.size <= len(event) <= EVENT_LENGTH:
             raise ValueError(f"event has {len(event)} bytes; valid: {_TYPE.size} to {EVENT_LENGTH}")
@@ -137,7 +137,7 @@ class UhidController:
         return None
 
     def next_input(self, now_s: float) -> bytes | None:
-        """Return the newest input report for the kernel; None without a new one or without a driver."""
+        """Return the event with the newest input report; None without a new report or without a driver."""
         report = self._controller.read_report(now_s)
         if report is None or not self.driven:
             return None

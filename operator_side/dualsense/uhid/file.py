@@ -1,4 +1,4 @@
-"""/dev/uhid as a file, and the loop of a simulated controller on it."""
+"""Access to /dev/uhid, and the loop that runs a simulated controller on it."""
 
 import contextlib
 import errno
@@ -19,10 +19,10 @@ _IN_A_CONTAINER = "in a container, on its host, and start it with --device=/dev/
 
 
 class UhidFile:
-    """Open file; the device disappears when it closes, however the process ends."""
+    """Open /dev/uhid. The kernel removes the device when the file closes, however the process ends."""
 
     def __init__(self, path: Path = UHID_PATH) -> None:
-        """Open it; ConfigurationError gives the remedy in one line if it is missing or not permitted."""
+        """Open `path`; ConfigurationError, with the remedy in one line, if that fails."""
         self._descriptor: int | None = None
         try:
             self._descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | os.O_NONBLOCK)
@@ -46,18 +46,18 @@ class UhidFile:
         self.close()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for an event of the kernel; return whether there is one."""
+        """Wait at most `timeout_s` for an event of the kernel; return whether there is one."""
         return bool(select.select([self._open_descriptor()], [], [], max(0.0, timeout_s))[0])
 
     def read(self) -> bytes | None:
-        """Return one event, or None without one."""
+        """Return one event of the kernel, without waiting; None if there is none."""
         try:
             return os.read(self._open_descriptor(), EVENT_LENGTH) or None
         except BlockingIOError:
             return None
 
     def write(self, event: bytes) -> None:
-        """Write an event; DeviceError if the kernel does not have the device."""
+        """Write an event; DeviceError if the kernel refuses it, as when it has removed the device."""
         try:
             os.write(self._open_descriptor(), event)
         except OSError as error:
@@ -66,7 +66,7 @@ class UhidFile:
             raise DeviceError(f"{said} ({reason}); its messages: sudo dmesg | grep playstation") from error
 
     def close(self) -> None:
-        """Close it; safe to call again."""
+        """Close the file; safe to call again."""
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is not None:
             os.close(descriptor)
@@ -86,7 +86,7 @@ def offer(
 ) -> None:
     """Plug `controller` in, and run it while `going(now_s)`, called every `period_s`, is True; then unplug it.
 
-    Questions of the kernel are answered at once. Input reports are sent at the deadlines; missed ones are skipped.
+    Requests of the kernel are answered at once. Each period the newest input report is sent, if there is a new one.
     """
     file.write(controller.plug_in())
     pacer = Pacer(period_s, clock.now())
@@ -104,5 +104,5 @@ def offer(
                     file.write(report)
             wait_for_turn(pacer, clock, file.wait, spin_s=0.0)
     finally:
-        with contextlib.suppress(DeviceError):  # the kernel may have let it go before
+        with contextlib.suppress(DeviceError):  # the kernel may have removed the device before
             file.write(controller.unplug())

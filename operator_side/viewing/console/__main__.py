@@ -1,11 +1,14 @@
-"""Process of the console: from the operator side to viser and the pages, and back.
+"""Console process: passes facts from the operator side to viser and the pages, and the pages' messages back.
+
+Each message on the channel begins with a letter:
 
 operator side ──▶ here    f facts, v a view payload as received, n a note, r the constants of a run,
-                          p the position in a recording
-here ──▶ operator side    a the address, w the number of open pages, s a page's words, e the reason for none,
-                          l the H.264 pictures that are lacking: once if they can be shown, and at each change
+                          p the position in a recording, d the run's normal end
+here ──▶ operator side    a the address, w the number of visible pages, s a page's message, e why there is no console,
+                          l the H.264 pictures that are lacking: first once H.264 can be shown, then at each change
 """
 
+import asyncio
 import contextlib
 import logging
 import math
@@ -15,6 +18,7 @@ import socket
 import struct
 import sys
 import threading
+from pathlib import Path
 from typing import Any, Final
 
 import msgspec
@@ -41,17 +45,19 @@ from operator_side.viewing.console.outlines import outline
 from operator_side.viewing.facts import OperatorFacts, ShownKind
 
 _NICENESS: Final = 5
-"""Increment of niceness, so that both sides have priority"""
+"""Increment of this process's niceness once it serves, so that both sides have priority"""
 _FRAME: Final = struct.Struct("<Bd")
-"""Header of a picture: its view, and its time on the robot side's clock"""
+"""Header of a picture: number of its view, and its capture time on the robot side's clock"""
 _MOST_LISTED: Final = 6
+_LAST_WORDS_S: Final = 0.3
+"""Seconds that pages have to receive the last message before the process ends"""
 _SLOW_PERIOD_S: Final = 0.25
-"""Period of drawings for a browser without a graphics processor, in seconds"""
+"""Seconds between scene updates if a browser draws without a graphics processor"""
 _LASTING: Final = {b"r": ShownKind.RUN, b"p": ShownKind.PLAYER}
 
 
 class _Process:
-    """The process; all but its first and last moment runs in the server's thread."""
+    """Console process. After the start, everything runs in the server's thread."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
@@ -66,8 +72,8 @@ class _Process:
         self._steps: Any = None
         self._lacks: tuple[int, int] | None = None
 
-    def run(self, port: int) -> None:
-        """Serve until the channel ends; report through it if that is impossible."""
+    def run(self, port: int, token: str) -> None:
+        """Serve until the channel ends. If serving is impossible, report the reason through the channel."""
         try:
             from operator_side.viewing.console.drawing import Drawing  # noqa: PLC0415  # an extra, and slow to import
             from operator_side.viewing.console.gate import Gate  # noqa: PLC0415
@@ -76,7 +82,7 @@ class _Process:
             from operator_side.viewing.console.server import Server  # noqa: PLC0415
         except ModuleNotFoundError as error:
             missing = (error.name or "").partition(".")[0]
-            self._give_up(f"{missing} is not installed on this machine; valid: pip install 'feelahead[operator]'")
+            self._give_up(f"{missing} is not installed; install it in the clone: pip install '.[operator]'")
             return
         part = socket.socket()
         part.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -85,7 +91,7 @@ class _Process:
         except OSError as error:
             self._give_up(f"--console-port {port}: {error.strerror}; valid: 0 for any port that is free")
             return
-        token, port = secrets.token_urlsafe(24), part.getsockname()[1]
+        port = part.getsockname()[1]
         gate = Gate(token, port)
         self._pages = Pages(lambda count: self._say("w", b"%d" % count), self._say)
         try:
@@ -108,6 +114,7 @@ class _Process:
 
     def _begin(self, loop: Any, address: str) -> None:
         self._say("a", address.encode())
+        os.nice(_NICENESS)
         loop.add_reader(self._channel.fileno(), self._receive)
 
     def _follow(self, steps: Any) -> None:
@@ -133,10 +140,12 @@ class _Process:
             self._give_up(f"the console failed: {error!r}")
             self._ended.set()
         if self._channel.ended:
-            self._ended.set()
+            loop = asyncio.get_running_loop()
+            loop.remove_reader(self._channel.fileno())
+            loop.call_later(_LAST_WORDS_S, self._ended.set)
 
     def _take(self, kind: bytes, content: bytes) -> SceneState | None:
-        """Take one message; return a scene's state to the caller, as only the newest counts."""
+        """Take one message. Return a scene's state instead of drawing it: the caller draws only the newest."""
         if kind == b"f":
             self._facts = facts = msgspec.msgpack.decode(content, type=OperatorFacts)
             at = [None if trigger.raw is None else SENSED_TRAVEL * trigger.raw for trigger in (facts.l2, facts.r2)]
@@ -145,6 +154,8 @@ class _Process:
         elif kind == b"n":
             note = {"kind": ShownKind.NOTE, "text": content.decode("utf-8", "replace")}
             self._pages.note(msgspec.json.encode(note).decode())
+        elif kind == b"d":
+            self._pages.show(ShownKind.ENDED, f'{{"kind":"{ShownKind.ENDED}"}}', lasting=True)
         elif kind in _LASTING:
             lasting = {"kind": _LASTING[kind], **msgspec.msgpack.decode(content)}
             self._pages.show(_LASTING[kind], msgspec.json.encode(lasting).decode(), lasting=True)
@@ -224,7 +235,7 @@ class _Process:
 
 
 def said(facts: OperatorFacts) -> dict[str, Any]:
-    """Make the words of a page, and its look; None for unknown ones."""
+    """Return the texts that a page shows, and the look (`Look`) of its state; None for what is unknown."""
     status, view = facts.status, LiveView(None, facts.status)
     state = view.phase if view.alarm or view.look is Look.STARTING else words(view.look)
     return {
@@ -239,11 +250,10 @@ def said(facts: OperatorFacts) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Run the companion process; its arguments are the channel's number and the port."""
-    channel, (port,) = companion_channel(sys.argv[1:])
-    os.nice(_NICENESS)
+    """Run the console process. Arguments: the channel's file descriptor, the port, and a file with a token, if any."""
+    channel, (port, *token) = companion_channel(sys.argv[1:])
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # no line for each refused request
-    _Process(channel).run(int(port))
+    _Process(channel).run(int(port), Path(token[0]).read_text().strip() if token else secrets.token_urlsafe(24))
     os._exit(0)  # does not wait for viser's thread
 
 

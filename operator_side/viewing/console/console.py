@@ -1,7 +1,8 @@
-"""Console as its feeder sees it: a separate process that never blocks this one."""
+"""Access of the operator side to its console: a separate process that never blocks this one."""
 
 from collections import deque
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Final, Self
 
 import msgspec
@@ -10,39 +11,46 @@ from common.companion.process import Companion
 from operator_side.viewing.facts import OperatorFacts
 
 _VIDEO_WAITS_BYTES: Final = 1 << 18
-"""Limit on waiting bytes above which pictures are skipped: a later one is newer."""
+"""Number of waiting bytes above which pictures are skipped, as newer ones follow"""
 _FACTS_WAIT_BYTES: Final = 1 << 20
+"""Number of waiting bytes above which facts are skipped"""
 _MOST_HEARD: Final = 256
-_END_LIMIT_S: Final = 0.3
-"""Limit on its end, in seconds: it may still be starting, and has nothing to lose."""
+"""Maximum number of pages' messages that wait for the caller"""
+_END_LIMIT_S: Final = 1.0
+"""Seconds to wait for the console process to end before it is killed: it has nothing to save"""
 
 
 PageWords = tuple[int, dict[str, Any] | None]
-"""Number of a page in this run, and its `hands`, its wish to `tune` or to `play`; None: this page is gone."""
+"""Number of a page, and its message: any of `hands`, `tune`, `play` and `again`; None if the page has closed."""
 
 
 class Console:
-    """Browser console; without viser there is none, which a note reports."""
+    """Browser console. Without viser no page is served, and a note says so."""
 
-    def __init__(self, title: str, *, port: int = 0, live: bool = True) -> None:
-        """Start it on `port` of this machine, 0 for any free one. live: no recording."""
+    def __init__(self, title: str, *, port: int = 0, live: bool = True, token: Path | None = None) -> None:
+        """Start the console process on `port` of this machine; 0 for any free port. live: not a replayed recording.
+
+        token: file with the token of the page's address; pages then offer to run again. None for a random token.
+        """
         self.address: str | None = None
-        """Address of its page, with the token; None until it is ready, and when it is gone."""
+        """Address of the page, with the token; None until the page is ready, and once the process has ended."""
         self.pages = 0
-        """Number of open pages; with none, nothing must be sent or rendered."""
+        """Number of visible pages; with 0, nothing need be sent or rendered."""
         self.lacks: tuple[int, int] | None = None
-        """As in `Watch`; None until it can show pictures in H.264."""
+        """As `lacks` in `Watch`; None until the console can show H.264 pictures."""
         self.came = 0
-        """Number of times that a page was opened."""
+        """Number of times that a page was opened or shown again."""
         self.words: deque[PageWords] = deque(maxlen=_MOST_HEARD)
-        """Words of the pages, oldest first, for the caller to take."""
+        """Messages of the pages, oldest first, for the caller to take."""
         self._handling: set[int] = set()
         """Open pages that have sent hands."""
         self._notes: list[str] = []
         self.gone = False
-        """Whether it has ended; a note gives the reason."""
-        self._companion = Companion("operator_side.viewing.console", [str(port)])
-        self._companion.channel.send(b"r", msgspec.msgpack.encode({"title": title, "live": live}))
+        """Whether the console process has ended; a note gives the reason."""
+        given = [] if token is None else [str(token)]
+        self._companion = Companion("operator_side.viewing.console", [str(port), *given])
+        run = {"title": title, "live": live, "may_run_again": token is not None}
+        self._companion.channel.send(b"r", msgspec.msgpack.encode(run))
 
     def __enter__(self) -> Self:
         return self
@@ -51,16 +59,16 @@ class Console:
         self.close()
 
     def fileno(self) -> int:
-        """Return the descriptor to wait for its messages."""
+        """Return the file descriptor that becomes readable when the console process sends a message."""
         return self._companion.channel.fileno()
 
     def facts(self, facts: OperatorFacts) -> None:
-        """Show these facts, unless it does not keep up."""
+        """Show `facts`; skip them if no page is visible or the console process does not keep up."""
         if self.pages and self._companion.channel.waiting < _FACTS_WAIT_BYTES:
             self._companion.channel.send(b"f", msgspec.msgpack.encode(facts))
 
     def view(self, payload: bytes, *, video: bool) -> None:
-        """Show a payload of the robot side. video: it may be skipped, as the next picture is as good."""
+        """Show a view payload of the robot side. video: a picture, skipped if the console process does not keep up."""
         if self.pages and not (video and self._companion.channel.waiting > _VIDEO_WAITS_BYTES):
             self._companion.channel.send(b"v", payload)
 
@@ -69,11 +77,11 @@ class Console:
         self._companion.channel.send(b"p", msgspec.msgpack.encode(state))
 
     def note(self, text: str) -> None:
-        """Show a lasting line."""
+        """Show a line that stays on the pages."""
         self._companion.channel.send(b"n", text.encode())
 
     def receive(self) -> None:
-        """Take the console's messages; call it often."""
+        """Take the messages of the console process; call it often."""
         channel = self._companion.channel
         if self.gone:
             return
@@ -102,7 +110,7 @@ class Console:
             self._handling.add(page)
 
     def _end(self, why: str) -> None:
-        """Note the end: no page is open, and all hands at pages are gone."""
+        """Note the end of the console process: report every page that sent hands as closed."""
         self.gone, self.address = True, None
         self.pages = 0
         for page in sorted(self._handling):
@@ -110,10 +118,12 @@ class Console:
         self._notes.append(why)
 
     def take_notes(self) -> list[str]:
-        """Return the notes for people since the last call."""
+        """Return the notes since the last call, for the status."""
         taken, self._notes = self._notes, []
         return taken
 
     def close(self) -> None:
-        """End it at once."""
+        """Tell the pages that the run has ended, and end the console process; kill it if that takes over 0.3 s."""
+        self._companion.channel.send(b"d", b"")
+        self._companion.channel.flush()
         self._companion.close(_END_LIMIT_S)

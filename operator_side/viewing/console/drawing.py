@@ -1,6 +1,7 @@
-"""Drawing of the robot side's scene in viser: the robot as believed, the objects, and the gripper where it is felt.
+"""Drawing of the robot side's scene in viser.
 
-Only changes are sent: a batch of poses for all shapes that share a mesh.
+It has the robot as the robot side estimates it, the objects as perceived, and the gripper's spheres moved ahead by
+each trigger's distance D. Only changes are sent to the browser: one batch of poses for all shapes that share a mesh.
 """
 
 from typing import Any, Final, NamedTuple
@@ -19,29 +20,29 @@ Floats = NDArray[np.float64]
 
 L2_COLOR: Final = (0, 114, 189)
 R2_COLOR: Final = (230, 130, 0)
-"""Blue and orange, distinct also to the colour-blind; the page's style has the same"""
+"""Blue and orange, which the colour-blind can tell apart; style.css has the same colours"""
 _HALF_TINTED_M3: Final = 2e-6
-"""Overlap that tints an object by half, in cubic metres"""
+"""Overlap, in cubic metres, at which an object's colour is half its own and half the trigger's"""
 _GHOST_OPACITY: Final = 0.16
 _SEEN_FROM_M: Final = (0.42, -0.5, 0.34)
 """First camera position, relative to the tool"""
 _LIGHT_FROM: Final = (0.4, -1.0, 1.5)
 _FIELD_OF_VIEW: Final = 0.9
-"""Angle in radians"""
+"""First camera's vertical angle of view, in radians"""
 _STILL: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _GONE: Final = 1e-6
-"""Scale of an invisible shape"""
+"""Scale that makes a shape invisible"""
 
 
 def compose(outer: Floats, inner: Floats) -> Floats:
-    """Transform poses (n, 7): `inner`, given in the frame `outer`, to the frame in which `outer` is given."""
+    """Compose poses (n, 7): `inner` is given in the frame `outer`; return it in the frame in which `outer` is given."""
     turn, inner_turn = (Rotation.from_quat(poses[:, 3:], scalar_first=True) for poses in (outer, inner))
     turns = (turn * inner_turn).as_quat(scalar_first=True)
     return np.concatenate([outer[:, :3] + turn.apply(inner[:, :3]), turns], axis=1)
 
 
 def _add(scene: viser.SceneApi, name: str, solid: Solid, places: Any, **looks: Any) -> viser.BatchedMeshHandle:
-    """Draw a solid at places (n, 3), not turned yet."""
+    """Draw n copies of a solid, unrotated, at the positions `places` (n, 3)."""
     return scene.add_batched_meshes_simple(
         name,
         solid.vertices,
@@ -57,7 +58,7 @@ def _add(scene: viser.SceneApi, name: str, solid: Solid, places: Any, **looks: A
 
 
 class _Batch:
-    """Batch of shapes that share a mesh."""
+    """Shapes that share a mesh and are drawn as one batch."""
 
     def __init__(self, scene: viser.SceneApi, name: str, solid: Solid, members: list[tuple[Shape, Any]]) -> None:
         shapes = [shape for shape, _ in members]
@@ -72,7 +73,7 @@ class _Batch:
         self._poses = np.full((len(members), 7), np.nan, np.float32)
 
     def place(self, links: Floats, objects: Floats, tints: "_Tints") -> None:
-        """Move and colour them. links, objects: poses (n, 7) of the owners."""
+        """Move and colour the shapes. links, objects: poses (n, 7) of the robot's links and of the objects."""
         outer = np.empty((len(self.owner), 7))
         outer[self.of_robot] = links[self.owner[self.of_robot]]
         outer[~self.of_robot] = objects[self.owner[~self.of_robot]]
@@ -94,7 +95,7 @@ class _Batch:
 
 
 class _Ghost:
-    """Spheres of the gripper where one trigger makes it felt."""
+    """Enlarged spheres of the gripper, moved ahead by the distance D of one trigger."""
 
     def __init__(self, scene: viser.SceneApi, name: str, color: tuple[int, int, int]) -> None:
         self._scene, self._name, self._color = scene, name, color
@@ -103,7 +104,7 @@ class _Ghost:
         self._radii: NDArray[np.float32] = np.zeros(0, np.float32)
 
     def place(self, spheres: NDArray[np.float32], moved_m: Floats | None, inflated_m: float) -> None:
-        """Draw spheres (m, 4), moved by (3,) and inflated; None hides them."""
+        """Draw spheres (m, 4), moved by `moved_m` (3,), radii grown by `inflated_m`; `moved_m` None hides them."""
         moved: NDArray[np.float32] = (spheres[:, :3] + (0.0 if moved_m is None else moved_m)).astype(np.float32)
         radii = np.full(len(spheres), _GONE, np.float32) if moved_m is None else spheres[:, 3] + np.float32(inflated_m)
         if self._handle is None or self._count != len(spheres):
@@ -120,7 +121,7 @@ class _Ghost:
 
 
 class Drawing:
-    """Drawing of the newest scene."""
+    """The newest scene, drawn in viser."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
@@ -140,7 +141,7 @@ class Drawing:
         server.scene.add_light_directional("/light from above", intensity=1.3, position=_LIGHT_FROM)
 
     def shapes(self, shapes: SceneShapes) -> None:
-        """Build the shapes, unless this version is built."""
+        """Build the shapes, unless shapes of the same version are built already."""
         if self._shapes is not None and self._shapes.version == shapes.version:
             return
         for batch in self._batches:
@@ -158,7 +159,10 @@ class Drawing:
         ]
 
     def state(self, state: SceneState, needed_m: tuple[float | None, float | None], advancing: str) -> None:
-        """Move everything. needed_m: D of L2 and R2. A state of another version's shapes is ignored."""
+        """Move and colour everything; ignore a state whose version is not that of the built shapes.
+
+        needed_m: distance D of L2 and of R2; None hides the ghost. advancing: "L2" or "R2".
+        """
         shapes = self._shapes
         if shapes is None or shapes.version != state.version:
             return
@@ -196,7 +200,7 @@ class Drawing:
                 self._label.visible = False
             return
         index, text = int(targets[0]), f"target: {shapes.objects[targets[0]]}"
-        # At its first shape's centre: the object's own frame may be anywhere.
+        # At the centre of the object's first shape: the origin of the object's frame may be far from its surface.
         pose = next((shape.pose for shape in shapes.shapes if shape.owner == index and not shape.of_robot), _STILL)
         position = compose(self._objects[index : index + 1], np.array([pose]))[0, :3]
         if self._label is None:

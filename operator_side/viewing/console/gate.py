@@ -1,4 +1,5 @@
-"""Access to the console. Any web site can reach a local port, so address, token and origin must be right.
+"""Access check for the console. Any web site can send requests to a local port, so the token, Host and Origin are
+checked.
 
 http://127.0.0.1:PORT/TOKEN/        our page
 http://127.0.0.1:PORT/TOKEN/live    its WebSocket
@@ -12,29 +13,29 @@ from typing import Final, Protocol
 LIVE: Final = "/live"
 SCENE: Final = "/scene"
 SOCKETS: Final = (LIVE, SCENE)
-"""Places that are WebSockets, and nothing else"""
+"""Paths below the token that are WebSockets; all other paths are files"""
 
 
 class Headers(Protocol):
-    """Headers as of `websockets`."""
+    """HTTP headers, with the interface of `websockets`."""
 
     def get_all(self, key: str) -> Sequence[str]:
-        """Return every value of a header, by its name in any case."""
+        """Return all values of the header `key`, in upper or lower case."""
 
 
 class Gate:
-    """Judge of requests; it gives no reason for a refusal."""
+    """Admits or refuses requests; gives no reason for a refusal."""
 
     def __init__(self, token: str, port: int) -> None:
         self.address = f"http://127.0.0.1:{port}/{token}/"
-        """Address of the page; it admits anyone who knows it."""
+        """Address of the page, with the token: whoever knows it is admitted."""
         self._token = token.encode("ascii")
         self._hosts = (f"127.0.0.1:{port}", f"localhost:{port}")
 
     def admits(self, path: str, headers: Headers) -> str | None:
-        """Return the place in the console of a request for `path`, from `/` on and without a query; None to refuse.
+        """Return the part of `path` after the token, from its `/` on and without the query; None to refuse the request.
 
-        A WebSocket must come from a page of ours, by its Origin; a page may come without one.
+        A WebSocket needs the Origin of our page; other requests may lack an Origin.
         """
         hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
         upgrade = bool(headers.get_all("Upgrade"))
@@ -50,11 +51,11 @@ class Gate:
         return place if (place in SOCKETS) is upgrade else None
 
     def headers(self, place: str) -> dict[str, str]:
-        """Return the headers of an answer for `place`: no caching, no foreign frames, no foreign sources.
+        """Return the headers of an answer for `place`: no caching, no framing by other sites, no foreign content.
 
-        viser's page is one file that unpacks itself, and starts a worker of WebAssembly. Our page embeds it by the
-        other of our two names, as another site: the browser then isolates it in a separate process, without access to
-        ours.
+        viser's page is one file that unpacks itself and starts a WebAssembly worker, so its policy permits more. Our
+        page embeds it under the other of our two host names (127.0.0.1, localhost), so that the browser treats it as
+        another site: it runs in its own process, without access to our page.
         """
         sockets = " ".join(f"ws://{host}" for host in self._hosts)
         sites = " ".join(f"http://{host}" for host in self._hosts)

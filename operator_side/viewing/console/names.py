@@ -1,4 +1,4 @@
-"""Codes that the page shares with this side, as the script `names.js`: one object for each set."""
+"""Codes (enum members) that the page shares with the operator side, as the script `names.js`."""
 
 import json
 from typing import Final, get_args
@@ -13,7 +13,7 @@ _CODES: Final = (ShownKind, LinkState, SessionState, Doing, Hands)
 
 
 def names() -> str:
-    """Return the script; `VIEWS` are in the order of their numbers on the wire."""
+    """Return the script: one object for each enum, and `VIEWS` in the order of the views' numbers on the wire."""
     codes = {one.__name__: {member.name: member.value for member in one} for one in _CODES}
     codes["MotionState"] = {state.upper(): state for state in get_args(MotionState)}
     lines = [f"export const {name} = Object.freeze({json.dumps(members)});" for name, members in codes.items()]

@@ -1,4 +1,4 @@
-"""Open pages: each receives the newest of every kind at its own pace, and reports its hands."""
+"""Open pages: each receives the newest message of every kind at its own pace, and sends the operator's inputs."""
 
 import asyncio
 import contextlib
@@ -12,37 +12,40 @@ from websockets.exceptions import ConnectionClosed
 from operator_side.viewing.facts import ShownKind
 
 MOST_PAGES: Final = 8
-"""Limit on open pages, and on pages that draw the scene"""
+"""Maximum number of open pages, and of pages that draw the scene"""
 _MOST_NOTES: Final = 50
+"""Maximum number of notes kept for later pages"""
 _A_SECOND: Final = 500
-"""Limit on a page's messages in a second: hands at 60 Hz, and every key's edge"""
+"""Maximum number of messages from a page in a second, for inputs 50 times a second and at each change"""
 _TOO_MANY, _NOT_OURS = 1013, 1008
-"""WebSocket's codes: try again later; policy violation"""
+"""WebSocket close codes: try again later; policy violation"""
 
 ROUND_ENDS: Final = f'{{"kind":"{ShownKind.END}"}}'
 """Message that a page answers with `taken`"""
 
 Heard = Callable[[str, bytes], None]
-"""Callback with `s` and MessagePack of PageWords"""
+"""Callback for a page's message: called with `s` and a PageWords in MessagePack"""
 
 
 class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Message of a page, in JSON. Others validate the content of the first three fields."""
+    """Message of a page, in JSON. The operator side validates the content of the first three fields."""
 
     hands: dict[str, Any] | None = None
     tune: dict[str, Any] | None = None
     play: dict[str, Any] | None = None
+    again: bool | None = None
+    """Whether the person wants to start the run again"""
     slow: bool | None = None
-    """Whether its browser draws the scene without a graphics processor"""
+    """Whether the page's browser draws the scene without a graphics processor"""
     looks: bool | None = None
-    """Whether its tab is visible: a hidden one is sent nothing but lasting messages"""
+    """Whether the page's tab is visible; a hidden tab is sent only lasting messages"""
     taken: bool | None = None
-    """Answer to ROUND_ENDS: the next round may follow. Browsers queue unread messages without a bound, so that a slow
-    page would see everything, later and later."""
+    """Answer to ROUND_ENDS: the next batch may follow. Without this answer a slow page would fall behind without limit,
+    as browsers queue all unread messages."""
 
 
 class _Page:
-    """Queue of one page: the newest of each kind, so that a slow page only misses some."""
+    """Queue of one page: only the newest message of each kind, so that a slow page skips messages but is not late."""
 
     def __init__(self) -> None:
         self.newest: dict[str, bytes | str] = {}
@@ -64,10 +67,10 @@ class _Page:
 
 
 class Pages:
-    """All open pages; runs in the server's thread."""
+    """All open pages; used only in the server's thread."""
 
     def __init__(self, changed: Callable[[int], None], heard: Heard) -> None:
-        """changed: called with the number of visible pages."""
+        """changed: called with the number of visible pages, at each change. heard: called for each page's message."""
         self._changed = changed
         self._heard = heard
         self._pages: dict[int, _Page] = {}
@@ -81,7 +84,10 @@ class Pages:
         return any(page.slow for page in self._pages.values())
 
     def show(self, kind: str, message: bytes | str, *, lasting: bool = False) -> None:
-        """Send text or bytes, in place of an unsent message of this kind. lasting: to later pages, too."""
+        """Queue a message for the visible pages; it replaces an unsent one of the same kind.
+
+        lasting: also for hidden pages, and for pages that open later.
+        """
         if lasting:
             self._lasting.pop(kind, None)  # the newest comes last
             self._lasting[kind] = message
@@ -91,7 +97,7 @@ class Pages:
                 page.something.set()
 
     def note(self, message: str) -> None:
-        """Send a note to every page, and to later ones."""
+        """Send a note to every page, also to those that open later."""
         self._noted += 1
         self.show(f"{ShownKind.NOTE} {self._noted % _MOST_NOTES}", message, lasting=True)
 
@@ -142,6 +148,6 @@ class Pages:
             if said.looks is not None and said.looks != page.looks:
                 page.looks = said.looks
                 self._count()
-            words = {"hands": said.hands, "tune": said.tune, "play": said.play}
+            words = {"hands": said.hands, "tune": said.tune, "play": said.play, "again": said.again}
             if words := {name: value for name, value in words.items() if value is not None}:
                 self._heard("s", msgspec.msgpack.encode((number, words)))

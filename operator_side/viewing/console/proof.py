@@ -1,4 +1,4 @@
-"""Proof of the gate by requests from outside: viser may change how it opens its server, unnoticed."""
+"""Check of the gate by real requests, because another version of viser may open its server in a way that avoids it."""
 
 import http.client
 from collections.abc import Mapping
@@ -14,9 +14,9 @@ _UPGRADE: Final = {
 
 
 def prove(port: int, token: str) -> str | None:
-    """Return the first answer of the server on `port` of this machine that breaks the gate's rules; None without one.
+    """Send requests to the server on `port` of this machine; describe the first answer against the gate's rules.
 
-    OSError if it does not answer.
+    None if all answers are right. OSError if the server does not answer.
     """
     here = f"127.0.0.1:{port}"
     ours, foreign = {"Origin": f"http://{here}"}, {"Origin": "http://example.com"}

@@ -1,8 +1,8 @@
 """Server of the page and of viser's scene, with the gate in front of both.
 
-viser opens its server with one call of `websockets.asyncio.server.serve`. Ours replaces that call meanwhile: it passes
-our socket, bound to this machine alone, and our check of each request, so that only admitted requests reach viser.
-`prove` tests that from outside.
+viser opens its server with one call of `websockets.asyncio.server.serve`. During that call a function of ours replaces
+`serve`. It passes our socket, which only this machine can reach, and our check of each request, so that only admitted
+requests reach viser. `proof.py` tests this with real requests.
 """
 
 import asyncio
@@ -24,10 +24,11 @@ from operator_side.viewing.console.names import names
 from operator_side.viewing.console.pages import MOST_PAGES, Pages
 
 _LARGEST_MESSAGE: Final = 1 << 16
-"""Limit on a page's message, in bytes: its hands, or viser's camera"""
+"""Maximum size of a page's message, in bytes; pages send only inputs, and viser's camera"""
 _PING_S: Final = 5.0
+"""Seconds between pings, and until a page that does not answer one is closed"""
 _CLOSE_S: Final = 0.5
-"""Limit on a WebSocket's closing, in seconds: a page closed for sending too much still sends"""
+"""Seconds to wait for a page's part in closing a WebSocket; one closed for sending too much may go on sending"""
 _TYPES: Final[Mapping[str, str]] = {
     ".html": "text/html; charset=utf-8",
     ".css": "text/css; charset=utf-8",
@@ -40,16 +41,16 @@ ProcessRequest = Callable[[ServerConnection, Request], Response | None]
 
 
 class Viser(viser.ViserServer):
-    """viser's server, without the tunnel that would publish the scene at a page's request."""
+    """viser's server, without the public tunnel to the scene that viser opens when a page requests it."""
 
     def request_share_url(self, verbose: bool = True) -> str | None:
-        """Refuse the tunnel."""
+        """Refuse to open a public tunnel."""
         del verbose
         return None
 
 
 def read_page() -> dict[str, tuple[str, bytes]]:
-    """Read the page's files and its names: by place, content type and content."""
+    """Return content type and content of the page's files and of names.js, keyed by their paths below the token."""
     folder = resources.files("operator_side.viewing.console") / "page"
     files = {
         f"/{file.name}": (_TYPES[file.name[file.name.rindex(".") :]], file.read_bytes())
@@ -60,10 +61,10 @@ def read_page() -> dict[str, tuple[str, bytes]]:
 
 
 class Server:
-    """viser's server behind the gate; our code runs in its thread's `loop`."""
+    """viser's server behind the gate. Our pages are served in the event loop of viser's thread, `loop`."""
 
     def __init__(self, gate: Gate, pages: Pages, part: socket.socket) -> None:
-        """part: a bound socket. RuntimeError if viser does not open its server in the known way."""
+        """part: a bound socket to listen on. RuntimeError if viser does not open its server as viser 1.1 does."""
         self._gate = gate
         self._pages = pages
         self._part = part
@@ -108,7 +109,7 @@ class Server:
             websockets.asyncio.server.serve = opens  # type: ignore[misc]
 
     def _answer(self, connection: ServerConnection, request: Request, visers: ProcessRequest) -> Response | None:
-        """Return the answer to a request; None for an admitted WebSocket."""
+        """Return the HTTP answer to a request; None for an admitted WebSocket, whose handshake then continues."""
         place = self._gate.admits(request.path, request.headers)
         if place in SOCKETS:
             return None

@@ -1,6 +1,6 @@
-"""Shapes of a scene as triangles for a browser: one mesh for all that differ in size alone. Meshes are trimesh's.
+"""Shapes of a scene as triangles for a browser: one mesh, made by trimesh, for all shapes that differ only in size.
 
-Vertices (v, 3) float32 in metres, triangles (t, 3) uint32, counterclockwise from outside.
+Vertices are (v, 3) float32 in metres; triangles are (t, 3) uint32, counterclockwise seen from outside.
 """
 
 from functools import cache
@@ -14,21 +14,24 @@ from common.protocol.view_messages import Shape
 
 Floats = NDArray[np.float32]
 _SIDES: Final = 24
+"""Number of sides of a drawn cylinder or capsule"""
 _ENDLESS_M: Final = 2.0
+"""Half size at which an endless plane is drawn"""
 _SHEET_M: Final = 1e-3
+"""Half thickness at which a plane is drawn"""
 
 
 class Solid(NamedTuple):
-    """Triangles before scaling along each axis."""
+    """Mesh of a shape, before it is scaled along each axis."""
 
     vertices: Floats
     triangles: NDArray[np.uint32]
     flat: bool = False
-    """Whether its edges are sharp"""
+    """Whether to shade each triangle flat, so that edges look sharp"""
 
 
 def solid_of(shape: Shape) -> tuple[tuple[object, ...], Solid, tuple[float, float, float]]:
-    """Return a key that is equal for shapes that share a mesh, that mesh, and the scale."""
+    """Return a key, a mesh, and the mesh's scale along x, y and z. Shapes with equal keys share the mesh."""
     x, y, z = shape.size_m
     if shape.kind == "box":
         return ("box",), box(), (x, y, z)
@@ -57,7 +60,7 @@ def box() -> Solid:
 
 @cache
 def sphere(divisions: int = 2) -> Solid:
-    """Return a sphere of radius 1: an icosahedron whose triangles are divided into four, `divisions` times."""
+    """Return a sphere of radius 1: an icosahedron, each triangle divided into four, `divisions` times over."""
     return _solid(trimesh.creation.icosphere(subdivisions=divisions))
 
 

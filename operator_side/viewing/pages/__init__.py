@@ -1,1 +1,1 @@
-"""Keyboard, mouse and gamepad of a browser's page: a second-class controller."""
+"""Keyboard, mouse and gamepad of a browser's page, used as a controller that cannot resist the finger."""

@@ -1,4 +1,4 @@
-"""Console page as a controller: its hands give a controller's state, used as it is."""
+"""Console page as a controller: the inputs at the page become a controller's state."""
 
 from collections.abc import Callable
 from typing import Final
@@ -13,22 +13,25 @@ from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.pages.page_messages import PageHands
 
 _PRESS_S: Final = 0.2
-"""Half period of presses of the arming button until the arm is armed, in seconds: each press is an edge."""
+"""Seconds for which the arming button is pressed, then released, and so on until the arm is armed"""
 _MOVES_GRIPPER: Final = 0.5
 """Share of the hands that must count for the gripper to move"""
 _GRIPPER: Final = {1: Action.CLOSE_GRIPPER, -1: Action.OPEN_GRIPPER}
 
 
 class BrowserHands:
-    """Hands of a page. Hold-to-run arms, once per press; motion counts once the hands were at rest while armed."""
+    """Controller made of a page's inputs.
+
+    Each press of hold-to-run may arm the arm once. Triggers and sticks count once all were at rest while it was armed.
+    """
 
     has_person = False
-    """Whether there is a scripted person to continue."""
+    """Whether a page may hand the controls back to a scripted person."""
 
     def __init__(
         self, pages: DrivingPage, calibrate: Callable[[TravelCalibration], None], *, swap_sides: bool = False
     ) -> None:
-        """calibrate: called with the calibration for the states: a page's travel has no dead zones."""
+        """calibrate: called with the calibration for the states of `read`: IDENTITY, as a page has no dead zones."""
         self._pages = pages
         self._calibrate = calibrate
         self._swap_sides = swap_sides
@@ -40,18 +43,18 @@ class BrowserHands:
 
     @property
     def hands(self) -> Hands:
-        """Owner of the hands."""
+        """Owner of the controls: a browser."""
         return Hands.BROWSER
 
     @property
     def doing(self) -> Doing:
-        """Present action of the hands."""
+        """Present action of the operator at the page."""
         if self._pages.doing is not Doing.RUNNING or self._moves:
             return self._pages.doing
         return Doing.AT_REST_FIRST if self._was_armed else Doing.ARMING
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Take the page's hands; the screen reports whether the arm is armed."""
+        """Make the controller's state from the page's inputs. screen: telemetry, which has the arm's state."""
         del delay_s
         self._calibrate(IDENTITY)
         stopped = self._was_stopped if screen is None else screen.state == "stopped"
@@ -61,7 +64,7 @@ class BrowserHands:
         hands = self._pages.hands(now_s)
         armed = screen is not None and screen.state == "armed"
         if hands is not None and self._was_armed and not armed:
-            # It stopped under these hands: they must rest before it arms again.
+            # The arm stopped while this page drove: all keys must come up before hold-to-run arms it again.
             self._pages.rest_anew()
             hands = None
         if hands is None:
@@ -77,20 +80,20 @@ class BrowserHands:
             pressed.add(Action.ARM)
         self._state = self._held(hands, pressed)
 
-    # The port
+    # Interface of `Controller` (operator_side/controller/port.py)
 
     @property
     def released(self) -> bool:
-        """Whether the last write neither resists nor rumbles; a page only shows it."""
+        """Whether the last write neither resists nor rumbles; a page only shows resistance and rumble."""
         return self._commanded.releases
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Return the state of the last tick."""
+        """Return the state that the last `tick` made."""
         del now_s
         return self._state
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Store `feel`."""
+        """Store `feel`; a page has nothing to write it to."""
         del now_s
         self._commanded = feel.following(self._commanded)
 

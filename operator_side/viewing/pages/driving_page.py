@@ -1,10 +1,13 @@
-"""Choice of the page that drives, and whether its hands count: keys lost by a browser must never move the arm.
+"""Choice of the page that drives, and whether its inputs move the arm.
 
-nobody ─▶ resting ─▶ ready ─▶ running         the page that drives: the first that began on purpose
-             ▲         │         │
-             └─────────┴─────────┘  a key besides hold-to-run, hold-to-run released, a stop, a disarmed arm
-After a stop the hands rest until it was reset on purpose: hold-to-run alone never arms again.
-silence for 150 ms, a page that stops driving or closes: nobody, and the next driver rests first
+A browser may miss that a key was released, which must never move the arm. So the inputs count only while running:
+
+nobody ─▶ resting ─▶ ready ─▶ running         the first page that asks to drive becomes the driving page
+             ▲         │         │            resting: all keys must be up for 1 s; ready: hold-to-run counts
+             └─────────┴─────────┘  on another key before hold-to-run, hold-to-run released, a stop, a disarmed arm
+
+After a stop the inputs rest until the stop is reset: hold-to-run alone never arms again.
+After 150 ms of silence, or when the driving page stops driving or closes, nobody drives; the next page rests first.
 """
 
 from collections import deque
@@ -19,36 +22,36 @@ from operator_side.viewing.pages.page_messages import PageHands, PageMessage, Tu
 from operator_side.viewing.pages.pictures import Pictures
 
 SILENCE_S: Final = 0.15
-"""Silence after which a page drives no more, and its stop counts as released, in seconds."""
+"""Seconds of silence after which a page no longer drives, and its emergency stop counts as released."""
 REST_S: Final = 1.0
-"""Time with all keys up before hold-to-run counts, in seconds."""
+"""Seconds for which all keys must be up before hold-to-run counts."""
 _MOST_WISHES: Final = 16
-"""Capacity between two turns."""
+"""Maximum number of tuning requests kept between two turns of the loop."""
 
 
 class DrivingPage:
-    """Receiver of pages' messages; `now_s` is the time of arrival."""
+    """Receives pages' messages and chooses the driving page. `now_s` is a message's time of arrival."""
 
     def __init__(self, *, may_drive: bool = True) -> None:
-        """may_drive: False while a real controller drives: pages can still stop, and tune."""
+        """may_drive: False if a real controller drives; pages can then only stop the arm and tune."""
         self.may_drive = may_drive
         self.rejected = 0
         """Number of invalid messages."""
         self.pictures = Pictures()
         """Freshness of what pages show"""
         self.stale = 0
-        """Number of messages that others of the same page had overtaken; only their stop counts."""
+        """Number of messages that arrived after a newer one of the same page; of these only the stop counts."""
         self.silences = 0
         """Number of times that a driving page was silent for too long"""
         self._numbers: dict[int, int] = {}
-        """Number of the newest message of each open page"""
+        """Sequence number of the newest message of each open page"""
         self._refused: set[int] = set()
         self._driver: int | None = None
         self._newest: PageHands | None = None
         self._heard_s = 0.0
         self._up_since_s: float | None = None
         self.doing = Doing.NOBODY_DRIVES
-        """Action of the page that drives, as of the last call"""
+        """Present action of the driving page, as of the last call"""
         self._stop_s: float | None = None
         self.reset_first = False
         """Whether a stop waits for its reset, so that no page's hands count"""
@@ -58,11 +61,11 @@ class DrivingPage:
 
     @property
     def driver(self) -> str | None:
-        """Word of the page that drives, as of the last call; None for none."""
+        """Word that identifies the driving page, as of the last call; None if no page drives."""
         return None if self._newest is None else self._newest.page
 
     def receive(self, page: int, content: object, now_s: float) -> None:
-        """Take one message of the page of this number; an invalid one is refused whole, and counted."""
+        """Take one message of the page with the number `page`; an invalid message is counted and otherwise ignored."""
         self._expire(now_s)
         try:
             message = msgspec.convert(content, PageMessage)
@@ -75,7 +78,7 @@ class DrivingPage:
             self._take(page, message.hands, now_s)
 
     def close(self, page: int, now_s: float) -> None:
-        """Forget the page, as it is gone."""
+        """Forget a page that has closed."""
         self._expire(now_s)
         self._numbers.pop(page, None)
         for gone in (self._refused, self._giving_back):
@@ -84,21 +87,21 @@ class DrivingPage:
             self._let_go()
 
     def hands(self, now_s: float) -> PageHands | None:
-        """Return the driving page's hands once they count; None while they rest, or nobody drives."""
+        """Return the driving page's inputs while they count (running); None otherwise."""
         self._expire(now_s)
         return self._newest if self.doing is Doing.RUNNING else None
 
     def driven(self, now_s: float) -> bool:
-        """Return whether a page drives, even at rest."""
+        """Return whether there is a driving page, even if its inputs do not count yet."""
         self._expire(now_s)
         return self._driver is not None
 
     def stopping(self, now_s: float) -> bool:
-        """Return whether any page presses the emergency stop."""
+        """Return whether any page holds the emergency stop down."""
         return self._stop_s is not None and now_s - self._stop_s < SILENCE_S
 
     def rest_anew(self) -> None:
-        """Require all keys up again before hold-to-run counts."""
+        """Require all keys to be up for 1 s again before hold-to-run counts."""
         if self._driver is not None:
             self.doing, self._up_since_s = Doing.ALL_KEYS_UP_FIRST, None
 
@@ -108,12 +111,12 @@ class DrivingPage:
         self.rest_anew()
 
     def take_give_back(self) -> bool:
-        """Return whether a page has handed back to the scripted person since the last call."""
+        """Return whether a page has handed the controls back to the scripted person since the last call."""
         given, self._give_back = self._give_back, False
         return given
 
     def follow(self, core: OperatorSide, now_s: float) -> None:
-        """Apply pages' stops, as the controller's, and their tuning wishes; call it every turn."""
+        """Apply the pages' emergency stops and tuning requests; call it in every turn of the loop."""
         self.pictures.follow(core, None if self._newest is None else self._newest.shown_s, now_s)
         if self.stopping(now_s):
             core.press_stop(now_s)
@@ -122,7 +125,7 @@ class DrivingPage:
             core.tune(wish.probability, wish.link, now_s)
 
     def facts(self, core: OperatorSide, now_s: float, *, person: bool) -> HandsFacts:
-        """Return the facts for the pages. person: as in HandsFacts."""
+        """Return the facts for the pages. person: whether they may hand the controls back to a scripted person."""
         self._expire(now_s)
         known = (self.may_drive, self.driver, person, core.tuner.why, core.tuner.link)
         return HandsFacts(*known, counts=self.pictures.hands, reset_first=self.reset_first)
@@ -143,7 +146,7 @@ class DrivingPage:
             self._follow(hands, now_s)
 
     def _choose(self, page: int, hands: PageHands) -> None:
-        """Choose the driver after this message: nobody takes over from a page that drives."""
+        """Update the driving page by this message. No page can take over from a page that drives."""
         may_give_back = self._driver in (None, page) and page not in self._giving_back and not self.reset_first
         (self._giving_back.add if hands.give_back else self._giving_back.discard)(page)
         if hands.give_back and may_give_back:
@@ -156,7 +159,7 @@ class DrivingPage:
             self._driver = page
             self.doing, self._up_since_s = Doing.ALL_KEYS_UP_FIRST, None
         elif page != self._driver:
-            # It must stop asking before it may ask again: nobody drives by accident.
+            # A refused page must stop asking before it may ask again, so that it does not drive by surprise later.
             self._refused.add(page)
 
     def _follow(self, hands: PageHands, now_s: float) -> None:

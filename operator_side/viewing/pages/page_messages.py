@@ -1,4 +1,4 @@
-"""Messages of a console page, hands and tuning wishes: frozen, and validated whole."""
+"""Messages of a console page: inputs and tuning requests. One invalid field refuses the whole message."""
 
 from typing import Annotated, Literal
 
@@ -13,25 +13,26 @@ _LARGEST = 2**53 - 1
 
 
 class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Hands at one page; sent 50 times a second while they drive, and at once on any change."""
+    """Inputs at one page; sent at once on any change, and 50 times a second while the page drives or stops the arm."""
 
     page: Annotated[str, Meta(min_length=1, max_length=32)]
     """Word that identifies the page"""
     number: Annotated[int, Meta(ge=0, le=_LARGEST)]
     """Sequence number of the page's messages"""
     driving: bool = False
-    """Whether the person has asked to drive from this page"""
+    """Whether the operator has asked to drive from this page"""
     run: bool = False
     """Whether hold-to-run is held"""
     l2: Share = 0.0
-    """Calibrated travel of the trigger that retreats, 0 to 1"""
+    """Calibrated travel of the trigger that moves the gripper back, 0 to 1"""
     r2: Share = 0.0
-    """Calibrated travel of the trigger that advances, 0 to 1"""
+    """Calibrated travel of the trigger that moves the gripper forward, 0 to 1"""
     lateral: Deflection = (0.0, 0.0)
-    """Deflection across: right and up positive, -1 to 1 each, no dead zone"""
+    """Deflection of the stick that moves across: right and up positive, -1 to 1 each, dead zone removed"""
     turning: Deflection = (0.0, 0.0)
+    """Deflection of the stick that turns, likewise"""
     gripper: Literal[-1, 0, 1] = 0
-    """-1 opens, 1 closes, 0 holds"""
+    """-1 opens the gripper, 1 closes it, 0 leaves it"""
     next_target: bool = False
     hand_over: bool = False
     stop: bool = False
@@ -39,7 +40,7 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     reset: bool = False
     """Whether the person resets the stop"""
     give_back: bool = False
-    """Whether the person hands back to the scripted one"""
+    """Whether the operator hands the controls back to the scripted person"""
     shown_s: Finite | None = None
     """Capture time of the picture shown in the first view, on the robot side's clock; None without one"""
 
@@ -50,21 +51,21 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def all_up(self) -> bool:
-        """Whether nothing is pressed."""
+        """Whether no trigger, stick, key or button is used."""
         pressed = self.run or self.gripper != 0 or self.next_target or self.hand_over or self.stop or self.reset
         return self.moves_nothing and not pressed
 
 
 class TuneWish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Wish of a page for another P or link; None leaves it."""
+    """Request of a page for another probability P or another emulated link; None leaves a value unchanged."""
 
     probability: Annotated[float, Meta(gt=0.0, lt=1.0)] | None = None
     link: Annotated[str, Meta(max_length=200)] | None = None
-    """Link in netem's words"""
+    """Emulated link, in netem's words"""
 
 
 class PageMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Message of a page."""
+    """Message of a page: inputs, a tuning request, or both."""
 
     hands: PageHands | None = None
     tune: TuneWish | None = None

@@ -1,4 +1,4 @@
-"""Controller that a person in a browser may take over from the scripted person, and hand back."""
+"""Simulated controller of the scripted person, which an operator in a browser may take over and hand back."""
 
 from collections.abc import Callable
 
@@ -14,10 +14,11 @@ from operator_side.viewing.pages.driving_page import DrivingPage
 
 
 class SharedHands(BrowserHands):
-    """Hands of the scripted person, until a page drives or stops. Only a page's wish hands back to them, never its
-    silence; then a new person begins, without memory.
+    """Controller used by the scripted person until a page drives or presses the emergency stop.
 
-    As a controller it is the person's, or the page; both receive each write.
+    The scripted person continues only when a page hands the controls back, never because the page is silent. Then a
+    new person begins, without memory. States come from the person's simulated DualSense or from the page; each write
+    goes to both.
     """
 
     has_person = True
@@ -32,23 +33,23 @@ class SharedHands(BrowserHands):
         *,
         swap_sides: bool = False,
     ) -> None:
-        """device: held by the result of `new_person`. calibration: of that device."""
+        """device: controller that the result of `new_person` operates. calibration: calibration of `device`."""
         super().__init__(pages, calibrate, swap_sides=swap_sides)
         self._device, self._calibration, self._new_person = device, calibration, new_person
         self._person: SimulatedHands | None = new_person()
 
     @property
     def hands(self) -> Hands:
-        """Owner of the hands: the person or a browser."""
+        """Owner of the controls: the scripted person or a browser."""
         return Hands.BROWSER if self._person is None else Hands.PERSON
 
     @property
     def doing(self) -> Doing:
-        """Present action of the hands."""
+        """Present action of the scripted person, or of the operator at the page."""
         return super().doing if self._person is None else self._person.doing
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Move the hands. delay_s: round trip that the person is used to."""
+        """Move the inputs of the present owner. delay_s: round trip that the scripted person has learned to expect."""
         given_back = self._pages.take_give_back()
         if self._pages.stopping(now_s) or self._pages.driven(now_s):
             self._person = None
@@ -61,11 +62,11 @@ class SharedHands(BrowserHands):
             self._calibrate(self._calibration)
             self._person.tick(now_s, screen, delay_s)
 
-    # The port
+    # Interface of `Controller` (operator_side/controller/port.py)
 
     @property
     def released(self) -> bool:
-        """Whether both are released."""
+        """Whether the simulated DualSense and the page are released."""
         return self._device.released and super().released
 
     def read(self, now_s: float) -> ControllerState | None:
@@ -73,11 +74,11 @@ class SharedHands(BrowserHands):
         return super().read(now_s) if self._person is None else self._device.read(now_s)
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Write to both, so that the next owner feels the present effects."""
+        """Write to the simulated DualSense and to the page, so that the next owner feels the present effects."""
         self._device.write(feel, now_s)
         super().write(feel, now_s)
 
     def close(self) -> None:
-        """Release both."""
+        """Release the simulated DualSense and the page."""
         self._device.close()
         super().close()

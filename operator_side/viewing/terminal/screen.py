@@ -1,4 +1,4 @@
-"""Screen of one moment: curves grow with the width, and a low terminal cuts the end."""
+"""Layout of the terminal view. Curves grow with the terminal's width; a low terminal cuts the last lines."""
 
 import math
 from collections import deque
@@ -17,8 +17,9 @@ from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts
 
 SILENT_AFTER_S: Final = 0.5
+"""Age of the facts above which an alarm says that there is no news, in seconds"""
 _KEPT: Final = 200
-"""Number of facts in the curves, 20 s at ten a second, and of notes"""
+"""Number of facts in a curve (20 s at ten a second), and number of notes kept"""
 _CURVES: Final = (("delay", "ms"), ("stiffness", ""), ("overlap", "mm³"), ("tick p99", "µs"))
 _BLOCKS: Final = " ▁▂▃▄▅▆▇█"
 _ALARM, _ARMED, _QUIET = "bold white on red", "bold black on bright_cyan", "reverse"
@@ -26,7 +27,7 @@ _FAINT, _TITLE, _PULL, _FELT = "bright_black", "bold", "bright_cyan", "bold brig
 
 
 class Screen:
-    """Content of the terminal."""
+    """Content of the terminal view: the newest facts, curves of recent ones, and notes."""
 
     def __init__(self) -> None:
         self.facts: OperatorFacts | None = None
@@ -34,13 +35,13 @@ class Screen:
         self._history: deque[tuple[float, ...]] = deque(maxlen=_KEPT)
 
     def add(self, facts: OperatorFacts) -> None:
-        """Show these facts, with their figures in the curves; 0 for unknown."""
+        """Show these facts, and append their figures to the curves; an unknown figure counts as 0."""
         self.facts, stiffest = facts, max(facts.l2.stiffness or 0.0, facts.r2.stiffness or 0.0)
         ahead = (None, None) if facts.scene is None else (facts.scene.overlap_mm3, facts.scene.tick_p99_us)
         self._history.append(tuple(number(value) or 0.0 for value in (facts.to_operator.newest_ms, stiffest, *ahead)))
 
     def lines(self, age_s: float, width: int) -> Group:
-        """Draw at most `width` columns, most important lines first. age_s: time since the facts came."""
+        """Draw all lines, at most `width` columns wide, the most important first. age_s: time since the last facts."""
         facts = self.facts
         view = LiveView() if facts is None else LiveView(facts.robot, facts.status)
         drawn: list[RenderableType] = [_banner(view, 0.0 if facts is None else age_s, width)]
@@ -55,7 +56,7 @@ class Screen:
 
 
 def _line(*pieces: str | tuple[str, str], style: str = "") -> Text:
-    """Make a line of plain or styled pieces; a peer's control characters do not reach the terminal."""
+    """Make a line of plain or styled pieces, without the control characters that a peer's text may have."""
     styled = [(piece, "") if isinstance(piece, str) else piece for piece in pieces]
     safe = ((printable(text), look) for text, look in styled)
     return Text.assemble(*safe, style=style, no_wrap=True, overflow="ellipsis")
@@ -67,7 +68,7 @@ def _named(**said: object) -> Text:
 
 
 def _banner(view: LiveView, age_s: float, width: int) -> Text:
-    """Draw the state in words and signs that need no colour; only an alarm fills the line."""
+    """Draw the state in words and signs, readable without colour. Only an alarm fills the whole line with signs."""
     text = view.phase if view.reason is None else f"{view.phase}: {view.reason}"
     if (old := age_s > SILENT_AFTER_S) or view.alarm:
         return _line(f"!!! {f'NO NEWS for {age_s:.1f} s' if old else text} ".ljust(width, "!"), style=_ALARM)
@@ -78,7 +79,7 @@ def _banner(view: LiveView, age_s: float, width: int) -> Text:
 
 
 def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
-    """Draw both sides' figures of the link, over the last second, of objects ahead and of the held one."""
+    """Draw figures of the link over the last second, of the nearest object, the target and the held object."""
     status, robot, known = view.operator, view.robot, view.scene
     felt = {} if status.feel in (None, Sight.SEEING) else {"feel": words(status.feel)}
     who = {"lease": lease_words(status.owner), "hands": words(facts.hands), "controller": words(status.controller)}
@@ -109,7 +110,7 @@ def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
 
 
 def _trigger(facts: OperatorFacts, name: str, cells: int) -> Group:
-    """Draw the finger's place, the strengths over the travel, and the onset distances. cells: width of a zone."""
+    """Draw a trigger: its travel, the strength of each zone, and the onset distances. cells: columns of one zone."""
     trigger, does = facts.l2 if name == "L2" else facts.r2, "advances" if facts.advancing == name else "retreats"
     raw, metres, cells = number(trigger.raw), number(trigger.needed_m), max(1, cells)
     reached = math.ceil(min(1.0, max(0.0, (raw or 0.0) * SENSED_TRAVEL)) * cells * 10)
@@ -129,7 +130,10 @@ def _trigger(facts: OperatorFacts, name: str, cells: int) -> Group:
 
 
 def _curve(name: str, unit: str, past: Sequence[float], width: int) -> Text:
-    """Draw a figure's last `_KEPT` values as blocks, each the largest of a few; and its newest and largest value."""
+    """Draw a figure's recent values as blocks, then its newest and its largest value.
+
+    A block shows the largest of several consecutive values.
+    """
     few, top = math.ceil(_KEPT / max(1, width - 34)), max(1.0, *past)
     highest = (max(past[max(0, end - few) : end]) for end in range(len(past), 0, -few))
     blocks = "".join(_BLOCKS[round(8 * max(0.0, value) / top)] for value in highest)[::-1].rjust(math.ceil(_KEPT / few))
@@ -137,7 +141,7 @@ def _curve(name: str, unit: str, past: Sequence[float], width: int) -> Text:
 
 
 def _figure(value: float | None, width: int = 0) -> str:
-    """Format a figure with its significant digits."""
+    """Format a figure, with fewer decimals the larger it is."""
     if (known := number(value)) is None:
         return f"{UNKNOWN:>{width}}"
     return f"{known:{width}.{0 if abs(known) >= 100.0 else 1 if abs(known) >= 1.0 else 2}f}"

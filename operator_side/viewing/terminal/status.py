@@ -1,7 +1,7 @@
-"""Terminal view instead of the status line: the same calls, drawn by a separate process that never blocks this one.
+"""Terminal view (`--tui`) in place of the status line, drawn by a process that never blocks the operator side.
 
-`python -m operator_side.viewing.terminal.status FD` is that process. It may wait for the terminal; facts that arrive
-meanwhile are skipped. It ends with the other end of the channel, and restores the terminal.
+`python -m operator_side.viewing.terminal.status FD` is that process. It may have to wait for a slow terminal; facts
+that arrive meanwhile are skipped. When the operator side closes the channel or ends, it restores the terminal and ends.
 """
 
 import contextlib
@@ -26,18 +26,18 @@ from operator_side.viewing.terminal.screen import Screen
 
 _PERIOD_S: Final = 0.1
 _END_LIMIT_S: Final = 0.5
-_LEAVE: Final = b"\x1b[0m\x1b[?25h\x1b[?1049l"  # to the first screen and its cursor
+_LEAVE: Final = b"\x1b[0m\x1b[?25h\x1b[?1049l"  # leave the alternate screen, and show the cursor
 _INPUT, _LOCAL, _LETTERS = 0, 3, 6
 
 
 class TerminalStatus(Status):
-    """Status on the whole terminal while the context is open; later notes are results, written as usual."""
+    """Status that fills the terminal while the context is open. Later notes, the run's results, are printed."""
 
     wants_facts: Final = True
     _companion: Companion | None = None
 
     def __init__(self, program: str) -> None:
-        """ConfigurationError unless standard output is a terminal."""
+        """Raise ConfigurationError unless standard output is a terminal whose cursor can be moved."""
         super().__init__("line", program)
         if not sys.stdout.isatty() or os.environ.get("TERM", "dumb") == "dumb":
             raise ConfigurationError("--tui: no terminal with a cursor; valid: a terminal and its TERM, or no --tui")
@@ -55,31 +55,31 @@ class TerminalStatus(Status):
             _put_back(self._before)
 
     def show(self, now_s: float, *, robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> None:
-        """Show nothing: the facts contain it."""
+        """Draw nothing, as the facts contain both statuses; only schedule the next call."""
         del robot, operator
         self._next_s = now_s + _PERIOD_S
 
     def show_facts(self, facts: OperatorFacts | str) -> None:
-        """Send facts, or a note, to be drawn; they are dropped while the terminal stalls."""
+        """Send facts, or a note, to the drawing process; they are dropped while the terminal stalls."""
         if self._companion is not None:
             self._companion.channel.send(msgspec.msgpack.encode(facts))
             if self._companion.channel.ended:
                 self.__exit__()
 
     def note(self, text: str) -> None:
-        """Show a line for a while; after the context, print it."""
+        """Show a line among the notes; once the context has ended, print it."""
         (super().note if self._companion is None else self.show_facts)(text)
 
 
 def _put_back(attributes: list[Any]) -> None:
-    """Restore the first screen and its cursor, and drop typed input. A closed terminal is left alone."""
+    """Restore the normal screen and its cursor, and drop what was typed. Ignore a terminal that has closed."""
     with contextlib.suppress(termios.error, OSError):
         termios.tcsetattr(sys.stdout, termios.TCSAFLUSH, attributes)
         os.write(sys.stdout.fileno(), _LEAVE)
 
 
 def main() -> None:
-    """Draw until the channel or the terminal ends: the program that started us gets its own signal then."""
+    """Run the drawing process until the channel or the terminal ends."""
     channel, _ = companion_channel(sys.argv[1:])
     before, changed = termios.tcgetattr(sys.stdout), termios.tcgetattr(sys.stdout)
     # Ctrl-Z would leave the arm uncontrolled, and Ctrl-S an old screen that looks current.

@@ -25,7 +25,7 @@ class Inner:
 
 @dataclass(frozen=True)
 class Options(RunOptions):
-    """Options of the tests."""
+    """Settings of an imaginary command."""
 
     probability: float = 0.99
     camera: Inner = field(default_factory=Inner)

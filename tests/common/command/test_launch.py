@@ -28,9 +28,9 @@ def stop(*_):
 """
 IMPORT = STOPPED_AT.format('launch("command", stop)')
 START = STOPPED_AT.format('launch("command", lambda: stop)')
-# Outside the command's own error handling, as for a signal between two statements.
+# Here the signal comes outside the command's own error handling, as it may between two statements.
 END = STOPPED_AT.format('common.command.command_line.run_command = stop\nlaunch("command", lambda: None)')
-# An exception could be lost in a compiler's callback.
+# Here the signal comes in a callback from C, as of a compiler, which would lose an exception.
 CALLBACK = STOPPED_AT.format('launch("command", lambda: __import__("ctypes").CFUNCTYPE(None)(stop)())')
 
 
@@ -79,7 +79,7 @@ BOTH = (signal.SIGINT, signal.SIGTERM)
 
 @pytest.fixture
 def handlers() -> Iterator[None]:
-    """Keep signals from the test runner, whatever a test finds, and restore its handlers."""
+    """Replace the test runner's signal handlers, so that no signal of a test reaches them; restore them afterwards."""
     before = {number: signal.signal(number, lambda *_: None) for number in BOTH}
     yield
     for number, handler in before.items():
@@ -125,9 +125,7 @@ main()
 def test_a_machine_without_mujoco_is_told_what_to_install() -> None:
     code, _, complaint = ended("-c", WITHOUT_MUJOCO)
     assert code == 2
-    assert complaint == (
-        "feelahead-robot: mujoco is not installed on this machine; valid: pip install 'feelahead[robot]'\n"
-    )
+    assert complaint == ("feelahead-robot: mujoco is not installed; install it in the clone: pip install '.[robot]'\n")
 
 
 @pytest.mark.processes
@@ -175,5 +173,5 @@ def test_an_output_that_cannot_be_written_is_one_line(code: str) -> None:
         )
     assert done.returncode == 1
     assert done.stderr == (
-        "x: the output cannot be written: No space left on device; valid: a place with room for it\n"
+        "x: the output cannot be written: No space left on device; valid: an output with enough room\n"
     )

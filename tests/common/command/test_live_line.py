@@ -1,4 +1,4 @@
-"""A run in words: the live line shows whole facts only, and the story tells each change once."""
+"""A run's status in words: the live line is never cut within a fact, and the story prints each change once."""
 
 import math
 from typing import Any
@@ -30,7 +30,7 @@ OPERATOR = OperatorStatus(
 
 
 def approach(**changes: Any) -> LiveView:
-    """Return both sides' statuses of an approach, with these figures of either changed."""
+    """Return the statuses of both sides during an approach; `changes` replace figures of either status."""
     return LiveView(replaced(ROBOT, **of(ROBOT, changes)), replaced(OPERATOR, **of(OPERATOR, changes)))
 
 

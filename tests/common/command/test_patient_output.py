@@ -1,4 +1,4 @@
-"""Output that blocks nobody: in order while it is read, dropped while it is not, its end reported once."""
+"""Output that never blocks the program: in order while read, dropped while nobody reads, its end reported once."""
 
 import contextlib
 import os
@@ -19,7 +19,7 @@ def pipe() -> Iterator[tuple[int, TextIO]]:
 
 
 class Reader(threading.Thread):
-    """Reader that reads until the end, once started."""
+    """Thread that reads all lines until the end of the output."""
 
     def __init__(self, descriptor: int) -> None:
         super().__init__(daemon=True)
@@ -51,7 +51,7 @@ def test_a_reader_that_pauses_gets_the_newest_lines_and_every_result() -> None:
         with output:
             for number in range(1000):
                 output.write(f"{number} {9_999 * 'x'}\n")
-        reader.start()  # Later than the context's end waits.
+        reader.start()  # So late that the output has given up to wait for a reader.
         for number in range(12):
             output.write(f"result {number}\n")
     reader.join(600)

@@ -20,7 +20,7 @@ def events(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
 
 
 def run(mode: StatusMode, seconds: float, start_s: float = 100.0) -> None:
-    """Call `show` once a millisecond."""
+    """Show a status each millisecond of virtual time, for `seconds`."""
     with Status(mode, "robot") as status:
         for tick in range(round(seconds * 1000)):
             status.show(start_s + tick / 1000, robot=RobotStatus(observers=tick))

@@ -1,4 +1,4 @@
-"""Companion that echoes all messages until the other end is gone."""
+"""Companion process for tests: sends each message back until the other end is gone."""
 
 import select
 import sys

@@ -12,7 +12,7 @@ def pair(room_bytes: int = 1 << 23) -> tuple[Channel, Channel]:
 
 
 def everything(channel: Channel, sender: Channel) -> list[bytes]:
-    """Return all messages that arrive until nothing waits at the sender."""
+    """Receive until the sender has nothing left to send; return all messages."""
     arrived: list[bytes] = []
     while True:
         more = channel.receive()

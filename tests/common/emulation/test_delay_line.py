@@ -19,7 +19,7 @@ EVERY_STREAM: list[tuple[Direction, Stream]] = [
 
 
 def given_delays_s(profile: LinkProfile, count: int) -> list[float]:
-    """Return the delays that a line of `profile` gives to messages 1 s apart."""
+    """Return the delays, in seconds, that an emulated link of `profile` gives to messages sent 1 s apart."""
     line: DelayLine[int] = DelayLine(profile)
     delays_s = []
     for number in range(count):

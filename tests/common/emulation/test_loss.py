@@ -1,4 +1,4 @@
-"""Losses and delays of a line compared with theory or the kernel's netem."""
+"""Losses and delays of an emulated link, compared with theory or with the kernel's netem."""
 
 import math
 

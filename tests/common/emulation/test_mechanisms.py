@@ -1,4 +1,4 @@
-"""Other mechanisms of a line compared with theory or the kernel's netem."""
+"""Duplicates, corruption, reordering, rate, outages and streams of an emulated link, compared with theory or netem."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""Named links: their specifications, their validity for the kernel, and the round trips of lone packets."""
+"""Links that can be given by name, such as wifi: their words, which the kernel must accept, and their round trips."""
 
 import re
 from typing import Any, get_args
@@ -20,7 +20,7 @@ NETEM_WORDS = re.compile(
     r"delay \d+(us|ms)( \d+(us|ms) distribution (normal|pareto|paretonormal))?"
     r"( loss ([\d.]+%|gemodel [\d.]+% [\d.]+%))? rate \d+[mg]bit"
 )
-"""Words that tc of iproute2 6.1 takes in this order, with units of the same meaning."""
+"""Pattern of words that `tc` of iproute2 6.1 accepts in this order, and with units that mean the same to `tc`"""
 
 
 @every_link
@@ -52,7 +52,7 @@ def test_nothing_is_overtaken_although_datagrams_may_be(name: str, direction: Di
 
 
 def round_trips_ms(name: str) -> FloatArray:
-    """Draw round trips of packets so far apart that none waits for another."""
+    """Draw round trips, in milliseconds, of packets so far apart that none waits for another."""
     generator, link = np.random.default_rng(1), LinkSpec.parse(name)
     profiles = [link.profile(direction) for direction in get_args(Direction)]
     ways = [delays_at(generator.random(100_000), one.delay_s, one.jitter_s, one.distribution) for one in profiles]

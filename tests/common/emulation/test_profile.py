@@ -1,4 +1,4 @@
-"""netem's grammar: accepted profiles, and refusals in one line."""
+"""Reading of links in netem's words: what is accepted, and what is refused in one line."""
 
 from pathlib import Path
 

@@ -78,7 +78,7 @@ def test_a_trace_stands_for_delay_and_loss(tmp_path: Path, clause: str) -> None:
 
 
 def deliveries(profile: LinkProfile, count: int) -> dict[int, float]:
-    """Return the delay in milliseconds of each message that arrives, when sent 1 s apart."""
+    """Send messages 1 s apart; return the delay in milliseconds of each that arrives."""
     line: DelayLine[int] = DelayLine(profile)
     delays_ms = {}
     for number in range(count):

@@ -1,4 +1,4 @@
-"""Changes of an emulated link during a run, and a line that takes them over."""
+"""Changes of an emulated link during a run: which are possible, and how the delay line adopts them."""
 
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""Written files: whole or not at all, and one line if they cannot be written."""
+"""A file is written whole or not at all, and one line says if it cannot be written."""
 
 import errno
 import json
@@ -15,7 +15,7 @@ from common.files.output_file import output_file, require_output_file, write_jso
 
 
 def fill_up(path: Path) -> None:
-    """Write a part before the disk is full."""
+    """Write a part of the file, then fail as on a full disk."""
     with output_file("--csv", path) as file:
         file.write("new " * 10_000)
         file.flush()

@@ -1,4 +1,4 @@
-"""Files named by a person: read whole without waiting, or refused."""
+"""TOML files named by a person are read whole and without waiting, or refused."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Loop of a side on a virtual clock."""
+"""A side's main loop, run on a virtual clock."""
 
 import pytest
 
@@ -11,7 +11,7 @@ PERIOD_S = 1e-3
 
 
 class Steps:
-    """Recorder of the loop's calls that stalls for long in its second reception."""
+    """Stand-in for a side that notes the loop's calls; its second reception takes 100 s, as if it were stopped."""
 
     resting = True
 
@@ -62,7 +62,7 @@ def side() -> Steps:
 
 
 def test_the_clock_is_read_after_receiving(side: Steps) -> None:
-    """A process that was stopped meanwhile must not take old messages for new."""
+    """A process that is stopped while it receives must not take old messages for new ones."""
     taken_s = [when_s for what, when_s in side.done if what == "message"]
     assert taken_s[0] < PERIOD_S
     assert min(taken_s[1:]) >= STOPPED_S

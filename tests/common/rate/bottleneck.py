@@ -1,4 +1,4 @@
-"""Robot side that sends haptics, telemetry and views through a bottleneck, in virtual time; pictures are dummies."""
+"""Simulation of a robot side that sends haptics, telemetry and dummy pictures through a slow link, in virtual time."""
 
 import itertools
 import math
@@ -25,7 +25,7 @@ Steady = Callable[[float], float]
 
 
 class Way(Protocol):
-    """One direction of a link, with DelayLine's interface."""
+    """Interface of one direction of a link, the same as that of DelayLine."""
 
     def push(self, now_s: float, item: Any, size_bytes: int | None = None) -> None: ...
 
@@ -33,10 +33,13 @@ class Way(Protocol):
 
 
 class Bottleneck:
-    """Drop-tail queue before a link of `bit_s` at each moment, then a delay; headers count."""
+    """Drop-tail queue before a link of limited rate, then a delay. Packet headers count.
+
+    `bit_s` gives the rate at each time.
+    """
 
     def __init__(self, bit_s: Steady, queue_s: float = 0.2, delay_s: float = 0.025) -> None:
-        """queue_s: longest queue, in seconds at the first rate."""
+        """queue_s: seconds that a full queue takes to empty at the initial rate, which gives its capacity."""
         self._bit_s, self._delay_s = bit_s, delay_s
         self._most_bits = queue_s * bit_s(0.0)
         self._free_s = 0.0
@@ -60,24 +63,24 @@ class Bottleneck:
 
 @dataclass
 class Ran:
-    """Results of a run, by the moment of sending."""
+    """Results of a run: delays, rates and pictures."""
 
     delays_s: list[tuple[float, float]] = field(default_factory=list)
     """(time of sending, delay) of each haptic message, in seconds"""
     rates_bit_s: list[float] = field(default_factory=list)
-    """Rate of each turn"""
+    """Rate that the controller set in each turn"""
     pictures: list[tuple[float, float]] = field(default_factory=list)
     """(time of complete arrival, age) of each picture, in seconds"""
     budget: Budget[str] = field(default_factory=lambda: Budget(("video", "scene")))
     picture_rate_control: PictureRateControl = field(default_factory=lambda: PictureRateControl(30.0, 75))
 
     def delay_s(self, share: float, since_s: float = 0.0, until_s: float = math.inf) -> float:
-        """Return a quantile of the haptics' delay."""
+        """Return the quantile `share` of the delays of haptic messages sent between `since_s` and `until_s`."""
         seen = sorted(delay_s for at_s, delay_s in self.delays_s if since_s <= at_s < until_s)
         return seen[min(len(seen) - 1, int(share * len(seen)))]
 
     def late_until_s(self, limit_s: float, since_s: float) -> float:
-        """Return when the last message above this delay arrived; `since_s` if none did."""
+        """Return when the last haptic message with a delay above `limit_s` arrived; `since_s` if none did after it."""
         return max(
             (at_s + delay_s for at_s, delay_s in self.delays_s if at_s + delay_s > since_s and delay_s > limit_s),
             default=since_s,
@@ -85,7 +88,7 @@ class Ran:
 
 
 class _Sides:
-    """Sending halves of both sides: haptics, telemetry, commands, pictures of two views and the scene."""
+    """What both sides send: haptics, telemetry, commands, pictures of two views, and the scene."""
 
     def __init__(self, out: Way, back: Way, drift: float) -> None:
         self.ran = Ran()
@@ -108,7 +111,7 @@ class _Sides:
         return True
 
     def take(self, now_s: float) -> None:
-        """Receive the arrivals at both sides."""
+        """Receive what has arrived at both sides."""
         for kind, content in self._out.pop(now_s):
             if kind == "haptics":
                 self.ran.delays_s.append((content.header.sent_s, now_s - content.header.sent_s))
@@ -123,7 +126,7 @@ class _Sides:
         self.ran.budget.hear(self._robot.outgoing, now_s)
 
     def feel(self, now_s: float) -> None:
-        """Send haptics, telemetry and commands."""
+        """Send haptics, telemetry and commands that are due."""
         budget = self.ran.budget
         if self._due("haptics", max(_HAPTICS_S, budget.haptic_interval_s), now_s):
             budget.spend("haptics", 200, now_s)
@@ -134,7 +137,7 @@ class _Sides:
             self._back.push(now_s, Watch(self._operator.stamp(self._there_s(now_s))), 100)
 
     def show(self, now_s: float) -> None:
-        """Make pictures and the scene unless they would wait."""
+        """Make the pictures and the scene that are due, unless earlier ones still wait to be sent."""
         budget, picture_rate_control = self.ran.budget, self.ran.picture_rate_control
         step = picture_rate_control.update(budget.left_bit_s, _VIEWS, now_s, eager=budget.controller.begins)
         for view in range(_VIEWS):
@@ -149,16 +152,17 @@ class _Sides:
             budget.offer("scene", b"s" * 1500, now_s)
 
     def leave(self, now_s: float) -> None:
-        """Send the streams that the budget releases."""
+        """Send the pieces of pictures and scene that the budget allows now."""
         for stream, payload, is_piece in self.ran.budget.take(now_s):
             self._out.push(now_s, (stream, (is_piece, payload)), len(payload))
         self.ran.rates_bit_s.append(self.ran.budget.controller.rate_bit_s)
 
 
 def run(out: Way, back: Way, seconds: float, *, drift: float = 0.0, others_s: float = 0.0) -> Ran:
-    """Run both sides, with pictures from 1 s on.
+    """Run both sides for `seconds`; pictures begin after 1 s.
 
-    drift: of the peer's clock. others_s: queueing delay that a bulk transfer keeps up, from 5 s on.
+    drift: seconds that the operator's clock gains in one second. others_s: queueing delay that a bulk transfer causes
+    from 5 s on.
     """
     sides = _Sides(out, back, drift)
     for turn in range(int(seconds / TURN_S)):

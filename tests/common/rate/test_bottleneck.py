@@ -1,4 +1,4 @@
-"""Controller, budget, pieces and pictures that give way, together before a bottleneck, in virtual time."""
+"""All of rate control together, before a slow link in virtual time: rate controller, budget, pieces, picture rate."""
 
 from itertools import pairwise
 

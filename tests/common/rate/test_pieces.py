@@ -1,4 +1,4 @@
-"""Pieces: joined in any order, and rejected if hostile or incomplete."""
+"""Pieces of a picture are joined in any order; hostile or incomplete ones are rejected."""
 
 import random
 

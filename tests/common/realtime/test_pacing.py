@@ -1,4 +1,4 @@
-"""Deadlines in virtual time: nothing here sleeps or reads a real clock."""
+"""Deadlines of a loop's turns, in virtual time: nothing here sleeps or reads a real clock."""
 
 import math
 
@@ -53,7 +53,7 @@ def test_a_restart_begins_a_new_grid_and_keeps_the_counts() -> None:
 
 
 class Waiting:
-    """`wait` of sockets in virtual time: sleeps end late, and a message may come."""
+    """Stand-in for the sockets' `wait`, in virtual time: each wait ends `late_s` late, or when a message comes."""
 
     def __init__(self, clock: VirtualClock, late_s: float = 0.0, message_s: float = math.inf) -> None:
         self.slept_s: list[float] = []

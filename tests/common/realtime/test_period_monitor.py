@@ -1,4 +1,4 @@
-"""A loop that misses its period reports the reason, once a run: in virtual time, with a machine's counters."""
+"""A loop that cannot keep its period reports the reason once a run. Time, and the machine's counters, are simulated."""
 
 import pytest
 
@@ -13,7 +13,10 @@ REMEDIES = {"physics": "fewer bodies", "sensing": "fewer objects", "": "a faster
 
 
 class Loop:
-    """Loop with turns of given durations; `waited` and `stolen`: the machine's share meanwhile, None for unknown."""
+    """Simulated loop with turns of given durations.
+
+    waited: share of time for which other programs had the processor. stolen: share that the host took. None: unknown.
+    """
 
     def __init__(self, *, waited: float | None = 0.0, stolen: float | None = 0.0) -> None:
         self.wall, self.processor = VirtualClock(100.0), VirtualClock(7.0)
@@ -37,7 +40,10 @@ class Loop:
     def run(
         self, for_s: float, computes_s: float, lasts_s: float | None = None, *, physics: float = 0.0, every: int = 1
     ) -> None:
-        """Run turns; each `every`-th computes for `computes_s`, `physics` of it in physics, and lasts `lasts_s`."""
+        """Run turns for `for_s`. Each `every`-th one computes for `computes_s`; others compute for 0.1 ms.
+
+        physics: share of the computing spent in physics. lasts_s: duration of each turn, if it is longer.
+        """
         end_s, turn = self.wall.now() + for_s, 0
         while self.wall.now() < end_s:
             self.wall.advance_to(max(self.wall.now(), self.pacer.deadline_s))

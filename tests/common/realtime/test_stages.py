@@ -1,4 +1,4 @@
-"""Durations of a turn's stages, in virtual time."""
+"""Measured durations of a turn's stages, in virtual time."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from common.statistics import BLOCK
 
 
 class Both:
-    """Wall clock and processor clock, advanced by a test."""
+    """Wall clock and processor clock, which a test advances."""
 
     def __init__(self) -> None:
         self.wall, self.processor = VirtualClock(), VirtualClock()

@@ -1,4 +1,4 @@
-"""Linux's counters of a thread that had to wait."""
+"""Linux's counters of the time for which a thread had to wait for the processor."""
 
 from pathlib import Path
 

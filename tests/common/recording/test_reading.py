@@ -1,4 +1,4 @@
-"""Bytes of a recording: blocks of entries, Foxglove's messages, a file cut anywhere, and a full disk."""
+"""Reading a recording: its blocks of entries, its messages for Foxglove, a file cut anywhere, and a full disk."""
 
 import json
 import os
@@ -27,7 +27,7 @@ BLOCKS_A_SECOND = 20
 
 
 def write_short(path: Path) -> list[int]:
-    """Write a file of five seconds; return the end of each second's chunk."""
+    """Write a recording of five seconds; return, for each second, the position in the file where its chunk ends."""
     file = RecordingFile(path, 1.7e9)
     content, ends = Content(file), []
     generator = np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""Recorder's process: complete seconds survive a killed process and a full disk."""
+"""The process that records: complete seconds are kept even if a process is killed or the disk is full."""
 
 import os
 import resource
@@ -22,7 +22,7 @@ LIMIT_S = 30.0
 
 
 class Bytes:
-    """Encoder of notes that are bytes already."""
+    """Encoder for a recording whose notes are bytes already."""
 
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
         del views
@@ -30,7 +30,7 @@ class Bytes:
         return now_s, entry(Kind.REPORT, now_s, content)
 
     def begin_epoch(self) -> None:
-        """Do nothing: no note depends on an earlier one."""
+        """Do nothing, as no note is encoded as a difference from an earlier one."""
 
 
 def recording_to(path: Path, side: str = "robot") -> SideRecording:
@@ -45,7 +45,7 @@ def numbers(path: Path, side: str = "robot") -> list[int]:
 
 
 def note_until(recording: SideRecording, done: Callable[[], bool], size: int = 8) -> tuple[int, list[str]]:
-    """Note numbers, in real time, until `done`; return their count and the messages."""
+    """Record the numbers 0, 1, 2 ... in real time until `done`; return their count and the recording's messages."""
     clock = MonotonicClock()
     end_s, count, said = clock.now() + LIMIT_S, 0, []
     while not done():

@@ -1,4 +1,4 @@
-"""Both ends on loopback."""
+"""The sockets of both sides, connected on loopback."""
 
 from collections.abc import Iterator
 

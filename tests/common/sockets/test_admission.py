@@ -1,4 +1,7 @@
-"""Peers that speak, flood, leave and are revoked: a state machine over the robot side's end; and a crowd's limits."""
+"""Which messages and connections the robot side's port admits.
+
+A state machine lets peers send, flood, leave and be revoked; other tests check the limits for many connections.
+"""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -20,28 +23,28 @@ from common.sockets.turns import SILENCE_S, Offered, routing_id
 from tests.helpers.socket_talk import EPHEMERAL
 
 LIMIT = 8
-"""Messages of a key in a second, in the machine; few, so that floods are short."""
+"""Limit of messages that one key may send in a second, in these tests; low, so that floods are short"""
 KEYS = ("anna's", "ben's")
 GROUP = b"\x01" + b"a group of ours"
-"""Group as of `new_group`, but fixed, so that each run has the same order."""
+"""Group of connections, as `new_group` makes them, but always the same, so that each run has the same order"""
 NAMES = (routing_id(GROUP, 0), routing_id(GROUP, 1), b"raw")
 DESCRIPTORS = (10_000, 10_001, 10_002)
 
 
 @dataclass(eq=False)
 class Line:
-    """Connection, open or not."""
+    """One connection of the model, open or closed."""
 
     name: bytes
     key: str
     descriptor: int
     heard_s: float = 0.0
     seen: bool = False
-    """Whether a message of the line was read after the gates had reported everything."""
+    """Whether one of this connection's messages was read at a time when the gates had reported all events"""
     by_another: bool = True
-    """Whether its descriptor differs from that of the last line with its routing id."""
+    """Whether this connection's descriptor differs from that of the connection heard before with the same routing id"""
     known: bool = False
-    """Whether it was then distinguished from the last line with its routing id."""
+    """Whether the robot side, when the gates had reported all events, could distinguish these two connections"""
 
     @property
     def peer(self) -> bytes:
@@ -49,10 +52,10 @@ class Line:
 
 
 class Connections(RuleBasedStateMachine):
-    """Peers that come, speak, flood, leave and are revoked; a message may be read long after its sender left.
+    """State machine of peers that connect, send, flood, leave and are revoked.
 
-    A newcomer takes over a routing id in use, even with another key. `unseen`: ZeroMQ's events that the gates have not
-    received yet; while the gates are `late` they receive none.
+    A message may be read long after its sender left. A new connection takes over a routing id in use, even with
+    another key. unseen: ZeroMQ's events that the gates have not received yet; while `late` is true they receive none.
     """
 
     def __init__(self) -> None:
@@ -108,7 +111,7 @@ class Connections(RuleBasedStateMachine):
         comes=st.booleans(),
     )
     def leave_or_come(self, descriptor: int, name: bytes, key: str, comes: bool) -> None:
-        """End the descriptor's owner; the next connection may have the descriptor at once."""
+        """End the connection that has this descriptor; with `comes`, a new connection has the descriptor at once."""
         if descriptor in self.open:
             self.leave(descriptor)
         if comes:
@@ -125,7 +128,10 @@ class Connections(RuleBasedStateMachine):
         self.second += 1
 
     def speakers(self) -> list[Line]:
-        """Return the newest line of each routing id, from which ZeroMQ reads, also after it left."""
+        """Return the connections whose messages may be read now: of each routing id the newest one.
+
+        It is open, or it was closed after a message of it had been read.
+        """
         return [line for line in self.newest.values() if self.is_open(line) or line.seen]
 
     def is_open(self, line: Line) -> bool:
@@ -134,7 +140,7 @@ class Connections(RuleBasedStateMachine):
     @precondition(lambda self: self.speakers())
     @rule(data=st.data(), count=st.sampled_from([LIMIT + 1, 3, 1]), late=st.booleans())
     def speak(self, data: st.DataObject, count: int, late: bool) -> None:
-        """Read messages of one connection."""
+        """Read `count` messages of one connection; check which are admitted and which connections are ended."""
         self.late = late
         line = data.draw(st.sampled_from(self.speakers()))
         properties = {"User-Id": line.key, int(zmq.SRCFD): line.descriptor}
@@ -166,9 +172,9 @@ class Connections(RuleBasedStateMachine):
             self.tell(name)
 
     def tell(self, peer: bytes) -> None:
-        """Send to the routing ids that a peer was last heard by: all of them, or the next one.
+        """Send to a peer, over all its routing ids or the next one; check that these, and no others, are used.
 
-        One that has been silent for longer may get a copy.
+        A routing id that has been silent for longer may get a copy.
         """
         lines = [line for line in self.heard.values() if line.peer == peer and line.key in self.allowed]
         everywhere = {line.name for line in lines}
@@ -187,14 +193,14 @@ class Connections(RuleBasedStateMachine):
 
 
 TestConnections = Connections.TestCase
-# Shrinking opens sockets by the thousand.
+# Without hypothesis' shrinking of failures, which would open thousands of sockets.
 TestConnections.settings = settings(max_examples=200, stateful_step_count=30, phases=[Phase.explicit, Phase.generate])
 
 
 def test_the_new_owner_of_a_departed_senders_descriptor_stays(
     robot: RobotSockets, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The descriptor may be another's by now, for example a viewer's, unknown to the control port."""
+    """The sender has left, and its descriptor may belong to another connection by now, for example a viewer's."""
     ended: list[int] = []
     monkeypatch.setattr(robot_sockets, "shut_down", ended.append)
     monkeypatch.setattr(robot_sockets, "PEER_LIMIT_PER_S", 0)

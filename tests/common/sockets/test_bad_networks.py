@@ -1,4 +1,4 @@
-"""Networks that swallow packets, and names that do not resolve: neither ends a link or slows the other."""
+"""Networks that drop packets without an answer, and names that do not resolve: nothing waits for them."""
 
 import socket
 import threading
@@ -18,7 +18,7 @@ _SYN_SENT = "02"
 
 @pytest.fixture
 def deaf_port() -> Iterator[int]:
-    """Yield a port that answers nobody: its queue of one is full, and Linux drops newcomers."""
+    """Yield a port that answers no connection: its queue of one is full, so Linux drops further attempts."""
     with ExitStack() as stack:
         listener = stack.enter_context(socket.create_server(("127.0.0.1", 0), backlog=0))
         for _ in range(3):
@@ -29,7 +29,7 @@ def deaf_port() -> Iterator[int]:
 
 
 def attempts(port: int) -> set[str]:
-    """Return the local ends of the connection attempts to `port`."""
+    """Return the local addresses from which connections to `port` are being attempted."""
     rows = (line.split() for line in Path("/proc/net/tcp").read_text(encoding="ascii").splitlines()[1:])
     return {row[1] for row in rows if row[3] == _SYN_SENT and row[2].endswith(f":{port:04X}")}
 
@@ -43,7 +43,7 @@ def test_an_attempt_that_nobody_answers_is_given_up(deaf_port: int) -> None:
             if len(seen) >= before + 2:
                 return
             operator.wait(0.01)
-    pytest.fail("one attempt all the time: the system tries it ever more rarely, for two minutes")
+    pytest.fail("only one connection attempt: the system repeats it ever more rarely, for two minutes")
 
 
 def test_control_and_view_are_served_by_threads_of_their_own() -> None:

@@ -1,4 +1,4 @@
-"""Port for a driver, over real sockets on loopback."""
+"""Port to which a driver process connects, over real sockets on loopback."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def driver(context: "zmq.Context[zmq.Socket[bytes]]", port: DriverPort, name: by
 
 
 def heard(port: DriverPort) -> list[tuple[bytes, bytes]]:
-    """Return the next messages."""
+    """Wait for messages at the port; return them."""
     for _ in range(_ROUNDS):
         port.wait(0.01)
         if found := port.receive():

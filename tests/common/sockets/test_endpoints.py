@@ -1,4 +1,4 @@
-"""Addresses of the sockets: refusals and their words, and the ports derived from given addresses."""
+"""Addresses that the sockets refuse, with what words, and the view port that follows from a control address."""
 
 import re
 from collections.abc import Callable

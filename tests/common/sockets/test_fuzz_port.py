@@ -1,4 +1,4 @@
-"""Strangers at the open port, by raw TCP: the operator is always heard and nothing accumulates."""
+"""Strangers who send anything by raw TCP to an open port: the operator is always heard, and nothing accumulates."""
 
 import contextlib
 import os
@@ -32,7 +32,7 @@ def operator(robot: RobotSockets) -> Iterator[OperatorSockets]:
 
 
 def is_heard(robot: RobotSockets, operator: OperatorSockets) -> bool:
-    """Return whether an operator's message arrives and an answer returns, whatever else is received."""
+    """Return whether a message of the operator arrives and an answer comes back, among any other messages."""
     for _ in range(ROUNDS):
         operator.send(b"operator")
         robot.wait(0.01)
@@ -49,7 +49,7 @@ def stranger(robot: RobotSockets) -> RawConnection:
 
 
 def drain(robot: RobotSockets, limit_s: float = 0.1) -> list[bytes]:
-    """Return the messages within `limit_s`, and then until none comes for a moment."""
+    """Return all messages; the first may take `limit_s`, each further one 0.1 s."""
     received: list[bytes] = []
     while robot.wait(0.1 if received else limit_s):
         received += [payload for _, payload in robot.receive()]
@@ -57,7 +57,7 @@ def drain(robot: RobotSockets, limit_s: float = 0.1) -> list[bytes]:
 
 
 class StandingClock(MonotonicClock):
-    """Clock at 0 s, so that everything falls into one second."""
+    """Clock that always shows 0 s, so that all messages fall into the same second."""
 
     def now(self) -> float:
         return 0.0
@@ -230,7 +230,7 @@ def test_a_message_of_too_many_frames_is_dropped_in_bounded_steps(
 
 
 def within_one_second(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep everything within the same second of the robot's clock, however long it takes."""
+    """Stop the robot side's clock, so that all messages fall into the same second, however long the test takes."""
     monkeypatch.setattr(robot, "_second", 0)
     monkeypatch.setattr(robot, "_clock", StandingClock())
 

@@ -1,4 +1,4 @@
-"""A gate closed before the socket that it watches."""
+"""A gate, which watches a socket's connections, may be closed before the socket."""
 
 import zmq
 

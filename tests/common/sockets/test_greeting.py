@@ -1,4 +1,4 @@
-"""First bytes of a connection that count as a ZeroMQ peer's."""
+"""Which first bytes of a TCP connection count as the greeting of a ZeroMQ peer."""
 
 import pytest
 

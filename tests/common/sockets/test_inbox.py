@@ -1,4 +1,4 @@
-"""Queries of ZeroMQ in a turn: few, and nothing is overlooked. Nothing here sleeps."""
+"""A turn asks ZeroMQ's sockets for messages only a few times, and overlooks none. Nothing here sleeps."""
 
 import select
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from tests.helpers.socket_talk import PATIENT_S, greet, publish_until_seen
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """List of the sockets that were asked for EVENTS, in order."""
+    """List to which each socket is added when it is asked for EVENTS."""
     those: list[Any] = []
     really = readable_now
 
@@ -40,12 +40,12 @@ def pair() -> Iterator[tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"]]:
 
 
 def signal_of(inbox: Inbox) -> bool:
-    """Return whether the inbox's descriptor signals within a bounded time."""
+    """Wait for the inbox's descriptor to signal; return whether it does in time."""
     return bool(select.select([inbox.descriptor], [], [], PATIENT_S)[0])
 
 
 def settle(inbox: Inbox) -> None:
-    """Read until the connection is made, and neither EVENTS nor the descriptor has news."""
+    """Read until neither EVENTS nor the descriptor tells of anything new."""
     while select.select([inbox.descriptor], [], [], 0.0)[0] or inbox.has_some():
         list(inbox.read())
 
@@ -102,7 +102,7 @@ def test_earlier_messages_are_found(pair: tuple["zmq.Socket[bytes]", "zmq.Socket
 def test_a_turn_drains_once_and_asks_each_socket_three_times_at_most(
     robot: RobotSockets, operator: OperatorSockets, asked: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Both ends send and receive a message a turn: EVENTS after sending, for arrivals, and for their end."""
+    """Both ends send and receive one message a turn. They ask for EVENTS after sending, before reading and after it."""
     peer = greet(robot, operator)
     selects: list[int] = []
     really = select.select

@@ -1,4 +1,4 @@
-"""Folder of keys: its content, its readers, and refusals in one line."""
+"""Folder of keys: its files, who may read them, and refusals in one line."""
 
 import errno
 import os
@@ -26,7 +26,7 @@ def folder(tmp_path: Path) -> KeyFolder:
 
 @pytest.fixture
 def allowed(folder: KeyFolder) -> AllowList:
-    """Return a list that has read anna's key."""
+    """Return an allow-list that has read one key, anna's."""
     folder.allow("anna", KEY)
     found = AllowList(folder)
     found.refresh()
@@ -282,7 +282,7 @@ def test_a_key_that_is_let_in_twice_is_named_when_one_name_is_revoked(folder: Ke
 
 
 def test_keys_are_where_each_system_keeps_a_persons_settings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    # They once were in ~/.config whatever XDG_CONFIG_HOME said, and on macOS.
+    # Earlier versions kept keys in ~/.config even if XDG_CONFIG_HOME was set, and on macOS.
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     assert keys.default_folder() == KeyFolder().path == tmp_path / "feelahead" / "keys"

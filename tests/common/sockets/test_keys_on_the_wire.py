@@ -1,4 +1,4 @@
-"""CURVE over real sockets on loopback: peers that get in, stay out, and are disconnected while running."""
+"""Keys (CURVE) over real sockets on loopback: which peers get in, which stay out, which are disconnected later."""
 
 import errno
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ EPHEMERAL = "tcp://127.0.0.1:0"
 PATIENT_S = 20.0
 LIMIT_S = 600.0
 REFUSAL_S = 0.5
-"""Time in seconds after which a silent peer was not let in: long for a handshake on loopback."""
+"""Seconds without a message after which a peer counts as kept out: much longer than a handshake on loopback"""
 
 
 @dataclass
@@ -52,7 +52,7 @@ def robot(tmp_path: Path) -> Iterator[Robot]:
 
 @dataclass
 class Seen:
-    """Messages that got through within some time."""
+    """Messages that arrived within some time: at the robot side, and at the operator side by control and view."""
 
     at_robot: list[tuple[bytes, bytes]]
     control: list[bytes]
@@ -60,7 +60,7 @@ class Seen:
 
 
 def exchange(robot: Robot, operator: OperatorSockets, limit_s: float, *, until_both: bool) -> Seen:
-    """Send and receive on both ends for `limit_s`, or until control and view got through."""
+    """Send and receive at both ends for `limit_s`; with `until_both`, stop once all three kinds have arrived."""
     clock = MonotonicClock()
     end_s = clock.now() + limit_s
     seen = Seen([], [], [])
@@ -87,7 +87,7 @@ def stays_out(robot: Robot, operator: OperatorSockets, limit_s: float = REFUSAL_
 
 
 def stays_out_and_says(robot: Robot, operator: OperatorSockets, text: str) -> bool:
-    """Return whether the operator side reports `text` while nothing gets through, however slow the machine."""
+    """Wait until the operator side reports `text`; return False if a message arrives before."""
     clock = MonotonicClock()
     end_s = clock.now() + LIMIT_S
     while clock.now() < end_s and stays_out(robot, operator, 0.1):

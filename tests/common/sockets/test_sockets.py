@@ -1,4 +1,4 @@
-"""Real sockets on loopback. Nothing here sleeps: every wait is for a message, or for a bounded time."""
+"""Real sockets on loopback. Nothing here sleeps: each wait ends with a message, or after a limit."""
 
 import os
 
@@ -171,7 +171,7 @@ def test_no_wake_is_lost_between_sends_and_receives(robot: RobotSockets, operato
 
 
 def test_signals_that_bring_nothing_prolong_no_wait(robot: RobotSockets, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Strangers that knock repeatedly must not keep the robot side from its next tick."""
+    """Strangers who connect again and again must not delay the robot side's next tick."""
     clock, (reading, writing) = VirtualClock(), os.pipe()
     os.write(writing, b"nobody reads it")
 
@@ -195,7 +195,7 @@ def test_signals_that_bring_nothing_prolong_no_wait(robot: RobotSockets, monkeyp
 
 
 def test_a_peer_is_asked_three_times_before_its_silence_ends_the_connection(robot: RobotSockets) -> None:
-    """One query would not do: a single late answer would end the connection."""
+    """With one heartbeat only, a single late answer would end the connection."""
     asked_ms = robot._control.get(zmq.HEARTBEAT_IVL)
     assert 3 * asked_ms == robot._control.get(zmq.HEARTBEAT_TIMEOUT)
 

@@ -1,4 +1,4 @@
-"""Several connections of one peer: used in turn or together, broken, taken over, and no longer read."""
+"""Several connections of one peer, used one after the other or all at once: also lost, replaced and unread ones."""
 
 import fcntl
 import socket
@@ -72,7 +72,7 @@ def test_a_full_connection_is_tried_again_soon() -> None:
 
 
 def test_a_silent_connection_gets_a_copy_twice_a_second_and_returns_once_heard() -> None:
-    """Both ends pass over silent connections: without copies, one that came back late would stay silent on both."""
+    """Neither end uses a silent connection. Without copies, one that works again would stay silent for ever."""
     turns: Turns[Fed] = Turns(Fed.offered)
     lively, silent = Fed(), Fed()
     turns.connections.extend((lively, silent))
@@ -202,7 +202,7 @@ def test_a_taken_over_routing_id_gives_another_key_neither_the_group_nor_its_ans
         assert robot.send(claimed, b"ben's")
         assert ben.poll(round(1e3 * PATIENT_S))
         assert ben.recv() == b"ben's", "nothing of anna's came before"
-        # Anna's connection was ended, too, so that she takes her place again.
+        # Anna's connection was ended, too; she connects again and gets her routing id back.
         for _ in range(ROUNDS):
             anna.send(b"anna")
             robot.wait(0.01)
@@ -232,12 +232,12 @@ def test_an_operator_of_sixteen_connections_stays_in_in_a_crowd(monkeypatch: pyt
 
 
 def unsent_bytes(descriptor: int) -> int:
-    """Return the bytes of a connection that the kernel holds and has not sent (SIOCOUTQNSD)."""
+    """Return the number of bytes that the kernel holds for a connection and has not sent (SIOCOUTQNSD)."""
     return int(struct.unpack("i", fcntl.ioctl(descriptor, 0x894B, bytes(4)))[0])
 
 
 def held_back(end: RobotSockets) -> list[int]:
-    """Return TCP_NOTSENT_LOWAT of this process's ends of the connections to both ports."""
+    """Return the TCP_NOTSENT_LOWAT of all ends, in this process, of connections to the two ports, sorted."""
     ports, marks = {port_of(end.control_endpoint), port_of(end.view_endpoint)}, []
     for descriptor in Path("/proc/self/fd").iterdir():
         try:
@@ -271,7 +271,7 @@ def test_the_kernel_holds_little_for_any_connection_of_either_side(
 def test_little_waits_for_a_peer_that_stops_reading_and_others_lose_nothing(
     robot: RobotSockets, operator: OperatorSockets
 ) -> None:
-    """Both sides limit what waits: some messages and kilobytes for each connection, however long."""
+    """For each connection only a few messages and kilobytes wait, however long the peer does not read."""
     owner = greet(robot, operator)
     group, receive_bytes = new_group(), 4096
     port = port_of(robot.control_endpoint)
@@ -299,14 +299,16 @@ def test_little_waits_for_a_peer_that_stops_reading_and_others_lose_nothing(
 def test_a_viewer_that_stops_reading_keeps_few_old_pictures_and_others_miss_nothing(
     robot: RobotSockets, operator: OperatorSockets
 ) -> None:
-    """A tick may publish both cameras' pictures and the scene just before telemetry."""
+    """Another viewer gets telemetry even if both cameras' pictures and the scene are published just before it."""
     rounds, picture = 100, bytes(100_000)
     tick = [(b"video", picture), (b"video", picture), (b"scene", b"scene"), (b"telemetry", b"state")]
     publish_until_seen(robot, operator, b"telemetry")
     with closing(RawConnection.introduced(port_of(robot.view_endpoint), b"SUB", buffer_bytes=4096)) as deaf:
         deaf.send(message(b"\x01video"))
         gate = robot._gates[1]
-        assert any(robot.wait(0.01) or len(gate.connections._numbers) == 2 for _ in range(ROUNDS) if not robot.receive())
+        assert any(
+            robot.wait(0.01) or len(gate.connections._numbers) == 2 for _ in range(ROUNDS) if not robot.receive()
+        )
         operator.receive_view()
         for _ in range(rounds):
             robot.receive()

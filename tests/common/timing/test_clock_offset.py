@@ -133,7 +133,7 @@ def test_what_we_sent_before_our_own_clock_jumped_says_nothing_after_it() -> Non
     offset, slept_s = ClockOffset(shared_clock=False), 0.100
 
     def ours(true_s: float) -> float:
-        """Return our clock, which stops while we sleep."""
+        """Return what our clock shows at `true_s`; it stops while the machine sleeps."""
         return true_s if true_s < 5.0 else max(5.0, true_s - slept_s)
 
     messages = []
@@ -154,7 +154,7 @@ def test_what_we_sent_before_our_own_clock_jumped_says_nothing_after_it() -> Non
 
 
 def delays_of(kind: str, generator: np.random.Generator, count: int) -> np.ndarray:
-    """Draw delays in seconds of messages 4 ms apart, as real links have them."""
+    """Draw the delays, in seconds, of `count` messages sent 4 ms apart over a link of the type `kind`."""
     exponential_s = generator.exponential(0.001, count)
     if kind == "wireless":
         return 0.002 + exponential_s + (generator.random(count) < 0.02) * generator.exponential(0.030, count)
@@ -191,7 +191,7 @@ def test_no_link_looks_like_a_jump_or_breaks_the_bound(kind: str, in_order: bool
         assert bound_s is not None
         assert abs(error_s(offset, clock, now_s)) <= bound_s
     assert (offset.jumps, offset.rejected) == (0, 0)
-    if kind != "wandering":  # Wandering delays have no floor to speak of.
+    if kind != "wandering":  # Wandering delays have no constant minimum.
         assert abs(error_s(offset, clock, now_s)) < 0.5e-3
 
 

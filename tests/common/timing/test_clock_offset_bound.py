@@ -1,4 +1,4 @@
-"""The published bound of a clock offset holds for all delays, drifts and jitters."""
+"""The error of an estimated clock offset never exceeds the reported bound, for any delay, drift and jitter."""
 
 import numpy as np
 import pytest

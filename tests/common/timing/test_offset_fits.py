@@ -24,7 +24,7 @@ def blocks_of(times_s: np.ndarray, values_s: np.ndarray, length_s: float = 0.1) 
 
 
 def both_ways(there_s: np.ndarray, back_s: np.ndarray, offset_s: float, skew: float) -> tuple[list[Block], list[Block]]:
-    """Return blocks of messages there and back, a sample each 4 ms."""
+    """Return blocks of time differences, to the peer and from the peer, for messages 4 ms apart with these delays."""
     times_s = 0.004 * np.arange(there_s.size)
     drifted_s = offset_s + skew * times_s
     return blocks_of(times_s, there_s + drifted_s), blocks_of(times_s, back_s - drifted_s)

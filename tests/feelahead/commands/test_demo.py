@@ -1,4 +1,4 @@
-"""The demo: its arguments to the two sides, its page and its messages at an early end."""
+"""The demo: the flags that it gives to both sides, its page, and its messages when a side ends early."""
 
 import json
 import os
@@ -16,9 +16,11 @@ from common.command.command_line import given_fields, parse_settings
 from common.command.status import Status
 from common.errors import ConfigurationError
 from feelahead.both_sides.summary import merge_summaries
-from feelahead.commands import demo as module
 from feelahead.commands import open_browser
-from feelahead.commands.demo import DemoSettings, demo
+from feelahead.commands.demo import command as module
+from feelahead.commands.demo.command import demo
+from feelahead.commands.demo.run import operator_arguments, robot_arguments, too_slow
+from feelahead.commands.demo.settings import DemoSettings
 from operator_side.settings import OperatorSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.settings import RobotSettings
@@ -32,15 +34,16 @@ def passed_on(*arguments: str) -> tuple[list[str], list[str]]:
     settings = parse_settings(DemoSettings, "demo", arguments)
     given = given_fields(arguments, DemoSettings)
     path = Path("summary.json")
-    robot = module._robot_arguments(settings, given, path)
-    return robot, module._operator_arguments(settings, given, path, LISTENING)
+    robot = robot_arguments(settings, given, path, LISTENING)
+    return robot, operator_arguments(settings, given, path, LISTENING)
 
 
 def test_only_what_was_said_goes_over_the_sides_own_files(tmp_path: Path) -> None:
     config = tmp_path / "robot.toml"
     config.write_text("seed = 3\nprobability = 0.5\n")
     robot, operator = passed_on("--robot-config", str(config))
-    assert robot == ["--summary=summary.json", "--bind=tcp://127.0.0.1:0", f"--config={config}"]
+    ports = ["--bind=tcp://127.0.0.1:1", "--view-bind=tcp://127.0.0.1:2"]
+    assert robot == ["--summary=summary.json", *ports, f"--config={config}"]
     unsaid = ("--seed", "--link", "--haptics", "--no-haptics", "--law", "--compensation")
     assert not [flag for flag in operator if flag.startswith(unsaid)]
 
@@ -83,7 +86,7 @@ def test_the_summary_and_the_errors_do_not_depend_on_the_reader(
 
     reads, writes = os.pipe()
     os.close(reads)
-    monkeypatch.setattr(module, "_run_both", run)
+    monkeypatch.setattr(module, "run_both", run)
     path = tmp_path / "out.json"
     with os.fdopen(writes, "w", encoding="utf-8") as gone:
         monkeypatch.setattr(sys, "stdout", gone)
@@ -95,8 +98,8 @@ def test_the_summary_and_the_errors_do_not_depend_on_the_reader(
 def test_a_link_over_which_the_sides_cannot_meet_is_the_reason() -> None:
     with pytest.raises(ConfigurationError, match=r"--link 'delay 1e9ms'.* take 2e\+06 s; valid: below 30 s"):
         demo(["--link", "delay 1e9ms", "--status", "none"])
-    assert module._too_slow(DemoSettings(link="delay 14s")) is None
-    assert module._too_slow(DemoSettings(link="to_robot: delay 31s")) is not None
+    assert too_slow(DemoSettings(link="delay 14s")) is None
+    assert too_slow(DemoSettings(link="to_robot: delay 31s")) is not None
 
 
 @pytest.mark.processes

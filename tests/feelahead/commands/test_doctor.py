@@ -1,4 +1,4 @@
-"""Checks of `feelahead doctor` on invented facts, and the command on this machine."""
+"""Each check of `feelahead doctor` with invented facts, and the whole command on this machine."""
 
 import json
 import re
@@ -14,7 +14,7 @@ from feelahead.commands.doctor.controllers import (
     check_permission,
     missing_grants,
 )
-from feelahead.commands.doctor.finding import Finding, Verdict, fit_for_demo
+from feelahead.commands.doctor.finding import Finding, Verdict
 from feelahead.commands.doctor.machine import (
     COMPILE,
     EXTRAS,
@@ -49,11 +49,11 @@ def permission(*seen: Finding, is_root: bool = False, rules: str = "") -> Findin
     ("findings", "verdict", "said", "remedy"),
     [
         ([check_extra("robot", {})], OK, "mujoco, numba", None),
-        ([check_extra("robot", ABSENT)], MISSING, "not installed: some_module", re.escape("'feelahead[robot]'")),
-        ([check_extra("record", ABSENT)], NOTE, "not installed: some_module", re.escape("'feelahead[record]'")),
+        ([check_extra("robot", ABSENT)], NOTE, "not installed: some_module", re.escape("'.[robot]'")),
+        ([check_extra("record", ABSENT)], NOTE, "not installed: some_module", re.escape("'.[record]'")),
         (
             [check_extra("robot", BROKEN)],
-            MISSING,
+            NOTE,
             "numba; cannot be imported: mujoco (libGL",
             "--force-reinstall .*robot",
         ),
@@ -77,8 +77,6 @@ def test_a_check(findings: list[Finding], verdict: Verdict, said: str, remedy: s
     assert said in finding.said
     assert (finding.remedy is None) == (remedy is None)
     assert re.search(remedy or "", finding.remedy or "")
-    # The demo needs nothing but its own extra.
-    assert fit_for_demo(findings) == (verdict is not MISSING or finding.name != "extra robot")
 
 
 def test_what_is_checked_is_what_the_package_brings() -> None:
@@ -133,24 +131,38 @@ def test_controllers_are_looked_at_and_left_alone(monkeypatch: pytest.MonkeyPatc
     assert (finding.verdict, finding.remedy) == (NOTE, "pip install it")
 
 
-@pytest.mark.parametrize(("verdict", "code"), [(OK, 0), (MISSING, 1)])
-def test_the_exit_code_says_whether_the_demo_can_run(
-    verdict: Verdict, code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("robot", "operator", "last_line"),
+    [
+        (OK, NOTE, "The demo can run: feelahead demo"),
+        (NOTE, OK, "This machine can be the operator side: feelahead-operator. The demo needs the extra robot, too."),
+        (NOTE, NOTE, "Neither side can run as it is: see what is missing."),
+    ],
+)
+def test_the_exit_code_says_whether_the_machine_can_be_a_side(
+    robot: Verdict,
+    operator: Verdict,
+    last_line: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     findings = [
-        Finding("extra robot", verdict, "numba [gone]", "pip install 'feelahead[robot]'"),
+        Finding("extra robot", robot, "numba [gone]", "pip install '.[robot]'"),
+        Finding("extra operator", operator, "viser"),
         Finding("udev rule", NOTE, "none", installing_command()),
     ]
     monkeypatch.setattr(doctor_command, "examine", lambda: findings)
+    code = 0 if OK in (robot, operator) else 1
     assert command(["doctor"]) == code
     lines = capsys.readouterr().out.splitlines()
     # Lines to be copied are not wrapped, and brackets are no markup.
     assert set(installing_command().splitlines()) <= set(lines)
     assert any("numba [gone]" in line for line in lines)
+    assert last_line in " ".join(lines)
     assert command(["doctor", "--json"]) == code
     told = json.loads(capsys.readouterr().out)
-    assert told["demo"] is (code == 0)
-    assert (told["findings"][0]["name"], told["findings"][0]["verdict"]) == ("extra robot", verdict.value)
+    assert (told["demo"], told["operator"]) == (robot is OK, operator is OK)
+    assert (told["findings"][0]["name"], told["findings"][0]["verdict"]) == ("extra robot", robot.value)
 
 
 @pytest.mark.processes

@@ -1,4 +1,4 @@
-"""Fields of small grippers in small scenes, for tests of contact distances."""
+"""Single looks of small grippers in small scenes, for tests of contact distances and onset distances."""
 
 from typing import Any
 
@@ -20,12 +20,12 @@ REACH_M = 0.15
 RADIUS_M = 0.008
 """Radius of a fingertip's sphere."""
 EQUAL_M = 1e-4
-"""Tolerance of contact distances."""
+"""Tolerance, in metres, for two contact distances that should be equal."""
 CLASSES = {Role.TARGET: TARGET, Role.IGNORED: SKIPPED}
 
 
 def ball_pose(radius_m: float = RADIUS_M, **placed: Any) -> GripperPose:
-    """Return one sphere about the tool's own point."""
+    """Return the pose of a gripper that is one sphere, centred on the tool point."""
     return free_pose([[0.0, 0.0, 0.0]], [radius_m], **placed)
 
 
@@ -37,7 +37,7 @@ def along(
     quantile: float = 0.0,
     reach_m: float = REACH_M,
 ) -> Along:
-    """Return a direction; `inflated_m` is the D_σ of every sphere if nothing varies."""
+    """Return the direction and uncertainty of a look. Without variances, D_σ of every sphere is `inflated_m`."""
     return Along(np.ascontiguousarray(direction), inflated_m, variance_m2, quantile, reach_m)
 
 
@@ -55,18 +55,21 @@ def look(
     widest_m: float = np.inf,
     by: Ahead | None = None,
 ) -> Field:
-    """Compute the field, by new tables unless `by` gives some; classes follow from the objects' roles."""
+    """Compute the field of one look. Without `classes`, the objects' classes follow from their roles.
+
+    by: gives the encoders' errors and the memory to use; without it, encoders have no errors and the memory is new.
+    """
     looking = by or Ahead(np.zeros(pose.tool_jacobian.shape[1]))
     return looking.look(pose, scene_table(objects), _classes(objects, classes), ahead, widest_m)
 
 
 def ways_of(pose: GripperPose, objects: PerceivedObjects, ahead: Along) -> FloatArray:
-    """Return the distances (8,) at which the strengths begin."""
+    """Return the eight onset distances (8,) of one look, for fast zones."""
     return look(pose, objects, ahead).fast_m
 
 
 def judged(pose: GripperPose, objects: PerceivedObjects, ahead: Along, **how: Any) -> Judged:
-    """Compare the distances of such a look with their definition; `how` as `look` takes it."""
+    """Compare the onset distances of one look with their definition. how: further arguments of `look`."""
     looking: Ahead = how.setdefault("by", Ahead(np.zeros(pose.tool_jacobian.shape[1])))
     found = look(pose, objects, ahead, **how)
     classes, widest_m = _classes(objects, how.get("classes")), how.get("widest_m", np.inf)

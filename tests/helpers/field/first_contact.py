@@ -1,4 +1,4 @@
-"""First contact of a sphere with a scene's first primitive, by the kernel function of a look."""
+"""Distance that a sphere moves until it touches a scene's first primitive, by the compiled function that looks use."""
 
 import math
 
@@ -18,7 +18,7 @@ _scene_at = SCENE.at
 def first_contact_m(
     objects: PerceivedObjects, start_m: FloatArray, radius_m: float, direction: FloatArray, reach_m: float
 ) -> float:
-    """Return the distance along the unit vector (3,); 0 if they overlap, infinite beyond the reach."""
+    """Return the distance along the unit vector `direction` (3,); 0 for an overlap now, infinite beyond `reach_m`."""
     # A bundle holds addresses of the table's arrays, and does not keep them alive.
     from_and_along, table = np.stack([start_m, direction]), scene_table(objects)
     found = float(_first_contact(from_and_along, radius_m, reach_m, table.bundle))

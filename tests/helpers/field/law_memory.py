@@ -1,4 +1,4 @@
-"""Memory of a law, and its kernels one by one, which the law itself runs in one call."""
+"""A law's memory between ticks, and single calls of kernels that the law itself runs together in one call."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from robot_side.laws.memory import Memory, memory_at
 
 
 def memory(spheres: int = 0) -> Memory:
-    """Return an initial memory with room for a gripper of `spheres`."""
+    """Return the initial memory of a law, with room for a gripper of `spheres` spheres."""
     made = Memory(JointLimits(np.ones(6), np.ones(6)), np.zeros(6), [np.zeros((0, 3))] * 2)
     made.make_room(max(spheres, 1), 1)
     made.prospect["stretch"] = 1.0
@@ -23,25 +23,25 @@ def memory(spheres: int = 0) -> Memory:
 def moved(
     kept: Memory, pose: GripperPose, after_s: float, ahead_m: float = 0.0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the tool's position (3,) and rotation (3, 3), and the spheres' centres (m, 3), after `after_s`."""
+    """Return the tool's position (3,) and rotation (3, 3), and the spheres' centres (m, 3), predicted for `after_s`."""
     _move(kept.bundle, pose.tool_position_m, pose.tool_rotation, pose.sphere_centers_m, after_s, ahead_m)
     return kept.tool_m.copy(), kept.rotation.copy(), kept.centers_m[: len(pose.sphere_centers_m)].copy()
 
 
 def moments(kept: Memory, pose: GripperPose, until_s: float, ahead_m: float = 0.0) -> tuple[float, ...]:
-    """Return the moments after which to look from the gripper's future place."""
+    """Return the times ahead, up to `until_s`, at which the gripper's predicted poses are to be looked from."""
     _plan(kept.bundle, pose.tool_position_m, pose.tool_rotation, pose.sphere_centers_m, until_s, ahead_m)
     return tuple(kept.moments_s[: kept.state["even_places"][0]].tolist())
 
 
 def farthest_m_s(kept: Memory, pose: GripperPose, ahead_m: float) -> float:
-    """Return the speed of the fastest sphere, or of one `ahead_m` farther ahead."""
+    """Return the largest speed of all spheres, where they are and if they were `ahead_m` farther along the approach."""
     found: float = _farthest(kept.bundle, pose.tool_position_m, pose.tool_rotation, pose.sphere_centers_m, ahead_m)
     return found
 
 
 def fingers_m_s(kept: Memory, pose: GripperPose, now_s: float, *, changed: bool = False) -> FloatArray:
-    """Return the spheres' velocities (m, 3) relative to the tool, measured at one more pose."""
+    """Measure the spheres at one more pose; return their velocities (m, 3) relative to the tool."""
     _measure(kept.bundle, pose.sphere_centers_m, pose.tool_position_m, pose.tool_rotation, now_s, changed)
     return kept.own_m_s.copy()
 
@@ -89,6 +89,6 @@ def keep(bundle: IntArray, side: int, place: int, now: float, tool: FloatArray, 
 def feel(
     bundle: IntArray, where: FloatArray, loop_age: float, is_known: bool, deflection: float, numbers: FloatArray
 ) -> None:
-    """Run the kernel; where (3, 3): the tool's position, its approach axis, and its velocity."""
+    """Run the kernel `felt.feel`. Rows of `where` (3, 3): the tool's position, its approach axis, and its velocity."""
     tool = load(where, 0), load(where, 1), load(where, 2)
     felt.feel(bundle, *tool, loop_age, is_known, deflection, numbers)

@@ -1,6 +1,6 @@
-"""Nearest points of primitives' surfaces, for many pairs at once: thin wrappers of the compiled pass.
+"""Distances from points to the surfaces of primitives: thin wrappers of the compiled `nearest_points`.
 
-Point i is paired with primitive i throughout. See `robot_side.surroundings.distances.nearest_points` for the result.
+Each function compares point i with primitive i only. `robot_side.surroundings.distances` explains the result.
 """
 
 import math
@@ -19,7 +19,7 @@ Nearest = tuple[FloatArray, FloatArray]
 
 
 def distance_to_object(objects: PerceivedObjects, index: int, point_m: FloatArray) -> float:
-    """Return the signed distance from `point_m` (3,) to an object, negative inside; infinite without primitives."""
+    """Return the signed distance from `point_m` (3,) to an object: negative inside, infinite without primitives."""
     scene = scene_table(objects)
     rows = np.arange(scene.first_rows[index], scene.first_rows[index + 1])
     points = np.broadcast_to(np.asarray(point_m, dtype=np.float64), (len(rows), 3))
@@ -27,29 +27,35 @@ def distance_to_object(objects: PerceivedObjects, index: int, point_m: FloatArra
 
 
 def nearest_on_sphere(points_m: FloatArray, centers_m: FloatArray, radii_m: FloatArray) -> Nearest:
-    """Compute from points (p, 3) to spheres (centers (p, 3), radii (p,))."""
+    """Return distances and directions from points (p, 3) to spheres: centers (p, 3), radii (p,)."""
     return _each(SPHERE, points_m, centers_m, radii_m)
 
 
 def nearest_on_box(
     points_m: FloatArray, centers_m: FloatArray, rotations: FloatArray, half_sizes_m: FloatArray
 ) -> Nearest:
-    """Compute from points (p, 3) to boxes: centers (p, 3), rotations (p, 3, 3) box to world, half sizes (p, 3)."""
+    """Return distances and directions from points (p, 3) to boxes.
+
+    Boxes: centers (p, 3), rotations (p, 3, 3) from box to world, half sizes (p, 3).
+    """
     return _each(BOX, points_m, centers_m, rotations, half_sizes_m)
 
 
 def nearest_on_tetrahedron(points_m: FloatArray, vertices_m: FloatArray) -> Nearest:
-    """Compute from points (p, 3) to tetrahedra (p, 4, 3), in any vertex order; one of zero volume is a plate."""
+    """Return distances and directions from points (p, 3) to tetrahedra (p, 4, 3), whose vertices are in any order.
+
+    A tetrahedron of zero volume counts as a plate.
+    """
     return _each(TETRAHEDRON, points_m, vertices_m)
 
 
 def nearest_on_half_space(points_m: FloatArray, normals: FloatArray, offsets_m: FloatArray) -> Nearest:
-    """Compute from points (p, 3) to half-spaces, solid where normal·x <= offset."""
+    """Return distances and directions from points (p, 3) to half-spaces, which are solid where normal·x <= offset."""
     return _each(HALF_SPACE, points_m, normals, offsets_m)
 
 
 def _each(kind: int, points_m: FloatArray, *columns: FloatArray) -> Nearest:
-    """Compute by a table of these primitives alone, including those without volume, which no scene's table keeps."""
+    """Compute with a table of only these primitives. It keeps those without volume, which `scene_table` leaves out."""
     count = len(points_m)
     places = np.arange(count)
     nothing = np.empty((0, 4))

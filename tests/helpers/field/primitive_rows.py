@@ -1,4 +1,4 @@
-"""Rows of a scene's table for each primitive and object, from the definitions, one by one in NumPy."""
+"""Reference for the rows of a scene's table, computed from the definitions in NumPy, one primitive at a time."""
 
 from dataclasses import dataclass
 
@@ -11,26 +11,29 @@ from robot_side.surroundings.perceived import PerceivedObjects
 
 @dataclass(frozen=True)
 class Row:
-    """One primitive."""
+    """Row of one primitive in a scene's table."""
 
     thing: int
     kind: int
     row_of_kind: int
     shape: FloatArray
-    """(15,)"""
+    """Numbers that describe the primitive, padded with zeros (15,)"""
     bound: FloatArray
-    """(4,)"""
+    """Centre and radius of a sphere that contains the primitive (4,)"""
     volume_m3: float
 
 
 def rows_of(objects: PerceivedObjects) -> list[Row]:
-    """Return the primitives with a volume, by object and then by kind."""
+    """Return the rows of all primitives that have a volume, sorted by object and then by kind."""
     found = [*_spheres(objects), *_boxes(objects), *_tetrahedra(objects), *_half_spaces(objects), *_meshes(objects)]
     return sorted((row for row in found if row.volume_m3 > 0.0), key=lambda row: (row.thing, row.kind, row.row_of_kind))
 
 
 def object_bound(rows: list[Row]) -> FloatArray:
-    """Return a sphere (4,) about the middle of the box around one object's bounds."""
+    """Return centre and radius (4,) of a sphere that contains one object.
+
+    The centre is the middle of the smallest box around the bounding spheres of `rows`.
+    """
     if not rows:
         return np.array([0.0, 0.0, 0.0, -np.inf])
     bounds = np.array([row.bound for row in rows])

@@ -1,4 +1,4 @@
-"""Situations of a freely flying tool, and the laws that sense them, for tests of stiffness."""
+"""Inputs of the law for a tool that moves freely, without an arm, and laws for them, for tests of stiffness."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -21,7 +21,7 @@ from tests.helpers.field.fields import RADIUS_M, ball_pose
 from tests.helpers.perceived_scenes import Scene
 
 EXACT = PredictionErrors({"operator": ((1.0, 0.0, 0.0),), "robot": ((1.0, 0.0, 0.0),)})
-"""Prediction without errors."""
+"""Prediction errors of zero for both compensations"""
 CAMERA_SD_M = 0.003
 SIGMA_M = 2.3263478740408408 * CAMERA_SD_M
 """D_σ at P = 0.99 with only camera errors."""
@@ -31,7 +31,7 @@ MOTION = ToolMotionSettings(FULL_SPEED_M_S, STICK_SPEED_M_S)
 
 
 def uncertain(**changes: Any) -> Uncertainty:
-    """Return camera errors of 3 mm and no others, unless changed."""
+    """Return the uncertainty at P = 0.99. Unless changed, it has camera errors of 3 mm (standard deviation) only."""
     return replace(Uncertainty(0.99, camera_sd_m=CAMERA_SD_M, prediction=EXACT), **changes)
 
 
@@ -44,7 +44,7 @@ def paper(encoder_sigma_rad: float = 0.0, **changes: Any) -> PaperLaw:
 
 
 def situation(pose: GripperPose, objects: PerceivedObjects | None = None, **changes: Any) -> Situation:
-    """Return a situation at rest, with a known loop age of 100 ms and a centred stick, unless changed."""
+    """Return an input of the law. Unless changed, the arm is at rest, the stick centred, the loop age known: 100 ms."""
     at_rest = Situation(
         pose=pose,
         joint_velocities_rad_s=np.zeros(6),
@@ -60,12 +60,12 @@ def situation(pose: GripperPose, objects: PerceivedObjects | None = None, **chan
 
 
 def moving(velocity_m_s: FloatArray) -> FloatArray:
-    """Return the joints' rates (6,) that move the free tool at this velocity (3,)."""
+    """Return the joint velocities (6,) that move the free tool at the velocity `velocity_m_s` (3,)."""
     return np.concatenate([velocity_m_s, np.zeros(3)])
 
 
 def walls(ahead_m: float | None, behind_m: float | None = None, front_m: float = RADIUS_M) -> PerceivedObjects:
-    """Return walls at these distances before and behind a gripper that reaches to front_m."""
+    """Return a wall `ahead_m` before and one `behind_m` behind a gripper that extends to ±`front_m`; None: no wall."""
     scene = Scene()
     if ahead_m is not None:
         scene.add().box([0.0, 0.0, front_m + ahead_m + 0.05], [0.5, 0.5, 0.05])
@@ -75,13 +75,13 @@ def walls(ahead_m: float | None, behind_m: float | None = None, front_m: float =
 
 
 def at(way_m: float, across_m: float = 0.0) -> GripperPose:
-    """Return one sphere at this place along and across."""
+    """Return the pose of a gripper of one sphere, at `way_m` along the approach and `across_m` across it."""
     return ball_pose(tool_position_m=[across_m, 0.0, way_m])
 
 
 @dataclass
 class Senses:
-    """Law, and a clock that advances by `step_s` with each use."""
+    """Law and a virtual clock: each call of `sense` first advances the clock by `step_s`."""
 
     law: Law = field(default_factory=swept)
     step_s: float = 10.0

@@ -1,1 +1,1 @@
-"""Strangers and hostile input at a real port."""
+"""Helpers that send invalid and hostile input to a real port, as any stranger on the network could."""

@@ -1,4 +1,4 @@
-"""Inputs of a hostile or broken peer: a seeded, endless mixture."""
+"""Random inputs of a hostile or broken peer, repeatable by a seed."""
 
 import contextlib
 import random
@@ -12,11 +12,11 @@ from tests.helpers.hostile.raw_zmtp import GREETING, RawConnection, frame, messa
 
 _STRANGERS = 8
 _HANGING = 128
-"""Number of connections that never finish their handshake, at any time."""
+"""Maximum number of connections that stay open without finishing their handshake"""
 
 
 def payload(generator: random.Random) -> bytes:
-    """Return bytes that look more or less like a message."""
+    """Return a random bad payload: noise, a message cut or altered, nested arrays, or impossible numbers."""
     kind = generator.randrange(5)
     if kind == 0:
         return generator.randbytes(generator.randrange(MAXIMUM_BYTES))
@@ -42,7 +42,7 @@ def _valid(generator: random.Random) -> bytes:
 
 
 class Attacker:
-    """Sender of hostile inputs, one after the other, to a robot side's two ports."""
+    """Hostile peer that sends one random input at a time to a robot side's control port or view port."""
 
     def __init__(self, control_port: int, view_port: int, seed: int) -> None:
         self._control_port = control_port
@@ -60,13 +60,13 @@ class Attacker:
         }
 
     def send(self) -> None:
-        """Send one hostile input; the robot side, or the system, may cut it short."""
+        """Send one hostile input. No error if the robot side or the system ends the connection meanwhile."""
         [send] = self._generator.choices(list(self._kinds), list(self._kinds.values()))
         with contextlib.suppress(OSError):
             send()
 
     def close(self) -> None:
-        """Close all connections."""
+        """Close all connections that are still open."""
         for connection in (*self._strangers, *self._hanging):
             connection.close()
 

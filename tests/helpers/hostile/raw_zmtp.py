@@ -1,4 +1,4 @@
-"""ZMTP 3.0 by hand over a plain TCP connection (rfc.zeromq.org/spec/23), so that errors can be sent."""
+"""ZMTP 3.0 (rfc.zeromq.org/spec/23) written on a plain TCP connection, so that tests can send invalid bytes."""
 
 import contextlib
 import socket
@@ -7,13 +7,16 @@ import struct
 from common.sockets.greeting import KNOCK
 
 GREETING = KNOCK + b"NULL".ljust(20, b"\0") + bytes(32)
-"""Greeting of 64 bytes: mechanism NULL, not a server, filler."""
+"""Greeting of 64 bytes: signature and version, mechanism NULL, then zeros: not a server, and filler."""
 _MORE, _LONG, _COMMAND = 1, 2, 4
 _TIMEOUT_S = 5.0
 
 
 def ready(socket_type: bytes, name: bytes = b"") -> bytes:
-    """Return the command that ends the handshake of the NULL mechanism; `name` is the routing id, empty for any."""
+    """Return the READY command, which ends the handshake of mechanism NULL.
+
+    name: routing id; if empty, the other side chooses one.
+    """
     body = b"\x05READY"
     for field, value in ((b"Socket-Type", socket_type), (b"Identity", name)):
         body += bytes([len(field)]) + field + struct.pack(">I", len(value)) + value
@@ -21,7 +24,7 @@ def ready(socket_type: bytes, name: bytes = b"") -> bytes:
 
 
 def frame(body: bytes, *, more: bool = False, claimed_bytes: int | None = None) -> bytes:
-    """Return one frame of a message; `claimed_bytes` is a false length."""
+    """Encode one frame of a message; `claimed_bytes` replaces the true length of `body`."""
     length = len(body) if claimed_bytes is None else claimed_bytes
     flags = _MORE if more else 0
     if length < 256:
@@ -30,7 +33,7 @@ def frame(body: bytes, *, more: bool = False, claimed_bytes: int | None = None) 
 
 
 def message(*bodies: bytes) -> bytes:
-    """Return one message of these frames."""
+    """Encode one message that consists of these frames."""
     return b"".join(frame(body, more=position < len(bodies) - 1) for position, body in enumerate(bodies))
 
 
@@ -40,12 +43,12 @@ def port_of(endpoint: str) -> int:
 
 
 class RawConnection:
-    """TCP connection to a port of this machine that never blocks for long, and that the other side may end."""
+    """TCP connection to a port of this machine, with a time-out of 5 s. The other side may end it at any time."""
 
     def __init__(self, port: int, sends: bytes = b"", buffer_bytes: int | None = None) -> None:
-        """buffer_bytes: limit of the kernel's receive buffer, for a peer that does not read."""
+        """Connect and send `sends`. buffer_bytes: the kernel's receive buffer, small for a peer that does not read."""
         self.open = True
-        """False once the other side has ended it."""
+        """False once either side has closed the connection"""
         self._socket = socket.socket()
         if buffer_bytes is not None:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer_bytes)
@@ -63,7 +66,7 @@ class RawConnection:
         return connection
 
     def send(self, content: bytes) -> None:
-        """Send all of `content`, unless the other side has ended the connection or does not read."""
+        """Send all of `content`; close the connection if the other side has ended it or does not read."""
         if not self.open:
             return
         try:
@@ -73,7 +76,7 @@ class RawConnection:
             self.close()
 
     def read_all(self, silence_s: float = 0.3) -> bytes:
-        """Return all bytes until a silence of `silence_s`."""
+        """Return all received bytes, until none has come for `silence_s` or the other side ends the connection."""
         self._socket.settimeout(silence_s)
         received = b""
         with contextlib.suppress(TimeoutError):
@@ -82,7 +85,7 @@ class RawConnection:
         return received
 
     def ended(self) -> bool:
-        """Return whether the other side has ended the connection; waits up to a few seconds."""
+        """Wait until the other side ends the connection, then return True; return False after 5 s without bytes."""
         if not self.open:
             return True
         self._socket.settimeout(_TIMEOUT_S)
@@ -102,7 +105,10 @@ class RawConnection:
         self._socket.close()
 
     def _await(self, expected: bytes) -> None:
-        """Read until `expected` has come: a message before the other side's half of the handshake would end it."""
+        """Read until `expected` has come.
+
+        A message sent before the other side's half of the handshake would end the connection.
+        """
         received = b""
         while self.open and expected not in received:
             content = self._socket.recv(65536)
@@ -111,7 +117,7 @@ class RawConnection:
             received += content
 
     def _read_away(self) -> None:
-        """Discard answers, so that they do not fill the buffers; close at the end of the stream."""
+        """Discard received bytes, so that they do not fill the buffers; close if the other side has ended."""
         self._socket.settimeout(0.0)
         try:
             while content := self._socket.recv(65536):

@@ -1,1 +1,1 @@
-"""Helpers of the suites that need a machine."""
+"""Helpers of test suites that need a virtual machine, network namespaces, or programs of Debian packages."""

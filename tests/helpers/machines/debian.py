@@ -1,4 +1,4 @@
-"""Debian's packages for the suites that need a machine: installed in CI, or unpacked into a separate folder."""
+"""Debian packages that test suites need: installed on the system in CI, or unpacked into a separate folder."""
 
 import fcntl
 import os
@@ -18,25 +18,25 @@ _LIBRARIES: Final = ("lib/x86_64-linux-gnu", "usr/lib/x86_64-linux-gnu")
 
 
 def cache_folder(name: str) -> Path:
-    """Return the folder that the suite `name` keeps from one run to the next."""
+    """Return the folder in which the test suite `name` keeps files from one run to the next."""
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "feelahead" / f"{name}-test"
     cache.mkdir(parents=True, exist_ok=True)
     return cache
 
 
 def install(packages: Sequence[str], program: str) -> None:
-    """Install `packages` unless `program` is there; skip the test except in CI, as root, on Debian."""
+    """If `program` is missing, install `packages`; skip the test instead unless in CI, as root, on Debian."""
     if shutil.which(program) is not None:
         return
     if os.environ.get("CI") != "true" or os.geteuid() != 0 or shutil.which("apt-get") is None:
-        pytest.skip(f"no {program} (with CI=true, root gets Debian's)")
+        pytest.skip(f"no {program} (run as root with CI=true, the tests install Debian's)")
     run_or_skip(["apt-get", "update", "-qq"])
     settings = {"DEBIAN_FRONTEND": "noninteractive"}
     run_or_skip(["apt-get", "install", "-qq", "--no-install-recommends", "--yes", *packages], settings)
 
 
 def run_or_skip(words: Sequence[str], settings: Mapping[str, str] | None = None, folder: Path | None = None) -> str:
-    """Run a command that provides something; skip the test with its last words if it fails."""
+    """Run a command and return its output. If it fails, skip the test, with its last line of errors as the reason."""
     environment = os.environ | dict(settings or {})
     try:
         done = subprocess.run(
@@ -50,7 +50,10 @@ def run_or_skip(words: Sequence[str], settings: Mapping[str, str] | None = None,
 
 
 class Apt:
-    """apt with separate lists and archives: the system's may be empty or stale, and stay unchanged."""
+    """apt with package lists and archives in a separate folder.
+
+    The system's own may be empty or stale, and are not changed.
+    """
 
     def __init__(self, folder: Path) -> None:
         options = {
@@ -61,7 +64,7 @@ class Apt:
             "APT::Update::Error-Mode": "any",
         }
         if os.geteuid() == 0:
-            options["APT::Sandbox::User"] = "root"  # Another user may not write to our folder.
+            options["APT::Sandbox::User"] = "root"  # apt's own user could not write to our folder.
         self._options = [part for name, value in options.items() for part in ("-o", f"{name}={value}")]
         for partial in ("lists/partial", "apt/archives/partial", "archives"):
             (folder / partial).mkdir(parents=True)
@@ -80,9 +83,10 @@ class Apt:
 
 
 def unpacked(name: str, packages: Callable[[Apt], list[str]], found: Callable[[Path], Parts]) -> Parts:
-    """Return `found` in the suite's folder of unpacked packages, downloading them if needed; otherwise skip the test.
+    """Return the result of `found` for the suite's folder of unpacked packages; if a part is missing, download them.
 
-    `found` raises FileNotFoundError for a missing part. Nothing is installed on the system.
+    `found` raises FileNotFoundError for a missing part. The test is skipped if no download is possible. Nothing is
+    installed on the system.
     """
     if platform.machine() != "x86_64":
         pytest.skip(f"the machine is {platform.machine()}; the test boots an x86_64 kernel")
@@ -91,11 +95,11 @@ def unpacked(name: str, packages: Callable[[Apt], list[str]], found: Callable[[P
             pytest.skip(f"no {program}: the machine and its kernel come as Debian packages")
     cache = cache_folder(name)
     with (cache / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # Another run may be filling it.
+        fcntl.flock(lock, fcntl.LOCK_EX)  # Another test run may be filling the folder.
         try:
             return found(cache / "root")
         except FileNotFoundError:
-            # The first time, and after changes of the system's libraries.
+            # So it is the first time, and after changes of the system's libraries.
             _download(cache, packages)
             return found(cache / "root")
 
@@ -114,13 +118,13 @@ def _download(cache: Path, packages: Callable[[Apt], list[str]]) -> None:
 
 
 def library_path(root: Path) -> dict[str, str]:
-    """Return the environment in which programs of unpacked packages find their libraries."""
+    """Return the environment variable by which programs of unpacked packages find their libraries."""
     folders = {str(path.parent) for place in _LIBRARIES for path in (root / place).rglob("*.so*")}
     return {"LD_LIBRARY_PATH": ":".join(sorted(folders))}
 
 
 def only(folder: Path, pattern: str) -> Path:
-    """Return the only file in `folder` of that pattern; FileNotFoundError for none or several."""
+    """Return the only file in `folder` that matches `pattern`; FileNotFoundError if none or several match."""
     found = sorted(folder.glob(pattern))
     if len(found) != 1:
         raise FileNotFoundError(f"{folder}/{pattern}: {len(found)} found")

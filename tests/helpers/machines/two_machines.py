@@ -1,4 +1,4 @@
-"""Two machines on a cable, for the network: a namespace each, and a virtual Ethernet link between them.
+"""Two simulated machines on one cable: two network namespaces, joined by a virtual Ethernet link.
 
 Needs root and iproute2's `ip`: without them tests are skipped.
 """
@@ -15,26 +15,26 @@ import pytest
 
 _PREFIX_BITS = 24
 _FOLDERS = (Path("/run/netns"), Path("/etc/netns"))
-"""Folders of the namespaces, and of the files that `ip` mounts in each."""
+"""Folder of the namespaces, and folder of the files that `ip` mounts over /etc in each namespace"""
 
 
 @dataclass
 class Machine:
-    """One of the two machines."""
+    """One of the two simulated machines: a network namespace with one end of the cable."""
 
     namespace: str
     device: str
-    """Device of the machine's end of the cable."""
+    """Name of the network device at this machine's end of the cable"""
     address: str
 
     @property
     def surroundings(self) -> list[str]:
-        """Command prefix that runs a program there."""
+        """Command prefix that runs a program on this machine."""
         return ["ip", "netns", "exec", self.namespace]
 
     @property
     def own_files(self) -> Path:
-        """Folder whose files replace those of /etc for programs that start there afterwards."""
+        """Folder whose files replace those of /etc, for programs that start on this machine from now on."""
         return Path("/etc/netns") / self.namespace
 
     def unplug(self) -> None:
@@ -46,7 +46,7 @@ class Machine:
         self.set_link("up")
 
     def set_link(self, *words: str) -> None:
-        """Run `ip link set DEVICE`."""
+        """Run `ip link set DEVICE WORDS` for this machine's end of the cable."""
         _ip("-n", self.namespace, "link", "set", self.device, *words)
 
     def readdress(self, address: str) -> None:
@@ -58,7 +58,7 @@ class Machine:
 
 @contextlib.contextmanager
 def two_machines(robot: str = "198.18.0.1", operator: str = "198.18.0.2") -> Iterator[tuple[Machine, Machine]]:
-    """Yield the robot's and the operator's machine with these addresses; skip the test if unavailable."""
+    """Yield the robot's and the operator's machine with these addresses; skip the test if none can be made here."""
     if shutil.which("ip") is None or os.geteuid() != 0:
         pytest.skip("network namespaces need root and iproute2 (apt install iproute2)")
     machines = one, other = (
@@ -89,7 +89,7 @@ def _connect(one: Machine, other: Machine) -> None:
 
 
 def _delete_left_behind() -> None:
-    """Delete namespaces of killed runs: the names end with a process that is gone."""
+    """Delete namespaces of killed test runs, whose names end with the id of a process that is gone."""
     for folder in _FOLDERS:
         for left in folder.glob("feelahead-*-*"):
             owner = left.name.rpartition("-")[2]
@@ -101,17 +101,17 @@ def _delete(namespace: str) -> None:
     _run_ip("netns", "del", namespace)
     for files in Path("/etc/netns").glob(namespace):
         shutil.rmtree(files, ignore_errors=True)
-        with contextlib.suppress(OSError):  # Others may have theirs there.
+        with contextlib.suppress(OSError):  # The folder may hold files of other namespaces.
             files.parent.rmdir()
 
 
 def _ip(*arguments: str) -> None:
-    """Assert that `ip` succeeds."""
+    """Run `ip`; AssertionError with the reason if it fails."""
     failed = _run_ip(*arguments)
     assert failed is None, failed
 
 
 def _run_ip(*arguments: str) -> str | None:
-    """Return the reason of a failure; None if `ip` succeeded."""
+    """Run `ip`; return the reason if it fails, else None."""
     done = subprocess.run(["ip", *arguments], capture_output=True, text=True, check=False)  # noqa: S607
     return None if done.returncode == 0 else f"ip {' '.join(arguments)}: {done.stderr.strip()}"

@@ -1,4 +1,4 @@
-"""Waiting in real time."""
+"""Waiting for conditions in real time."""
 
 import time
 from collections.abc import Callable
@@ -17,7 +17,7 @@ def wait_until(
 ) -> Value:
     """Return the first value of `condition` that is not None or False.
 
-    AssertionError after `limit_s` names `what` was awaited, and the state `instead`.
+    After `limit_s`, raise AssertionError: it names the event `what`, and the state that `instead` returns.
     """
     end_s = time.monotonic() + limit_s
     while time.monotonic() < end_s:

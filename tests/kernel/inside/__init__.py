@@ -1,1 +1,1 @@
-"""Tests that pytest runs inside the machine: the kernel's driver and ours on a virtual controller."""
+"""Tests that pytest runs inside the virtual machine: the kernel's driver and ours, each on a virtual controller."""

@@ -1,4 +1,4 @@
-"""Robot side without an arm: its real sockets, lease and safety, and the test's stiffness."""
+"""Robot side without an arm: with real sockets, lease and safety, and a stiffness that the test sets."""
 
 from common.protocol.codec import encode
 from common.protocol.uniform_field import STRENGTHS
@@ -7,25 +7,25 @@ from tests.helpers.felt import felt
 from tests.helpers.serving_robot import ServingRobot
 
 SLOW_MACHINE = SafetySettings(gap_s=3.0, age_s=10.0, max_delay_s=20.0, healthy_s=0.3, lease_s=30.0)
-"""Limits for a processor emulated in software, too slow for 0.1 s: reactions are checked, not their time."""
+"""Longer safety limits, as an emulated processor is too slow for the usual 0.1 s. Tests do not check reaction times."""
 _FIELD_PERIOD_S = 0.02
 
 
 class ArmlessRobot(ServingRobot):
-    """One life of the robot side, in a thread."""
+    """Robot side without an arm, which runs in a thread during the context."""
 
     def __init__(self) -> None:
         super().__init__(publishes=False, safety=SLOW_MACHINE)
         self.r2_stiffness = 0.0
-        """Stiffness of R2 everywhere, 0 to 1."""
+        """Stiffness of R2 in each zone, 0 to 1"""
         self.moving = False
-        """Whether an arm would be commanded to move now."""
+        """Whether the robot side would now command an arm to advance"""
         self.state = "disarmed"
         self._next_s = 0.0
 
     @property
     def flags(self) -> list[str]:
-        """Flags with which the operator side finds it."""
+        """Flags of an operator side that connect it to this robot side."""
         return [f"--connect={self.control}", f"--view-connect={self.view}"]
 
     @property
@@ -34,7 +34,7 @@ class ArmlessRobot(ServingRobot):
         return self.session.motion_received
 
     def tick(self, now_s: float) -> None:
-        """Decide as a robot side does, and send the owner a stiffness."""
+        """Update session and safety as a robot side does, and send the owner of the lease a stiffness."""
         self.session.update(now_s)
         permission = self.session.permission(now_s)
         self.state = permission.state

@@ -1,4 +1,4 @@
-"""The command `feelahead virtual-dualsense`, as a separate process."""
+"""Tests of the command `feelahead virtual-dualsense`, run as a separate process."""
 
 import signal
 import subprocess

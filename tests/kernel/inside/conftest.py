@@ -1,4 +1,4 @@
-"""Virtual controllers of every kind."""
+"""Virtual controllers of each model and connection."""
 
 from collections.abc import Iterator
 
@@ -13,6 +13,6 @@ _VARIANTS = [Variant(transport, model) for transport in Transport for model in M
 
 @pytest.fixture(scope="session", params=_VARIANTS, ids=lambda variant: variant.name)
 def plugged(request: pytest.FixtureRequest) -> Iterator[Plugged]:
-    """Controller; tests that need it plug it in."""
+    """Virtual controller, at first unplugged; a test plugs it in."""
     with Plugged(request.param) as one:
         yield one

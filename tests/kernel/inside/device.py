@@ -1,4 +1,4 @@
-"""Our own driver on the kernel's raw device, through real hidapi."""
+"""Tests of our own driver, which reads and writes the kernel's raw device through the real hidapi."""
 
 import contextlib
 import os
@@ -30,7 +30,7 @@ _EFFECTS: Final[tuple[tuple[Strengths, Strengths], ...]] = (
 
 @contextlib.contextmanager
 def our_device(plugged: Plugged) -> Iterator[HidDualSense]:
-    """Our driver on the controller."""
+    """Our driver, open on the virtual controller during the context."""
     hidraw = bound(plugged).hidraw()
     assert hidraw is not None
     device = HidDualSense(load_backend(), os.fsencode(hidraw))
@@ -41,7 +41,7 @@ def our_device(plugged: Plugged) -> Iterator[HidDualSense]:
 
 
 def newest_state(device: HidDualSense) -> ControllerState | None:
-    """Return the newest input report."""
+    """Return the state by the newest input report; None if no report came."""
     return device.read(0.0)
 
 

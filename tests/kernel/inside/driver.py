@@ -1,4 +1,4 @@
-"""Kernel's own driver on the virtual controller, as games see it."""
+"""Tests of the kernel's own driver on the virtual controller, which games use."""
 
 import contextlib
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ from tests.kernel.inside.plugged import Plugged
 
 
 def bound(plugged: Plugged) -> KernelView:
-    """Plug the controller in; return the kernel's view once its driver has finished."""
+    """Plug the controller in; return the kernel's view once the driver has made its three input devices."""
     plugged.plug_in()
     view = wait_until("the kernel shows the controller", lambda: seen_device(plugged.identity))
     wait_until("three input devices", lambda: len(view.inputs()) == 3)
@@ -34,7 +34,7 @@ def bound(plugged: Plugged) -> KernelView:
 
 @contextlib.contextmanager
 def opened(plugged: Plugged) -> Iterator[InputDevice]:
-    """Controller's input device of sticks, triggers and buttons."""
+    """Open the input device that has the controller's sticks, triggers and buttons."""
     with InputDevice(bound(plugged).inputs()[plugged.identity.name]) as device:
         yield device
 

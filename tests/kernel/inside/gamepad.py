@@ -1,4 +1,4 @@
-"""Our evdev pad on the kernel's own input device; its force feedback returns as a controller's rumble."""
+"""Tests of our evdev driver on the kernel's input device. Force feedback written to it arrives as controller rumble."""
 
 import os
 import signal
@@ -29,14 +29,14 @@ HALF, FULL = 128 / 255, 1.0
 
 @pytest.fixture(scope="module")
 def plugged() -> Iterator[Plugged]:
-    """Controller whose driver offers force feedback."""
+    """Virtual controller whose kernel driver offers force feedback."""
     with Plugged(Variant(Transport.USB)) as one:
         yield one
 
 
 @pytest.fixture
 def pad(plugged: Plugged) -> Iterator[OpenController]:
-    """Our pad on the controller."""
+    """Our evdev driver, open on the virtual controller with nothing pressed."""
     bound(plugged)
     plugged.hands_off()
     found = find_pad(None)
@@ -51,7 +51,7 @@ def rumble(plugged: Plugged) -> Rumble:
 
 
 def reads(pad: OpenController, *, l2: float | None = None, r2: float | None = None) -> ControllerState | None:
-    """Return the state once these triggers are read, None before."""
+    """Read the pad; return its state if the triggers have the travels `l2` and `r2`, otherwise None."""
     state = pad.device.read(0.0)
     assert state is not None
     return state if (l2 in (None, state.l2)) and (r2 in (None, state.r2)) else None

@@ -1,4 +1,4 @@
-"""Kernel's view of a controller: its HID device under /sys, and input devices by the numbers of linux/input.h."""
+"""A controller as the kernel shows it: its HID device under /sys, and its input devices (codes of linux/input.h)."""
 
 import fcntl
 import os
@@ -11,19 +11,19 @@ from operator_side.dualsense.uhid.controller import BUS, UhidIdentity
 
 
 class KernelView:
-    """HID device."""
+    """HID device of a controller, as a folder under /sys."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     @property
     def driver(self) -> str | None:
-        """Name of the bound driver; None without one."""
+        """Name of the kernel driver that is bound to the device; None if there is none."""
         link = self.folder / "driver"
         return link.resolve().name if link.exists() else None
 
     def inputs(self) -> dict[str, Path]:
-        """Return the device file of each input device, by its name."""
+        """Return the device file of each input device, by the input device's name."""
         found = {}
         for folder in sorted(self.folder.glob("input/input*")):
             events = sorted(folder.glob("event*"))
@@ -32,13 +32,13 @@ class KernelView:
         return found
 
     def hidraw(self) -> Path | None:
-        """Return the raw device file."""
+        """Return the hidraw device file, if there is one."""
         found = sorted(self.folder.glob("hidraw/hidraw*"))
         return Path("/dev") / found[0].name if found else None
 
 
 def seen_device(identity: UhidIdentity) -> KernelView | None:
-    """Return the HID device with these ids; None if there is none."""
+    """Return the HID device with the ids of `identity`; None if there is none."""
     ids = f"{BUS[identity.transport]:04X}:{SONY_VENDOR_ID:04X}:{identity.model.value:04X}."
     found = sorted(Path("/sys/bus/hid/devices").glob(f"{ids}*"))
     return KernelView(found[0]) if found else None
@@ -54,7 +54,7 @@ _KEY_BYTES = 96
 
 
 class InputDevice:
-    """Open /dev/input/event file."""
+    """An input device, opened as a file /dev/input/event*."""
 
     def __init__(self, path: Path) -> None:
         self._descriptor = os.open(path, os.O_RDWR)
@@ -66,7 +66,7 @@ class InputDevice:
         os.close(self._descriptor)
 
     def axes(self, *codes: int) -> tuple[int, ...]:
-        """Return the present values of absolute axes."""
+        """Return the present values of the absolute axes `codes`."""
         return tuple(self._axis(code) for code in codes)
 
     def _axis(self, code: int) -> int:

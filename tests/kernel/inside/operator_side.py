@@ -1,4 +1,4 @@
-"""Process feelahead-operator on a real kernel: its controller comes and goes, and must not stay stiff."""
+"""Tests of feelahead-operator on a real kernel: no trigger stays stiff when the controller or the process is lost."""
 
 import os
 import signal
@@ -17,16 +17,16 @@ from tests.kernel.inside.plugged import Plugged, Variant
 
 _PATIENCE_S = 90.0
 _START_PATIENCE_S = 400.0
-"""Limit of a start in seconds: it imports everything, half a minute on an emulated processor, more if busy."""
+"""Time limit of a start in seconds: imports take half a minute on an emulated processor, more on a busy machine"""
 _HEALTHY_S = 0.7
-"""Time in seconds, above the healthy time of the robot side."""
+"""Seconds for which commands are sent before arming: longer than the robot side demands"""
 _PRESSED_S = 0.3
 _HOLD_TO_RUN = Button.L1
 _ARM = Button.OPTIONS
 
 
 class Desk:
-    """Controller, operator side, and the robot side that it is connected to."""
+    """Virtual controller, operator side, and the robot side to which the operator side is connected."""
 
     def __init__(self, plugged: Plugged, operator: SideProcess, robot: ArmlessRobot) -> None:
         self.plugged = plugged
@@ -36,7 +36,7 @@ class Desk:
         self.controller = "unknown"
 
     def note(self, part: str, patience_s: float = _PATIENCE_S) -> None:
-        """Wait for a note with `part` in it."""
+        """Wait until the operator side has printed a note that contains `part`."""
 
         def said() -> bool:
             self._listen()
@@ -60,7 +60,7 @@ class Desk:
 
 @pytest.fixture(scope="module", params=Transport, ids=lambda transport: transport.value)
 def desk(request: pytest.FixtureRequest) -> Iterator[Desk]:
-    """Operator side that starts before its controller is there; it does not depend on the model."""
+    """Operator side, started before its controller is plugged in, for USB and for Bluetooth with one model."""
     with (
         ArmlessRobot() as robot,
         Plugged(Variant(request.param)) as plugged,
@@ -73,19 +73,19 @@ def desk(request: pytest.FixtureRequest) -> Iterator[Desk]:
 
 
 def hold(plugged: Plugged, *buttons: Button, r2_n: float = 0.0) -> None:
-    """Hold these buttons and pull R2."""
+    """Hold these buttons only, and pull R2 with `r2_n` newtons."""
     plugged.ask(lambda controller: controller.set_buttons(frozenset(buttons)))
     plugged.ask(lambda controller: controller.set_finger_force(0.0, r2_n))
 
 
 def arm_and_pull(desk: Desk) -> None:
-    """Arm as a person does, then pull R2 until the arm would move and the trigger is stiff."""
+    """Arm with the buttons that a person uses, then pull R2 until an arm would move and R2 is stiff."""
     arm_and_move(desk)
     wait_until("the trigger is stiff", lambda: not desk.plugged.ask(lambda controller: controller.released))
 
 
 def arm_and_move(desk: Desk) -> None:
-    """Arm as a person does, then pull R2 until the arm would move."""
+    """Arm with the buttons that a person uses, then pull R2 until an arm would move."""
     plugged, robot = desk.plugged, desk.robot
     plugged.plug_in()
     robot.r2_stiffness = 0.9
@@ -149,6 +149,6 @@ def test_killed_with_stiff_triggers_its_watchdog_releases_them(desk: Desk) -> No
 
 
 def released_and_stopped(desk: Desk) -> None:
-    """Wait until the triggers are free and the arm may not move."""
+    """Wait until the triggers are free and the robot side is disarmed."""
     wait_until("the triggers are released", lambda: desk.plugged.ask(lambda controller: controller.released))
     wait_until("the robot stops", lambda: desk.robot.state == "disarmed" and not desk.robot.moving)

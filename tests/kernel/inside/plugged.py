@@ -1,4 +1,4 @@
-"""Virtual controller in the machine, and hands on it."""
+"""Virtual controller inside the virtual machine, which a test plugs in, unplugs and operates."""
 
 import threading
 from collections import deque
@@ -22,21 +22,21 @@ ADDRESS: Final = "01:02:03:04:05:06"
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """Model of a controller, and its connection."""
+    """Model of a controller, and its transport: USB or Bluetooth."""
 
     transport: Transport
     model: Model = Model.DUALSENSE
 
     @property
     def name(self) -> str:
-        """Name for people."""
+        """Name of model and transport, as messages show it."""
         return f"{self.model.title} on {self.transport.value}"
 
 
 class Plugged:
-    """Simulated controller on /dev/uhid, alive in a separate thread while it is plugged in.
+    """Simulated controller, offered to the kernel through /dev/uhid by a thread while it is plugged in.
 
-    Unplugged, it keeps its state, like one that is back before it loses power.
+    While unplugged, it keeps its state, like a real controller that comes back before it loses power.
     """
 
     def __init__(self, variant: Variant) -> None:
@@ -56,7 +56,7 @@ class Plugged:
         self.unplug()
 
     def plug_in(self) -> None:
-        """Plug it in; no effect if it is plugged in."""
+        """Plug the controller in; no effect if it is plugged in already."""
         if self._thread is not None:
             return
         self._ending = False
@@ -64,7 +64,7 @@ class Plugged:
         self._thread.start()
 
     def unplug(self) -> None:
-        """Unplug it; no effect if it is unplugged."""
+        """Unplug the controller; no effect if it is unplugged already. Raise the error with which its thread ended."""
         self._ending = True
         if self._thread is not None:
             self._thread.join()
@@ -74,7 +74,7 @@ class Plugged:
             raise failure
 
     def ask(self, function: Callable[[SimulatedDualSense], Value]) -> Value:
-        """Call `function` on the simulated controller in its own thread."""
+        """Call `function` with the simulated controller in the controller's thread; return the result."""
         answers: deque[Value] = deque()
         thread = self._thread
         if thread is None:
@@ -86,7 +86,7 @@ class Plugged:
         return answers[0]
 
     def hands_off(self) -> None:
-        """Release everything."""
+        """Release triggers, sticks and buttons."""
 
         def let_go(controller: SimulatedDualSense) -> None:
             controller.set_sticks()

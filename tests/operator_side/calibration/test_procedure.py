@@ -1,4 +1,4 @@
-"""Measurements and refusals of a calibration."""
+"""Calibration of a controller: results for good measurements, and refusals of bad ones."""
 
 import math
 
@@ -114,7 +114,7 @@ def test_what_never_rests_is_refused() -> None:
         (Wear(r2=(0.26, 1.0)), 1.0, r"R2 rests at 0\.26"),
         (Wear(right=((0.4, 0.0), (0.4, 0.0))), 1.0, "the right stick rests at"),
         (Wear(left=((-0.3, 0.0), (0.3, 0.0))), 1.0, "the left stick rested at"),
-        # The highest rest and the least pull that count by themselves.
+        # The highest rest and the smallest pull, each of which is accepted by itself.
         (Wear(l2=(0.25, 0.5)), 1.0, r"L2 rests at 0\.25 and ends at 0\.50: there is too little travel"),
         (Wear(), 0.45, r"the pulls of L2 ended at 0\.45, 0\.45, 0\.45; valid: 0\.5"),
         (Wear(), 0.0, "not done: Pull L2"),

@@ -1,4 +1,4 @@
-"""Calibrations on disk: by the controller's address, whole or not at all, and refused when broken."""
+"""Calibration files: named by the controller's address, written completely or not at all, refused if invalid."""
 
 import os
 from pathlib import Path

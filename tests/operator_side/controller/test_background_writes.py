@@ -1,4 +1,4 @@
-"""Writes by a thread: the newest goes out, nobody waits, and failures are reported."""
+"""Writes in a thread: the newest values are written, the caller never waits, and failures are reported."""
 
 import threading
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ LIMIT_S = 600.0
 
 
 class SlowDevice:
-    """Device whose writes block until released."""
+    """Device whose writes block until the test releases them."""
 
     def __init__(self) -> None:
         self.written: list[Feel] = []
@@ -49,7 +49,7 @@ class SlowDevice:
 
 @pytest.fixture
 def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[SlowDevice]:
-    # However late the machine lets the thread end.
+    # Wait, as a busy machine may let the thread end late.
     monkeypatch.setattr(operator_side.controller.background_writes, "CLOSE_TIMEOUT_S", LIMIT_S)
     made = SlowDevice()
     yield made

@@ -1,4 +1,4 @@
-"""Controller that comes and goes, in virtual time: notes, searches, and no trigger left stiff."""
+"""Connection to a controller that comes and goes, in virtual time: notes, searches, and no trigger left stiff."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ STIFF = Feel(r2=feedback(3, 6))
 
 @dataclass
 class FakeDevice:
-    """Controller that can be unplugged."""
+    """Simulated device that the test can unplug."""
 
     log: list[str]
     plugged_in: bool = True
@@ -51,7 +51,7 @@ class FakeDevice:
 
 
 class FakeSearch(BackgroundSearch):
-    """Search with a chosen next result."""
+    """Search whose next result the test chooses."""
 
     def __init__(self) -> None:
         self.result: OpenController | DeviceError | None = NoDeviceError("no controller found")
@@ -73,7 +73,7 @@ class FakeSearch(BackgroundSearch):
 
 
 class World:
-    """Connection with fake search, listener and guard; `log` holds their calls."""
+    """Connection with a fake search, listener and watchdog, whose calls are listed in `log`."""
 
     def __init__(self) -> None:
         self.log: list[str] = []
@@ -221,7 +221,7 @@ def test_a_return_is_recognised_by_the_address(world: World, before: str | None,
 
 
 def test_each_trouble_is_said_once_and_looked_at_again(world: World) -> None:
-    # The system gives permission a moment after a controller appears: one refusal is no trouble yet.
+    # The system grants permission a moment after a controller appears, so a single refusal is not noted.
     world.search.result = DeviceError("no permission")
     world.run(PERIOD_S + LOOK_PERIOD_S / 2)
     assert world.connection.take_notes() == []

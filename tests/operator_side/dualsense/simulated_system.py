@@ -1,4 +1,4 @@
-"""Machine with simulated controllers, in virtual time: hidapi, the search, background writes, the watchdog."""
+"""Simulated machine in virtual time: hidapi with controllers, the search, background writes, the watchdog."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,7 +21,7 @@ PERIOD_S = 0.004
 
 
 class SimulatedHandle:
-    """hidapi's handle on a simulated controller: with hidapi's errors; waiting advances virtual time."""
+    """Stand-in for hidapi's `device`, with hidapi's errors. A read that waits advances virtual time."""
 
     def __init__(self, system: "SimulatedSystem") -> None:
         self._system = system
@@ -70,20 +70,23 @@ class SimulatedHandle:
 
 
 class SimulatedSystem:
-    """hidapi of the machine: a plugged-in controller is at its path, and another object after its return."""
+    """Stand-in for the module hidapi, with the plugged-in controllers by path.
+
+    A controller that is plugged in again is another object.
+    """
 
     def __init__(self) -> None:
         self.clock = VirtualClock(1.0)
         self.devices: dict[bytes, SimulatedDualSense] = {}
         self.failing = 0
-        """Number of transfers, to any controller, that will fail."""
+        """Number of next transfers, to any controller, that will fail."""
 
     def unplug(self, path: bytes) -> None:
-        """Remove the controller at `path`; without power it does nothing."""
+        """Remove the controller at `path`; without power its triggers are released."""
         self.devices.pop(path).write(RELEASED, self.clock.now())
 
     def transfer(self, device: SimulatedDualSense, report: bytes) -> bool:
-        """Hand an output report over; False for a transfer that failed."""
+        """Give an output report to a controller; return False if the transfer failed."""
         if self.failing > 0:
             self.failing -= 1
             return False
@@ -100,7 +103,7 @@ class SimulatedSystem:
 
 
 class StallingWrites:
-    """BackgroundWrites without a thread: writes while `stalled` go out when the stall ends."""
+    """BackgroundWrites without a thread: a write while `stalled()` is made once the stall has ended."""
 
     def __init__(self, device: Controller, stalled: Callable[[], bool]) -> None:
         self._device = device
@@ -117,7 +120,7 @@ class StallingWrites:
         return self._waiting is not None and now_s - self._since_s > STALL_S
 
     def waits_since(self, now_s: float) -> float:
-        """Return the seconds for which a write has waited; 0 for none."""
+        """Return the seconds for which a write has been waiting; 0 if none waits."""
         return 0.0 if self._waiting is None else max(now_s - self._since_s, 1e-9)
 
     def read(self, now_s: float) -> ControllerState | None:
@@ -141,7 +144,7 @@ class StallingWrites:
 
 
 class VirtualSearch(BackgroundSearch):
-    """Search without a thread."""
+    """Search without a thread: `begin` finds at once."""
 
     def __init__(self, find: Callable[[str | None], OpenController], stalled: Callable[[], bool]) -> None:
         self.looks = 0
@@ -168,7 +171,7 @@ class VirtualSearch(BackgroundSearch):
 
 
 class VirtualWatchdog(ReleaseGuard):
-    """Law of the release watchdog; its processes have separate tests."""
+    """Release watchdog in virtual time, without its process, which test_release_watchdog.py tests."""
 
     def __init__(self, system: SimulatedSystem) -> None:
         self._holds: tuple[SimulatedDualSense, bytes] | None = None
@@ -190,12 +193,12 @@ class VirtualWatchdog(ReleaseGuard):
         self._deadline_s = None
 
     def look(self) -> None:
-        """Release after a silence."""
+        """Release the controller if a beat is overdue."""
         if self._deadline_s is not None and self._system.clock.now() >= self._deadline_s:
             self.release()
 
     def release(self) -> None:
-        """Write the report, at up to three attempts."""
+        """Write the report that releases the held controller, in up to three attempts."""
         self._deadline_s = None
         if self._holds is not None:
             any(self._system.transfer(*self._holds) for _ in range(3))

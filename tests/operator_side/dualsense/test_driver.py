@@ -1,4 +1,4 @@
-"""Driver of a real controller against a stand-in for hidapi."""
+"""Driver of a real DualSense, with a stand-in for hidapi."""
 
 import sys
 import types
@@ -34,7 +34,7 @@ def open_fake(handle: FakeHandle) -> HidDualSense:
     return HidDualSense(FakeBackend({0x0CE6: {PATH: handle}}), PATH)
 
 
-# Opening it
+# Opening
 
 
 @TRANSPORTS

@@ -1,4 +1,4 @@
-"""Choice of a controller among several, or among several paths to one."""
+"""Choice of a controller among several, or among several paths to the same controller."""
 
 import threading
 
@@ -108,7 +108,7 @@ def test_the_rule_names_every_model_on_usb_and_bluetooth() -> None:
 
 
 class Looks:
-    """Find function that waits until the test releases it."""
+    """Function `find` for a search, which waits until the test releases it."""
 
     def __init__(self, result: OpenController | Exception) -> None:
         self.result = result

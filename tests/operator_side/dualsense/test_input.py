@@ -1,4 +1,4 @@
-"""Input and feature reports: every field in its place on both transports, round trips, one error for all else."""
+"""Input and feature reports: every field on both transports, round trips, and one error for all other bytes."""
 
 import contextlib
 import zlib
@@ -21,19 +21,19 @@ FIRMWARE = Firmware(0x01020304, 0x12345678, 0x0224)
 
 
 def checked(header: bytes, content: bytes) -> bytes:
-    """Append zlib's checksum of `header` and `content`; the header byte is not sent."""
+    """Append to `content` the CRC-32 of `header` and `content`; the header byte itself is not sent."""
     return content + zlib.crc32(header + content).to_bytes(4, "little")
 
 
 def framed(block: bytes, transport: Transport) -> bytes:
-    """Build a report by hand, with the common block in its place."""
+    """Build a report by hand, with the common block at the transport's offset."""
     if transport is Transport.USB:
         return b"\x01" + block
     return checked(b"\xa1", b"\x31\x01" + block + bytes(9))
 
 
 def report_with(transport: Transport, **fields: int) -> bytes:
-    """Build the report of an idle controller with bytes of the common block set: `c7=0x28` is byte 7."""
+    """Build the report of an untouched controller with some bytes of the common block set; `c7` sets byte 7."""
     block = bytearray(63)
     block[0:4] = bytes([128] * 4)
     block[7] = 0x08
@@ -109,7 +109,7 @@ def test_every_input_report_survives_a_round_trip(transport: Transport, block: b
     assert parse_input_report(report) == state
     start = 1 if transport is Transport.USB else 2
     built = report[start : start + 63]
-    # Fields with a single encoding are the same bytes: all but the hat's null states and the undefined bits.
+    # Bytes are equal where each value has only one encoding: not for the hat's null states and undefined bits.
     assert built[0:7] == block[0:7]
     assert built[7] & 0xF0 == block[7] & 0xF0
     assert built[8] == block[8]

@@ -1,4 +1,4 @@
-"""Effects and output reports: exact bytes in each framing, only our flags, round trips, and no debug code anywhere."""
+"""Effects and output reports: exact bytes in each framing, only our flags, round trips, and never a debug code."""
 
 from dataclasses import fields
 from typing import Any
@@ -42,7 +42,7 @@ CODES = [0xFC, 0xFD, 0xFE]
 
 
 def framings(block: bytes) -> tuple[bytes, bytes, bytes]:
-    """Build the report by hand: on USB, on Bluetooth as in hid-playstation, and as in SDL and most libraries."""
+    """Build a report by hand in three framings: USB; Bluetooth as hid-playstation; Bluetooth as SDL and others."""
     return (
         b"\x02" + block,
         sealed(Seed.OUTPUT, (b"\x31\xb0\x10" + block).ljust(74, b"\0")),
@@ -57,9 +57,9 @@ def framings(block: bytes) -> tuple[bytes, bytes, bytes]:
     ("effect", "expected"),
     [
         (FREE_TRIGGER, "05 00 00 00 00 00 00 00 00 00 00"),
-        # The public test vector.
+        # Test vector from public sources.
         (feedback(3, 6), "21 f8 03 00 da b6 2d 00 00 00 00"),
-        # Computed by hand: three bits a zone, strength less one, from bit 3 * zone.
+        # Computed by hand: each zone's strength minus 1, in three bits from bit 3 * zone on.
         (feedback(9, 8), "21 00 02 00 00 00 38 00 00 00 00"),
         (feedback(0, 8), "21 ff 03 ff ff ff 3f 00 00 00 00"),
         (feedback(0, 1), "21 ff 03 00 00 00 00 00 00 00 00"),

@@ -30,10 +30,10 @@ from tests.operator_side.dualsense.simulated_system import (
 
 
 class Plugs(RuleBasedStateMachine):
-    """Two controllers on USB and Bluetooth, faults of the wire and of our process, and the operator side's core.
+    """Core of an operator side with two controllers on USB and Bluetooth, with faults of transfers and of our process.
 
-    The robot side's end grants the lease and sends fields. It arms on request after released triggers, and disarms when
-    commands stop for 100 ms.
+    A stand-in for the robot side grants the lease and sends stiffness. It arms on request once the triggers were
+    released, and disarms if no command comes for 100 ms.
     """
 
     def __init__(self) -> None:
@@ -56,7 +56,7 @@ class Plugs(RuleBasedStateMachine):
     def now_s(self) -> float:
         return self.system.clock.now()
 
-    # The listener: passed on to the core
+    # Listener of the connection, which passes events on to the core
 
     def controller_found(self, now_s: float) -> None:
         if self.connection.found > self.changes.count("found"):
@@ -150,7 +150,7 @@ class Plugs(RuleBasedStateMachine):
     @precondition(lambda self: self.system.devices)
     @rule()
     def arm(self) -> None:
-        """Make the triggers stiff, if a controller is there."""
+        """End the faults, connect a controller, arm the arm and make the triggers stiff."""
         self.stalled, self.system.failing, self.strength = False, 0, 7
         for _ in range(2000):  # Another controller is taken after three searches.
             self.turn()
@@ -195,5 +195,5 @@ class Plugs(RuleBasedStateMachine):
 
 
 TestPlugs = Plugs.TestCase
-# Shrinking takes minutes.
+# Without shrinking, which would take minutes.
 TestPlugs.settings = settings(max_examples=60, stateful_step_count=20, phases=[Phase.explicit, Phase.generate])

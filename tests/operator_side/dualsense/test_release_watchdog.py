@@ -1,4 +1,4 @@
-"""Watchdog as a real process, with a FIFO in place of the controller's device node."""
+"""Release watchdog as a real process, with a FIFO in place of the controller's device node."""
 
 import contextlib
 import os
@@ -22,7 +22,7 @@ REPORT = bytes(range(48))
 
 
 class FakeController:
-    """Device node that remembers its writes."""
+    """FIFO as a device node, from which the test reads what was written."""
 
     def __init__(self, path: Path) -> None:
         self.path = os.fsencode(path)
@@ -30,7 +30,7 @@ class FakeController:
         self._file = os.open(path, os.O_RDWR | os.O_NONBLOCK)
 
     def written(self, within_s: float) -> bytes:
-        """Return the bytes written, after waiting `within_s` for the first; empty for none."""
+        """Return the bytes written; wait up to `within_s` for the first, and return none if none comes."""
         readable, _, _ = select.select([self._file], [], [], within_s)
         return os.read(self._file, 65536) if readable else b""
 
@@ -49,14 +49,14 @@ def controller(tmp_path: Path) -> Iterator[FakeController]:
 
 @pytest.fixture
 def guard(monkeypatch: pytest.MonkeyPatch) -> Iterator[ReleaseGuard]:
-    # However late the machine lets the process end.
+    # Wait, as a busy machine may let the process end late.
     monkeypatch.setattr(operator_side.dualsense.hid.release_guard, "_END_TIMEOUT_S", LIMIT_S)
     with ReleaseGuard() as made:
         yield made
 
 
 def leave(guard: ReleaseGuard) -> None:
-    """Close the watchdog's pipe, as at any end of ours; it ends by itself."""
+    """Close the watchdog's input, as happens whenever our process ends, and wait until the watchdog ends."""
     guard.__exit__(None, None, None)
     assert guard._process is not None
     assert guard._process.returncode == 0
@@ -68,7 +68,7 @@ def process_of(guard: ReleaseGuard) -> int:
 
 
 def wait_for_end(process_id: int) -> None:
-    """Wait until a process that is not our child is gone or a zombie."""
+    """Wait until a process that is not our child has ended or is a zombie."""
     try:
         watched = os.pidfd_open(process_id)
     except ProcessLookupError:
@@ -108,7 +108,7 @@ def test_when_the_beats_cease_it_releases_once_for_each_silence(
 def test_at_rest_no_beat_is_missed(guard: ReleaseGuard, controller: FakeController) -> None:
     guard.hold(controller.path, REPORT)
     wait_until_open(process_of(guard), controller.path)
-    # Both at once, however long the machine lets either process wait in between.
+    # Suspend the watchdog meanwhile, so that it reads both lines at once, even on a busy machine.
     os.kill(process_of(guard), signal.SIGSTOP)
     guard.beat()
     guard.rest()
@@ -167,7 +167,7 @@ def wait_until_open(process_id: int, path: bytes) -> None:
     with select.epoll() as pause:
         for _ in range(round(LIMIT_S / 0.01)):
             files = Path(f"/proc/{process_id}/fd").iterdir()
-            # It opens and closes others while it starts.
+            # While it starts, the process opens and closes other files.
             with contextlib.suppress(FileNotFoundError):
                 if any(os.fsencode(file.readlink()) == path for file in files):
                     return

@@ -1,4 +1,4 @@
-"""Simulated controller: the mechanics of its finger, the timing of its reports, and commands."""
+"""Simulated controller: mechanics of finger and trigger, timing of reports, and commands."""
 
 import math
 from typing import Any
@@ -47,7 +47,7 @@ def resistance_n(travel: float, strength: int) -> float:
 
 @given(FORCES, STRENGTHS)
 def test_forces_balance_at_the_equilibrium(force_n: float, strengths: tuple[int, ...]) -> None:
-    """Up to the equilibrium the finger overcomes everything; there, or one zone farther, the resistance holds."""
+    """Below the equilibrium travel the finger overcomes the resistance; there, or one zone farther, it does not."""
     travel = equilibrium_travel(force_n, strengths)
     assert 0.0 <= travel <= 1.0
     for zone in range(10):
@@ -55,7 +55,7 @@ def test_forces_balance_at_the_equilibrium(force_n: float, strengths: tuple[int,
         if begin < travel:
             assert resistance_n(end, strengths[zone]) <= force_n + 1e-9
     if 0.0 < travel < 1.0:
-        # At a boundary, to rounding, either zone may hold.
+        # At a boundary between zones, rounding decides which zone stops the finger.
         beside = {min(max(int(travel * 10 + one), 0), 9) for one in (-1e-9, 1e-9)}
         assert max(resistance_n(travel, strengths[zone]) for zone in beside) >= force_n - 1e-9
 
@@ -93,12 +93,12 @@ def state_at(device: SimulatedDualSense, now_s: float) -> ControllerState:
 
 
 def number_of(report: bytes) -> int:
-    """Return the sequence number, by the layout of a USB report."""
+    """Return the sequence number in a USB report."""
     return report[7]
 
 
 def clock_of(report: bytes) -> float:
-    """Return the sensor timestamp in seconds, by the layout of a USB report."""
+    """Return the sensor timestamp in a USB report, in seconds."""
     return int.from_bytes(report[28:32], "little") / 3e6
 
 
@@ -126,7 +126,7 @@ def test_a_late_reader_gets_the_newest_report_once_and_clocks_wrap() -> None:
 @given(st.lists(st.tuples(st.floats(0.0, 8.0), STRENGTHS, st.integers(1, 60), st.booleans()), min_size=1, max_size=5))
 @settings(max_examples=40)
 def test_how_often_it_is_read_does_not_matter(phases: list[tuple[float, tuple[int, ...], int, bool]]) -> None:
-    """Read once a phase or 20 times a report: travel and report are the same."""
+    """Reading once for each phase or 20 times for each report gives the same travel and reports."""
     coarse, fine = SimulatedDualSense(), SimulatedDualSense()
     tick = 0
     for device in (coarse, fine):
@@ -149,7 +149,7 @@ def test_how_often_it_is_read_does_not_matter(phases: list[tuple[float, tuple[in
 
 @TRANSPORTS
 def test_output_reports_change_only_what_they_set(transport: Transport) -> None:
-    """A value and a report on the wire have the same effect."""
+    """A `Feel` and the output report that it is encoded in have the same effect."""
     by_value, by_wire = SimulatedDualSense(transport), SimulatedDualSense(transport)
     third = (0, 0, 3, 0, 0, 0, 0, 0, 0, 0)
     for number, (output, l2, r2) in enumerate(
@@ -204,7 +204,7 @@ def test_close_releases_puts_a_changed_light_back_and_ends() -> None:
 
 
 def used(what: str, *arguments: Any, **named: Any) -> Any:
-    """Call a method of a controller that was read at 1 s, or of a trigger."""
+    """Call a method of a controller that was read at 1 s, or of a simulated trigger."""
     device = SimulatedDualSense()
     device.read(1.0)
     owner: Any = SimulatedTrigger() if hasattr(SimulatedTrigger, what) and what != "set_finger_force" else device

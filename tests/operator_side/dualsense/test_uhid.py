@@ -1,4 +1,4 @@
-"""/dev/uhid: its protocol to the byte, the controller offered to the kernel, the file and its loop."""
+"""Controller offered through /dev/uhid: exact bytes of the protocol, the file, and the loop."""
 
 import os
 import struct
@@ -82,7 +82,7 @@ def test_refusals() -> None:
 
 
 def lived(kernel: FakeKernel, until_s: float) -> list[float]:
-    """Offer a controller until then; return the times at which the loop asked whether to continue."""
+    """Offer a controller until `until_s`; return the times at which the loop asked whether to continue."""
     asked: list[float] = []
 
     def going(now_s: float) -> bool:
@@ -94,7 +94,7 @@ def lived(kernel: FakeKernel, until_s: float) -> list[float]:
 
 
 def test_a_life_from_plug_to_unplug() -> None:
-    """Reports before a driver is bound are lost, as on a cable that nobody polls."""
+    """Reports made before a driver uses the device are lost, as on a cable that nobody polls."""
     kernel = FakeKernel(VirtualClock(100.0), deque([(100.0, get_report(1, 5)), (100.001, said(START))]))
     lived(kernel, until_s=100.02)
     kinds = [event[0] for _, event in kernel.heard]

@@ -1,4 +1,4 @@
-"""Stand-in for an evdev node: events and plays over a socket pair, and linux/input.h's ioctls by hand."""
+"""Stand-in for an evdev device node: events go over a socket pair, and ioctls of linux/input.h are answered here."""
 
 import contextlib
 import os
@@ -16,7 +16,7 @@ def bits(*codes: int) -> bytes:
 
 
 class FakeNode:
-    """Kernel's end of the node, on a 64-bit machine."""
+    """Kernel's end of an evdev device node, with the layouts of a 64-bit machine."""
 
     def __init__(self, keys: tuple[int, ...] = PAD_KEYS, effects: tuple[int, ...] = (0x50,)) -> None:
         ours, self._theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -26,7 +26,7 @@ class FakeNode:
         self.values = dict.fromkeys(range(4), 128) | {2: 0, 5: 0, 3: 128, 4: 128, 16: 0, 17: 0}
         self.down: set[int] = set()
         self.uploaded: list[tuple[int, int, int, int]] = []
-        """Id, length in ms, strong and weak magnitude of each upload."""
+        """Id, length in ms, strong and weak magnitude of each uploaded effect."""
         self._bits = {0x20: bits(0, 1, 3, 21), 0x21: bits(*keys), 0x23: bits(*RANGES), 0x35: bits(*effects)}
 
     def ioctl(self, descriptor: int, request: int, content: Any) -> int:
@@ -54,11 +54,11 @@ class FakeNode:
         return 0
 
     def send(self, *events: tuple[int, int, int]) -> None:
-        """Send events (kind, code, value), and the end of a report."""
+        """Send events (kind, code, value), and then the event that ends a report."""
         self._theirs.sendall(b"".join(EVENT.pack(0, 0, *event) for event in (*events, (0, 0, 0))))
 
     def plays(self) -> list[tuple[int, int]]:
-        """Return the played effects (id, count) since the last call."""
+        """Return the effects (id, count) that were played since the last call."""
         try:
             content = self._theirs.recv(65536)
         except BlockingIOError:

@@ -1,4 +1,4 @@
-"""Gamepad with rumble on a fake node: hands are read as the kernel holds them, and stiffness becomes rumble."""
+"""Gamepad with rumble on a fake device node: inputs are read, and stiffness becomes rumble."""
 
 from collections.abc import Iterator
 from itertools import pairwise

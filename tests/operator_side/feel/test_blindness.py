@@ -1,4 +1,4 @@
-"""Signal of blindness; tests/operator_side/test_core_states.py covers every order of events."""
+"""Rumble and light that signal blindness; test_core_states.py tests the states in any order of events."""
 
 import itertools
 

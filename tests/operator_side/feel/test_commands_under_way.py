@@ -1,4 +1,4 @@
-"""Commands under way agree with fine time steps, for all commands and times."""
+"""Displacement by commands under way: equal to an integration in fine time steps, for any commands and times."""
 
 import itertools
 import math
@@ -22,7 +22,7 @@ COMMANDS = st.lists(TRAVEL, min_size=1, max_size=60)
 
 
 def sent_every(travels: list[float], period_s: float = PERIOD_S) -> CommandsUnderWay:
-    """Return commands of which number i left after i periods."""
+    """Return a history of commands, of which number i was sent after i periods."""
     commands = CommandsUnderWay()
     for index, travel in enumerate(travels):
         commands.sent(index * period_s, travel)
@@ -45,7 +45,7 @@ def displacement(
 
 
 def stepped(travels: list[float], now_s: float, since_s: float, speed_m_s: float, acceleration: float) -> Displacement:
-    """Compute the same by time steps, none across a command; command i holds from i periods on."""
+    """Compute the displacement by fine time steps, each within one command; command i holds from i periods on."""
     displacement_m, commands = (
         0.0,
         [index * PERIOD_S for index in range(len(travels)) if since_s < index * PERIOD_S < now_s],
@@ -99,7 +99,7 @@ def test_the_speed_given_to_the_newest_command_replaces_the_speed_asked_for(
 def test_a_course_beside_a_stick_that_costs_no_time_goes_the_same_way(
     changes: list[float], speed: float, acceleration: float, data: st.DataObject
 ) -> None:
-    """Every 10 ms the course approaches the mean of a finger's commands that takes 40 ms from end to end."""
+    """A course follows the mean command of each 10 ms, so that it differs a little from `displacement`."""
     commands, now_s, travel = CommandsUnderWay(), (len(changes) - 1) * PERIOD_S + 0.01, 0.0
     for index, change in enumerate(changes):
         travel = min(max(travel + change, -1.0), 1.0)
@@ -113,13 +113,14 @@ def test_a_course_beside_a_stick_that_costs_no_time_goes_the_same_way(
 
 
 def test_a_command_that_had_not_come_when_it_should_have_is_still_under_way() -> None:
-    # The robot had nothing newer than 0.0 for 30 ms: the command of 4 ms comes at the time of the report or later.
+    # At the report, the robot side had held the command of 0 ms for 30 ms. So the command of 4 ms arrives with the
+    # report or later.
     commands = sent_every([1.0] + [0.0] * 24)
     speed = 0.25
     late = displacement(commands, 0.1, 0.0, 0.030, speed)
     assert late == displacement(commands, 0.1, 0.0, 0.004, speed)
     assert late.displacement_m == pytest.approx(speed**2 / (2.0 * 3.0))
-    # Without another command after it, `held` is taken as it is.
+    # Without a later command, `held` is used unchanged.
     alone = sent_every([1.0])
     assert displacement(alone, 0.1, 0.0, 0.030, speed).displacement_m == pytest.approx(0.07 * speed)
 
@@ -168,7 +169,7 @@ def test_memory_is_bounded_whatever_the_rate() -> None:
     for tick in range(10_000):
         commands.sent(1e-6 * tick, 0.0)
     assert len(commands) == 4096
-    # Forgotten commands do not count as none.
+    # Commands that have left the history are unknown; they do not count as zero.
     assert commands.displacement(0.01, Report(0.001, 0.0, 0.0, FULL_M_S), 3.0) is None
     for tick in range(2000):
         commands.sent(1.0 + PERIOD_S * tick, 0.0)

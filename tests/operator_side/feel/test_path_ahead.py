@@ -1,4 +1,4 @@
-"""Objects where the sticks lead are felt by their mover before the robot side can know."""
+"""Path ahead: objects where the sticks lead are felt before the robot side has received the sticks' commands."""
 
 from typing import Any
 
@@ -30,14 +30,14 @@ TRAVELS = zone_travels(TriggerTravel())
 RIGHT_ACROSS, RIGHT_TURNED, UP_ACROSS = (1, 2, 3), (4, 5), (6, 7, 8)
 RIGHT: Sticks = (1.0, 0.0, 0.0, 0.0)
 CHANGES_S = np.diag([FIELD.full_speed_m_s / FIELD.acceleration_m_s2, 0.0, 0.0, 0.0, 0.0])
-"""Time constants of changes: only the trigger takes time."""
+"""K of Course for one joint per axis: only changes of the trigger take time"""
 REPORT = Report(0.0, 0.0, 0.0, FIELD.full_speed_m_s)
 
 HORIZON_M = 0.4
 
 
 def around(near: dict[int, float], *, advancing: bool = True) -> Around:
-    """Return a map with nothing within reach, except from these probes."""
+    """Return a map that is free, except for these probes with their contact distances."""
     onsets_m = np.full((LISTS, PROBES), np.inf)
     for probe, displacement_m in near.items():
         onsets_m[slice(0, 2) if advancing else slice(2, 4), probe] = displacement_m
@@ -45,7 +45,7 @@ def around(near: dict[int, float], *, advancing: bool = True) -> Around:
 
 
 def under_way(now_s: float, sticks: Sticks, travel: float = 0.0, since_s: float = 0.0) -> CommandsUnderWay:
-    """Return commands at rest until `since_s`, and as given from then on, every 4 ms."""
+    """Return a history with a command every 4 ms: at rest until `since_s`, and as given from then on."""
     commands = CommandsUnderWay()
     for number in range(round(now_s / 0.004) + 1):
         moves = number * 0.004 >= since_s - 1e-9
@@ -75,11 +75,11 @@ def test_sticks_that_rest_are_not_traced() -> None:
 
 @pytest.mark.parametrize("forth", [True, False])
 def test_what_stands_where_the_stick_leads_makes_the_zones_full_that_get_so_far(forth: bool) -> None:
-    """Within 0.4 s of commands under way and what follows, the stick leads past two thirds and on to the end."""
+    """With 0.4 s of commands under way, the stick leads beyond the probe at two thirds and to the outermost one."""
     commanded = around(dict.fromkeys(RIGHT_ACROSS, 0.03), advancing=forth)
     found = first_zone(commanded, RIGHT, forth=forth)
     assert 0 < found < ZONE_COUNT
-    # The last zone gets less far, this one farther: u h + u²/2a, from rest less what the start takes.
+    # The last zone gets less far, this one farther: u h + u²/2a, less the distance that starting from rest costs.
     for zone, reaches in ((found - 1, False), (found, True)):
         u = TRAVELS[zone] * FIELD.full_speed_m_s
         assert (u * HORIZON_S >= 0.03) is reaches
@@ -106,22 +106,22 @@ def test_what_lies_straight_ahead_of_a_turn_or_a_drift_is_not_met() -> None:
     assert first_zone(commanded, AT_REST) == ZONE_COUNT  # not traced
     for sticks in (RIGHT, (0.0, 0.0, 1.0, 0.0)):
         assert first_zone(commanded, sticks) == ZONE_COUNT
-        # A stick that has just begun is still before the object.
+        # A stick that was deflected just now has not reached the object yet.
         assert first_zone(commanded, sticks, now_s=0.0) < ZONE_COUNT
 
 
 def test_a_stick_that_is_let_go_now_leads_to_what_it_would_have_passed() -> None:
-    """Whether the stick continues is unknown: it has just begun, and the object is at the gripper's place."""
+    """The stick was deflected just now, and the object is at the gripper's position: a stick released now meets it."""
     commanded = around({0: 0.05})
     assert first_zone(commanded, RIGHT, now_s=0.012) < ZONE_COUNT
-    # After two thirds of the distance to the first probe it has led past.
+    # After two thirds of the distance to the first probe the stick has led past the object.
     assert first_zone(commanded, RIGHT, now_s=0.2) == ZONE_COUNT
 
 
 def test_strength_rises_before_full_as_it_does_straight_ahead_and_no_farther() -> None:
     rising = onsets(*(0.193 + 0.001 * k for k in range(8)))
     two_things = onsets(0.05, 0.06, *(0.195 + 0.001 * k for k in range(6)))
-    # From rest: braking gives back what the start takes.
+    # From rest: braking adds the distance that starting costs.
     reaches_m = FIELD.full_speed_m_s * TRAVELS[-1] * HORIZON_S
     for field in (rising, two_things):
         commanded = around(dict.fromkeys((*RIGHT_ACROSS, 0), reaches_m + 0.003))
@@ -142,7 +142,7 @@ def test_both_sticks_at_once_take_the_shorter_way() -> None:
     turned = first_zone(commanded, (0.0, 0.0, 1.0, 0.0))
     assert turned < ZONE_COUNT
     assert first_zone(commanded, (1.0, 0.0, 1.0, 0.0)) == turned
-    # A stick between two directions meets objects in either.
+    # A stick deflected between two directions meets objects in either direction.
     assert first_zone(around(dict.fromkeys(RIGHT_ACROSS, 0.02)), (0.7, 0.4, 0.0, 0.0)) < ZONE_COUNT
     assert first_zone(around(dict.fromkeys(UP_ACROSS, 0.02)), (0.9, 0.05, 0.0, 0.0)) == ZONE_COUNT
     diagonal = around(dict.fromkeys((*RIGHT_ACROSS, *UP_ACROSS), 0.02))
@@ -150,7 +150,7 @@ def test_both_sticks_at_once_take_the_shorter_way() -> None:
 
 
 def probes_at() -> FloatArray:
-    """Return the probes' places (PROBES, 4), as shares of T of a fully deflected stick."""
+    """Return the probes' positions (PROBES, 4), as shares of the outermost probe's displacement."""
     found = [[0.0, 0.0, 0.0, 0.0]]
     for x, y in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)):
         found += [[part * x / 3, part * y / 3, 0.0, 0.0] for part in (1, 2, 3)]
@@ -233,7 +233,7 @@ def test_without_a_map_or_where_the_robot_side_reckons_nothing_is_traced() -> No
 
 
 def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> None:
-    """An object that the stick reaches is felt 10 ms late at most."""
+    """So an object to which the stick leads is felt at most 10 ms late."""
     commanded, free = around(dict.fromkeys((*RIGHT_ACROSS, 0), 0.03)), around({})
     made = haptics()
     assert strengths(made, message(0.3, free)) == (0,) * ZONE_COUNT
@@ -246,7 +246,7 @@ def test_a_path_is_traced_once_for_each_write_and_at_once_for_a_new_map() -> Non
 
 
 def test_what_is_to_be_touched_is_felt_beside_a_stick_in_the_zones_that_touch_it() -> None:
-    """A map has distances of full strength only; a target's slow distances rise to strength 4, with full behind."""
+    """A map has only distances of full strength. A target's slow list has strengths up to 4 before that."""
     target = msgspec.structs.replace(FIELD, slow_m=onsets(*[0.002] * 4, *[0.3] * 4), fast_m=onsets(*[0.002] * 8))
     slow, fast = around({0: 0.002}).onsets_m(FAR_M)[:2], around({}).onsets_m(FAR_M)[0]
     commanded = Around.of(FULL_S, np.stack([slow[0], fast, fast, fast]), CHANGES_S)

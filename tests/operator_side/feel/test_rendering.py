@@ -1,4 +1,4 @@
-"""Rendering of fields over time: both triggers' zones, and the motors."""
+"""Rendering of stiffness fields over time: strengths of both triggers' zones, and the motors."""
 
 import pytest
 from hypothesis import given
@@ -66,7 +66,7 @@ def test_a_contact_is_signalled_by_one_short_pulse_of_the_right_motor() -> None:
     assert motors(True, 1.082) == motors(True, 9.0) == motors(False, 9.001) == Rumble()
     assert motors(True, 9.002) == Rumble(0.0, 0.7)
     assert rendering.render(None, LET_GO, None, 9.01) == RELEASED
-    # An object still in contact when the field is back is no news.
+    # An object that is still set down when stiffness messages are back causes no pulse.
     assert motors(True, 20.0) == Rumble()
 
 
@@ -90,7 +90,7 @@ def test_the_free_travel_is_the_way_that_is_left() -> None:
         rendering = TriggerRendering(USUAL, TravelCalibration())
         ahead = field(onsets(left_m))
         free.append(zones(rendering.render(update(uniform_field(0), ahead), LET_GO, STILL, 0.0))[1].count(0))
-    # A zone of 0.184 m/s needs 0.3 * 0.184 + 0.184²/6 = 61 mm: the sixth.
+    # The zone that commands 0.184 m/s, the sixth, needs 0.3 * 0.184 + 0.184²/6 = 61 mm.
     assert free == [10, 5, 3, 1, 0]
 
 

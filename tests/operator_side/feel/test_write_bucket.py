@@ -1,4 +1,4 @@
-"""At most 100 writes in any second, releases at once, and danger without long waits."""
+"""Writes to a controller: at most 100 in any second, releases at once, and short waits for all else."""
 
 from typing import Any
 
@@ -30,7 +30,7 @@ RELEASE = NOTHING | {"state": "disarmed"}
 
 
 class Run:
-    """Operator side with a report every millisecond, and its controller."""
+    """Operator side that receives stiffness every millisecond, and the writes to its controller."""
 
     def __init__(self) -> None:
         self.side, self.robot = OperatorSide(2, "clock"), LinkEnd("robot", 1, "clock")

@@ -1,4 +1,4 @@
-"""The ten zones: exact in examples by hand, and monotone for any finger and arm."""
+"""Strengths of the ten zones: exact in examples computed by hand, and monotone for any travel and field."""
 
 from typing import Any
 
@@ -24,7 +24,7 @@ WAYS = st.lists(st.floats(-0.1, HORIZON_M), min_size=8, max_size=8).map(lambda m
 
 @st.composite
 def fields(draw: st.DrawFn) -> TriggerField:
-    """Draw fields; slow distances are never the shorter ones."""
+    """Draw fields whose slow onset distances are never shorter than the fast ones."""
     fast: OnsetDistances = draw(WAYS)
     slow = onsets(*(metres + draw(st.floats(0.0, 0.1)) for metres in fast)) if draw(st.booleans()) else fast
     full, acceleration = draw(st.floats(0.05, 0.5)), draw(st.floats(1.0, 20.0))
@@ -49,7 +49,7 @@ def test_an_example_worked_out_by_hand() -> None:
         acceleration_m_s2=3.0,
     )
     # u = 0.02, 0.06, 0.10 .. 0.30 m/s; D = 0.01 + 0.3 u + u²/6 + max(0, 0.2 - u)²/6
-    #   = 21.5, 31.9, 43.3, 55.9, 69.5, 84.1, 99.3, 115, 115, 115 mm; below 45 mm/s by the slow ways.
+    #   = 21.5, 31.9, 43.3, 55.9, 69.5, 84.1, 99.3, 115, 115, 115 mm; below 45 mm/s with the slow list.
     zones = zone_strengths(ahead, 0.2, zone_travels(TriggerTravel(0.0, 1.0)), 0.0, Displacement(0.01, 0.2), 0.3)
     assert zones == ((1, 1, 1, 3, 4, 6, 7, 7, 7, 7), 0)
     zones = zone_strengths(ahead, 0.11, zone_travels(TriggerTravel(0.0, 1.0)), 0.0, Displacement(0.01, 0.2), 0.3)
@@ -57,7 +57,7 @@ def test_an_example_worked_out_by_hand() -> None:
 
 
 def one_by_one(ahead: TriggerField, travels: tuple[float, ...], other: float, moving: Displacement) -> list[int]:
-    """Compute each zone's strength by the equation alone."""
+    """Compute each zone's strength directly by the equation of D_z."""
     full, strengths = ahead.full_speed_m_s, [0]
     advancing = [travel for travel in travels if travel > other]
     for travel in travels:
@@ -97,7 +97,7 @@ def test_what_is_beyond_the_horizon_is_full_and_counted_and_no_sooner() -> None:
 
 @pytest.mark.parametrize(("full_speed_m_s", "slow_zones"), [(0.25, 2), (0.1, 2), (0.5, 1), (2.0, 1)])
 def test_slow_zones_take_the_slow_ways(full_speed_m_s: float, slow_zones: int) -> None:
-    # Below 45 mm/s, or below 18 % of a slower arm's full speed.
+    # Slow zones: below 45 mm/s, or below 18 % of full speed if that is less.
     touching = field(onsets(-1.0), onsets(1.0), full_speed_m_s=full_speed_m_s)
     strengths = zone_strengths(touching, 10.0, USUAL, 0.0, STILL).strengths
     assert strengths == (0,) * slow_zones + (8,) * (10 - slow_zones)

@@ -1,4 +1,4 @@
-"""One table of buttons and actions, with docs and help that agree."""
+"""Button map: docs and help texts agree with it."""
 
 import re
 
@@ -27,17 +27,17 @@ def test_the_help_says_what_the_code_does(capsys: pytest.CaptureFixture[str]) ->
     said = " ".join((OperatorSettings.__doc__ or "").split()).lower()
     assert said.split(". ")[0].rstrip(".") in " ".join(re.sub("[│╭╮╰╯─|]", " ", shown).split()).lower()
     for words in (
-        "l1 held: the arm may move",
-        "options: arm it",
+        "the arm moves only while l1 is held",
+        "options arms it",
         "circle stops everything",
-        "cross closes",
-        "square opens the gripper",
+        "cross closes the gripper",
+        "square opens it",
         "triangle changes the target",
         "create hands the robot over",
         "r2 advances",
         "l2 retreats",
         "the left stick moves across",
-        "the right one turns",
+        "the right stick turns",
     ):
         assert words in said
     assert {button.value.lower() for button in BUTTON_OF.values()} <= set(re.findall(r"\w+", said))

@@ -1,4 +1,4 @@
-"""Operator's intent from the controller's state: calibration and the button map."""
+"""Operator's intent from a controller's state, by calibration and button map."""
 
 import pytest
 
@@ -39,7 +39,7 @@ def test_swapped_sides_swap_triggers_sticks_and_l1_and_nothing_else() -> None:
     )
     plain = operator_intent(state, calibration)
     swapped = operator_intent(state, calibration, swap_sides=True)
-    # Each trigger keeps its own calibration: only their purposes are swapped.
+    # Each trigger keeps its own calibration; only the triggers' purposes are swapped.
     assert (plain.l2, plain.r2) == pytest.approx((0.5, 0.5))
     assert (swapped.l2, swapped.r2) == (plain.r2, plain.l2)
     assert (swapped.lateral, swapped.turning) == (plain.turning, plain.lateral)

@@ -1,4 +1,4 @@
-"""From raw to calibrated travel: dead zones, saturation, sticks that rest off centre."""
+"""Calibrated travel and deflection: dead zones, saturation, sticks that rest off centre."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Scripted person alone: hand-made views of an imaginary robot, and the hands' reactions."""
+"""Scripted person without a robot: the test shows made-up telemetry, and checks how the person reacts."""
 
 import dataclasses
 import math
@@ -47,7 +47,7 @@ def test_nothing_is_answered_before_the_reaction_time(reaction_s: float) -> None
 # The phases
 
 UP_AT_M = 0.41
-"""Height to which an object gripped with the tool at 0.3 m is carried, in metres."""
+"""Height of the tool, in metres, at which an object that was gripped at 0.3 m is carried"""
 
 
 def at_height(height_m: float, back_m: float = 0.44, *, holding: bool = True) -> Telemetry:
@@ -55,7 +55,7 @@ def at_height(height_m: float, back_m: float = 0.44, *, holding: bool = True) ->
 
 
 def carried(settings: PersonSettings = CLEAR_SIGHTED) -> Desk:
-    """Return a desk at the moment when the person begins to lower the object."""
+    """Return a desk whose person begins to lower the object."""
     desk = Desk(settings)
     desk.arm()
     desk.until(Doing.LIFTING, armed(holding=True), 3.0)
@@ -65,7 +65,7 @@ def carried(settings: PersonSettings = CLEAR_SIGHTED) -> Desk:
 
 
 def sinks(desk: Desk, from_m: float, to_m: float, speed_m_s: float) -> None:
-    """Show the tool sinking."""
+    """Show a tool that sinks from `from_m` to `to_m`."""
     height_m = from_m
     while height_m > to_m:
         desk.watch(at_height(height_m), FRAME_S)
@@ -82,7 +82,7 @@ def test_the_task_from_waiting_to_withdrawing() -> None:
     for hands in desk.watch(None, 0.5):
         assert (hands.l2_n, hands.r2_n, hands.left, hands.buttons) == (0.0, 0.0, (0.0, 0.0), frozenset({Button.L1}))
         assert hands.phase == Doing.RESTING
-    # The first picture takes a reaction time, and arming needs hands at rest.
+    # The person sees the first telemetry one reaction late, and arming requires inputs at rest.
     assert 0.7 < desk.until(Doing.ARMING, VIEW, 3.0) < 1.3
     assert all(hands.buttons == {Button.L1, Button.OPTIONS} for hands in desk.watch(VIEW, 0.1))
     desk.until(Doing.ADVANCING, armed((0.0, 0.0, 0.3)), 0.5)
@@ -94,13 +94,13 @@ def test_the_task_from_waiting_to_withdrawing() -> None:
     assert closing[-1].r2_n == closing[-1].l2_n == 0.0
     desk.until(Doing.LIFTING, armed(holding=True), 1.0)
     desk.watch(armed(holding=True), 1.0)
-    # They carry it back, level, and no farther than they meant.
+    # They carry the object back horizontally, no farther than intended.
     desk.until(Doing.CARRYING, at_height(UP_AT_M, 0.5), 0.5)
     back = desk.watch(at_height(UP_AT_M, 0.5), 0.5)[-1]
     assert (back.l2_n > 0.0, back.r2_n, back.left, Button.CROSS in back.buttons) == (True, 0.0, (0.0, 0.0), True)
     assert 0.0 < desk.watch(at_height(UP_AT_M, 0.46), 1.0)[-1].l2_n < back.l2_n
     desk.until(Doing.LOWERING, at_height(UP_AT_M), 0.5)
-    # An object that sags before it is lowered is not in contact yet.
+    # An object that sinks a little before it is lowered does not count as set down.
     sinks(desk, UP_AT_M, UP_AT_M - 0.004, 0.01)
     lowering = desk.watch(at_height(UP_AT_M - 0.004), 1.0)[-1]
     assert lowering.phase == Doing.LOWERING
@@ -109,7 +109,7 @@ def test_the_task_from_waiting_to_withdrawing() -> None:
     assert desk.person.phase == Doing.LOWERING
     desk.until(Doing.LETTING_GO, at_height(0.32), 1.0)
     assert all(hands.buttons == {Button.L1, Button.SQUARE} for hands in desk.watch(at_height(0.32), 0.5)[1:])
-    # First up from where they pressed it down, then back.
+    # First up, as they have pressed the object down, then back.
     rising = desk.watch(at_height(0.32, holding=False), 1.0)[-1]
     assert (rising.phase, stick_speed_m_s(rising) < 0.0) == (Doing.LETTING_GO, True)
     desk.until(Doing.DRAWING_BACK, at_height(0.335, holding=False), 0.5)
@@ -130,7 +130,7 @@ def test_a_trusting_person_lowers_gently_from_a_reaction_after_rumble_until_cont
     eased = [h.now_s for h in desk.hands if h.now_s >= felt_s and stick_speed_m_s(h) < 1.01 * GENTLY_M_S]
     assert bool(eased) == bool(trust)
     assert all(eased_s - felt_s > 0.15 for eased_s in eased)
-    # It stays gentle: what was felt is still there.
+    # The person stays gentle: the object that was felt is still there.
     desk.tell(Feel(rumble=Rumble()))
     assert (stick_speed_m_s(desk.watch(at_height(0.35), 0.3)[-1]) < 1.01 * GENTLY_M_S) == bool(trust)
 
@@ -169,14 +169,14 @@ def test_they_pull_as_far_as_distance_and_delay_ask_for(
 def test_the_stick_goes_to_where_the_target_is_seen(
     across_m: tuple[float, float], direction: tuple[float, float]
 ) -> None:
-    """The tool's y axis points down the screen, the stick's up."""
+    """The tool's y axis points down on the screen, the stick's y axis up."""
     desk = Desk()
     desk.arm()
     hands = desk.watch(armed((*across_m, 0.2)), 1.0)[-1]
     length = math.hypot(*hands.left)
     assert length > CALIBRATION.left_stick.dead_zone
     assert (hands.left[0] / length, hands.left[1] / length) == pytest.approx(direction)
-    # At this distance from the line they centre first.
+    # At this distance of the target from the tool axis, they centre first.
     assert hands.r2_n == 0.0
 
 
@@ -188,7 +188,7 @@ def test_lifting_goes_up_whichever_way_the_tool_points(up: Vector3) -> None:
     desk.until(Doing.LIFTING, screen, 3.0)
     hands = desk.watch(screen, 1.0)[-1]
     x, y = CALIBRATION.left_stick.deflection(hands.left)
-    # Right, down and forward of the tool frame, each as a share of its full speed.
+    # Right, down and forward in the tool's frame, each as a share of full speed.
     assert (x, -y) == pytest.approx((0.5 * up[0], 0.5 * up[1]), abs=1e-9)
     for side, force_n in ((1, hands.r2_n), (-1, hands.l2_n)):
         meant = max(0.0, 0.5 * side * up[2])
@@ -281,7 +281,7 @@ def test_a_person_who_moves_and_waits_moves_the_seen_distance_and_looks_after_th
     first, ends = pulled.index(True), pulled.index(False, pulled.index(True))
     again = pulled.index(True, ends)
     assert (again - ends) * TICK_S == pytest.approx(delay_s + 0.25, abs=0.1)
-    # The path of a minimum-jerk move, by the intended travel and not by the lagging finger's.
+    # The path of a minimum-jerk move, by the intended travel, which the finger follows with a lag.
     meant = [habitual_travel(hands.r2_n) * FULL_TRIGGER_M_S * TICK_S for hands in seen[first:ends]]
     assert sum(meant) == pytest.approx(0.2 + GRASP_M, rel=0.02)
 
@@ -290,7 +290,7 @@ def test_a_person_who_moves_and_waits_moves_the_seen_distance_and_looks_after_th
 
 
 def habitual_travel(force_n: float) -> float:
-    """Return a free trigger's calibrated travel at that force."""
+    """Return the calibrated travel that a free trigger would have under this force."""
     return (
         0.0 if force_n == 0.0 else CALIBRATION.r2.travel((force_n - SPRING_PRELOAD_N) / SPRING_RISE_N / SENSED_TRAVEL)
     )

@@ -1,4 +1,4 @@
-"""Sent commands: the robot side holds what the hands mean, within what no finger does on purpose."""
+"""Sending of commands: the robot side's held command differs from the intent by at most 0.01."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -51,7 +51,7 @@ def test_a_hand_that_holds_still_is_heard_every_16_ms_and_at_full_rate_each_time
 
 
 def test_five_commands_of_resting_hands_may_come_late_before_the_robot_side_stops_the_arm() -> None:
-    """Each of the connections in turn may wait for a lost packet; a turn may be late by 3 ms."""
+    """Commands may be late because each connection in turn waits for a lost packet, and a turn may be 3 ms late."""
     held = HeldCommand()
     sent = [turn * MOTION_PERIOD_S for turn in range(250) if held.due(REST, 7, turn * MOTION_PERIOD_S) is not None]
     gap_s = SafetySettings().gap_s

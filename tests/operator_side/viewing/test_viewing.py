@@ -1,4 +1,4 @@
-"""Views at this side: facts of the core, figures of the scene, and the viewers that get them."""
+"""Views at the operator side: facts of the core, figures of the scene, and what console and status get."""
 
 import math
 from collections import deque
@@ -43,7 +43,7 @@ def facts_of(bench: Bench, surroundings: Surroundings | None = None) -> Operator
 
 
 def felt_bench(*, swap_sides: bool = False, l2: float = 0.0, r2: float = 0.0) -> Bench:
-    """Return a bench at rest, with compensation by the robot side."""
+    """Return a bench that has received stiffness for an arm at rest; the robot side compensates the delay."""
     bench = Bench(compensation="robot", swap_sides=swap_sides)
     bench.hands(Button.L1, l2=l2, r2=r2)
     bench.feel_field(
@@ -110,7 +110,7 @@ def test_delays_are_those_of_the_last_second() -> None:
     assert there.newest_ms == pytest.approx(99.0)
     bench.now_s += 1.1
     assert facts_of(bench).to_operator.mean_ms is None
-    # Half of the round trip is used for an unknown one-way delay.
+    # If the one-way delay is unknown, half of the round trip is used.
     bench.side.link.recent.append((bench.now_s, None, 0.2))
     facts = facts_of(bench)
     assert facts.to_operator.mean_ms is None
@@ -118,7 +118,7 @@ def test_delays_are_those_of_the_last_second() -> None:
 
 
 class FakeConsole:
-    """Console whose pages are in the test's hands."""
+    """Stand-in for the console, whose pages and messages the test sets."""
 
     def __init__(self) -> None:
         self.pages = 0
@@ -151,7 +151,7 @@ def surroundings(now_s: float) -> Surroundings:
 
 
 class Looking:
-    """Operator side with a turn each 4 ms."""
+    """Operator side with a fake console, and a turn of the loop every 4 ms."""
 
     def __init__(self) -> None:
         self.bench, self.console = Bench(), FakeConsole()
@@ -185,7 +185,7 @@ def test_four_times_a_second_it_is_asked_for_and_thirty_times_shown() -> None:
     assert 295 <= len(looking.console.shown) <= 301
     looking.console.pages = 0
     assert looking.turns(1.0) == []
-    # After a pause it continues at its rate, without catching up.
+    # After a pause, facts continue at their rate, without making up for missed ones.
     before, looking.console.pages = len(looking.console.shown), 1
     looking.turns(1.0)
     assert 29 <= len(looking.console.shown) - before <= 31

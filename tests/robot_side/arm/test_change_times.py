@@ -1,4 +1,4 @@
-"""Time in which the arm follows trigger and sticks together, against the references of its joints."""
+"""Following trigger and sticks with change times of the tool gives the motion that the joints' acceleration allows."""
 
 import numpy as np
 from hypothesis import given, settings

@@ -1,4 +1,4 @@
-"""Estimate of joints and fingers beside the same filters in plain NumPy, and its restarts."""
+"""Estimate of joints and fingers from noisy readings, compared with the same filters in NumPy; and its restarts."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ def state(time_s: float, joints: FloatArray, velocities: FloatArray, fingers: Fl
 
 
 def test_it_is_a_complementary_filter_and_an_alpha_beta_filter() -> None:
-    """Compare with the filters in plain NumPy, over uneven steps."""
+    """Both filters equal those in plain NumPy, over time steps of different lengths."""
     random, estimate, time_s = np.random.default_rng(6), JointEstimate(), 0.0
     joints, fingers, finger_velocities = np.zeros(5), np.zeros(2), np.zeros(2)
     last_velocities = np.zeros(5)

@@ -1,4 +1,4 @@
-"""From hands to joints: tool motion, resolved rates, abilities of the arm, each beside the same in plain NumPy."""
+"""From an intent to joint velocities: tool motion, resolved rates and the arm's limits, compared with plain NumPy."""
 
 import dataclasses
 import math
@@ -98,7 +98,7 @@ def test_limits_hold_and_keep_the_direction(twist: FloatArray, limits: FloatArra
     jacobian = jacobian_with(np.linspace(0.2, 1.0, 6), seed, 6)
     free, limited = joint_velocities(jacobian, twist, FREE), joint_velocities(jacobian, twist, limits)
     assert (np.abs(limited) <= limits * (1.0 + 1e-12)).all()
-    # Parallel and of the same sense, and no shorter than necessary.
+    # Of the same direction, and no shorter than necessary.
     np.testing.assert_allclose(limited * np.linalg.norm(free), free * np.linalg.norm(limited), atol=1e-9)
     assert limited @ free >= 0.0
     if (np.abs(free) > limits).any():
@@ -124,7 +124,7 @@ def test_values_that_are_not_finite_are_refused(bad: float) -> None:
 @pytest.mark.parametrize("joints", [5, 6, 7])
 @pytest.mark.parametrize("smallest", [0.0, 1e-9, 1e-3, 0.02, 0.05, 0.0599, 0.06 - 1e-12, 0.06 + 1e-12, 0.0601, 0.1])
 def test_the_solution_is_the_damped_one_on_both_sides_of_the_threshold(smallest: float, joints: int) -> None:
-    """Above the threshold the solver needs no singular values."""
+    """Above the threshold, where nothing is damped, the solver takes a path without singular values."""
     twist = np.random.default_rng(7).uniform(-0.2, 0.2, 6)
     for seed in range(20):
         singular_values = np.append(np.linspace(2.0, 0.3, min(joints, 6) - 1), smallest)

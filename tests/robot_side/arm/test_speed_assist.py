@@ -1,4 +1,4 @@
-"""Speed is capped so that the arm still stops before full strength; objects to be touched stay in reach."""
+"""Speed assistance: the arm can always stop before the distance of full strength, and can still touch the target."""
 
 import pytest
 from hypothesis import given, settings

@@ -1,4 +1,4 @@
-"""Contact of a held object with a support: noticed at once, never in the air, and kept until the tool rises."""
+"""A held object that is set down: its contact is noticed at once, never in the air, and counts until the tool rises."""
 
 import numpy as np
 import pytest
@@ -10,11 +10,11 @@ from robot_side.arm.touchdown import Touchdown, carried_n
 
 TICK_S = 1e-3
 STIFFNESS_N_M = 8e3
-"""Stiffness of the built-in arm at its tool, about 8 N a millimetre."""
+"""Stiffness of the built-in arm at its tool in N/m: about 8 N for each millimetre"""
 
 
 class Arm:
-    """Tool that follows its commands, with a load in its fingers, above a table at height 0."""
+    """Simulated tool that follows its commands exactly and holds an object above a table at height 0."""
 
     def __init__(self, weight_n: float = 2.0, *, measures: bool = True, noise_n: float = 0.0) -> None:
         self.touchdown = Touchdown()
@@ -25,11 +25,11 @@ class Arm:
 
     @property
     def pressed_n(self) -> float:
-        """Return the force on the table in newtons."""
+        """Force with which the held object is pressed on the table, in newtons."""
         return STIFFNESS_N_M * max(0.0, -self.meant_m)
 
     def go(self, speed_m_s: float, duration_s: float, jolt_n: float = 0.0) -> float | None:
-        """Rise or sink at this speed, heeding a contact; return the time of a new contact, None without."""
+        """Rise (> 0) or sink, but sink no more after a contact; return when a new contact is noticed, if any."""
         for tick in range(round(duration_s / TICK_S)):
             stands = self.touchdown.stands
             told_m_s = max(0.0, speed_m_s) if stands else speed_m_s

@@ -58,7 +58,7 @@ _ERRORS: dict[str, Any] = {
 
 
 def test_the_mean_along_a_direction_is_how_much_nearer_things_are_than_they_seem() -> None:
-    """û·(μ_ee - μ_c): an arm farther ahead is nearer, as is an object that the camera sees too far away."""
+    """The mean is û·(μ_ee - μ_c): positive if the gripper is farther ahead, or an object nearer, than it seems."""
     uncertainty = Uncertainty(**_ERRORS)
     direction = np.array([0.6, 0.0, -0.8])
     assert uncertainty.mean_along_m(direction) == pytest.approx(0.6 * (0.001 - 0.001) - 0.8 * (0.0005 + 0.002))
@@ -135,7 +135,7 @@ _LINKS_M = np.array([0.4, 0.3, 0.2])
 
 
 def _planar_position(angles_rad: FloatArray) -> FloatArray:
-    """Return the tip of a planar arm with the links `_LINKS_M`: (..., 3) for angles (..., 3)."""
+    """Return the positions (..., 3) of the tip of a planar arm with the links `_LINKS_M`, for joint angles (..., 3)."""
     heading = np.cumsum(angles_rad, axis=-1)
     x = (_LINKS_M * np.cos(heading)).sum(axis=-1)
     y = (_LINKS_M * np.sin(heading)).sum(axis=-1)
@@ -169,7 +169,7 @@ def test_covariance_is_what_noisy_encoders_do_to_a_planar_arm() -> None:
 @settings(derandomize=True, deadline=None, max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1), points=st.integers(1, 5), joints=st.integers(1, 8))
 def test_the_variance_along_a_direction_is_that_of_the_joints_errors(seed: int, points: int, joints: int) -> None:
-    """ûᵀ J diag(σ²) Jᵀ û = |diag(σ) Jᵀ û|²."""
+    """The variance along û is ûᵀ J diag(σ²) Jᵀ û = |diag(σ) Jᵀ û|², for joint errors with standard deviations σ."""
     rng = np.random.default_rng(seed)
     jacobians, sigma = rng.normal(size=(points, 3, joints)), rng.uniform(0, 1e-2, joints)
     covariance = position_covariance(jacobians, sigma)

@@ -23,7 +23,7 @@ REACH_M = 0.05
 
 
 class SerialArm:
-    """Turning joints with fixed axes through fixed points of the previous links, and a tool with spheres."""
+    """Random serial arm of turning joints, with a tool of three spheres."""
 
     def __init__(self, seed: int, joints: int = 6) -> None:
         random = np.random.default_rng(seed)
@@ -34,7 +34,7 @@ class SerialArm:
         self._spheres_in_tool_m = random.uniform(-0.1, 0.1, (3, 3))
 
     def pose(self, angles_rad: FloatArray) -> GripperPose:
-        """Compute forward kinematics as a product of turns, and the Jacobians from the moved axes."""
+        """Compute the pose as a product of the joints' rotations, and the Jacobian from the moved axes."""
         rotation, translation = np.eye(3), np.zeros(3)
         axes, points = [], []
         for axis, point, angle in zip(self._axes, self._points_m, angles_rad, strict=True):
@@ -58,7 +58,7 @@ class SerialArm:
 
 
 def thing(center_m: FloatArray, seed: int = 0) -> PerceivedObjects:
-    """Return one object of a box, a ball, and a tetrahedron, after another object."""
+    """Return two objects: a large ball, and then a target that consists of two boxes, a ball and a tetrahedron."""
     random = np.random.default_rng(seed)
     scene = Scene().add().sphere(center_m, 0.3).add(Role.TARGET)
     scene.box(center_m, random.uniform(0.005, 0.05, 3), random_rotation(random))
@@ -69,7 +69,7 @@ def thing(center_m: FloatArray, seed: int = 0) -> PerceivedObjects:
 
 
 def surface_of(objects: PerceivedObjects, index: int, random: np.random.Generator) -> FloatArray:
-    """Return points (n, 3) all over the surfaces of the object's primitives, their corners included."""
+    """Return points (n, 3) all over the surfaces of an object's primitives, including all corners."""
     corners = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
     unit = random.uniform(-1.0, 1.0, (200, 3))
     unit[np.arange(200), random.integers(3, size=200)] = random.choice([-1.0, 1.0], 200)
@@ -106,7 +106,7 @@ def test_supports_and_what_is_ignored_are_never_gripped() -> None:
 
 
 def test_what_has_no_end_is_never_gripped() -> None:
-    """A wall or a floor without a support's name cannot move with the tool, and stays an obstacle."""
+    """An infinite wall or floor, even if its role is not support, cannot move with the tool."""
     scene = Scene().add().half_space([0.0, 0.0, 1.0], -0.01)
     assert gripped_object(scene_table(scene.objects()), ORIGIN, REACH_M) is None
     objects = scene.add(Role.TARGET).sphere([0.0, 0.0, 0.04], 0.02).objects()
@@ -162,7 +162,7 @@ def test_what_is_made_of_tetrahedra_is_felt_as_early_as_the_same_box() -> None:
 
 
 def test_a_cup_is_felt_at_its_wall_and_not_at_its_box() -> None:
-    """The inside stays free: a mesh is covered by its own surface, convex or not."""
+    """The inside of a held cup stays free of spheres: they cover the surface of a mesh, convex or not."""
     turns = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
     ring = np.column_stack([np.cos(turns), np.sin(turns)])
     outline = [(0.0, 0.0), (0.03, 0.0), (0.03, 0.06), (0.025, 0.06), (0.025, 0.005), (0.0, 0.005)]
@@ -189,7 +189,7 @@ def test_a_cup_is_felt_at_its_wall_and_not_at_its_box() -> None:
 
 
 def mesh_points(corners_m: FloatArray, random: np.random.Generator) -> FloatArray:
-    """Return points (n, 3) of triangles (t, 3, 3)."""
+    """Draw points (n, 3) on the triangles (t, 3, 3), 20 on each."""
     points: FloatArray = np.einsum(
         "tnk,tki->tni", random.dirichlet(np.ones(3), (len(corners_m), 20)), corners_m
     ).reshape(-1, 3)
@@ -197,7 +197,7 @@ def mesh_points(corners_m: FloatArray, random: np.random.Generator) -> FloatArra
 
 
 def test_a_scene_unknown_before_is_held_without_a_search() -> None:
-    """A tick has no time for a search: it uses a box's spheres, or a ball around each tetrahedron."""
+    """A tick has no time to search for few spheres: it uses a box's known cover, or a ball around each tetrahedron."""
     unknown = HeldCovers(Scene().add().sphere(ORIGIN, 0.01).objects())
     objects = thing(ORIGIN)
     held = grip(objects, 1, free_pose([ORIGIN], [0.01]), unknown)

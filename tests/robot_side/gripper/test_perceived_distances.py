@@ -1,4 +1,4 @@
-"""Distances for people, from the unenlarged gripper to the perceived objects; spheres in near order."""
+"""Distances that people are shown, from the gripper to perceived objects; and the order that keeps spheres together."""
 
 import numpy as np
 import pytest
@@ -48,13 +48,13 @@ def test_it_is_the_least_over_all_spheres_and_objects(seed: int) -> None:
 
 
 def spread(centers: np.ndarray, order: np.ndarray, size: int) -> float:
-    """Return the mean distance of points from the middle of their run."""
+    """Cut ordered points into runs of `size`; return the mean distance of the points from the middle of their run."""
     runs = [centers[order[first : first + size]] for first in range(0, len(order), size)]
     return float(np.mean([np.linalg.norm(run - run.mean(axis=0), axis=1).mean() for run in runs]))
 
 
 def test_separate_heaps_are_not_mixed() -> None:
-    """All runs but the last are whole, so that heaps of whole runs are not mixed."""
+    """Heaps of 12 points give two whole runs of 6 each, so no run has points of two heaps."""
     random = np.random.default_rng(2)
     heaps = np.repeat(np.arange(5), 12)
     centers = random.normal(size=(60, 3)) * 0.01 + np.array([3.0, 1.0, 0.0]) * heaps[:, None]

@@ -33,7 +33,7 @@ def outside_m(points: FloatArray, centers: FloatArray, radii: FloatArray) -> Flo
 
 
 def check(solids: list[Solid], true_depth_m: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Assert that nothing sticks out, and that each sphere, made 3 mm smaller, is within the shape."""
+    """Cover solids; assert that spheres contain the whole surface, and that each protrudes by at most 3 mm."""
     centers, radii, stand_out_m = cover_surface(solids, STAND_OUT_M, [np.eye(3)])
     assert stand_out_m == STAND_OUT_M
     random = np.random.default_rng(0)

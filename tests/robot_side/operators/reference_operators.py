@@ -1,4 +1,4 @@
-"""Second implementation of who commands and what moves: the reference of the state machine."""
+"""Second implementation of lease, session and safety, with which the state machine compares the product's."""
 
 from dataclasses import dataclass, field
 
@@ -9,12 +9,12 @@ from robot_side.operators.safety import RELEASED_TRAVEL, SafetySettings
 
 State = SessionState
 ROOM = 2
-"""Most observers, and most departed operators: the machine lowers the product's limits to this."""
+"""Maximum number of observers, and of operators that are away; the state machine gives the product the same limits"""
 
 
 @dataclass(eq=False)
 class Party:
-    """One epoch of an operator."""
+    """What is known about one epoch of an operator."""
 
     epoch: int
     peer: bytes
@@ -27,7 +27,7 @@ class Party:
 
 
 class ReferenceOperators:
-    """Lease, safety and session in one class, with times as plain numbers."""
+    """Lease, safety and session of all operators, in one class with simple variables."""
 
     def __init__(self, settings: SafetySettings) -> None:
         self.settings = settings
@@ -38,17 +38,17 @@ class ReferenceOperators:
             self.discarded
         ) = 0
         self.stops: list[tuple[float, str]] = []
-        """(time, beginning of the reason)"""
+        """Each stop of the arm: (time, first words of the reason)"""
         self.stopped = self.next_target = self.owner_changed = False
         self.followed: dict[int, int] = {}
-        """Newest followed stop's number, by epoch."""
+        """Sequence number of the newest emergency stop that was followed, by epoch"""
         self.loop_began_s: float | None = None
         self.loop_heard_s = 0.0
-        """Sending time of the stamp echoed by this lease's newest accepted command."""
+        """Time at which the newest command was accepted"""
         self._listen()
 
     def _listen(self) -> None:
-        """Begin a lease: earlier messages do not count."""
+        """Forget all commands, as earlier ones do not count in a new lease."""
         self.command: MotionCommand | None = None
         self.accepted_s: float | None = None
         self.echo_s: float | None = None
@@ -66,7 +66,7 @@ class ReferenceOperators:
         self._settle()
 
     def check(self, now_s: float) -> None:
-        """Disarm after a gap, and for a loop age that is too high or unknown."""
+        """Disarm the arm after a gap in the commands, or if the loop age is too high or unknown."""
         if self.accepted_s is not None and now_s - self.accepted_s > self.settings.gap_s:
             self._disarm(now_s, f"no command for {1e3 * (now_s - self.accepted_s):.0f} ms")
             self.command = self.accepted_s = None
@@ -74,7 +74,7 @@ class ReferenceOperators:
             self._disarm(now_s, "loop age of")
 
     def hear(self, message: Hello | MotionCommand, peer: bytes, arrival: Arrival, now_s: float) -> None:
-        """Receive one message; `arrival` gives the ages, and freshness is computed here."""
+        """Receive one message. `arrival` gives its ages; whether it is fresh is computed here."""
         self.update(now_s)
         self._hear(message, peer, arrival, now_s)
         self._settle()
@@ -144,7 +144,7 @@ class ReferenceOperators:
             self.owner.state = State.STOPPED if self.stopped else State.DISARMED
 
     def _hear_stop(self, command: MotionCommand, now_s: float) -> None:
-        """Follow a stop however late it comes, except a copy of a followed one, or an older one."""
+        """Follow an emergency stop however late it comes, unless this one or a newer one was followed already."""
         epoch, sequence = command.header.epoch, command.header.sequence
         if command.emergency_stop and sequence > self.followed.get(epoch, 0):
             self.followed = {epoch: sequence}
@@ -183,7 +183,7 @@ class ReferenceOperators:
         self._listen()
 
     def _settle(self) -> None:
-        """Act on the final state after one message: an owner for an instant is none."""
+        """Grant the lease by the final state after a message: an owner that lost the lease again does not count."""
         if self.owner is not None and self.token != self.settled_token:
             self.settled_token = self.token
             self.granted += 1
@@ -191,7 +191,10 @@ class ReferenceOperators:
             self.owner.hand_over_down = self.owner.next_target_down = True
 
     def _leave(self, party: Party, state: State, now_s: float) -> None:
-        """Give `party` a state without the lease; the lease passes to the longest waiting participant heard lately."""
+        """Give `party` a state without the lease.
+
+        If it had the lease, the lease passes to the participant who has waited longest, of those heard lately.
+        """
         waiting = [one for one in self.observers() if now_s - one.heard_s < self.settings.lease_s]
         if party.state is State.ARMED:
             self.stops.append((now_s, ""))

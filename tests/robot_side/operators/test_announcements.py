@@ -1,4 +1,4 @@
-"""One owner, many observers: the lease over time, with virtual operators on a real robot side."""
+"""What the owner of the lease and observers are sent over time, with simulated operators on a real robot side."""
 
 import msgspec
 import numpy as np
@@ -41,7 +41,7 @@ def test_observers_feel_at_a_reduced_rate_and_see_the_robots_state(bench: Bench)
 
 
 def to_owner(bench: Bench, ticks: int) -> list[tuple[float, bool, AnyMessage]]:
-    """Return the time of each message to the owner, and whether it went everywhere."""
+    """Tick; return each message of the stream "haptics" as (time, whether it went over all connections, message)."""
     found = []
     for _ in range(ticks):
         bench.ticks += 1

@@ -1,4 +1,4 @@
-"""Arm without new states, or with old ones only: the session's reaction, in virtual time."""
+"""An arm that gives no new states, or only old ones, is stopped and disarmed, in virtual time."""
 
 import re
 from dataclasses import replace

@@ -1,6 +1,6 @@
-"""Faults of the stream of commands, to the millisecond of the arm; without its guard, each test fails.
+"""Faults in the stream of commands, and when exactly the arm reacts. Each test fails if its guard is removed.
 
-The state machine beside this file covers what needs no arm: who commands, which commands count, and stops.
+test_operator_machine.py covers what needs no arm: who commands, which commands count, and stops.
 """
 
 import math
@@ -23,7 +23,7 @@ Patch = Callable[[pytest.MonkeyPatch], None]
 
 
 def cruising() -> tuple[Bench, Operator]:
-    """Return a robot side whose arm an operator moves at an even speed."""
+    """Return a robot side, and the operator who moves its arm at an even speed."""
     bench = Bench()
     operator = bench.join(2)
     bench.cruise(operator)
@@ -31,7 +31,7 @@ def cruising() -> tuple[Bench, Operator]:
 
 
 def begins_to_slow_s(bench: Bench, before: int) -> float:
-    """Return when the arm began to slow down, after `before` states at an even speed."""
+    """Return the time at which the arm began to slow down after its first `before` states."""
     even = float(np.median([speed for _, speed in bench.watch.speeds_rad_s[before - 20 : before]]))
     later = bench.watch.speeds_rad_s[before:]
     measured_s, speed = next(one for one in later if one[1] < 0.95 * even)
@@ -40,7 +40,7 @@ def begins_to_slow_s(bench: Bench, before: int) -> float:
 
 
 def stream_stops() -> None:
-    """Kill -9, a half-open connection and a pulled cable all look like this from within."""
+    """The commands stop, as they do after kill -9, with a half-open connection, or with a pulled cable."""
     bench, operator = cruising()
     accepted_s, before = bench.now_s - 3 * TICK_S, len(bench.watch.speeds_rad_s)
     bench.silence(T_S + 0.3)
@@ -55,7 +55,7 @@ def stream_stops() -> None:
 
 
 def nobody_ticks() -> None:
-    """Second line of defence: without ticks the arm moves by itself for a second."""
+    """The robot side stops ticking: the arm itself must then stop when its last command is no longer valid."""
     bench, _ = cruising()
     start_s, before = bench.now_s, len(bench.watch.speeds_rad_s)
     for millisecond in range(1, 1001):
@@ -75,7 +75,7 @@ def short_gaps() -> None:
 
 
 def steady_delay() -> None:
-    """A second from the operator to the arm is no fault: the arm moves as fast as without."""
+    """A constant delay of 1 s from the operator to the arm is no fault: the arm moves as fast as without it."""
     speeds = [mean_speed_rad_s(delay_s) for delay_s in (0.0, 1.0)]
     assert speeds[1] == pytest.approx(speeds[0], rel=0.02)
 

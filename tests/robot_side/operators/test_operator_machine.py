@@ -1,4 +1,4 @@
-"""Lease, safety and session for any actions of operators, step by step beside a separate reference."""
+"""Lease, safety and session after random actions of operators, compared step by step with a second implementation."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -40,7 +40,7 @@ arrivals = st.builds(
 
 
 class DrawnLink(LinkEnd):
-    """Link end that orders messages as the real one does; the machine draws the ages."""
+    """End of a link that recognizes fresh messages as the real one does; the state machine draws the ages."""
 
     ages = FRESH
 
@@ -49,7 +49,10 @@ class DrawnLink(LinkEnd):
 
 
 class OperatorMachine(RuleBasedStateMachine):
-    """Operators that come, go, replay and press; each step is checked against the reference and the invariants."""
+    """State machine of operators that come, go, command and replay messages.
+
+    After each step, the product is compared with the reference, and invariants are checked.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -79,7 +82,7 @@ class OperatorMachine(RuleBasedStateMachine):
 
     @rule(place=st.integers(0, 20))
     def restart(self, place: int) -> None:
-        """Begin another epoch over somebody's connection; rarely, as an ended epoch never comes back."""
+        """Begin a new epoch over a participant's connection, which ends that participant's epoch for ever."""
         if place < len(self.reference.parties):
             self.epoch += 1
             self.hello(self.epoch, list(self.reference.parties.values())[place].peer)
@@ -104,7 +107,7 @@ class OperatorMachine(RuleBasedStateMachine):
         content: dict[str, bool],
         travels: tuple[float, float],
     ) -> None:
-        """Send one command; `behind`: age of the token, in leases."""
+        """Send one command. behind: 0 for the token of the present lease, 1 for a token that is one less."""
         waiting = self.reference.observers()
         if whose == "owner" and self.reference.owner is not None:
             epoch = self.reference.owner.epoch
@@ -114,25 +117,25 @@ class OperatorMachine(RuleBasedStateMachine):
 
     @rule(place=st.integers(0, 30), key=st.sampled_from(["", "another"]))
     def replay(self, place: int, key: str) -> None:
-        """Deliver a message again, over another connection of the same key or of another one."""
+        """Deliver an earlier message again, over another connection with the same key or another key."""
         self.deliver(self.sent[max(0, len(self.sent) - 1 - place)], peer_name(key, b"elsewhere"))
 
     @rule(epoch=epochs, stop=st.booleans())
     def forge(self, epoch: int, *, stop: bool) -> None:
-        """Command under another operator's epoch, with another key."""
+        """Send a command with an operator's epoch, but over a connection with another key."""
         forged = MotionCommand(self.header(epoch), 1.0, 0.0, run=True, emergency_stop=stop, token=self.reference.token)
         self.deliver(forged, peer_name("another", b"forger"))
 
     @rule(duration_s=st.sampled_from([0.001, 0.03, 0.099, 0.101, 0.3, 0.41, 0.6]), ticks=st.integers(0, 3))
     def silence(self, duration_s: float, ticks: int) -> None:
-        """Let time pass; without a tick the next message reveals it."""
+        """Let `duration_s` pass, with `ticks` ticks. With none, the session notices only by the next message."""
         for _ in range(ticks):
             self.tick(duration_s / ticks)
         self.now_s += 0.0 if ticks else duration_s
 
     @rule()
     def come_back(self) -> None:
-        """Silence all participants, and let them return in turn."""
+        """Let all participants be silent until their leases end, then let them come back one after the other."""
         self.tick(SETTINGS.lease_s)
         for epoch, party in list(self.reference.parties.items()):
             self.hello(epoch, party.peer)
@@ -146,7 +149,7 @@ class OperatorMachine(RuleBasedStateMachine):
         echo=st.booleans(),
     )
     def stream(self, count: int, travels: tuple[float, float], content: dict[str, bool], *, echo: bool) -> None:
-        """Command for a while; waiting participants say Hello after it."""
+        """Send `count` commands of the owner, a tick after each; then waiting participants send a Hello."""
         for _ in range(count):
             if (owner := self.reference.owner) is not None:
                 ages = FRESH if echo else replace(FRESH, loop_age_s=None)
@@ -161,7 +164,7 @@ class OperatorMachine(RuleBasedStateMachine):
         ticks=st.integers(0, 2),
     )
     def arm(self, count: int, pause_s: float, ticks: int) -> None:
-        """Command with released triggers for about the healthy time, pause, and press the button."""
+        """Try to arm: send commands with released triggers for about the healthy time, pause, and press the button."""
         self.stream(count, (0.0, 0.0), {}, echo=True)
         self.silence(pause_s, ticks)
         self.stream(1, (0.0, 0.0), {"arm": True}, echo=True)
@@ -186,7 +189,7 @@ class OperatorMachine(RuleBasedStateMachine):
         self.compare()
 
     def tick(self, duration_s: float) -> None:
-        """Advance time, and do the core's work in a tick."""
+        """Advance time, and do for session and reference what the core does in a tick; compare the results."""
         self.now_s += duration_s
         self.session.update(self.now_s)
         self.reference.update(self.now_s)
@@ -205,7 +208,7 @@ class OperatorMachine(RuleBasedStateMachine):
         self.compare()
 
     def compare(self) -> None:
-        """Compare the session with the reference."""
+        """Assert that the session has the same state as the reference."""
         session, reference = self.session, self.reference
         owner = session.lease.owner
         assert (None if owner is None else owner.epoch) == (None if not reference.owner else reference.owner.epoch)
@@ -237,7 +240,7 @@ class OperatorMachine(RuleBasedStateMachine):
         self.hold_what_must_always_hold()
 
     def hold_what_must_always_hold(self) -> None:
-        """Check the invariants: one lease, growing tokens, nothing older, correct arming."""
+        """Assert the invariants: one owner, growing tokens, no older command accepted, and correct arming."""
         lease, command = self.session.lease, self.safety.command
         owning = [one for one in lease.known() if one.state in OWNING]
         assert owning == ([] if lease.owner is None else [lease.owner])

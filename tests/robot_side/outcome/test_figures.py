@@ -15,7 +15,7 @@ ROLES = {"post": Role.OBSTACLE, "cup": Role.TARGET, "table": Role.SUPPORT}
 def sensed(
     enlargement_m: float, overlap_m3: float = 0.0, l2: int = 0, r2: int = 0, tool_speed_m_s: float = 0.0
 ) -> Sensed:
-    """l2, r2: strengths, 0 to 8."""
+    """Return a result of the law. l2, r2: strength of each trigger, 0 to 8."""
     figures = {"enlargement_m": enlargement_m, "overlap_m3": overlap_m3, "tool_speed_m_s": tool_speed_m_s}
     return Sensed.of(l2=uniform_field(l2), r2=uniform_field(r2), horizon_m=0.2, **figures)
 
@@ -89,7 +89,7 @@ def test_the_smallest_distance_is_kept_and_absence_is_no_distance() -> None:
 
 
 def contacts(touching_s: list[float], step_s: float = 0.01) -> int:
-    """Return the contact onsets of one pair that touches in the steps of `touching_s` (from, to, from, to ...)."""
+    """Return the number of contacts counted for a pair that touches in the times `touching_s`: from, to, from, to."""
     figures = RunFigures()
     for step in range(200):
         now_s = step * step_s

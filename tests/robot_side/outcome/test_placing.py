@@ -1,4 +1,4 @@
-"""Criteria of a placed target, and of a contact felt in advance: with an invented truth of the target."""
+"""When a target counts as placed, and its contact as felt in advance, for a target whose motion the test makes up."""
 
 import math
 
@@ -16,7 +16,10 @@ def at(gap_m: float, sinking_m_s: float = 0.0, tilt_rad: float = 0.0, x_m: float
 def set_down(
     warned_from_m: float | None = 0.03, tilt_rad: float = 0.0, let_go_at_m: float = -1.0
 ) -> tuple[Placing, float]:
-    """Lift by 100 mm, lower at 20 mm/s and release on the table, or at a height; return also the time of contact."""
+    """Lift a target by 100 mm, lower it at 20 mm/s and release it on the table, or at the height `let_go_at_m`.
+
+    Return the figures and the time of contact.
+    """
     placing, now_s = Placing(), 0.0
     placing.observe(at(0.0), False, False, now_s)
     gap_m = 0.1

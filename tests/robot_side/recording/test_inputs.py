@@ -1,4 +1,4 @@
-"""Arm states and frames return bit for bit, also as differences."""
+"""Recorded arm states and frames of objects are read back bit for bit, also those stored as differences."""
 
 from dataclasses import fields, replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""Robot side's report of the link: made for the owner alone, twice a second, and shown until it is old."""
+"""The robot side's report about the link: sent to the owner only, twice a second, and shown until it is too old."""
 
 from collections.abc import Iterator
 

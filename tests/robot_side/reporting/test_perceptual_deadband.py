@@ -1,4 +1,4 @@
-"""Enough leaves: a receiver that extrapolates the last message is never wrong by more than can be felt."""
+"""Enough messages are sent: a receiver that extrapolates the last one is never wrong by more than can be felt."""
 
 import math
 from itertools import pairwise
@@ -30,14 +30,14 @@ def changed(found: Sensed, **changes: Any) -> Sensed:
 
 
 def sensed(left_m: float, speed_m_s: float = 0.0, **changes: Any) -> Sensed:
-    """Return a wall `left_m` ahead of R2, and nothing behind."""
+    """Return what the law finds for a wall `left_m` ahead, in the direction of R2, and nothing behind."""
     wall = field(onsets(*(min(left_m + 1e-3 * k, FAR_M) for k in range(8))), **ABLE)
     free = field(onsets(*[FAR_M] * 8), **ABLE)
     return changed(Sensed.of(free, wall, speed_m_s=speed_m_s, horizon_m=FAR_M), **changes)
 
 
 class Run:
-    """Gripper before a wall, tick by tick, beside the receiver's belief."""
+    """Simulated gripper before a wall, and what a receiver computes from the last message, tick by tick."""
 
     def __init__(self, left_m: float, **options: Any) -> None:
         self.deadband = StiffnessDeadband(**options)
@@ -66,7 +66,7 @@ class Run:
 
     @property
     def nearer_m(self) -> float:
-        """Return by how much the wall is nearer than the receiver believes."""
+        """Metres by which the wall is nearer than the receiver computes."""
         return self.believed_m - self.moved_m - self.left_m
 
     @property

@@ -1,4 +1,4 @@
-"""Sending: haptics at once, telemetry where there is room, pictures in pieces that are joined again."""
+"""Sending within the budget: haptics at once, telemetry if there is room, pictures in pieces that are joined again."""
 
 from common.emulation.spec import LinkSpec
 from common.rate.outgoing_queue import OutgoingQueue
@@ -10,7 +10,7 @@ PICTURE = bytes(range(256)) * 60
 
 
 class Sockets:
-    """Sockets that keep the sent messages."""
+    """Stand-in for sockets that keeps sent messages."""
 
     def __init__(self) -> None:
         self.sent: list[tuple[bytes, bytes]] = []
@@ -60,3 +60,16 @@ def test_a_small_message_leaves_whole_and_telemetry_gives_way_where_there_is_no_
     sending.send(queue, 0.032)
     assert sockets.sent == [(b"peer", bytes(4000))]
     assert sending.summary()["to_operator"]["achieved"]["sent"] == 1
+
+
+def test_outages_of_all_streams_coincide_whenever_each_begins() -> None:
+    """A picture stream that begins later is cut with haptics: it is one link."""
+    sockets = Sockets()
+    sending = Sending(LinkSpec.parse("outage 2s at 10s"), sockets, first_number=0)
+    sending.push([Outgoing("haptics", b"robot", b"first")], 100.0)
+    sending.send(None, 100.0)
+    for now_s in (109.0, 111.0, 113.0):
+        sending.push([Outgoing("telemetry", b"", b"later %d" % now_s)], now_s)
+        sending.send(None, now_s)
+    published = [payload for _, payload in sockets.published]
+    assert published == [b"later 109", b"later 113"]

@@ -1,4 +1,4 @@
-"""Nearest points against scipy's convex hulls and non-negative least squares, and distances made of them."""
+"""Distances to primitives, compared with scipy's convex hulls and non-negative least squares; distances to objects."""
 
 import math
 from collections.abc import Callable
@@ -38,10 +38,10 @@ repeatable = settings(derandomize=True, deadline=None, max_examples=40)
 
 
 def _check_against_hull(points: FloatArray, hulls: list[FloatArray], found: Nearest) -> None:
-    """Compare with convex hulls, one for each point.
+    """Compare found distances and directions with those to convex hulls, one hull for each point.
 
-    Outside, the point reached is on the hull (not too near), and no convex combination of the vertices
-    is nearer (not too far). Inside, the distance is that of the nearest facet plane.
+    For a point outside, the surface point that they lead to must be on the hull, so they are not too short. No convex
+    combination of the vertices may be nearer, so they are not too long. Inside, the nearest facet's plane counts.
     """
     distances, directions = found
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, atol=1e-12)

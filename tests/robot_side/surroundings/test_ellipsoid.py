@@ -1,4 +1,4 @@
-"""Ellipsoids: nearest point, first touch and overlap, against spheres, a fine mesh, and columns of the overlap."""
+"""Ellipsoids: nearest point, first contact and overlap, compared with spheres, a fine mesh and an integral."""
 
 import math
 from itertools import pairwise
@@ -37,13 +37,13 @@ def shape(center: FloatArray, rotation: FloatArray, half_axes: FloatArray) -> Fl
 
 
 def overlap(of: FloatArray, center: FloatArray, radius: float) -> tuple[float, FloatArray]:
-    """Return V in m³ and dV/dcentre (3,) in m²."""
+    """Return the overlap V of a ball with an ellipsoid in m³, and dV/dcentre (3,) in m²."""
     overlap_gradient = np.empty(3)
     return ellipsoid.overlap_one_ellipsoid(of, 0, *center, radius, NO_MESHES, overlap_gradient), overlap_gradient
 
 
 def beside(rng: np.random.Generator, half_axes: FloatArray, depth: float) -> tuple[FloatArray, FloatArray]:
-    """Draw a point `depth` below the surface at a random normal, and this normal, in the own frame."""
+    """Draw a point `depth` below the surface of an ellipsoid, and the normal there, in the ellipsoid's frame."""
     on_surface = rng.normal(size=3)
     on_surface *= half_axes / np.linalg.norm(on_surface)
     normal = on_surface / half_axes**2
@@ -53,7 +53,7 @@ def beside(rng: np.random.Generator, half_axes: FloatArray, depth: float) -> tup
 
 @pytest.mark.parametrize("depth", [0.0, -1e-4, 1e-3])
 def test_a_needle_that_pierces_the_balls_pole_pushes(depth: float) -> None:
-    """No section between the pole and the outermost node shows where it pierces."""
+    """The needle enters the ball between the ball's pole and the outermost computed section, so no section shows it."""
     of, radius, step = shape(np.zeros(3), np.eye(3), np.array([1e-4, 1e-4, 0.05])), 0.008, 1e-6
     before, after = (overlap(of, np.array([0.0, 0.0, 0.05 - depth + side]), radius)[0] for side in (-step, step))
     _, overlap_gradient = overlap(of, np.array([0.0, 0.0, 0.05 - depth]), radius)
@@ -75,7 +75,7 @@ def test_a_ball_is_a_sphere(seed: int) -> None:
 
 
 def by_columns(half_axes: FloatArray, center: FloatArray, radius: float) -> float:
-    """Integrate V over columns on a polar grid about the ball's centre, so that its rim is on the grid."""
+    """Integrate the overlap V over columns parallel to z, on a polar grid about the ball's centre."""
     nodes, weights = np.polynomial.legendre.leggauss(400)
     rho, turn = radius * np.sin(0.25 * math.pi * (nodes + 1.0)), np.arange(800) * math.tau / 800
     x, y = center[0] + rho[:, None] * np.cos(turn), center[1] + rho[:, None] * np.sin(turn)

@@ -1,4 +1,4 @@
-"""Overlaps with one mesh of a scene, against those of the library; which meshes are convex."""
+"""Overlaps of spheres with one mesh of a scene, compared with the overlap library's; and which meshes are convex."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ Surface = tuple[FloatArray, IntArray]
 
 
 def hollow() -> Surface:
-    """Return a cube with a cubic cavity in its middle."""
+    """Return vertices and triangles of a cube with a cubic cavity in its middle."""
     places, tetrahedra = grid_tetrahedra(3)
     middle = (np.floor(places[tetrahedra].mean(axis=1)) == 1.0).all(axis=1)
     used, numbers = np.unique(surface_of(tetrahedra[~middle]), return_inverse=True)
@@ -37,7 +37,7 @@ SURFACES: dict[str, tuple[Surface, bool]] = {
 
 
 def centers_about(mesh: Mesh, rng: np.random.Generator) -> FloatArray:
-    """Draw points (n, 3) all about a mesh, some of them right above a corner or an edge of it."""
+    """Draw points (n, 3) in and around a mesh; some have one, two or three coordinates of one of its corners."""
     size = mesh.highest_m - mesh.lowest_m
     centers: FloatArray = rng.uniform(mesh.lowest_m - 0.3 * size, mesh.highest_m + 0.3 * size, (INT64, 3))
     corners = mesh.tables.triangles[:, :9].reshape(-1, 3)[rng.integers(3 * mesh.triangle_count, size=INT64)]
@@ -48,7 +48,7 @@ def centers_about(mesh: Mesh, rng: np.random.Generator) -> FloatArray:
 @pytest.mark.parametrize("radius_m", [0.0005, 0.004, 0.02, 0.08])
 @pytest.mark.parametrize("name", SURFACES)
 def test_a_mesh_has_the_overlap_of_the_library(name: str, radius_m: float) -> None:
-    """Before its faces, edges and corners, within it, swallowing it, and where it meets only one plane."""
+    """Spheres are outside, at faces, edges and corners, or inside; small ones meet one plane, large ones swallow it."""
     rng = np.random.default_rng(len(name))
     library, rotation, position = MeshLibrary([Mesh(*SURFACES[name][0])]), random_rotation(rng), rng.normal(size=3)
     mesh = Mesh(*SURFACES[name][0])

@@ -1,4 +1,4 @@
-"""Frames as differences from an earlier one, against whole frames."""
+"""Frames of objects that are given as differences from an earlier frame equal whole frames."""
 
 from dataclasses import fields, replace
 
@@ -26,7 +26,7 @@ def whole(rng: np.random.Generator) -> PerceivedObjects:
 
 
 def elsewhere(objects: PerceivedObjects, things: np.ndarray, rng: np.random.Generator) -> PerceivedObjects:
-    """Move some objects: every number of theirs changes."""
+    """Return a frame in which all numbers of the objects `things` are different."""
     changed = {}
     for kind in KINDS:
         mine = np.isin(getattr(objects, kind.owner), things)
@@ -79,7 +79,7 @@ def test_other_objects_than_the_movers_are_refused() -> None:
     with pytest.raises(ValueError, match=r"roles holds 0; valid: one for each"):
         movers.frame(0.0, movers.at_first, ())
     for things in ([4, 0], [0, 0], [-1], [len(first.names)]):
-        with pytest.raises(ValueError, match="rising places"):
+        with pytest.raises(ValueError, match="rising indices"):
             Movers(first, np.array(things))
     with pytest.raises(ValueError, match="complete frame"):
         Movers(movers.frame(0.0, movers.at_first, first.roles), np.array([0]))

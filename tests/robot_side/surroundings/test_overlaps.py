@@ -1,4 +1,4 @@
-"""Overlaps with one primitive of a scene, against those of the library: volumes and gradients."""
+"""Overlaps of spheres with one primitive of a scene, and their gradients, compared with the overlap library's."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ NO_MESHES = np.zeros((1, 2), dtype=np.int64)
 
 
 def each(kernel: Compiled, shapes: FloatArray, centers: FloatArray, radii: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return V (n,) and dV/dcentre (n, 3) of spheres, each with its own shape."""
+    """Return the overlaps V (n,) and dV/dcentre (n, 3) of sphere k with shape k, for all k."""
     volumes, gradients = np.empty(len(radii)), np.empty((len(radii), 3))
     for k, (center, radius) in enumerate(zip(centers, radii, strict=True)):
         volumes[k] = kernel(shapes, k, *center.tolist(), float(radius), NO_MESHES, gradients[k])
@@ -24,14 +24,14 @@ def each(kernel: Compiled, shapes: FloatArray, centers: FloatArray, radii: Float
 
 
 def assert_equal(found: tuple[FloatArray, ...], expected: tuple[FloatArray, ...], radii: FloatArray) -> None:
-    """Assert equality within 1e-12 of the ball, and of its disc."""
+    """Assert that overlaps agree within 1e-12 of the sphere's volume, and gradients within 1e-12 of its great disc."""
     ball, disc = 4.0 / 3.0 * np.pi * radii**3, np.pi * radii**2
     assert (np.abs(found[0] - expected[0]) / ball).max() <= EQUAL
     assert (np.abs(found[1] - expected[1]) / disc[:, None]).max() <= EQUAL
 
 
 def points_of(rng: np.random.Generator, feature: str, half: FloatArray) -> FloatArray:
-    """Draw points (n, 3) on the faces, edges or corners of boxes, or within them."""
+    """Draw points (n, 3) inside boxes, or on their faces, edges or corners, as `feature` says."""
     at_ends = {"inside": 0, "face": 1, "edge": 2, "corner": 3}[feature]
     points: FloatArray = rng.uniform(-0.95, 0.95, (INT64, 3))
     ends = np.argsort(rng.random((INT64, 3))) < at_ends
@@ -42,7 +42,7 @@ def points_of(rng: np.random.Generator, feature: str, half: FloatArray) -> Float
 @pytest.mark.parametrize("thin", [0, 1, 2], ids=["box", "plate", "rod"])
 @pytest.mark.parametrize("feature", ["inside", "face", "edge", "corner"])
 def test_a_box_has_the_overlap_of_the_library(feature: str, thin: int, ratio: float) -> None:
-    """Boxes are swallowed if much smaller than the sphere, and swallow it if much larger."""
+    """ratio: size of the sphere to that of the box, from a sphere inside the box to a box inside the sphere."""
     rng = np.random.default_rng(len(feature))
     half = rng.uniform(0.02, 0.05, (INT64, 3))
     half[:, :thin] *= 1e-3
@@ -74,7 +74,7 @@ def test_a_tetrahedron_has_the_overlap_of_the_library(corners: int, flat: float,
 
 @pytest.mark.parametrize("depth", [-1e-9, 0.0, 1e-9, 1e-3], ids=lambda depth: f"by {depth} radii")
 def test_what_is_just_touched_has_an_overlap_of_nothing(depth: float) -> None:
-    """A sphere before a cube's corners, faces and edges: the overlap is at most a millionth of it, and at least 0."""
+    """Spheres that just touch a cube's corners, faces and edges: the overlap is the library's, and never below 0."""
     ways = np.array([[x, y, z] for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z], dtype=float)
     count, radius = len(ways), 0.01
     out = ways / np.linalg.norm(ways, axis=1)[:, None]

@@ -1,4 +1,4 @@
-"""Table of a frame: a row for each primitive, grouped by object; made once, and refused if invalid."""
+"""Table of a frame of objects: one row for each primitive, grouped by object; made once; refused if invalid."""
 
 import dataclasses
 import weakref
@@ -28,7 +28,7 @@ from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
 
 def mixed() -> PerceivedObjects:
-    """Return objects whose primitives of one kind do not follow each other."""
+    """Return objects with primitives of several kinds, so that primitives of one kind are not next to each other."""
     cube = Mesh(0.1 * CUBE_CORNERS, CUBE_TRIANGLES)
     scene = Scene().add().sphere([1.0, 0.0, 0.0], 0.1).box([1.0, 0.0, 0.2], [0.1, 0.2, 0.3]).mesh(cube, [1.0, 0.5, 0.0])
     scene.add(Role.IGNORED).add().half_space([0.0, 0.0, 1.0], -1.0)
@@ -81,7 +81,7 @@ def test_a_table_is_made_once_for_each_frame(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def moved(objects: PerceivedObjects, rng: np.random.Generator) -> PerceivedObjects:
-    """Move and turn every primitive, without changing its size."""
+    """Return the objects with all primitives moved and turned; their sizes stay the same."""
     shift, turn = rng.normal(size=3), random_rotation(rng)
     return dataclasses.replace(
         objects,
@@ -97,12 +97,12 @@ def moved(objects: PerceivedObjects, rng: np.random.Generator) -> PerceivedObjec
 
 
 def frame_of(movers: Movers, objects: PerceivedObjects) -> PerceivedObjects:
-    """Return a frame with the movers as in `objects`, and all else as in the first frame."""
+    """Return a frame in which moving objects are as in `objects`, and all others as in the first frame."""
     return movers.frame(0.0, movers.numbers_in(objects), objects.roles)
 
 
 def assert_as_defined(table: SceneTable, objects: PerceivedObjects) -> None:
-    """Assert that the table agrees with the definitions of each primitive and each object."""
+    """Assert that the table has the rows that follow from the definitions of primitives and objects."""
     rows = rows_of_primitives(objects)
     of_thing = [[row for row in rows if row.thing == thing] for thing in range(len(objects.names))]
     same = partial(np.testing.assert_allclose, rtol=1e-12, atol=1e-12)
@@ -245,7 +245,7 @@ def test_frames_do_not_pile_up() -> None:
     ("field", "factor"), [("sphere_centers_m", np.nan), ("mesh_positions_m", np.nan), ("mesh_rotations", 1.1)]
 )
 def test_bad_objects_are_named_and_never_silently_far_away(field: str, factor: float) -> None:
-    """Other invalid values: test_validity.py."""
+    """NaN would compare as far away, so it must be refused. test_validity.py tests other invalid values."""
     objects = random_scene(np.random.default_rng(0), 2, meshes=1)
     broken = dataclasses.replace(objects, **{field: getattr(objects, field) * factor})
     for _ in range(2):

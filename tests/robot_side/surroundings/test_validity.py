@@ -91,7 +91,7 @@ def test_a_missing_row_is_found_before_a_kernel_reads_past_the_end(field: str) -
 @pytest.mark.parametrize("owner", _INDICES)
 @pytest.mark.parametrize("bad", [-1, 99])
 def test_each_primitive_belongs_to_an_object_that_is_there(owner: str, bad: int) -> None:
-    """A row without an object would be left out of the scene's table, and not be felt."""
+    """A primitive without an object would not get into the scene's table, and so would not be felt."""
     with pytest.raises(ValueError, match=rf"objects\.{owner} holds .*valid: 0 to"):
         require_valid(_changed(owner, lambda owners: np.where(np.arange(len(owners)) == 1, bad, owners)))
 

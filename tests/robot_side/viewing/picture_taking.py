@@ -1,4 +1,4 @@
-"""Pictures of a scene by the real companion, and the pixels of the scene's points."""
+"""Pictures of a scene, rendered by the real companion process, and where points of the scene are in them."""
 
 import select
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ Image = npt.NDArray[np.uint8]
 
 
 class PictureTaker:
-    """Client that orders one picture at a time from a companion, and waits for it."""
+    """Client that orders pictures from a companion, one at a time, and waits for each."""
 
     def __init__(self, scene: Scene, companion: Companion, viewpoints_of: dict[ViewName, Viewpoint]) -> None:
         self.scene = scene
@@ -44,12 +44,12 @@ class PictureTaker:
         self.ready = self._answer()
 
     def take(self, view: ViewName, captured_s: float = 1.5, *, halved: bool = False) -> Image:
-        """Return the present scene in RGB (HEIGHT, WIDTH, 3), or half of each."""
+        """Return a picture of the present scene in RGB (HEIGHT, WIDTH, 3); `halved`: of half the height and width."""
         image: Image = simplejpeg.decode_jpeg(self.picture(view, captured_s, halved=halved).content)
         return image
 
     def picture(self, view: ViewName, captured_s: float = 1.5, *, halved: bool = False, h264: bool = False) -> Picture:
-        """Return the companion's answer to one order."""
+        """Order one picture of the present scene; return the companion's answer, still encoded."""
         mujoco.mj_forward(self.scene.model, self.scene.data)
         data, channel = self.scene.data, self._companion.channel
         mocap = np.concatenate([data.mocap_pos, data.mocap_quat], axis=1)
@@ -73,7 +73,7 @@ class PictureTaker:
         return message
 
     def pixel(self, view: ViewName, point_m: FloatArray) -> tuple[int, int]:
-        """Return row and column of a point (3,) of the world, which must be in the picture."""
+        """Return row and column at which a view shows the point (3,) of the world; AssertionError if it does not."""
         row, column, ahead_m = project(self.scene, self.viewpoints[view], point_m)
         assert ahead_m > 0.0
         assert 0 <= row < HEIGHT
@@ -83,13 +83,13 @@ class PictureTaker:
 
 @contextmanager
 def picture_taker(scene: Scene, viewpoints_of: dict[ViewName, Viewpoint] | None = None) -> Iterator[PictureTaker]:
-    """Yield a picture taker with a new companion."""
+    """Start a companion; yield a picture taker that uses it."""
     with Companion(MODULE) as companion:
         yield PictureTaker(scene, companion, viewpoints_of or viewpoints(scene))
 
 
 def project(scene: Scene, viewpoint: Viewpoint, point_m: FloatArray) -> tuple[float, float, float]:
-    """Return row and column in the picture, and the distance ahead of the camera, of a point (3,) of the world."""
+    """Return where a camera shows a point (3,) of the world: row, column, and distance ahead of the camera."""
     data, model = scene.data, scene.model
     if viewpoint.camera is None:
         place_m, forward, up = placed(viewpoint, data)
@@ -106,7 +106,7 @@ def project(scene: Scene, viewpoint: Viewpoint, point_m: FloatArray) -> tuple[fl
 
 
 def around(image: Image, pixel: tuple[int, int], by: int = 2) -> FloatArray:
-    """Return the mean colour (3,) of some pixels."""
+    """Return the mean colour (3,) of the pixels at most `by` rows and columns from `pixel`."""
     row, column = pixel
     mean: FloatArray = image[row - by : row + by + 1, column - by : column + by + 1].reshape(-1, 3).mean(axis=0)
     return mean

@@ -1,4 +1,4 @@
-"""Pictures in H.264 from the robot side's encoder to the operator side's JPEG."""
+"""Pictures encoded in H.264 by the robot side, and decoded to JPEG by the operator side."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ HEADER = Header(epoch=1, sequence=2, sent_s=3.0)
 
 
 def moving(number: int, width: int = 160, height: int = 96) -> Image:
-    """Draw a bright disc that crosses a slope of colours."""
+    """Draw picture `number` of a bright disc that moves across a background of changing colours."""
     rows, columns = np.mgrid[0:height, 0:width]
     picture = np.stack([columns % 256, 2 * rows % 256, 128 + 0 * rows], axis=2)
     picture[np.hypot(rows - height // 2, columns - 20 - 3 * number) < 12] = (250, 250, 90)
@@ -31,7 +31,7 @@ def step(encoder: H264, picture: Image, quality: int = 90, *, whole: bool = Fals
 
 
 def error(steps: Steps, sent: VideoStep, picture: Image) -> float | None:
-    """Return the root mean square error of the shown picture, of 255; None if nothing is shown."""
+    """Decode a step; return the root mean square error of the picture, of 255, or None if no picture results."""
     frame = steps.follow(sent)
     if frame is None:
         return None

@@ -1,4 +1,4 @@
-"""Pictures give way: rate, then quality, then size, and come back slowly in reverse."""
+"""Pictures on a slow link: their rate is reduced, then quality, then size; later all return slowly, in reverse."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Robot side's end of rendering in virtual time, with a companion that acts as the test says."""
+"""The robot side's handling of the rendering companion, in virtual time, with a stand-in that the test controls."""
 
 from collections.abc import Iterator
 from typing import Literal

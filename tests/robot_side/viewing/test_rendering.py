@@ -1,4 +1,4 @@
-"""Real pictures by the real companion: places of objects, by their colour."""
+"""Pictures of the real companion show objects where they are, as their colours tell."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.processes
 
 
 def place_target(scene: Scene, position_m: FloatArray) -> None:
-    """Put the target, which has a free joint, at a position (3,)."""
+    """Put the target at a position (3,) in the world."""
     [target] = [thing for thing in scene.objects if thing.name == "target"]
     body = scene.model.geom_bodyid[target.geoms[0]]
     first = scene.model.jnt_qposadr[scene.model.body_jntadr[body]]
@@ -25,7 +25,7 @@ def place_target(scene: Scene, position_m: FloatArray) -> None:
 
 
 def is_green(color: FloatArray) -> bool:
-    """Return whether it is the target's colour, in any light."""
+    """Return whether a colour (3,) is the target's green, in any light."""
     return bool(color[1] > 1.4 * color[0] and color[1] > 1.4 * color[2] and color[1] > 30.0)
 
 

@@ -1,4 +1,4 @@
-"""Views for those who look, in virtual time: their amount, time and content."""
+"""Which pictures and scenes are sent to operators who ask for views, when and how many, in virtual time."""
 
 from collections import Counter
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Robot side with an operator who looks, as its loop drives it, in virtual time."""
+"""Robot side with an operator who watches its views, run in virtual time as the real loop runs it."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -27,7 +27,7 @@ TABLES: list["Table"] = []
 
 @dataclass
 class Table:
-    """Robot side with an operator who looks, as the loop drives it; a companion answers after 4 ms."""
+    """Robot side, an operator who watches its views, and a stand-in companion that answers after 4 ms."""
 
     settings: RobotSettings = field(default_factory=RobotSettings)
     link: LinkSpec = field(default_factory=LinkSpec)

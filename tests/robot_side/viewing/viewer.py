@@ -1,4 +1,4 @@
-"""Viewer of a real robot side: it says Hello and Watch, and receives the views."""
+"""Viewer of a real robot side: sends Hello and Watch messages, and receives the views."""
 
 import contextlib
 from collections.abc import Mapping, Sequence
@@ -20,17 +20,17 @@ _COMPANION = b"robot_side.viewing.companion"
 
 @dataclass
 class Seen:
-    """Messages of one stretch of time; ages are those on arrival, by the processes' shared clock."""
+    """Messages received in some time. Ages are those on arrival, by the clock that all processes share."""
 
     began_s: float
     ended_s: float = 0.0
     views: list[tuple[float, AnyViewMessage]] = field(default_factory=list)
-    """(time of arrival, message)"""
+    """(time of arrival, message) of each view message"""
     stiffness_ages_s: list[float] = field(default_factory=list)
 
 
 class Viewer:
-    """Participant that looks; the first one is the owner, but drives nothing."""
+    """Participant that receives views. The first one gets the lease, but commands nothing."""
 
     def __init__(self, control: str, view: str, epoch: int) -> None:
         self._sockets = OperatorSockets(control, view, topics=(VIDEO_TOPIC, SCENE_TOPIC))
@@ -38,12 +38,12 @@ class Viewer:
         self._end = LinkEnd("operator", epoch, clock_domain())
 
     def say(self, now_s: float, what: Mapping[str, Any]) -> None:
-        """Ask for some of overview, first_person and scene; the others end."""
+        """Ask for the views in `what`: overview, first_person, scene. Views not asked for are no longer sent."""
         self._sockets.send(encode(self._end.hello(now_s)))
         self._sockets.send(encode(Watch(self._end.stamp(now_s), **what)))
 
     def take(self, seen: Seen, now_s: float) -> None:
-        """Receive all that has arrived."""
+        """Receive all messages that have arrived, into `seen`."""
         for payload in self._sockets.receive():
             message: Any = decode(payload)
             if isinstance(message, StiffnessUpdate):
@@ -57,7 +57,7 @@ class Viewer:
                 seen.views.append((now_s, decode_view(whole)))
 
     def wait(self, seconds: float) -> None:
-        """Wait until something comes."""
+        """Wait until a message comes, at most `seconds`."""
         self._sockets.wait(seconds)
 
     def close(self) -> None:
@@ -66,7 +66,7 @@ class Viewer:
 
 
 def look(viewers: Sequence[Viewer], seconds: float, **what: Any) -> Seen:
-    """Let all of them look for a while; return what the first one sees."""
+    """Let all viewers receive views for `seconds`; return what the first one receives."""
     clock = MonotonicClock()
     next_s = began_s = clock.now()
     seen, others = Seen(began_s), Seen(began_s)
@@ -83,7 +83,7 @@ def look(viewers: Sequence[Viewer], seconds: float, **what: Any) -> Seen:
 
 
 def companion_of(process_id: int) -> int | None:
-    """Return the process that renders for the robot side `process_id`; None if there is none."""
+    """Return the id of the process that renders for the robot side `process_id`; None if there is none."""
     for children in Path(f"/proc/{process_id}/task").glob("*/children"):
         for child in children.read_text(encoding="ascii").split():
             with contextlib.suppress(OSError):

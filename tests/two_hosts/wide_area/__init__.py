@@ -1,1 +1,1 @@
-"""The kernel's own TCP over a wide area: delay, loss, rate and queue between two network namespaces, for trials."""
+"""Trials over the kernel's TCP: delay, loss, rate and queue of a wide-area network between two network namespaces."""

@@ -1,4 +1,7 @@
-"""The command `make wide-area`, also `python -m tests.two_hosts.wide_area`; with `stream` first, messages alone."""
+"""The command `make wide-area`, also `python -m tests.two_hosts.wide_area`.
+
+It runs both sides (question.py); with the first argument `stream`, it sends messages only (stream.py).
+"""
 
 from collections.abc import Sequence
 
@@ -8,7 +11,7 @@ from tests.two_hosts.wide_area import question, stream
 
 
 def command(arguments: Sequence[str]) -> int:
-    """Ask one of both questions."""
+    """Run the question that the first argument selects; return the exit code."""
     return ask(stream.QUESTION, arguments[1:]) if arguments[:1] == ["stream"] else ask(question.QUESTION, arguments)
 
 

@@ -1,4 +1,4 @@
-"""Bulk transfer over TCP beside the sides, like an upload: `receive`, or `send SECONDS`."""
+"""Bulk transfer over TCP that competes with both sides, like an upload. The argument is `receive` or `send`."""
 
 import select
 import socket
@@ -14,7 +14,7 @@ _LOOKS_S: Final = 0.2
 
 
 def receive() -> None:
-    """Receive from one sender; at the end of the standard input print the number of bytes."""
+    """Receive from one sender until the standard input ends; then print the number of bytes."""
     with socket.create_server(_ADDRESS) as server:
         sys.stdout.write("{}\n")
         sys.stdout.flush()
@@ -27,7 +27,7 @@ def receive() -> None:
 
 
 def send() -> None:
-    """Send zeros until the standard input ends."""
+    """Send zeros until the standard input ends, as fast as TCP accepts them."""
     deadline_s = time.monotonic() + 3600.0
     with socket.create_connection(_ADDRESS) as receiver:
         receiver.setblocking(False)

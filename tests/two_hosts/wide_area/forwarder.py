@@ -1,7 +1,7 @@
-"""Wide area as a process: two namespaces with a TUN device each, and the packets between them.
+"""Process that emulates a wide-area network: it passes packets between two namespaces with a TUN device each.
 
-It makes the namespaces, and deletes them with all programs in them when its standard input ends: nothing is left even
-when its parent is killed. Each input line of JSON (`Order`) gets an output line: the counts since the line before.
+It makes the namespaces. When its standard input ends, it deletes them and kills all programs in them, so nothing is
+left even if its parent is killed. For each input line of JSON (`Order`) it prints the counts since the line before.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ from tests.two_hosts.wide_area.wire_direction import Counts, Direction, Directio
 DEVICE: Final = "wan0"
 ADDRESSES: Final[dict[str, str]] = {"robot": "10.78.0.1", "operator": "10.78.0.2"}
 _LEAVING: Final[tuple[Direction, ...]] = ("to_operator", "to_robot")
-"""Direction in which each host sends, in their order."""
+"""Direction in which each host sends, in the order of `ADDRESSES`"""
 _CLONE_NEWNET: Final = 0x40000000
 _TUNSETIFF: Final = 0x400454CA
 _TUN_WITHOUT_HEADER: Final = 0x1001
@@ -36,22 +36,22 @@ _CONTROLS: Final = Path("/proc/sys/net/ipv4/tcp_available_congestion_control")
 _NETWORK: Final = "10.78.0.0/24"
 _LARGEST: Final = 2048
 _IN_A_ROW: Final = 64
-"""Number of packets read before the next check for due ones."""
+"""Maximum number of packets read from a device before due packets are delivered"""
 
 
 class Order(msgspec.Struct, frozen=True):
-    """Order to the forwarder: the first at its start, others at any time."""
+    """Order to the forwarder. The first starts it; each later one asks for the counts, and may change directions."""
 
     ways: dict[Direction, DirectionSettings] | None = None
-    """Words by direction; directions without words stay as they are."""
+    """New settings of directions; those without settings stay as they are"""
     control: str | None = None
-    """TCP congestion control of the hosts, in the first order; None: the machine's."""
+    """TCP congestion control of both hosts, obeyed in the first order only; None: the machine's default"""
     seed: int = 0
 
 
 @contextlib.contextmanager
 def _inside(namespace: str) -> Iterator[None]:
-    """Move this thread into a network namespace."""
+    """Move this thread into a network namespace during the context."""
     libc = ctypes.CDLL(None, use_errno=True)
     with contextlib.ExitStack() as stack:
         for path in ("/proc/self/ns/net", f"/run/netns/{namespace}"):
@@ -72,7 +72,7 @@ def _ip(*words: str) -> None:
 
 @contextlib.contextmanager
 def _hosts(control: str | None) -> Iterator[tuple[dict[str, str], list[int]]]:
-    """Yield the namespaces by host, and a descriptor of each one's device."""
+    """Make both namespaces; yield their names by host, and the descriptors of their TUN devices."""
     namespaces = {host: f"feelahead-wide-{host}-{os.getpid()}" for host in ADDRESSES}
     descriptors = []
     try:
@@ -117,7 +117,7 @@ class _Forwarder:
         self._said_s = now_s
 
     def run(self) -> None:
-        """Forward until the standard input ends."""
+        """Forward packets and obey orders until the standard input ends."""
         orders = sys.stdin.fileno()
         while True:
             wait_s = max(0.0, self._due[0][0] - time.monotonic()) if self._due else None
@@ -154,7 +154,7 @@ class _Forwarder:
                 self._failed += 1
 
     def _obey(self, order: Order) -> dict[str, Any]:
-        """Count since the last order, and change the directions."""
+        """Change directions as ordered; return the counts since the last order."""
         now_s = time.monotonic()
         late_ms = 1e3 * np.array(self._late_s or [0.0])
         figures: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""Messages over one ZeroMQ connection at a constant rate: `receive`, or `send HZ SECONDS`, each in its host."""
+"""Programs that send messages over one ZeroMQ connection at a constant rate: `send HZ SECONDS` and `receive`."""
 
 import math
 import struct
@@ -15,15 +15,15 @@ from tests.two_hosts.wide_area.forwarder import ADDRESSES
 
 PAYLOAD_BYTES: Final = 156
 WARM_UP_S: Final = 3.0
-"""Time in seconds whose messages do not count: TCP opens its window with them."""
+"""Seconds at the start whose messages are left out, as TCP still opens its window"""
 _ENDPOINT: Final = f"tcp://{ADDRESSES['operator']}:5555"
 _STAMP: Final = struct.Struct("<d?")
-"""Time of sending by the machine's shared clock, and whether the message counts."""
+"""Time of sending, by the clock that both hosts share, and whether the message counts"""
 _SETTLES_S: Final = 1.0
 
 
 def receive() -> None:
-    """Receive until the standard input ends; then print the ages in ms, and the number of messages."""
+    """Receive until the standard input ends; then print quantiles of the messages' ages, and their number."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     socket = context.socket(zmq.ROUTER)
     socket.setsockopt(zmq.RCVHWM, 0)
@@ -43,7 +43,7 @@ def receive() -> None:
 
 
 def ages(delays_s: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, float]:
-    """Return `mean_ms`, `p50_ms`, `p95_ms`, `p99_ms` and `arrived` of (n,) delays in seconds."""
+    """Return mean and quantiles of the delays (n,), in milliseconds, and their number as `arrived`."""
     of_ms = 1e3 * delays_s if delays_s.size else np.array([math.nan])
     p50, p95, p99 = np.quantile(of_ms, (0.5, 0.95, 0.99))
     found = {"mean_ms": of_ms.mean(), "p50_ms": p50, "p95_ms": p95, "p99_ms": p99, "arrived": delays_s.size}
@@ -51,7 +51,10 @@ def ages(delays_s: np.ndarray[tuple[int], np.dtype[np.float64]]) -> dict[str, fl
 
 
 def send(hz: float, seconds: float) -> None:
-    """Send at `hz`, then wait until the standard input ends; nothing is delayed or dropped here."""
+    """Send `hz` messages a second for `seconds` after a warm-up, then wait until the standard input ends.
+
+    The socket has no high-water mark: it drops no message.
+    """
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     socket = context.socket(zmq.DEALER)
     socket.setsockopt(zmq.SNDHWM, 0)

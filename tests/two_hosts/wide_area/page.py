@@ -1,6 +1,6 @@
-"""Page of the console without a browser: it watches everything, and counts pictures and their ages.
+"""Stand-in for a browser with the console's page: it receives all data, and measures number and ages of the pictures.
 
-page ADDRESS, which the operator side prints at its start.
+Usage: page ADDRESS, the console's address, which the operator side prints at its start.
 """
 
 import asyncio
@@ -19,11 +19,11 @@ from websockets.typing import Origin
 from operator_side.viewing.console.pages import ROUND_ENDS
 
 _PICTURE: Final = struct.Struct("<Bd")
-"""View, and time of capture by the machine's shared clock."""
+"""First bytes of a picture's message: the view, and the time of capture by the clock that both hosts share"""
 
 
 async def look(address: str) -> dict[str, float]:
-    """Watch until the standard input ends; return pictures of both views a second, and their ages on arrival in ms."""
+    """Receive until the standard input ends; return pictures a second, and quantiles of their ages on arrival."""
     ends = asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
     origin = Origin("http://" + urlsplit(address).netloc)
     ages_s: list[float] = []

@@ -23,9 +23,9 @@ _Numbers = Annotated[tuple[float, ...], tyro.conf.arg(metavar="NUMBER...")]
 
 @dataclass(frozen=True)
 class WideSweep(Sweep):
-    """Run both sides in two network namespaces, with a wide area between them: all combinations of the values.
+    """Run both sides in two network namespaces, with a wide-area network between them, for all combinations of values.
 
-    Needs root, iproute2 and /dev/net/tun. Each run takes --seconds and ten more to start; they take turns.
+    Needs root, iproute2 and /dev/net/tun. The runs follow each other; each takes --seconds, and ten seconds to start.
     """
 
     delay: _Numbers = (100.0,)
@@ -33,27 +33,27 @@ class WideSweep(Sweep):
     loss: _Numbers = (0.0,)
     """Per cent of packets lost, in each direction."""
     burst: _Numbers = (0.0,)
-    """Milliseconds in which all packets are lost, every 5 s, in each direction."""
+    """Duration in milliseconds of bursts in which all packets are lost: a burst every 5 s, in each direction."""
     rate: _Numbers = (0.0,)
-    """Mbit/s of the robot's uplink; 0: unlimited."""
+    """Rate of the robot's uplink in Mbit/s; 0: unlimited."""
     falls_to: _Numbers = (0.0,)
-    """Mbit/s of the robot's uplink in the second half of the time; 0: no change."""
+    """Rate of the robot's uplink in Mbit/s in the second half of a run; 0: no change."""
     queue: _Numbers = (200.0,)
-    """Milliseconds for which a packet may wait for the rate."""
+    """Longest time, in milliseconds, that a packet waits in the queue before the uplink; others are dropped."""
     control: tuple[str, ...] = ("reno",)
-    """TCP's congestion control: reno, cubic, bbr, if the machine has them."""
+    """TCP's congestion control: reno, cubic, bbr, or another that the machine has."""
     connections: Annotated[tuple[int, ...], tyro.conf.arg(metavar="N...")] = (0,)
-    """Connections of the operator side; 0: its default."""
+    """Number of the operator side's connections for control; 0: the operator side's default."""
     person: tuple[Literal["drives", "rests"], ...] = ("drives",)
-    """The scripted person, or hands that do nothing."""
+    """drives: the scripted person drives; rests: nobody touches the controls."""
     pictures: tuple[bool, ...] = (False,)
-    """Whether a page watches both views and the scene."""
+    """Whether a page of the console receives both views and the scene."""
     bulk: tuple[bool, ...] = (False,)
     """Whether a TCP transfer fills the robot's uplink."""
     observer: tuple[Literal["none", "reads", "stops"], ...] = ("none",)
-    """A second operator side; stops: stopped (SIGSTOP) after a third of the time."""
+    """A second operator side. none: there is none. reads: it observes. stops: SIGSTOP after a third of the time."""
     seconds: float = 20.0
-    """Length of each run, from the operator side's start."""
+    """Length of each run in seconds, from the operator side's start."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -64,18 +64,18 @@ _VARIED: Final = tuple(one.name for one in fields(Trial) if one.name != "seconds
 
 
 def cells(settings: WideSweep) -> Iterator[Trial]:
-    """Yield the grid."""
+    """Yield a trial for each combination of the values."""
     for chosen in product(*(getattr(settings, name) for name in _VARIED)):
         yield Trial(**dict(zip(_VARIED, chosen, strict=True)), seconds=settings.seconds)
 
 
 def run(cell: Trial, seed: int) -> Iterator[Row]:
-    """Run one trial."""
+    """Run one trial; yield its figures."""
     yield run_trial(cell, seed)
 
 
 def show(_: WideSweep, table: Table) -> Iterator[RenderableType]:
-    """Show a line for each run: the varied values, and the figures."""
+    """Show a table with a line for each run: the values that vary, and the figures."""
     varied = [name for name in (*_VARIED, "seed") if len({row[name] for row in table}) > 1] or ["delay"]
     columns = {name: parts for name, parts in _COLUMNS.items() if any(table.values(part) for part in parts)}
     lines = (
@@ -105,9 +105,10 @@ _COLUMNS: Final[Mapping[str, Sequence[str]]] = {
     "late after fall, s": ("late_after_fall_s",),
     "late, ms": ("late_p99_ms", "late_max_ms"),
 }
-"""Figures that share a column; the first of two is to the operator. queueing: in ages, and in the link itself.
+"""Columns of the shown table: the names of the figures that each column shows, by the column's title.
 
-late: the forwarder's p99 and maximum.
+Of two directions, the first is to the operator. queueing: by the messages' ages, then in the link's own queue. late:
+p99 and maximum of how late the forwarder delivered packets.
 """
 
 

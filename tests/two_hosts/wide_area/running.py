@@ -1,4 +1,4 @@
-"""Runs of a trial: both sides over the wide area for some seconds, with viewers or transfers beside them."""
+"""Run a trial: both sides over the wide area for some seconds, if asked with an observer, a page or a bulk transfer."""
 
 import contextlib
 import os
@@ -28,7 +28,7 @@ _DEVICES: Final = {"drives": "simulated", "rests": "browser"}
 
 
 def run_trial(trial: Trial, seed: int = 0) -> Row:
-    """Run a trial; FeelaheadError if no wide area is possible, or a side fails."""
+    """Run a trial; return its figures. FeelaheadError if no wide area is possible here, or a side fails."""
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="feelahead-wide-")))
         wide = stack.enter_context(WideArea(trial.ways(), trial.control, seed))
@@ -44,7 +44,7 @@ def run_trial(trial: Trial, seed: int = 0) -> Row:
 
 @dataclass
 class _Sides:
-    """Processes of a trial, and their statuses."""
+    """Processes of a trial, and what their statuses say."""
 
     stack: contextlib.ExitStack
     wide: WideArea
@@ -52,16 +52,16 @@ class _Sides:
     folder: Path
     seed: int
     statuses: int = 0
-    """Number of the robot side's statuses since it was first armed."""
+    """Number of the robot side's statuses since the arm was first armed"""
     armed: int = 0
     armed_after_s: float | None = None
     fell_s: float = 0.0
-    """Time at which the rate fell, on the machine's shared clock."""
+    """Time at which the uplink's rate fell, by the clock that all processes share"""
     beside: dict[str, float] = field(default_factory=dict)
-    """Figures of the page and the bulk transfer."""
+    """Figures of the page and of the bulk transfer"""
 
     def start(self) -> None:
-        """Start everything; the time counts from the operator side's first status."""
+        """Start all processes of the trial; return after the operator side's first status."""
         trial = self.trial
         cameras = () if trial.pictures else ("--no-cameras",)
         self.robot = self._side("robot", "robot", f"--bind=tcp://{_ENDPOINT}", "--insecure", *cameras)
@@ -99,7 +99,7 @@ class _Sides:
         return self.stack.enter_context(self.wide.run(host, *words))
 
     def watch(self) -> Iterator[Mapping[str, Any]]:
-        """Let the time pass; yield the forwarder's counts until the rate falls, and after."""
+        """Wait for the run's time; yield the forwarder's counts until the rate falls, if it does, and until the end."""
         trial = self.trial
         began_s = time.monotonic()
         for of_all in (1 / 3, 1 / 2, 1.0):
@@ -149,10 +149,10 @@ class _Sides:
         return late_s
 
     def row(self, total: Mapping[str, Any], robot: Mapping[str, Any], operator: Mapping[str, Any]) -> Row:
-        """Make the row of both summaries, the statuses, and the counts; None for unmeasured figures.
+        """Return the trial's figures, from both summaries, the statuses and the counts; None for unmeasured ones.
 
-        Ages are those of applied messages: at the operator on arrival, at the robot in each tick that moves the arm. A
-        late message was overtaken, and counts as `slowest` alone. `armed` is a share of the statuses.
+        Ages are those of applied messages: at the operator on arrival, at the robot in each tick that moves the arm.
+        A message that a newer one overtook counts in `slowest_...` only. `armed` is a share of the statuses.
         """
         row: Row = {}
         for way, summary in (("to_operator", operator), ("to_robot", robot)):
@@ -181,7 +181,7 @@ _ADDED: Final = ("seconds", "packets", "bytes", "lost", "dropped")
 
 
 def _total(parts: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """Sum the counts of all parts; of other figures take the worst, and of words and rates the last part's."""
+    """Sum the counts of all parts of a run. For times take the largest, and for all else the last part's value."""
     first, *others = parts
     total = dict(first)
     for part in others:

@@ -1,4 +1,4 @@
-"""Does the emulated link's `stream` delay messages as the kernel's TCP does, on one connection of equal delay and loss?
+"""Does our emulation of `stream` delay messages as the kernel's TCP does, on a connection of equal delay and loss?
 
 python -m tests.two_hosts.wide_area stream --delay 25 100 --loss 1 --seconds 60
 """
@@ -24,13 +24,13 @@ from tests.two_hosts.wide_area.wire_direction import DirectionSettings
 
 _MODEL: Final = "stream"
 _LAST_S: Final = 3.0
-"""Time in seconds for the last messages, which may need retransmission."""
+"""Seconds, beside the delay, in which the last messages may still arrive, as TCP may send them again"""
 _Numbers = Annotated[tuple[float, ...], tyro.conf.arg(metavar="NUMBER...")]
 
 
 @dataclass(frozen=True)
 class StreamSweep(Sweep):
-    """Send messages of 156 bytes over one ZeroMQ connection: the kernel's TCP beside the model, in one direction.
+    """Send messages of 156 bytes in one direction: over ZeroMQ and the kernel's TCP, and through the emulation.
 
     Needs root, iproute2 and /dev/net/tun.
     """
@@ -40,11 +40,11 @@ class StreamSweep(Sweep):
     loss: _Numbers = (1.0,)
     """Per cent of packets lost, in each direction."""
     hz: _Numbers = (100.0, 250.0)
-    """Messages a second."""
+    """Number of messages a second."""
     control: tuple[str, ...] = ("reno", "cubic", "bbr")
-    """TCP's congestion control, if the machine has it."""
+    """TCP's congestion control: reno, cubic, bbr, or another that the machine has."""
     seconds: Annotated[float, Meta(ge=1.0, le=3600.0)] = 30.0
-    """Length of each run, after 3 s in which TCP opens its window."""
+    """Length of each run in seconds, after 3 s in which TCP opens its window."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -53,18 +53,18 @@ class StreamSweep(Sweep):
 
 @dataclass(frozen=True)
 class Cell(Limited):
-    """One link, and the carrier of its messages."""
+    """One link, and what carries the messages."""
 
     delay: Annotated[float, Meta(ge=0.0, le=5000.0)]
     loss: Annotated[float, Meta(ge=0.0, le=100.0)]
     hz: Annotated[float, Meta(ge=1.0, le=1e4)]
     control: str
-    """A congestion control, or `stream`"""
+    """Congestion control of the kernel's TCP, or `stream` for the emulation"""
     seconds: float
 
 
 def cells(settings: StreamSweep) -> Iterator[Cell]:
-    """Yield the grid, the model first."""
+    """Yield all combinations of the values; for each link the emulation comes first."""
     for delay in settings.delay:
         for loss in settings.loss:
             for hz in settings.hz:
@@ -73,7 +73,7 @@ def cells(settings: StreamSweep) -> Iterator[Cell]:
 
 
 def run(cell: Cell, seed: int) -> Iterator[Row]:
-    """Send the messages once."""
+    """Send the messages of one cell; yield the figures of their ages."""
     if cell.control == _MODEL:
         link = LinkSpec.parse(f"delay {cell.delay}ms loss {cell.loss}%", seed, "stream")
         sent_s = [number / cell.hz for number in range(int(cell.hz * cell.seconds))]
@@ -91,7 +91,7 @@ def run(cell: Cell, seed: int) -> Iterator[Row]:
 
 
 def show(_: StreamSweep, table: Table) -> Iterator[RenderableType]:
-    """Show a line for each link and rate: mean / p50 / p95 / p99."""
+    """Show a table with a line for each link and rate: mean / p50 / p95 / p99 of the ages."""
     kinds = list(dict.fromkeys(row["control"] for row in table))
     names = ("mean_ms", "p50_ms", "p95_ms", "p99_ms")
     lines = []

@@ -1,4 +1,4 @@
-"""One direction of the wide area against its words, without a clock or a network."""
+"""One direction of the wide area behaves as its settings say; these tests use neither a clock nor a network."""
 
 import pytest
 
@@ -6,7 +6,7 @@ from tests.two_hosts.wide_area.wire_direction import DirectionSettings, Wire
 
 _PACKET_BYTES = 1250
 _RATE_BIT_S = 1e6
-"""Rate in bit/s at which a packet takes 10 ms."""
+"""Rate in bit/s at which a packet of these tests takes 10 ms"""
 
 
 def arrivals(words: DirectionSettings, sent_s: list[float]) -> list[float | None]:

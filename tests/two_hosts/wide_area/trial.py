@@ -1,4 +1,4 @@
-"""Trial over a wide area."""
+"""Settings of one trial over a wide area."""
 
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
@@ -11,7 +11,7 @@ from tests.two_hosts.wide_area.wire_direction import Direction, DirectionSetting
 
 @dataclass(frozen=True)
 class Trial(Limited):
-    """One link, and the load on it; the flags of `question.WideSweep` explain each field."""
+    """One link, and the load on it. `question.WideSweep` explains the fields of the same name."""
 
     delay: Annotated[float, Meta(ge=0.0, le=5000.0)] = 100.0
     loss: Annotated[float, Meta(ge=0.0, le=100.0)] = 0.0
@@ -28,6 +28,6 @@ class Trial(Limited):
     seconds: Annotated[float, Meta(ge=2.0, le=3600.0)] = 20.0
 
     def ways(self) -> dict[Direction, DirectionSettings]:
-        """Return the link at the start, in SI units."""
+        """Return the settings of both directions at the start, in SI units."""
         words = DirectionSettings(self.delay / 1e3, self.loss / 1e2, self.burst / 1e3, queue_s=self.queue / 1e3)
         return {"to_operator": replace(words, rate_bit_s=1e6 * self.rate), "to_robot": words}

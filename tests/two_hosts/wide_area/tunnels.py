@@ -1,4 +1,4 @@
-"""The wide area from outside: its hosts, their programs, and the forwarder's counts."""
+"""Control of an emulated wide area: start it, run programs on its two hosts, and get the forwarder's counts."""
 
 import os
 import shutil
@@ -21,7 +21,7 @@ _ENDS_S: Final = 5.0
 
 
 class Child:
-    """Program that reads and writes lines of JSON; it ends when its standard input does."""
+    """Child process that reads and writes lines of JSON, and ends when its standard input ends."""
 
     def __init__(self, module: str, *arguments: str, before: Sequence[str] = ()) -> None:
         environment = os.environ | {"PYTHONPATH": str(ROOT)}
@@ -44,7 +44,7 @@ class Child:
         self.end()
 
     def say(self, line: str) -> None:
-        """Write a line to it; FeelaheadError if it is gone."""
+        """Write a line to the process; FeelaheadError if the process has ended."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(line + "\n")
@@ -53,7 +53,7 @@ class Child:
             raise FeelaheadError(f"wide area: the {self.name} has ended") from error
 
     def hear(self) -> dict[str, Any]:
-        """Read its next line; FeelaheadError if it ends first, or reports an error."""
+        """Read the next line from the process; FeelaheadError if the process ends instead, or reports an error."""
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         said: dict[str, Any] = msgspec.json.decode(line) if line else {"error": f"the {self.name} has ended"}
@@ -62,13 +62,13 @@ class Child:
         return said
 
     def last(self) -> dict[str, Any]:
-        """End its input; return its last line."""
+        """Close the process's standard input; return the line that the process prints then."""
         assert self._process.stdin is not None
         self._process.stdin.close()
         return self.hear()
 
     def end(self) -> None:
-        """End it, by force if necessary."""
+        """End the process, by force if necessary."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.close()
@@ -81,10 +81,10 @@ class Child:
 
 
 class WideArea(Child):
-    """Forwarder with its hosts, as a context: nothing of them is left at its end."""
+    """Running forwarder and its two hosts, as a context: at its end, hosts and programs are gone."""
 
     def __init__(self, ways: dict[Direction, DirectionSettings], control: str | None = None, seed: int = 0) -> None:
-        """FeelaheadError without root, `ip`, TUN devices or this congestion control."""
+        """Start; FeelaheadError if root, `ip`, TUN devices or the congestion control `control` are missing."""
         if (missing := what_is_missing()) is not None:
             raise FeelaheadError(f"wide area: {missing}")
         super().__init__("forwarder")
@@ -96,21 +96,21 @@ class WideArea(Child):
             raise
 
     def surroundings(self, host: Host) -> list[str]:
-        """Return the command prefix that runs a program there."""
+        """Return the command prefix that runs a program on `host`."""
         return ["ip", "netns", "exec", self._namespaces[host], "env", f"PYTHONPATH={ROOT}"]
 
     def run(self, host: Host, module: str, *arguments: str) -> Child:
-        """Run one of this package's programs there."""
+        """Start one of this package's programs on `host`."""
         return Child(module, *arguments, before=self.surroundings(host))
 
     def figures(self, ways: dict[Direction, DirectionSettings] | None = None) -> dict[str, Any]:
-        """Return the counts since the last call; with `ways`, change these directions from now on."""
+        """Return the forwarder's counts since the last call; with `ways`, change these directions from now on."""
         self.say(msgspec.json.encode(Order(ways)).decode())
         return self.hear()
 
 
 def what_is_missing() -> str | None:
-    """Return why no wide area is possible on this machine, and the remedy; None if one is."""
+    """Return why this machine cannot emulate a wide area, and the remedy; None if it can."""
     if os.geteuid() != 0:
         return "network namespaces need root"
     if shutil.which("ip") is None:

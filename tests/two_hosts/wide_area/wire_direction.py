@@ -1,4 +1,4 @@
-"""One direction of the wide area: loses, queues and delays packets, and counts them. It has no clock."""
+"""One direction of the wide area: loses, queues, delays and counts packets. The caller gives the time."""
 
 import random
 from dataclasses import dataclass, field
@@ -14,42 +14,42 @@ Direction = Literal["to_operator", "to_robot"]
 
 @dataclass(frozen=True)
 class DirectionSettings(Limited):
-    """Delay, loss, rate and queue of one direction; the forwarder gets them as JSON."""
+    """Delay, loss, rate and queue of one direction; sent to the forwarder as JSON."""
 
     delay_s: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
-    """Delay of each packet, after the queue."""
+    """Delay of each packet, after the queue, in seconds"""
     loss: Share = 0.0
-    """Share of packets lost, each independently."""
+    """Share of packets that are lost, each independently of the others"""
     burst_s: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
-    """Time in which all packets are lost, at the end of each `burst_every_s`."""
+    """Seconds at the end of each `burst_every_s` in which all packets are lost"""
     burst_every_s: Annotated[float, Meta(gt=0.0, le=1000.0)] = 5.0
     rate_bit_s: Annotated[float, Meta(ge=0.0, le=1e11)] = 0.0
-    """Rate of the link; 0: unlimited."""
+    """Rate of the link in bit/s; 0: unlimited"""
     queue_s: Annotated[float, Meta(ge=0.0, le=100.0)] = 0.2
-    """Longest wait; a packet that would wait longer is dropped."""
+    """Longest waiting time in the queue, in seconds; a packet that would wait longer is dropped"""
 
 
 @dataclass
 class Counts:
-    """Packets of one direction, as they came from the sender."""
+    """Counts of the packets that the sender gave to one direction."""
 
     packets: int = 0
     bytes: int = 0
     lost: int = 0
     dropped: int = 0
-    """Number of packets that met a full queue."""
+    """Number of packets dropped because the queue was full"""
     queued_s: list[float] = field(default_factory=list)
-    """Waiting time of each packet for the rate."""
+    """Waiting time of each packet in the queue, in seconds"""
 
     def summary(self) -> dict[str, float]:
-        """Return `packets`, `bytes`, `lost`, `dropped` and `queue_p95_ms`."""
+        """Return the counts `packets`, `bytes`, `lost`, `dropped`, and `queue_p95_ms`, a quantile of waiting times."""
         p95 = 1e3 * float(np.quantile(self.queued_s, 0.95)) if self.queued_s else 0.0
         counted = {name: getattr(self, name) for name in ("packets", "bytes", "lost", "dropped")}
         return counted | {"queue_p95_ms": p95}
 
 
 class Wire:
-    """Drop-tail queue before a rate, and a delay behind it. The order is netem's: lose, drop, delay."""
+    """Loss, then a drop-tail queue before a limited rate, then a delay: the order of netem."""
 
     def __init__(self, words: DirectionSettings, seed: int, direction: Direction, began_s: float) -> None:
         self.counts = Counts()
@@ -58,14 +58,14 @@ class Wire:
         self._began_s = self._free_s = began_s
 
     def change(self, words: DirectionSettings, now_s: float) -> None:
-        """Change the words from now on; waiting bits leave at the new rate."""
+        """Change the settings from `now_s` on; bits that wait in the queue leave at the new rate."""
         if self._words.rate_bit_s and words.rate_bit_s:
             waiting_s = max(0.0, self._free_s - now_s)
             self._free_s = now_s + waiting_s * self._words.rate_bit_s / words.rate_bit_s
         self._words = words
 
     def take(self, size_bytes: int, now_s: float) -> float | None:
-        """Return when a packet of this size arrives, on the caller's clock in seconds; None if lost or dropped."""
+        """Return when a packet sent at `now_s` arrives, by the same clock; None if it is lost or dropped."""
         words, counts = self._words, self.counts
         counts.packets += 1
         counts.bytes += size_bytes

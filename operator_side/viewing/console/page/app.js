@@ -1,4 +1,4 @@
-// The page: shows the console's messages as they arrive.
+// Main script of the page: shows the console's messages as they arrive.
 import { Chart } from "./charts.js";
 import { Hands as PageHands } from "./hands.js";
 import { make } from "./make.js";
@@ -12,7 +12,7 @@ const SILENCE_MS = 400; // facts come 30 times a second
 const RETRY_MS = 500;
 const MOST_NOTES = 50;
 const FIGURES = {
-  // in the bar: element and title
+  // figures in the bar: id of the element, and title
   link: "Link",
   lease: "Lease",
   whose: "Hands",
@@ -47,6 +47,7 @@ let drawn = false;
 const frame = document.querySelector("#scene iframe");
 const slow = drawsSlowly();
 let run = { title: "", live: true };
+let ended = ""; // why the connection is expected to end
 
 const send = (object) => {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(object));
@@ -75,8 +76,11 @@ function receive(message) {
   else if (message.kind === ShownKind.FACTS) showFacts(message);
   else if (message.kind === ShownKind.SCENE) showScene(message);
   else if (message.kind === ShownKind.NOTE) showNote(message.text);
+  else if (message.kind === ShownKind.ENDED) ended ||= "THE RUN HAS ENDED";
   else if (message.kind === ShownKind.RUN) {
     run = message;
+    ended = "";
+    byId("again").hidden = !run.may_run_again;
     clock.live = run.live;
     document.title = `feelahead: ${run.title}`;
     document.body.classList.toggle("replay", !run.live);
@@ -87,7 +91,7 @@ function receive(message) {
   }
 }
 
-// Recording of a robot side alone: its pictures and scene exist, and nothing of an operator side.
+// Show a recording made by a robot side alone: it has pictures and a scene, but no facts of an operator side.
 function goWithoutFacts(atS) {
   everHeard = true;
   clock.set(atS, null);
@@ -141,7 +145,7 @@ function showCounts({ page, hands: whose, status }) {
   if (off) text("hands_off", `PICTURES ARE OLD: ${share} until they are fresh`);
 }
 
-// Rate and queue as measured by the robot side, lost packets, and held-back streams.
+// Show rate and queueing delay as measured by the robot side, lost packets, and streams that are held back.
 function showLink(status) {
   const figure = (value, digits = 0) => (value == null ? "?" : value.toFixed(digits));
   const rate = status.rate_kbit_s == null ? "?" : `${figure(status.rate_kbit_s / 1000, 1)} Mbit/s`;
@@ -149,6 +153,11 @@ function showLink(status) {
   const held = status.held_back ? `; held back: ${status.held_back}` : "";
   text("pictures", `${status.pictures ?? "?"}${held}`);
 }
+
+byId("again").onclick = () => {
+  send({ again: true });
+  ended = "STARTING AGAIN";
+};
 
 function draw(wanted) {
   drawn = wanted;
@@ -160,14 +169,16 @@ function draw(wanted) {
 byId("drawn").onclick = () => draw(!drawn);
 draw(!slow);
 
-// Without a graphics processor the drawing takes processor time from all else: only on request, and less often.
+// Whether the browser draws without a graphics processor: the scene then takes much processor time, so it is drawn only
+// on request, and updated less often.
 function drawsSlowly() {
   const context = document.createElement("canvas").getContext("webgl");
   const renderer = context?.getParameter(context.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? 0);
   return /swiftshader|llvmpipe|software|basic render/i.test(renderer ?? "software");
 }
 
-// Under our other name the scene is another site, in a separate process: drawing it slows nothing here.
+// Address of the scene under our other host name (localhost or 127.0.0.1). The browser treats that as another site,
+// in a process of its own, so that drawing the scene does not slow this page.
 function sceneAddress() {
   const address = new URL("scene/", location.href);
   address.hostname = location.hostname === "localhost" ? "127.0.0.1" : "localhost";
@@ -176,7 +187,7 @@ function sceneAddress() {
 }
 
 function showScene(scene) {
-  // Earlier, viser has no camera position for the scene.
+  // Only now, as viser has no camera position before the first scene.
   if (drawn && !frame.src) frame.src = sceneAddress();
   frame.hidden = !drawn;
   overlay.show(scene, facts);
@@ -212,9 +223,9 @@ function look() {
   byId("lost").hidden = !lost;
   if (lost) {
     const [word, because] = byId("lost").children;
-    word.textContent = open ? (everHeard ? "NOTHING HEARD" : "WAITING FOR THE OPERATOR SIDE") : "CONNECTION LOST";
+    word.textContent = ended || (open ? (everHeard ? "NOTHING HEARD" : "WAITING FOR THE OPERATOR SIDE") : "CONNECTION LOST");
     const old = everHeard ? `What you see is ${(silentMs / 1000).toFixed(1)} s old. ` : "";
-    because.textContent = old + (open ? "The operator side is silent." : `The console: ${closedBecause || "not reached yet"}.`);
+    because.textContent = ended ? "" : old + (open ? "The operator side is silent." : `The console: ${closedBecause || "not reached yet"}.`);
   }
   const limits = facts?.pictures;
   views.forEach((view, k) => view.look(limits?.old_s[k] ?? null, limits?.dead_s[k]));

@@ -18,7 +18,7 @@ export class Chart {
     [this.#title, this.#unit, this.#series, this.#full] = [title, unit, series, full];
   }
 
-  // An earlier time than the newest one: the recording was moved back.
+  // A time before the newest sample means that the recording was moved back: begin anew.
   add(nowMs, values) {
     if (this.#samples.at(-1)?.[0] > nowMs) this.#samples = [];
     this.#samples.push([nowMs, values]);

@@ -1,10 +1,11 @@
-// Keyboard, pointer and gamepad of this page as a second-class controller, and the emergency stop.
+// Keyboard, pointer and gamepad of this page, used as a controller; and the emergency stop.
 //
 // watching ─▶ resting ─▶ ready ─▶ running       resting: all keys up for a second; ready: hold-to-run counts
 //     ▲          ▲         │         │
-//     └──────────┴─────────┴─────────┘  a key up, a blurred or hidden page, a stop, silence: all is released
+//     └──────────┴─────────┴─────────┘  on hold-to-run released, a blurred or hidden page, a stop, silence
 //
-// The operator side decides by the same rules (operator_side/viewing/pages/driving_page.py); this is for display.
+// The operator side decides by the same rules whether inputs move the arm (operator_side/viewing/pages/driving_page.py);
+// the state here is only for display.
 import { atRest, both, Grips, Keys, readGamepads, REST } from "./inputs.js";
 import { Doing, MotionState } from "./names.js";
 import { Panel } from "./panel.js";
@@ -12,9 +13,9 @@ import { Tuning } from "./tuning.js";
 
 const PERIOD_MS = 20;
 const REST_MS = 1000;
-const HELD_UP_MS = 150; // a page that was suspended for longer releases, as the operator side does
+const HELD_UP_MS = 150; // a page that was suspended for longer releases all inputs; the operator side does the same
 const SILENCE_MS = 500; // without facts for longer the arm's state is unknown
-const AGREES_MS = 500; // until the facts reflect our messages
+const AGREES_MS = 500; // time until the facts reflect our messages
 const STOP_MS = 200;
 const STOP_TRIES_MS = 5000;
 const EDITS = "input:not([type=button]), select, textarea, [contenteditable=true]";
@@ -90,7 +91,7 @@ export class Hands {
     return this.#facts?.status.state === MotionState.ARMED;
   }
 
-  // Armed by the operator side's own hands, which may learn of it later than the status.
+  // Whether our inputs move the arm: it is armed, and the operator side lets inputs count (perhaps a little later).
   get #moves() {
     return this.#armed && this.#facts.status.person === Doing.RUNNING;
   }
@@ -104,12 +105,12 @@ export class Hands {
     if (event.target.matches?.(EDITS)) return;
     if (event.code === "KeyX" && !event.repeat) this.#resetNow();
     if (event.ctrlKey || event.altKey || event.metaKey) {
-      this.#release("A browser shortcut was pressed."); // the browser may keep its release to itself
+      this.#release("A browser shortcut was pressed."); // the browser may not report its release
       return;
     }
-    // Also while watching: a key that is down already must come up first.
+    // Also while watching: a key that is already down when driving begins must come up first.
     if (!this.#keys.press(event.code) || this.#state === "watching") return;
-    event.preventDefault(); // neither scroll nor press a button by Space
+    event.preventDefault(); // keys must not scroll the page, nor Space press a button
     if (!event.repeat) this.#step();
   }
 
@@ -120,7 +121,7 @@ export class Hands {
     this.#step();
   }
 
-  // The window has lost the focus, perhaps to the scene, which is another site: its keys never reach us.
+  // The window has lost the focus. If the scene's frame has it, take it back: another site's keys never reach us.
   #left() {
     this.#release("The page lost the focus.");
     this.#stopHeld.delete("Escape");
@@ -237,7 +238,7 @@ export class Hands {
     }
   }
 
-  // The operator side's view of us overrides ours.
+  // Follow the operator side where its state differs from ours.
   #agree() {
     const known = this.#hands;
     if (this.#state === "watching" || known === null) return;

@@ -1,7 +1,8 @@
-// Inputs of this page: keys by their place, for any layout; pointers; gamepads in the standard mapping.
+// Inputs of this page: keys, by their position on the keyboard, whatever its layout; pointers; gamepads in the standard
+// mapping.
 
 export const KEYS = [
-  // action, codes of the keys, label
+  // action, codes of its keys, label
   ["run", ["Space"], "hold to run (arms, too)"],
   ["advance", ["KeyW", "ArrowUp"], "advance"],
   ["retreat", ["KeyS", "ArrowDown"], "retreat"],
@@ -23,7 +24,7 @@ const WORDS = { Space: "Space", ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "�
 const LEVEL = /^(?:Digit|Numpad)([1-9])$/;
 const RAMP_S = 0.6;
 const PULLED = 0.05; // dead zone of a gamepad's trigger
-const DEFLECTED = 0.12; // dead zone of its sticks
+const DEFLECTED = 0.12; // dead zone of a gamepad's sticks
 
 export const REST = Object.freeze({
   run: false, l2: 0, r2: 0, lateral: [0, 0], turning: [0, 0], gripper: 0, next_target: false, hand_over: false,
@@ -33,9 +34,9 @@ export const atRest = (hands) =>
   !hands.run && hands.l2 === 0 && hands.r2 === 0 && hands.gripper === 0 && !hands.next_target && !hands.hand_over &&
   [...hands.lateral, ...hands.turning].every((part) => part === 0);
 
-// Keys that are down, and the travel of each action: it rises over RAMP_S, and falls to zero at once.
+// Keys that are down, and the travel of each action, which rises over RAMP_S and falls to zero at once.
 export class Keys {
-  level = 4; // of 9
+  level = 4; // travel that a held key reaches, in ninths
   #down = new Set();
   #ways = new Map();
 
@@ -56,7 +57,7 @@ export class Keys {
     this.#ways.clear();
   }
 
-  // moves: travels grow only then; held keys count as pressed in any case.
+  // moves: whether inputs move the arm now; travels grow only then. Held keys count as pressed in any case.
   read(passed_s, moves) {
     const held = new Set([...this.#down].map((code) => DOES.get(code)));
     const most = this.level / 9;
@@ -82,7 +83,7 @@ export class Keys {
 }
 
 export async function keyWords() {
-  // The key's label on this keyboard if the browser knows it, else the one of its place.
+  // The key's label on this keyboard if the browser knows the layout, else its label on a US keyboard.
   const layout = await navigator.keyboard?.getLayoutMap?.().catch(() => null);
   return (code) => WORDS[code] ?? (layout?.get(code) ?? code.replace("Key", "")).toUpperCase();
 }
@@ -95,7 +96,7 @@ function stick(x, y) {
   return [x * part + 0, -y * part + 0]; // a gamepad's y points down
 }
 
-// swapped: left and right exchanged, as for a controller of ours.
+// swapped: exchange left and right, as --swap-sides does for a controller.
 export function readGamepads(swapped) {
   const found = [...(navigator.getGamepads?.() ?? [])].filter((pad) => pad?.connected);
   const known = found.filter((pad) => pad.mapping === "standard");
@@ -122,7 +123,7 @@ export function readGamepads(swapped) {
   return { hands, stop, reset, name: known[0]?.id ?? null, unknown: known.length ? null : found[0]?.id ?? null };
 }
 
-// Merge two hands: the larger value of each.
+// Merge two sets of inputs: the larger value of each input.
 export function both(one, other) {
   const farther = (a, b) => (Math.hypot(...a) >= Math.hypot(...b) ? a : b);
   return {
@@ -137,7 +138,7 @@ export function both(one, other) {
   };
 }
 
-// Elements held with a pointer; each also holds to run, and its value grows from the place of the press.
+// Elements held with a pointer. Each counts as hold-to-run, too; its value grows with the distance from the press.
 export class Grips {
   #held = new Map();
 
@@ -145,7 +146,7 @@ export class Grips {
     this.changed = changed;
   }
 
-  // says(right, up): hands for these shares of `reach` pixels from the place of the press.
+  // says(right, up): returns the inputs for a pointer moved right and up by these shares of `reach` pixels.
   add(element, says, reach = 90) {
     const share = (pixels) => Math.max(-1, Math.min(1, pixels / reach));
     element.addEventListener("pointerdown", (event) => {

@@ -1,4 +1,4 @@
-// Panel of the hands: its texts, buttons and grips.
+// Panel for driving: its texts, buttons and elements to hold.
 import { KEYS, keyWords } from "./inputs.js";
 import { make } from "./make.js";
 import { Doing, Hands, LinkState, MotionState, SessionState } from "./names.js";

@@ -1,4 +1,4 @@
-// Player of a recording: play and pause, the moment that is shown, and the speed.
+// Controls of a replayed recording: play and pause, position, and speed.
 import { make } from "./make.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10];

@@ -1,4 +1,4 @@
-// View of one trigger: the strength of each tenth of its travel, the finger's place, and the strength there.
+// View of one trigger: the strength of each of its ten zones, its present travel, and the strength there.
 import { make } from "./make.js";
 
 const ZONES = 10;

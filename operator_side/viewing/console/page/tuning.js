@@ -1,16 +1,16 @@
-// Tuning during a run: P of eq. 10 and the emulated link, if the run permits it.
+// Tuning during a run, if the run permits it: probability P of eq. 10, and the emulated link.
 import { make } from "./make.js";
 import { LinkState, SessionState } from "./names.js";
 
 const PROBABILITIES = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998, 0.999];
 const PAUSE_MS = 250; // a slider's value is sent once it rests
-const FOLLOWS_MS = 2000; // after a wish the slider shows it for this time, then the actual value
+const FOLLOWS_MS = 2000; // for this time after a request the slider shows the requested value, then the actual one
 const UNITS = { us: 1e-3, ms: 1, s: 1e3 };
 
 const nearest = (value) =>
   PROBABILITIES.reduce((best, one, k) => (Math.abs(one - value) < Math.abs(PROBABILITIES[best] - value) ? k : best), 0);
 
-// Delay and jitter in ms, and loss in per cent, of a profile in netem's words.
+// Read delay and jitter in ms, and loss in per cent, from a link profile in netem's words.
 export function readWords(words) {
   const [, delay = "0", unit = "ms", jitter = "0", jitterUnit = "ms"] =
     /delay ([\d.]+)(us|ms|s)(?: ([\d.]+)(us|ms|s))?/.exec(words)?.map((part) => part ?? undefined) ?? [];

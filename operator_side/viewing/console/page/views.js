@@ -1,7 +1,7 @@
-// Camera pictures, the newest only, with their age. The operator side works out what age is old.
+// Camera views: the newest picture of each, with its age. The operator side works out what age is old.
 const DEAD_S = 0.5; // without the operator side's limits, as in an old recording
 
-// Estimate of the operator side's clock, by the fastest message.
+// Estimate of the operator side's clock, from the message with the least delay.
 export class Clock {
   live = true;
   #ahead = [];
@@ -17,12 +17,12 @@ export class Clock {
     [this.#nowS, this.#offsetS] = [nowS, offsetS];
   }
 
-  // Time of pictures and charts: a recording has its own.
+  // Present time for pictures and charts; in a replay it is the recording's.
   get nowMs() {
     return this.live ? performance.now() : 1000 * this.#nowS;
   }
 
-  // Age of a time on the robot side's clock; null while unknown.
+  // Seconds since a time on the robot side's clock; null while the clock offset is unknown.
   ageS(robotS) {
     if (this.#offsetS === null || !this.#ahead.length) return null;
     const nowS = this.live ? performance.now() / 1000 + Math.max(...this.#ahead) : this.#nowS;

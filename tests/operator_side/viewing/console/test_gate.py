@@ -1,4 +1,4 @@
-"""Admission: refused without the token, from another site, or by another name."""
+"""Gate of the console: requests without the token, from another site or for another host are refused."""
 
 import pytest
 from hypothesis import given
@@ -31,7 +31,7 @@ def test_the_token_opens_the_gate_by_either_name(host: str) -> None:
 
 
 OTHER_HOSTS = (None, "", "example.com", f"example.com:{PORT}", "127.0.0.1", f"127.0.0.1:{PORT + 1}")
-"""Hosts under which a site, once its name resolves to this machine, would share our origin."""
+"""Values of the header Host to refuse. A site whose name resolves to this machine would send its own name"""
 OTHER_SITES = ("http://example.com", f"https://{HERE}", "null", f"http://localhost:{PORT}", "http://127.0.0.1", "")
 OURS = f"http://{HERE}"
 

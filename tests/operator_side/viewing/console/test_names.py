@@ -1,4 +1,4 @@
-"""Page and operator side agree on names, and the page compares codes, never words."""
+"""Page and operator side use the same field names and codes; the page compares codes, never texts."""
 
 import re
 from typing import Final
@@ -25,7 +25,7 @@ _READ: Final = {
     r"\bstatus\??\.(\w+)": (OperatorStatus,),
     r"\bscreen\??\.(\w+)": (Telemetry,),
 }
-"""Places where the page reads a struct, with the possible structs"""
+"""Expressions by which the page reads a struct, with the structs that they may be"""
 
 
 def test_the_page_uses_only_codes_that_there_are() -> None:

@@ -1,4 +1,4 @@
-"""Pages: their messages, their permissions, and their number, over real WebSockets in one process."""
+"""Pages over real WebSockets in one process: their messages, their limits, and their number."""
 
 import asyncio
 import contextlib
@@ -18,7 +18,7 @@ Opens = Callable[[], contextlib.AbstractAsyncContextManager[ClientConnection]]
 
 
 class Desk:
-    """Pages, and the messages that they caused."""
+    """Pages, and the callbacks that they made."""
 
     def __init__(self) -> None:
         self.counts: list[int] = []
@@ -51,7 +51,7 @@ def run(story: Callable[[Desk, Opens], Awaitable[None]]) -> Desk:
 
 
 async def a_round(page: ClientConnection) -> list[str | bytes]:
-    """Return all messages up to the round's end."""
+    """Return all messages until the end of the batch."""
     messages: list[str | bytes] = []
     while (message := await page.recv()) != ROUND_ENDS:
         messages.append(message)
@@ -79,7 +79,7 @@ def test_a_page_that_is_slow_misses_all_but_the_newest_of_each_kind() -> None:
             for number in range(1, 100):
                 desk.pages.show("facts", f"{number}")
                 desk.pages.show("overview", b"%d" % number)
-            # It has not taken the first round, so nothing more was sent, and nothing piled up.
+            # The page has not confirmed the first batch, so that nothing more was sent, and no queue grew.
             await quick.send(TAKEN)
             assert await a_round(quick) == ["99", b"99"]
             await slow.send(TAKEN)
@@ -105,7 +105,7 @@ def test_what_hands_and_sliders_say_is_passed_on_with_the_pages_number() -> None
         ("s", [2, {"hands": {"keys": []}, "tune": {"probability": 0.9}}]),
         ("s", [2, {"play": {"paused": True}}]),
     ]
-    # A closed page holds nothing.
+    # The inputs of a closed page are released.
     assert sorted(page for _, (page, said) in heard[3:] if said is None) == [1, 2]
 
 

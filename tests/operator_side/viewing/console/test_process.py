@@ -1,4 +1,4 @@
-"""Console as a process: its gate from outside, the messages to a page, and its ends."""
+"""Console process: its gate, tested by requests; messages to a page; the ways in which it ends."""
 
 import asyncio
 import os
@@ -143,7 +143,7 @@ def test_pages_get_facts_pictures_and_the_scene_as_they_are_fed(console: Console
     async def watch(opened: ClientConnection) -> tuple[Counter[str], dict[str, object]]:
         counts: Counter[str] = Counter()
         newest: dict[str, object] = {}
-        # As many of each as come in a second and more.
+        # More of each than come in a second.
         while min(counts[kind] for kind in ("facts", "scene", *VIEW_NAMES)) < 40:
             message = await opened.recv()
             if isinstance(message, bytes):
@@ -255,7 +255,7 @@ def test_it_outlives_ctrl_c_and_ends_with_its_feeder() -> None:
 
 
 def notes_of(console: Console) -> list[str]:
-    """Return its first notes."""
+    """Return the notes of a console that ends by itself."""
     with console:
         until(console, lambda: console.gone)
         return console.take_notes()
@@ -273,10 +273,10 @@ def test_a_port_that_is_taken_is_said() -> None:
     [
         (
             "raise ModuleNotFoundError('No module', name='viser')",
-            "no console: viser is not installed on this machine; valid: pip install 'feelahead[operator]'",
+            "no console: viser is not installed; install it in the clone: pip install '.[operator]'",
         ),
         (
-            # As a viser that opens its server differently would.
+            # As another version of viser, which opens its server differently, would do.
             "class ViserServer:\n    def __init__(self, **options): pass\n    def get_port(self): return 1\n"
             "SceneApi = BatchedMeshHandle = LabelHandle = None",
             "no console: this viser opens its server in another way than viser 1.1 does",

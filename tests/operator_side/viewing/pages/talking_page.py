@@ -1,4 +1,4 @@
-"""A talking page of the console, without a browser."""
+"""Page of the console that sends messages, without a browser."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,7 +11,7 @@ PERIOD_S = 0.02
 
 
 class TalkingPage:
-    """One page, by its number and its word."""
+    """Page of the console, with its number and the word that identifies it."""
 
     def __init__(self, pages: DrivingPage, page: int = 1) -> None:
         self.pages = pages
@@ -20,7 +20,7 @@ class TalkingPage:
         self.number = 0
 
     def content(self, **hands: Any) -> dict[str, Any]:
-        """Return the next message, as decoded from JSON."""
+        """Return the page's next message, as decoded from JSON."""
         self.number += 1
         return {"hands": {"page": self.word, "number": self.number, "driving": True} | hands}
 
@@ -28,18 +28,18 @@ class TalkingPage:
         self.pages.receive(self.page, self.content(**hands), now_s)
 
     def go_on(self, now_s: float, for_s: float, **hands: Any) -> float:
-        """Send the same 50 times a second; return when the next message is due."""
+        """Send the same inputs 50 times a second for `for_s`; return the time when the next message is due."""
         for step in range(round(for_s / PERIOD_S)):
             self.say(now_s + step * PERIOD_S, **hands)
         return now_s + round(for_s / PERIOD_S) * PERIOD_S
 
 
 Does = Callable[[float], dict[str, Any] | None]
-"""Hands at the page at a time; None for silence."""
+"""Function that returns the inputs at the page at a time; None if the page sends nothing"""
 
 
 class AtThePage:
-    """Person at the controller, and a scripted person at a page, for whole runs."""
+    """Controller of a whole run, with a page at which `does` gives the inputs."""
 
     def __init__(self, page: TalkingPage, simulated_hands: BrowserHands, does: Does) -> None:
         self.page = page

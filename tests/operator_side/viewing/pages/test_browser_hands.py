@@ -1,4 +1,4 @@
-"""A page as a controller, and whose hands count: the person's, the page's, or nobody's."""
+"""Page as a controller, and whose inputs count: the scripted person's, the page's, or nobody's."""
 
 from itertools import pairwise
 from typing import Any
@@ -25,11 +25,11 @@ TICK_S = 0.004
 WORN = TravelCalibration(
     TriggerTravel(0.2, 0.9), TriggerTravel(0.0, 0.7), StickRest(0.1, -0.05, 0.2), StickRest(-0.1, 0.1, 0.05)
 )
-"""Calibration of the person's controller"""
+"""Calibration of the scripted person's controller"""
 
 
 class Desk:
-    """Page, controller, and a screen that the test sets."""
+    """Page, controller, and telemetry that the test sets."""
 
     def __init__(self, *, swap_sides: bool = False, person: bool = False):
         self.swap_sides = swap_sides
@@ -59,7 +59,7 @@ class Desk:
         return self.ticks * TICK_S
 
     def let_pass(self, for_s: float, says: bool = True, **hands: Any) -> list[OperatorIntent]:
-        """Let the page send the same, or nothing; return the intents of the controller's states."""
+        """Let the page send the same inputs, or nothing, for `for_s`; return the intents from its states."""
         meant = []
         for step in range(round(for_s / TICK_S)):
             if says and step % round(PERIOD_S / TICK_S) == 0:

@@ -1,4 +1,4 @@
-"""The driving page, and the times when its hands count: by examples, and for any messages and silences."""
+"""Choice of the driving page, and when its inputs count: by examples, and for any messages and silences."""
 
 import math
 from dataclasses import dataclass
@@ -159,7 +159,7 @@ def test_the_person_goes_on_only_by_the_page_that_drives_or_any_when_none_does(p
 
 @dataclass(frozen=True)
 class Heard:
-    """Message of a page, and its time."""
+    """Message of a page, with its time of arrival."""
 
     now_s: float
     page: int
@@ -221,7 +221,7 @@ def test_hands_count_only_while_fresh_and_after_a_second_of_rest(script: list[tu
 
 
 def judge(pages: DrivingPage, heard: list[Heard], now_s: float) -> None:
-    """Assert that counted hands are fresh and follow a second of the same page's rest, without a gap or a stop."""
+    """Assert that inputs that count are recent, and follow a second of rest of the same page without gap or stop."""
     hands = pages.hands(now_s)
     if hands is None:
         return

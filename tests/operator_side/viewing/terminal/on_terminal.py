@@ -1,4 +1,4 @@
-"""Program on a terminal whose other end we hold."""
+"""Program on a pseudo-terminal whose other end the test reads and writes."""
 
 import fcntl
 import os
@@ -18,7 +18,7 @@ LIMIT_S = 60.0
 
 
 class OnTerminal:
-    """Command on a separate pseudo-terminal of 80 x 24."""
+    """Command that runs on its own pseudo-terminal, of 80 x 24 characters."""
 
     def __init__(self, command: Sequence[str]) -> None:
         self.ours, self.theirs = pty.openpty()
@@ -46,13 +46,13 @@ class OnTerminal:
                 self.seen += os.read(self.ours, 1 << 16)
 
     def end(self, last: bytes) -> int:
-        """Send Ctrl-C and read its output up to `last`; return its exit code."""
+        """Send Ctrl-C and read the output up to `last`; return the command's exit code."""
         self.process.send_signal(signal.SIGINT)
         self.read_until(lambda seen: last in seen)
         code: int = self.process.wait(LIMIT_S)
         return code
 
     def is_put_back(self) -> bool:
-        """Return whether the terminal shows the first screen, with its cursor and input modes."""
+        """Return whether the terminal is as before: normal screen, cursor and input modes."""
         after = self.seen.rpartition(ENTERED)[2]
         return LEFT in after and b"\x1b[?25h" in after and termios.tcgetattr(self.ours) == self.before

@@ -1,4 +1,4 @@
-"""Terminal view: the content of the screen, and the terminal's restoration at every end."""
+"""Terminal view: content of the screen, and restoration of the terminal however the program ends."""
 
 import io
 import os
@@ -112,7 +112,7 @@ def test_the_screen_follows_the_terminals_size_and_is_put_back_on_ctrl_c(player:
     assert not typed[3] & termios.ECHO
     assert typed[3] & termios.ISIG
     player.resize(60, 20)
-    # A whole screen is sent at once, from its first place on; its lines do not scroll it.
+    # A whole screen is sent at once, from the top left corner on, and does not scroll.
     player.read_until(lambda seen: b"\x1b[H" in seen and seen.split(b"\x1b[H")[-2].count(b"\n") == 19)
     assert player.end(b"the result") == 0
     assert player.is_put_back()

@@ -15,5 +15,5 @@ def built_in() -> Scene:
 
 @pytest.fixture
 def shapes(tmp_path: Path) -> Scene:
-    """Objects of every shape before the planar arm."""
+    """Scene of the planar arm before objects of every shape."""
     return load_scene(planar_arm(tmp_path, world=SHAPES, extra_top=STONE), "tcp")

@@ -93,7 +93,7 @@ def test_a_suspended_process_skips_all_but_two_seconds() -> None:
 
 
 class SlowMachine:
-    """Clock on which every reading takes as long as a step on a machine too slow for the model."""
+    """Clock that advances by `step_s` with each reading, as if the machine were too slow for the model."""
 
     def __init__(self, step_s: float) -> None:
         self.now_s = 50.0

@@ -1,4 +1,4 @@
-"""Compiled step of the simulated arm against plain NumPy and MuJoCo's own products, over long random runs."""
+"""The simulated arm's compiled step, compared with plain NumPy and MuJoCo's own products in long random runs."""
 
 import math
 from collections.abc import Callable
@@ -22,7 +22,7 @@ SPRING = '<joint name="elbow" stiffness="3" springref="-40"'
 
 
 class PlainReference:
-    """Reference in array operations."""
+    """Reference motion of the arm's joints, computed in plain NumPy."""
 
     def __init__(self, position: FloatArray, ends: tuple[FloatArray, FloatArray], windup: FloatArray) -> None:
         self.position, (self.lower, self.upper), self.windup = position, ends, windup
@@ -54,7 +54,7 @@ class PlainReference:
 
 
 class PlainGripper:
-    """Gripper's reference, opening and grip, by interpolation in the travel."""
+    """Reference, opening and grip of the gripper, computed in plain NumPy from its measured travel."""
 
     def __init__(self, travel: GripperTravel) -> None:
         self.travel = travel
@@ -84,7 +84,7 @@ class PlainGripper:
 
 
 def plain_inputs(scene: Scene, reference: PlainReference) -> tuple[FloatArray, FloatArray]:
-    """Return the expected inputs (n,) and torques (n,) of the arm's actuators."""
+    """Return the expected inputs (n,) and torques (n,) of the arm's actuators, computed in plain NumPy."""
     data, robot, drives = scene.data, scene.robot, scene.robot.drives
     dofs, motor = robot.arm_velocities, (drives.stiffness == 0.0) & (drives.damping == 0.0)
     error = reference.position - data.qpos[robot.arm_positions]

@@ -1,4 +1,4 @@
-"""Values drawn from the seed stay within their stated ranges."""
+"""Places and sizes in the built-in scenes, drawn by the seed, stay within the ranges that docs/scenes.md states."""
 
 from typing import Any, get_args
 
@@ -14,7 +14,7 @@ NAMES: tuple[SceneName, ...] = get_args(SceneName)
 
 
 def box(scene: Scene, name: str) -> tuple[Any, Any]:
-    """Return centre (3,) and half sizes (3,) of the object's only geom."""
+    """Return centre (3,) and half sizes (3,) of an object that consists of one box."""
     geom = next(thing for thing in scene.objects if thing.name == name).geoms[0]
     return scene.data.geom_xpos[geom], scene.model.geom_size[geom]
 

@@ -1,4 +1,4 @@
-"""Frozen scenes of tests/data agree with their comments: objects, distances, and motion."""
+"""The scenes in tests/data, which never change, are as their comments say: objects, distances and motion."""
 
 import copy
 import re
@@ -20,7 +20,7 @@ STEP_M = 1e-3
 
 
 Hit = tuple[float, str, str]
-"""End of a free path: distance in mm, part of the gripper or of the held object, and the object hit."""
+"""First contact straight ahead: distance in mm, the part of the gripper (or held object), and the object hit"""
 SCENES: dict[str, tuple[str, Hit | None]] = {
     "wall": ("wall", (320, "fingertip", "wall")),
     "plate": ("plate", (320, "fingertip", "plate")),
@@ -49,9 +49,9 @@ SCENES: dict[str, tuple[str, Hit | None]] = {
     "terrain": ("terrain", None),
     "terrain_ahead": ("terrain", (320, "fingertip", "terrain")),
 }
-"""Objects of each scene, and the hit; None where a continued pull never collides."""
+"""Names of the objects in each scene, and the first contact straight ahead; None if there is none"""
 DOWN = {"place_held", "u_mesh", "mug"}
-"""Scenes in which the tool points downwards."""
+"""Scenes in which the tool points downwards"""
 TABLES = [name for name in SCENES if name.startswith("table_")]
 every_scene = pytest.mark.parametrize("name", SCENES)
 
@@ -71,14 +71,14 @@ def approach(scene: Scene) -> FloatArray:
 
 
 def split_geoms(scene: Scene) -> tuple[list[int], list[int]]:
-    """Return the geoms of the gripper and a held target, and all others."""
+    """Return the geoms of the gripper and of targets, and the geoms of all other objects."""
     held = [geom for thing in scene.objects if scene.roles[thing.name] is Role.TARGET for geom in thing.geoms]
     others = [geom for thing in scene.objects for geom in thing.geoms if geom not in held]
     return [*scene.robot.gripper_geoms.tolist(), *held], others
 
 
 def first_hit(scene: Scene) -> Hit | None:
-    """Return where the true gripper ends straight ahead, by bisection of the step with the first contact."""
+    """Return the first contact of a gripper that moves straight ahead, found in steps and then by bisection."""
     data = copy.copy(scene.data)
     # MuJoCo's tree of a body's geoms was built for their original places.
     scene.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE

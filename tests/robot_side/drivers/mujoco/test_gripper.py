@@ -1,4 +1,4 @@
-"""Measured travel of a gripper, and the gap between its spheres."""
+"""Measurement of a gripper's travel between open and closed, and the gap between the spheres of its fingers."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from tests.helpers.arm_models import TENDON_GRIPPER, planar_arm
 
 
 def sweep(openings_m: FloatArray, lengths: FloatArray) -> GripperSweep:
-    """Return a sweep of two jaws with a constant other pair; one finger joint."""
+    """Return a sweep of a gripper with one finger joint. Of its pairs of parts, one has a constant gap."""
     controls = np.arange(len(lengths), dtype=np.float64)[:, None]
     gaps_m = np.column_stack([openings_m, openings_m + 0.02, np.full(len(lengths), 0.01)])
     return GripperSweep(controls, lengths[:, None], lengths, gaps_m)

@@ -1,4 +1,4 @@
-"""True distances among many objects, against each pair's own."""
+"""True minimum distance among many objects, compared with the distances of all single pairs."""
 
 import itertools
 from pathlib import Path

@@ -126,7 +126,7 @@ SIGNS = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, 
 
 @pytest.mark.parametrize("closing_s", [0.0, 0.3, 0.8])
 def test_the_spheres_go_with_the_boxes_of_the_gripper_wherever_its_fingers_are(closing_s: float) -> None:
-    """In its link's frame each box is covered, and no sphere stands out (see test_spheres)."""
+    """In its link's frame, each box of the gripper is covered and no sphere protrudes too far (see test_spheres)."""
     driver = ToolDriver.load(encoder=Encoder(0.0, 0.0))
     driver.move(np.array([0.05, 0.1, -0.05, 0.2, 0.1, 0.3]), 0.2)
     state = driver.grip(1.0, closing_s) if closing_s else driver.wait(PERIOD_S)

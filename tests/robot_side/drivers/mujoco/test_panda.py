@@ -1,4 +1,4 @@
-"""Panda with a Robotiq gripper, from a package unrelated to feelahead: torque motors, a tendon servo."""
+"""Panda arm (torque motors) with a Robotiq gripper (tendon servo), whose model is from a package unrelated to ours."""
 
 import importlib.util
 from pathlib import Path
@@ -23,7 +23,7 @@ def asset(name: str) -> Path:
 
 @pytest.fixture(scope="module")
 def alone() -> ToolDriver:
-    """Robot's own file; each test continues from where the last one left it."""
+    """Scene of the robot's model by itself; each test continues from the state that the last one left."""
     return ToolDriver.load(asset("panda.xml"), "pinch")
 
 

@@ -1,4 +1,4 @@
-"""Gripper placed among the objects: distances against those computed by hand."""
+"""Distances of a gripper that is put at given poses among the objects, compared with distances computed by hand."""
 
 import math
 
@@ -21,7 +21,7 @@ NOWHERE = np.zeros(3)
 
 
 class Posed:
-    """Frozen scene, and the joints of its keyframe."""
+    """A scene of tests/data, and the joint positions of its keyframe."""
 
     def __init__(self, name: str) -> None:
         self.scene = load_scene(DATA / f"{name}.xml", "tool")
@@ -31,7 +31,10 @@ class Posed:
         self.fingers: FloatArray = qpos[robot.finger_positions].copy()
 
     def at(self, *shift_m: float, fingers: FloatArray | None = None, turned_rad: float = 0.0) -> PosedScene:
-        """Pose the scene; `turned_rad`: of the first joint, which turns the whole arm about the vertical."""
+        """Put the arm at the keyframe, changed, and all objects shifted by `shift_m`; return the posed scene.
+
+        turned_rad: change of the first joint, which turns the whole arm about the vertical.
+        """
         arm_rad = self.arm_rad + turned_rad * np.eye(6)[0]
         self.posed.set_pose(arm_rad, self.fingers if fingers is None else fingers, np.array(shift_m or NOWHERE))
         return self.posed
@@ -48,7 +51,10 @@ def beside() -> Posed:
 
 
 def path(ahead_m: float, across_m: float = 0.0, turned_rad: float = 0.0) -> ToolPath:
-    """Return a path from the home pose, evenly along x and y, or along an arc about the vertical; 3 mm a step."""
+    """Return a path of the tool from the home pose, in steps of 3 mm.
+
+    The path is straight along x and y, or an arc about the vertical on which the tool turns by `turned_rad`.
+    """
     share = np.linspace(0.0, 1.0, 1 + math.ceil(ahead_m / 0.003))[:, None]
     half = 0.5 * share * turned_rad
     moved_m = share * ahead_m * np.sinc(half / math.pi) * np.hstack([np.cos(half), np.sin(half), 0.0 * half])
@@ -83,7 +89,7 @@ def test_a_drift_towards_a_wall_beside_is_not_clear_and_one_away_is(beside: Pose
 
 
 def test_a_turn_goes_along_an_arc(wall: Posed, beside: Posed) -> None:
-    """The tool's point moves where it points: towards a wall beside, by half the angle at first."""
+    """The tool point always moves in the direction in which the tool points, here towards a wall beside it or away."""
     for turned, clear in ((0.4, False), (-0.4, True), (0.02, True)):
         assert beside.at().stays_clear(path(0.2, 0.0, turned), 0.0) is clear
     before = wall.at().gap_m()
@@ -121,7 +127,7 @@ def test_a_camera_is_off_by_its_errors_and_the_shift(name: str) -> None:
 
 
 def test_where_things_may_sleep_they_are_moved_as_well() -> None:
-    """With sleep enabled, MuJoCo reads the places of fixed geoms only once."""
+    """If bodies may sleep, MuJoCo reads the positions of fixed geoms only once; posed objects must still move."""
     scene = load_scene(DATA / "wall.xml", "tool")
     scene.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     mujoco.mj_step(scene.model, scene.data)

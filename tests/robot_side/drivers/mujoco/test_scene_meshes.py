@@ -1,4 +1,4 @@
-"""Curved and non-convex objects through the whole robot side: never smaller than they are, and hardly larger."""
+"""Curved and non-convex objects, as the robot side perceives them: never smaller than in the model, hardly larger."""
 
 import math
 from collections.abc import Callable
@@ -40,26 +40,26 @@ VOLUMES_M3 = {
 
 
 def mesh_asset(name: str, vertices: FloatArray, triangles: IntArray, inertia: str = "convex") -> str:
-    """Return an MJCF asset with these vertices and triangles."""
+    """Return the MJCF text of a mesh asset with these vertices and triangles."""
     numbers = " ".join(f"{value:.17g}" for value in vertices.ravel())
     indices = " ".join(str(index) for index in triangles.ravel())
     return f'<asset><mesh name="{name}" inertia="{inertia}" vertex="{numbers}" face="{indices}"/></asset>'
 
 
 def scene_with(path: Path, world: str, assets: str = "") -> Scene:
-    """Load the planar arm before the objects `world`."""
+    """Load a scene of the planar arm and the objects in the MJCF text `world`."""
     return load_scene(planar_arm(path, world=world, extra_top=assets), "tcp")
 
 
 def placed(scene: Scene, in_body_m: FloatArray, body: str = "round") -> FloatArray:
-    """Return points (n, 3) of a body's frame in the world."""
+    """Return points (n, 3) in the world frame that are given in a body's frame."""
     frame = scene.data.body(body)
     in_world: FloatArray = frame.xpos + in_body_m @ frame.xmat.reshape(3, 3).T
     return in_world
 
 
 def overlap_of(objects: PerceivedObjects, name: str, centers_m: FloatArray, radius_m: float) -> FloatArray:
-    """Return the overlaps (n,) of spheres with one object, in m³, by the code path of a tick."""
+    """Return the overlaps (n,) in m³ of single spheres with one object, computed by the code that a tick runs."""
     scene = scene_table(objects)
     classes = np.full(len(objects.names), SKIPPED, dtype=np.int64)
     classes[objects.names.index(name)] = OBSTACLE

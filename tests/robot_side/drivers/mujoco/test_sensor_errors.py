@@ -1,4 +1,4 @@
-"""Errors of encoders and camera: of the given size, and the same for the same seed."""
+"""Simulated errors of encoders and camera have the given size, and are the same for the same seed."""
 
 import math
 
@@ -26,7 +26,7 @@ def test_readings_are_whole_steps() -> None:
 
 
 def test_the_lasting_error_has_the_mean_and_deviation_asked_for_with_the_papers_sign() -> None:
-    """perceived = true - e_c, so -e_c is added to the true positions."""
+    """By eq. 1-2, perceived = true - e_c: the drawn error e_c is subtracted from the true positions."""
     names = tuple(f"object{index}" for index in range(4000))
     offsets = CameraError(names, mean_m=0.004, standard_deviation_m=0.002, seed=1).next_frame()
     assert offsets.shape == (4000, 3)

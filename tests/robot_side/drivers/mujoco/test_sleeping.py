@@ -1,4 +1,4 @@
-"""Objects at rest in a built-in scene sleep where they would rest awake."""
+"""Objects at rest in a built-in scene fall asleep, and lie where they would lie without sleeping."""
 
 from pathlib import Path
 from typing import get_args
@@ -18,7 +18,7 @@ SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 
 
 def asleep(scene: Scene) -> set[str]:
-    """Return the free bodies that sleep."""
+    """Return the bodies with a free joint that MuJoCo lets sleep."""
     model, data = scene.model, scene.data
     bodies = {name: model.body(f"table_scene/{name}").id for name in FREE}
     return {name for name, body in bodies.items() if not data.tree_awake[model.body_treeid[body]]}

@@ -1,4 +1,4 @@
-"""First true contact and its speed, on scripted approaches without the arm's own physics."""
+"""First true contact and its closing speed, on scripted motions without physics of the arm."""
 
 import math
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ from tests.helpers.repository import DATA
 
 STEP_S = 0.001
 WAY_M = 0.32
-"""Distance from home to the contact in every scene here, in metres; the scenes' own tests check it."""
+"""Distance ahead from the home pose to the contact, in metres, in the scenes used here (see test_frozen_scenes.py)"""
 AHEAD = np.array([1.0, 0.0, 0.0])
 DOWN = np.array([0.0, 0.0, -1.0])
 STILL = np.zeros(3)
@@ -24,11 +24,11 @@ STILL = np.zeros(3)
 
 @dataclass
 class Script:
-    """Gripper that moves exactly as commanded, step by step, also through contacts."""
+    """Gripper that moves exactly as the test says, step by step, even through objects."""
 
     scene: Scene
     held: str | None = None
-    """Object that moves along with the gripper."""
+    """Name of the object that moves with the gripper, if any"""
     truth: TrueContact = field(init=False)
 
     def __post_init__(self) -> None:
@@ -39,7 +39,10 @@ class Script:
         return Script(load_scene(path if isinstance(path, Path) else DATA / f"{path}.xml", "tool"), held)
 
     def step(self, velocity_m_s: FloatArray, turning_rad_s: FloatArray = STILL, **joints: float) -> ContactOnset | None:
-        """Step the tool with that velocity, linear and angular, in the world frame; `joints` move at theirs."""
+        """Move the tool for one step at this linear and angular velocity in the world frame; return a new contact.
+
+        joints: velocities of further joints, by name.
+        """
         model, data, robot = self.scene.model, self.scene.data, self.scene.robot
         jacobian = np.zeros((6, model.nv))
         mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], robot.site)
@@ -65,7 +68,7 @@ class Script:
         return None
 
     def go(self, way_m: float, direction: FloatArray = AHEAD) -> "Script":
-        """Move there in steps of a millimetre, each correcting the last one's error."""
+        """Move the tool by `way_m` along `direction`, in steps of 1 mm that each correct the last one's error."""
         tool = self.scene.data.site_xpos[self.scene.robot.site]
         path = np.linspace(tool, tool + way_m * direction, math.ceil(way_m / 0.001) + 1)
         for place_m in path[1:]:
@@ -76,7 +79,7 @@ class Script:
 def speed_of_coming_nearer(
     script: Script, velocity_m_s: FloatArray, turning_rad_s: FloatArray = STILL, **joints: float
 ) -> float:
-    """Return the speed from the distances, up to the last step before the contact."""
+    """Move until the contact; return how fast the gap fell in the last step before it."""
     gaps = [script.truth.gap_m(script.held)]
     while script.step(velocity_m_s, turning_rad_s, **joints) is None:
         gaps.append(script.truth.gap_m(script.held))
@@ -96,7 +99,7 @@ def test_onto_a_wall_it_closes_at_the_speed_it_has(speed_m_s: float) -> None:
 @pytest.mark.parametrize("turning_rad_s", [0.5, -0.5])
 @pytest.mark.parametrize("name", ["wall", "wall_45"])
 def test_a_gripper_that_turns_closes_as_fast_as_the_distance_falls(name: str, turning_rad_s: float) -> None:
-    """The tips are 15 mm ahead of the tool and 50 mm beside it: turning alone gives them 25 mm/s."""
+    """The fingertips are 15 mm ahead of the tool and 50 mm beside it, so turning alone moves them at 25 mm/s."""
     motion = 0.05 * AHEAD, np.array([0.0, 0.0, turning_rad_s])
     onset = Script.load(name).go(0.312).until_contact(*motion)
     assert onset is not None
@@ -105,7 +108,7 @@ def test_a_gripper_that_turns_closes_as_fast_as_the_distance_falls(name: str, tu
 
 
 def test_of_several_contacts_the_fastest_counts() -> None:
-    """Both tips are 1.5 mm off; the second step puts both into the wall, the outer one faster by its turning."""
+    """The second step puts both fingertips into the wall at once; the outer one is faster, as the gripper turns."""
     script, motion = Script.load("wall").go(0.3185), (1.0 * AHEAD, np.array([0.0, 0.0, 4.0]))
     assert script.step(*motion) is None
     onset = script.step(*motion)

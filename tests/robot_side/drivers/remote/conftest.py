@@ -1,4 +1,4 @@
-"""Built-in scene."""
+"""Fixture for the tests of remote drivers: the built-in scene."""
 
 import pytest
 

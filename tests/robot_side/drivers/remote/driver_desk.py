@@ -1,4 +1,7 @@
-"""Driver and the robot side's end of it in virtual time, with a delay both ways and a separate driver clock."""
+"""Simulated driver process of an arm, connected to the robot side's `RemoteArm`, in virtual time.
+
+The connection has a delay in both directions, and the driver has a separate clock.
+"""
 
 from collections import deque
 from typing import Any
@@ -13,11 +16,11 @@ from robot_side.drivers.remote.driver_session import ArmShape
 SHAPE = ArmShape(("shoulder", "elbow"), ("finger",), np.array([0.04]), 0.08)
 TICK_S = 0.001
 AHEAD_S = 1000.0
-"""Lead of the driver's clock over ours, in seconds."""
+"""Seconds by which the driver's clock is ahead of ours"""
 
 
 class DriverDesk:
-    """Wire between both, and a driver that follows velocities perfectly."""
+    """Connection to a driver, and a driver whose joints follow commanded velocities exactly."""
 
     def __init__(self, delay_s: float = 0.0, measuring_s: float = 0.0, period_s: float = 0.01) -> None:
         self.delay_s, self.measuring_s, self.period_s = delay_s, measuring_s, period_s
@@ -37,7 +40,7 @@ class DriverDesk:
         self._to_driver: deque[tuple[float, dict[str, Any]]] = deque()
 
     def receive(self) -> list[tuple[bytes, bytes, float]]:
-        """Receive as the robot side's port does."""
+        """Return what has arrived at the robot side; used by `RemoteArm` in place of a real port."""
         found = []
         while self._to_robot and self._to_robot[0][0] <= self.now_s:
             _, peer, payload = self._to_robot.popleft()
@@ -45,17 +48,17 @@ class DriverDesk:
         return found
 
     def send(self, peer: bytes, payload: bytes) -> bool:
-        """Send as the robot side's port does."""
+        """Send a message to the driver; used by `RemoteArm` in place of a real port."""
         self._to_driver.append((self.now_s + self.delay_s, msgpack.unpackb(payload)))
         return peer == self.peer
 
     @property
     def drivers_s(self) -> float:
-        """Time of the driver's clock, in seconds."""
+        """Present time by the driver's clock, in seconds."""
         return self.now_s + AHEAD_S
 
     def say(self, peer: bytes | None = None, **fields: Any) -> None:
-        """Send a state; fields: replace the true values."""
+        """Send a state from the driver; `fields` replace its true values."""
         self.sequence += 1
         newest = self.newest
         state: dict[str, Any] = {
@@ -72,7 +75,7 @@ class DriverDesk:
         self._to_robot.append((self.now_s + self.delay_s, peer or self.peer, payload))
 
     def drive(self) -> None:
-        """Run the driver for one tick."""
+        """Run the driver for one tick: receive, move the joints, and send a state if one is due."""
         while self._to_driver and self._to_driver[0][0] <= self.now_s:
             message = self._to_driver.popleft()[1]
             if "refused" in message:
@@ -87,7 +90,10 @@ class DriverDesk:
             self.say()
 
     def run(self, seconds: float, velocity: float | None = None, gap_s: float = 0.1) -> None:
-        """Let time pass; velocity: commanded to both joints in every tick, for `gap_s` each."""
+        """Run driver and robot side for `seconds`.
+
+        velocity: commanded to both joints in each tick, and valid for `gap_s`; None: the arm is to stop.
+        """
         for _ in range(round(seconds / TICK_S)):
             self.now_s += TICK_S
             if self.speaks:
@@ -100,5 +106,5 @@ class DriverDesk:
             self.arm.command_gripper(0.0, until_s)
 
     def age_s(self) -> float:
-        """Return the age of the newest state as the robot side assumes it."""
+        """Return the age that the robot side assumes for the newest state."""
         return self.now_s - self.arm.state(self.now_s).time_s

@@ -1,4 +1,4 @@
-"""Robot side whose arm and objects are other processes: the examples of docs/drivers, over real sockets."""
+"""Robot side with a driver process for the arm and one for objects: the examples of docs/drivers, on real sockets."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Arm behind a driver, in virtual time: ages of its states, its stops, and messages rejected whole."""
+"""Arm behind a driver process, in virtual time: ages of its states, stops, and messages that are rejected whole."""
 
 import math
 from typing import Any

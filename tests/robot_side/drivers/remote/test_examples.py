@@ -1,4 +1,4 @@
-"""Examples of docs/drivers, run as they are: over real sockets, as processes, with a fake of LeRobot's interface."""
+"""The examples of docs/drivers: run as processes over real sockets; for LeRobot, with a fake of its interface."""
 
 import contextlib
 import importlib.util
@@ -81,7 +81,7 @@ def test_the_example_arm_follows_stops_when_it_is_killed_and_another_takes_its_p
 
 
 def silent_s(arm: RemoteArm, port: DriverPort) -> float:
-    """Return the age of the newest state after a turn in which the arm is commanded to stop."""
+    """Command the arm to stop, for one turn; return the age of its newest state."""
     state = arm.state(now_s := port.wait(TURN_S))
     arm.command(np.zeros(6), state.time_s)
     arm.command_gripper(0.0, now_s)
@@ -126,7 +126,7 @@ def test_the_example_in_cpp_packs_what_the_robot_side_reads(tmp_path: Path) -> N
 
 
 def lerobot_arm() -> ModuleType:
-    """Return the driver for LeRobot, imported from its folder."""
+    """Import the example driver for LeRobot's arms from its file; return the module."""
     found = importlib.util.spec_from_file_location("lerobot_arm", EXAMPLES / "lerobot_arm.py")
     assert found is not None
     assert found.loader is not None
@@ -136,7 +136,7 @@ def lerobot_arm() -> ModuleType:
 
 
 class FakeFollower:
-    """Robot with LeRobot 0.4's interface that is at its goals, except for a blocked gripper."""
+    """Robot with the interface of LeRobot 0.4, which reaches each goal at once; only its gripper may be blocked."""
 
     def __init__(self) -> None:
         self.at = {"shoulder_pan.pos": 10.0, "elbow_flex.pos": -20.0, "gripper.pos": 100.0}
@@ -152,7 +152,7 @@ class FakeFollower:
 
 
 def lerobot_turns(arm: Any, since_s: float, turns: int, command: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Run turns at 50 Hz; return the last state."""
+    """Run turns of the example driver at 50 Hz, each with `command`; return the last state."""
     state: dict[str, Any] = {}
     for turn in range(turns):
         now_s = since_s + 0.02 * turn

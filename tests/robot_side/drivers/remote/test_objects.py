@@ -1,4 +1,4 @@
-"""Perceived objects from another process, in virtual time."""
+"""Objects that another process perceives and sends, in virtual time."""
 
 import math
 from typing import Any
@@ -17,11 +17,11 @@ from robot_side.viewing.perceived_shapes import PerceivedModel
 CUP: dict[str, Any] = {"name": "cup", "sphere": 0.05, "position_m": [0.5, 0.0, 0.1]}
 CORNERS = [[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]]
 TURNED = [math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
-"""Quaternion of a right angle about z"""
+"""Quaternion of a rotation by a right angle about z"""
 
 
 class Sender:
-    """Perceiving process, and the wire from it."""
+    """Stand-in for the process that perceives objects, and its connection to the robot side."""
 
     def __init__(self) -> None:
         self.now_s, self.sequence = 10.0, 0
@@ -39,7 +39,7 @@ class Sender:
         return bool(peer)
 
     def says(self, *things: dict[str, Any], peer: bytes = b"eyes", **fields: Any) -> PerceivedObjects:
-        """Send this frame; return the perceived objects."""
+        """Send a frame with these objects; return what the robot side perceives. `fields` replace the frame's own."""
         self.sequence += 1
         frame = {"version": 1, "sequence": self.sequence, "sent_s": 3.0, "taken_s": 2.98, "objects": things} | fields
         self._sent.append((peer, msgpack.packb(frame), self.now_s))
@@ -96,7 +96,7 @@ def test_a_role_is_changed_from_the_next_frame_on() -> None:
 @pytest.mark.parametrize(
     ("things", "fields", "says"),
     [
-        ([CUP, CUP], {}, "'cup' is there 2 times; valid: once"),
+        ([CUP, CUP], {}, "'cup' occurs 2 times; valid: once"),
         ([{"name": "cup"}], {}, "'cup' has 0 shapes; valid: 1 of sphere, box"),
         ([CUP | {"box": [1, 1, 1]}], {}, "'cup' has 2 shapes"),
         ([CUP | {"quaternion": [1, 1, 0, 0]}], {}, "quaternion = (1.0, 1.0, 0.0, 0.0); valid: of length 1"),
@@ -129,7 +129,7 @@ def test_a_silence_is_told_and_what_was_seen_last_holds_on() -> None:
     assert sender.objects.perceive(sender.now_s) is frame
     assert "the newest frame is 0.6 s old" in sender.notes[-1]
     sender.says(CUP, peer=b"restarted", sequence=0)
-    assert "come again" in sender.notes[-1]
+    assert "arrive again" in sender.notes[-1]
 
 
 def test_nothing_is_perceived_before_the_first_frame() -> None:

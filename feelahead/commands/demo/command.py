@@ -1,0 +1,99 @@
+"""`feelahead demo`: both sides as two processes on loopback, with a simulated controller and person."""
+
+import contextlib
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from common.command.command_line import given_fields, parse_settings
+from common.command.status import Status
+from common.command.stop_signal import StopSignal
+from common.emulation.figures import report_lines
+from common.emulation.spec import Direction, Stream, unused_clauses
+from common.errors import ConfigurationError
+from common.files.output_file import write_json
+from common.recording.side import Recorder
+from feelahead.both_sides.summary import merge_summaries, read_summary
+from feelahead.commands.demo.page import KeptPage
+from feelahead.commands.demo.run import run_both, too_slow
+from feelahead.commands.demo.settings import DemoSettings
+from operator_side.viewing.terminal.status import TerminalStatus
+
+_SENT: tuple[tuple[Direction, Stream], ...] = (
+    ("to_robot", "haptics"),
+    ("to_operator", "haptics"),
+    ("to_operator", "telemetry"),
+)
+"""Streams between the two sides."""
+_ELSEWHERE = "; each side's keys have a separate file: --robot-config FILE.toml, --operator-config FILE.toml"
+
+
+def demo(arguments: Sequence[str]) -> int:
+    """Run the demo; return 1 if a side failed during the run, else 0, also after Ctrl-C."""
+    settings = parse_settings(DemoSettings, "feelahead demo", arguments, _ELSEWHERE)
+    if (complaint := too_slow(settings)) is not None:
+        raise ConfigurationError(complaint)
+    given = given_fields(arguments, DemoSettings)
+    errors: list[str] = []
+    try:
+        with TerminalStatus("feelahead demo") if settings.tui else Status(settings.status, "feelahead demo") as status:
+            with tempfile.TemporaryDirectory(prefix="feelahead-") as folder, StopSignal() as stop:
+                for text in unused_clauses(settings.link_spec(), _SENT):
+                    status.note(text)
+                recorder = None if settings.record is None else Recorder(settings.record, Path(folder) / "recorder")
+                summaries = {side: Path(folder) / f"{side}.json" for side in ("robot", "operator")}
+                page = KeptPage(Path(folder)) if settings.has_pages and settings.record is None else None
+                with contextlib.suppress(BrokenPipeError):
+                    errors = run_both(settings, given, summaries, stop, page, status)
+                    while page is not None and page.take_again() and not errors:
+                        errors = run_both(settings, given, summaries, stop, page, status)
+                merged = merge_summaries(read_summary(summaries["robot"]), read_summary(summaries["operator"]), errors)
+                if recorder is not None:
+                    merged["recording"] = merged.get("recording", {}) | recorder.finish()
+            # Before the report, whose output may block until somebody reads it.
+            if settings.summary is not None:
+                write_json("--summary", settings.summary, merged)
+        for line in [*_report(merged), *report_lines(merged.get("link", {}))]:
+            status.note(line)
+    finally:
+        for error in errors:
+            sys.stderr.write(f"feelahead demo: {error}\n")
+    return 1 if errors else 0
+
+
+def _report(summary: dict[str, Any]) -> list[str]:
+    """Return the lines that report the run to the person at the terminal."""
+    if not summary.get("ticks"):
+        return ["nothing to report: the robot side left no figures"]
+    delays = summary.get("delay_ms", {})
+    shown = [
+        f"{name.replace('_', ' ')} {delay['mean']:.1f} ± {delay['sd']:.1f} ms"
+        for name, delay in delays.items()
+        if delay.get("mean") is not None and delay.get("sd") is not None
+    ]
+    kept = summary.get("recording")
+    recorded = [] if kept is None else [f"recorded: {kept['kept_s']:.1f} s, {kept['bytes'] / 1e6:.1f} MB"]
+    task, stiffness, enlargement = summary["task"], summary["stiffness"], summary["enlargement_mm"]
+    grasp = "not grasped" if task["time_to_grasp_s"] is None else f"grasped after {task['time_to_grasp_s']:.1f} s"
+    placing = task["placing"]
+    return [
+        f"delay: {', '.join(shown) or 'unknown'}",
+        f"stiffness: R2 up to {stiffness['r2']['max']:.2f}, L2 up to {stiffness['l2']['max']:.2f}; "
+        f"enlargement {enlargement['min']:.0f} to {enlargement['max']:.0f} mm",
+        f"target: {grasp}, lifted {task['lifted_mm']:.0f} mm, {_placed(placing)}",
+        f"contacts with obstacles: {task['obstacle_contacts']}",
+        *recorded,
+    ]
+
+
+def _placed(placing: Mapping[str, Any]) -> str:
+    """Describe in words how the target was set down."""
+    if not placing["placed"]:
+        return "not placed"
+    felt = "not felt before it was touched"
+    if placing["felt_before_s"] is not None:
+        felt = f"felt {placing['felt_before_s']:.1f} s and {placing['felt_before_mm']:.0f} mm before it was touched"
+    how = f"placed after {placing['time_s']:.1f} s at {placing['contact_speed_mm_s']:.0f} mm/s"
+    return f"{how}; what it stands on was {felt}"

@@ -1,0 +1,75 @@
+"""Settings of `feelahead demo`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from msgspec import Meta
+
+from common.command.run_options import RunOptions
+from common.limits import check_limits
+from common.protocol.messages import Compensation
+from robot_side.laws.named import LawName
+
+
+@dataclass(frozen=True)
+class DemoSettings(RunOptions):
+    """Both sides on this machine: a simulated arm, a simulated DualSense, and a scripted person.
+
+    The person arms the arm and pulls R2 to advance towards the target. They feel the trigger stiffen near objects.
+    Then they grasp the target, lift it, and set it down again. Neither a robot nor a controller is needed.
+
+    Try: feelahead demo --link "delay 50ms 10ms distribution normal", then the same with --no-haptics.
+    """
+
+    scene: Literal["table", "wall", "slot", "shelf"] | None = None
+    """Objects around the built-in arm's target. table: a cluttered table (default). wall: a wall 10 to 60 mm behind the
+    target. slot: two posts in front of the target, with 15 to 40 mm to spare on each side. shelf: the target stands on
+    a shelf with a raised front edge. The exact sizes of the last three are drawn from the seed."""
+    duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
+    """Duration of the run, counted from when the link is up. Unless given, the run ends 5 s after the last page of the
+    console was closed, or after 60 s without a page. Where no page can open (--no-console, --tui, or output that is no
+    terminal) it ends after 30 s."""
+    probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
+    """Share of approaches in which the warning must come before the contact, between 0 and 1 (eq. 10)."""
+    assist: Literal["none", "speed"] = "none"
+    """speed: the robot side caps the speed along the triggers, so that the arm stops where full strength begins."""
+    law: LawName = "swept"
+    """Law of the stiffness. swept: along each trigger, early enough to release it in time. paper: the paper's plain
+    law, for comparison."""
+    compensation: Compensation = "operator"
+    """Side that compensates the delay. operator: by the commands still under way. robot: by speed times loop age
+    (v t_d, eq. 8)."""
+    haptics: bool = True
+    """Whether the triggers are stiffened; with --no-haptics the same person only sees."""
+    model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
+    """MJCF arm with actuators, instead of the built-in one."""
+    site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Site of the model between the fingertips, with the z axis along the approach."""
+    realtime: bool = False
+    """Ask for real-time scheduling and locked memory for both sides; without the permission they run without."""
+    console: bool = True
+    """Serve the console, a page for the browser, at an address that is shown. From a terminal on a machine with a
+    display the page opens by itself."""
+    console_port: Annotated[int, Meta(ge=0, le=65535), tyro.conf.arg(metavar="PORT")] = 0
+    """Port of the console's page on this machine; 0: any free port."""
+    tui: bool = False
+    """Show the state on the full terminal instead of in one line; for machines without a browser."""
+    robot_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """File with more settings for the robot side; feelahead-robot --help lists them."""
+    operator_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """File with more settings for the operator side; feelahead-operator --help lists them."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_limits(self)
+        if self.tui and self.status != "line":
+            raise ValueError(f"--tui with --status {self.status}; valid: only one of them")
+        if self.scene is not None and self.model is not None:
+            raise ValueError(f"--scene {self.scene} with --model; valid: one of them, as a model has its own scene")
+
+    @property
+    def has_pages(self) -> bool:
+        """Whether the console is served, so that pages can be opened."""
+        return self.console and not self.tui

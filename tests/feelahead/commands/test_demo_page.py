@@ -1,0 +1,132 @@
+"""When the demo ends, by its pages or its duration, and that its address survives a restart; without processes."""
+
+import json
+import re
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
+from websockets.typing import Origin
+
+from feelahead.commands.demo.page import AFTER_PAGES_S, FIRST_PAGE_S, KeptPage, Lifetime, free_ports
+from tests.operator_side.viewing.terminal.on_terminal import OnTerminal
+
+_LIMIT_S = 60.0
+
+
+def ends_at(lifetime: Lifetime, pages: dict[float, int], limit_s: float = 500.0) -> tuple[float, str]:
+    """Return when and why the run ends. pages: number of open pages, by the time from which on it holds."""
+    lifetime.begin(0.0)
+    now_s, open_now = 0.0, 0
+    while now_s < limit_s:
+        open_now = pages.get(now_s, open_now)
+        if (why := lifetime.why_over(open_now, now_s)) is not None:
+            return now_s, why
+        now_s += 0.5
+    raise AssertionError("it goes on")
+
+
+def test_a_duration_wins_over_pages() -> None:
+    assert ends_at(Lifetime(20.0), {0.0: 1}) == (20.0, "the run ends after 20 s")
+
+
+def test_without_a_page_it_ends_after_a_minute_and_says_what_makes_it_longer() -> None:
+    at_s, why = ends_at(Lifetime(None), {})
+    assert at_s == FIRST_PAGE_S
+    assert "--duration" in why
+
+
+@pytest.mark.parametrize("closed_s", [10.0, 59.0, 300.0])
+def test_it_goes_on_while_a_page_is_open_and_ends_after_the_last_one_closed(closed_s: float) -> None:
+    pages = {2.0: 1, 4.0: 2, 6.0: 1, closed_s: 0}
+    # The page was seen open for the last time one step before.
+    assert ends_at(Lifetime(None), pages) == (closed_s - 0.5 + AFTER_PAGES_S, "the page was closed: the run ends")
+
+
+def test_a_reload_does_not_end_it() -> None:
+    assert ends_at(Lifetime(None), {2.0: 1, 50.0: 0, 53.0: 1, 100.0: 0})[0] > 100.0
+
+
+def test_it_does_not_end_before_the_link_was_up() -> None:
+    lifetime = Lifetime(1.0)
+    assert lifetime.why_over(0, 1e6) is None
+    assert not lifetime.has_begun
+
+
+def test_a_page_finds_the_next_run_at_the_same_address(tmp_path: Path) -> None:
+    page = KeptPage(tmp_path)
+    token, waits = page.flags()
+    path = Path(token.removeprefix("--console-token="))
+    secret = path.read_text()
+    assert (len(secret) >= 24, path.stat().st_mode & 0o077) == (True, 0)
+    assert waits.startswith("--person-waits=")
+    assert page.is_new("http://127.0.0.1:4321/secret/")
+    assert page.flags() == [token, waits, "--console-port=4321"]
+    assert not page.is_new("http://127.0.0.1:4321/secret/")
+    assert path.read_text() == secret
+    page.wants_again = True
+    assert [page.take_again(), page.take_again()] == [True, False]
+
+
+def test_ports_for_both_sides_differ() -> None:
+    ports = free_ports(2)
+    assert len(set(ports)) == 2
+    assert all(1024 <= port <= 65535 for port in ports)
+
+
+def opened(address: str) -> Connection:
+    """Open the page's connection, again and again until the console serves it."""
+    end_s = time.monotonic() + _LIMIT_S
+    while True:
+        try:
+            page = connect(
+                address.replace("http", "ws", 1) + "live",
+                origin=Origin(re.sub(r"/[^/]*/$", "", address)),
+                max_size=None,
+            )
+        except (OSError, ConnectionClosed):
+            assert time.monotonic() < end_s
+            continue
+        page.send(json.dumps({"slow": True, "looks": True}))
+        return page
+
+
+def read_until(page: Connection, kind: str) -> dict[str, object]:
+    """Return the page's next message of this kind; a picture counts as `picture`."""
+    end_s = time.monotonic() + _LIMIT_S
+    while time.monotonic() < end_s:
+        content = page.recv(timeout=_LIMIT_S)
+        message: dict[str, object] = json.loads(content) if isinstance(content, str) else {"kind": "picture"}
+        if message["kind"] == "end":
+            page.send(json.dumps({"taken": True}))
+        if message["kind"] == kind:
+            return message
+    raise AssertionError(f"no {kind}")
+
+
+@pytest.mark.processes
+def test_a_page_keeps_the_demo_alive_and_runs_it_again_at_the_same_address() -> None:
+    demo = OnTerminal([sys.executable, "-P", "-m", "feelahead", "demo"])
+    address = re.compile(rb"http://127\.0\.0\.1:\d+/[\w-]+/")
+    try:
+        demo.read_until(lambda seen: address.search(seen.replace(b"\r\n", b"")))
+        found = address.search(demo.seen.replace(b"\r\n", b""))
+        assert found is not None
+        with opened(found[0].decode()) as page:
+            assert read_until(page, "run")["may_run_again"] is True
+            read_until(page, "picture")
+            page.send(json.dumps({"again": True}))
+            assert read_until(page, "ended") == {"kind": "ended"}
+            with pytest.raises(ConnectionClosed):
+                read_until(page, "nothing more")
+        with opened(found[0].decode()) as page:
+            read_until(page, "picture")
+        demo.read_until(lambda seen: b"the page was closed: the run ends" in seen)
+        demo.read_until(lambda seen: b"contacts with obstacles" in seen)
+        assert demo.process.wait(_LIMIT_S) == 0
+    finally:
+        demo.close()
