@@ -56,7 +56,7 @@ def test_another_is_taken_only_after_several_looks_for_the_one_from_before() -> 
     look = Finder(backend)
     for _ in range(2):  # The one found then is looked for as often again.
         for _ in range(LOOKS_FOR_THE_SAME):
-            with pytest.raises(NoDeviceError, match=f"{ADDRESS} is not there, only another: {OTHER}"):
+            with pytest.raises(NoDeviceError, match=f"{ADDRESS} is not there, only: {OTHER}"):
                 look(ADDRESS)
             assert other.closed == other.times_opened
         found = look(ADDRESS)
