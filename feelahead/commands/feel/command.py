@@ -93,8 +93,9 @@ def feel(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
             simulated.set_finger_force(*pulling(clock.now())[:2])
         return ""
 
-    with typing(keys=True) as keys, Trying(walk, console, until=until) as trying:
-        _use(settings, trying, clock, keys if simulated is None else hands, simulated, backend)
+    source = typing(keys=True) if simulated is None else contextlib.nullcontext(hands)
+    with source as typed, Trying(walk, console, until=until) as trying:
+        _use(settings, trying, clock, typed, simulated, backend)
     return 0
 
 
@@ -108,8 +109,8 @@ def _measure(settings: FeelSettings, console: Console, backend: HidBackend | Non
         console.print(text, markup=False, highlight=False, soft_wrap=not console.is_terminal)
 
     measuring = Measuring(measurement, say)
-    with typing(keys=False) as lines:
-        typed = lines if hands is None else lambda: hands.act(measurement, clock.now())
+    scripted = None if hands is None else contextlib.nullcontext(lambda: hands.act(measurement, clock.now()))
+    with scripted or typing(keys=False) as typed:
         _use(settings, measuring, clock, typed, simulated, backend)
     if (result := measurement.result) is None or measuring.address is None:
         sys.stdout.write("given up: nothing was stored\n")

@@ -103,7 +103,7 @@ def live(desk: Desk, activity: Activity, typed: Typed, clock: Clock, stop: StopS
 def typing(*, keys: bool) -> Iterator[Typed]:
     """Read standard input. keys: each key at once and unseen, only from a terminal; else whole lines from anywhere."""
     if sys.stdin is None or (keys and not sys.stdin.isatty()):
-        yield lambda: ""
+        yield lambda: "" if keys else None
         return
     descriptor = sys.stdin.fileno()
     with _each_key(descriptor) if keys else contextlib.nullcontext():

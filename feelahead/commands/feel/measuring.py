@@ -13,9 +13,9 @@ from operator_side.people.settings import PersonSettings
 
 _GUIDE: Final = (
     "Put the scale on a table and set it to zero. Hold the controller so that only {trigger} touches the scale, where"
-    " your finger lies, and press down more slowly than the scale counts, until it yields. Nine presses: without an effect, then"
-    f" strengths 1 to 8. Several readings on a line count by their median; {BACK!r} repeats the press before; Ctrl-C"
-    " gives up."
+    " your finger lies, and press down more slowly than the scale counts, until it yields. Nine presses: without an"
+    f" effect, then strengths 1 to 8. Several readings on a line count by their median; {BACK!r} repeats the press"
+    " before; Ctrl-C gives up."
 )
 
 
