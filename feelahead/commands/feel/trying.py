@@ -17,7 +17,7 @@ _SHOW_S: Final = 0.05
 _KEYS: Final[dict[str, PatternName]] = {str(n): name for n, name in enumerate(get_args(PatternName), start=1)}
 HELP: Final = f"keys: {'  '.join(f'{key} {name}' for key, name in _KEYS.items())}  space next  q end"
 _PULLED, _LET_GO = 0.2, 0.1
-_BAR: Final = 30
+_BAR: Final = 20
 
 
 class Trying:

@@ -2,9 +2,11 @@
 
 import contextlib
 import os
+import pty
 import signal
 import subprocess
 import sys
+import termios
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +15,7 @@ import pytest
 import feelahead.commands.feel.command
 from common.errors import ConfigurationError
 from feelahead.commands.feel.command import feel
+from feelahead.commands.feel.loop import typing
 from feelahead.commands.feel.patterns import STAGES, Stage, Walk
 from feelahead.main import command
 from operator_side.calibration.force_measurement import ForceMeasurement
@@ -101,6 +104,22 @@ def test_a_simulated_measurement_is_stored_only_where_asked_for(
 def test_what_makes_no_sense_is_refused(flags: list[str], said: str) -> None:
     with pytest.raises(ConfigurationError, match=said):
         command(["feel", *flags])
+
+
+def test_keys_are_taken_one_by_one_and_the_terminal_is_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    person, terminal = pty.openpty()
+    before = termios.tcgetattr(terminal)
+    with os.fdopen(terminal) as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        with typing(keys=True) as typed:
+            assert typed() == ""
+            os.write(person, b"2 ")
+            assert typed() == "2 "
+            assert not termios.tcgetattr(terminal)[3] & termios.ECHO
+        assert termios.tcgetattr(terminal) == before
+        os.close(person)
+        with typing(keys=False) as typed:
+            assert typed() is None
 
 
 # A real controller to hidapi

@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 from operator_side.dualsense.hid.second_writer import PERIOD_S, SecondWriters, search_writers, writers_of
-from tests.helpers.fake_proc import add_process
+from tests.helpers.machines.fake_proc import add_process
 
 NODE = "/dev/hidraw93"
 PATH = NODE.encode()
