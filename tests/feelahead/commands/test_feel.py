@@ -226,6 +226,10 @@ def test_the_triggers_are_released_however_its_process_ends(tmp_path: Path, numb
     ) as process:
         try:
             assert max(parse_output_report(os.read(controller, REPORT_LENGTH)).r2 or ()) == MAX_STRENGTH
+            assert process.stdout is not None
+            # This test itself is a second writer.
+            expected = f"({os.getpid()}) holds the controller open for writing, too".encode()
+            assert any(expected in line for line in process.stdout)
             process.send_signal(number)
             assert process.wait(LIMIT_S) == (-9 if number is signal.SIGKILL else 0)
             assert parse_output_report(os.read(controller, REPORT_LENGTH)).r2 == FREE_TRIGGER
