@@ -1,4 +1,4 @@
-"""Command `feelahead`: all that needs both sides."""
+"""Command `feelahead`: its subcommands, and the text of its help."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -21,15 +21,15 @@ _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
     "keys": (keys, "who may operate the robot side: make key pairs, allow, list and revoke"),
     "virtual-dualsense": (virtual_dualsense, "a controller that every program on this machine sees, with no hardware"),
     "replay": (replay, "show a recording, or compute it again and compare"),
-    "export": (export, "turn a recording into CSV, Parquet, a LeRobot dataset, or a whole file"),
+    "export": (export, "turn a recording into CSV, Parquet or a LeRobot dataset"),
     "plot": (plot, "draw a recording on one page"),
     "bench": (bench, "measure speed and accuracy, compared with alternatives"),
-    "try": (try_out, "test people and robots under delay, faults and attacks"),
+    "try": (try_out, "run an experiment in simulation: approaches, the demo, haptics on and off, latency"),
 }
 
 
 def command(arguments: Sequence[str]) -> int:
-    """Run the command that the first argument names."""
+    """Run the subcommand that the first argument names; without one, print the help."""
     if not arguments or arguments[0] in ("-h", "--help"):
         lines = [f"  {name:<19}{text}" for name, (_, text) in _COMMANDS.items()]
         sys.stdout.write(

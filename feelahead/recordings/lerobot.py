@@ -1,8 +1,8 @@
 """Export of a recording as one episode of a LeRobot dataset, v3.0, for learning from demonstrations.
 
-data/chunk-000/file-000.parquet            one row a frame, pictures as encoded bytes
+data/chunk-000/file-000.parquet            one row for each frame, pictures as encoded bytes
 meta/info.json, stats.json, tasks.parquet
-meta/episodes/chunk-000/file-000.parquet   one row an episode
+meta/episodes/chunk-000/file-000.parquet   one row for each episode
 """
 
 import io
@@ -27,7 +27,7 @@ _TASK: Final = "reach the target, grasp it, lift it and set it down"
 _STRENGTHS: Final = 8
 _ZONES: Final = 10
 _SAMPLED_PICTURES: Final = 20
-"""Largest number of pictures, roughly, in the statistics."""
+"""About the maximum number of pictures from which the statistics are computed."""
 _ENLARGED_QUALITY: Final = 90
 _ACTION: Final = {
     "l2": "command.l2",
@@ -41,7 +41,7 @@ _ACTION: Final = {
 
 
 class Picture(NamedTuple):
-    """Picture of a camera."""
+    """One picture of a camera."""
 
     time_s: float
     """Time since the recording began"""
@@ -49,7 +49,10 @@ class Picture(NamedTuple):
 
 
 def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
-    """Write the dataset; return the number of frames. Raises ConfigurationError without an arm or commands."""
+    """Write the dataset into `folder`; return the number of frames.
+
+    Raises ConfigurationError if the recording has no states of the arm or no commands.
+    """
     import pyarrow  # noqa: PLC0415
     from pyarrow import parquet  # noqa: PLC0415
 
@@ -64,7 +67,7 @@ def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
     stats: dict[str, Any] = {}
     for name, parts in vectors.items():
         values = np.stack([joined.numbers(column)[first:] for column in parts.values()], axis=1).astype(np.float32)
-        # A value with gaps, such as a field, keeps the last one: the format has no gaps.
+        # The format allows no gaps: a column with gaps, such as the stiffness, repeats its last value.
         values = _held(values)
         features[name] = {"dtype": "float32", "shape": [len(parts)], "names": list(parts)}
         columns[name] = pyarrow.FixedSizeListArray.from_arrays(pyarrow.array(values.ravel()), len(parts))
@@ -102,14 +105,17 @@ def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
 
 
 def pictures(recording: Recording, view: str) -> list[Picture]:
-    """Return a camera's pictures, in order."""
+    """Return all pictures of the camera `view`, in order of time."""
     first_ns = recording.began_ns()
     messages = recording.messages([f"/camera/{view}"])
     return [Picture(1e-9 * (message.log_ns - first_ns), read_image(message.content).jpeg) for message in messages]
 
 
 def _of_one_size(shown: list[Picture]) -> tuple[list[Picture], tuple[int, int]]:
-    """Enlarge pictures that a narrow link made smaller, as the format has one size; return them and (width, height)."""
+    """Enlarge pictures that were sent smaller over a narrow link, as the format allows one size only.
+
+    Return the pictures and their (width, height).
+    """
     from PIL import Image  # noqa: PLC0415
 
     opened = [Image.open(io.BytesIO(picture.jpeg)) for picture in shown]
@@ -126,10 +132,10 @@ def _of_one_size(shown: list[Picture]) -> tuple[list[Picture], tuple[int, int]]:
 
 
 def _vectors(joined: Table) -> dict[str, dict[str, str]]:
-    """Return each feature's parts by name, with their columns."""
+    """Return for each feature of the dataset its parts, and the joined table's column for each part."""
     joints = [column for column in joined.columns() if column.startswith("arm.position_rad.")]
     if not joints or "command.r2" not in joined.columns():
-        raise ConfigurationError("--format lerobot: no arm or no commands in it; valid: a recording of the demo")
+        raise ConfigurationError("--format lerobot: arm states or commands are missing; valid: both sides recorded")
     state = {f"joint_{index}_rad": column for index, column in enumerate(joints)}
     velocity = {f"joint_{index}_rad_s": f"arm.velocity_rad_s.{index}" for index in range(len(joints))}
     vectors = {
@@ -153,7 +159,7 @@ def _vectors(joined: Table) -> dict[str, dict[str, str]]:
 
 
 def _first_whole_row(vectors: Mapping[str, Mapping[str, str]], seen: Mapping[str, list[Picture]], joined: Table) -> int:
-    """Return the first row that has every required column."""
+    """Return the first row from which every required column has a value and every camera a picture."""
     needed = [*vectors["observation.state"].values(), *vectors["action"].values()]
     if "observation.stiffness" in vectors:
         needed += vectors["observation.stiffness"].values()
@@ -161,12 +167,12 @@ def _first_whole_row(vectors: Mapping[str, Mapping[str, str]], seen: Mapping[str
     begins += [int(np.searchsorted(np.array(joined.times_s), found[0].time_s)) for found in seen.values()]
     first = max(begins)
     if first >= len(joined.times_s):
-        raise ConfigurationError("--format lerobot: at no moment was there something of everything")
+        raise ConfigurationError("--format lerobot: the recording ends before every required value has come")
     return first
 
 
 def _held(values: Any) -> Any:
-    """Fill each gap with the last value before it, or 0 for none."""
+    """Fill each gap with the last value before it, or with 0 if there is none."""
     filled = values.copy()
     rows = np.where(np.isfinite(filled), np.arange(len(filled))[:, None], -1)
     newest = np.maximum.accumulate(rows, axis=0)
@@ -186,7 +192,7 @@ def _statistics(values: FloatArray) -> dict[str, Any]:
 
 
 def _picture_statistics(shown: list[Picture]) -> dict[str, Any]:
-    """Return statistics of each colour, 0 to 1, (3, 1, 1)."""
+    """Return each statistic of the pictures' colours, 0 to 1, in the shape (3, 1, 1)."""
     from PIL import Image  # noqa: PLC0415
 
     step = max(1, len(shown) // _SAMPLED_PICTURES)
@@ -198,7 +204,7 @@ def _picture_statistics(shown: list[Picture]) -> dict[str, Any]:
 
 
 def _hint(feature: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the `datasets` library's description of a column."""
+    """Return the description of a column that Hugging Face's library `datasets` expects."""
     if feature["dtype"] == "image":
         return {"_type": "Image"}
     if feature["shape"] == [1]:
@@ -208,7 +214,7 @@ def _hint(feature: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _tasks(pyarrow: Any) -> Any:
-    """Return the table of tasks; the texts are the index of a data frame, as the format's reader expects."""
+    """Return the table of tasks. Their texts are the index of a pandas data frame, as the format's reader expects."""
     table = pyarrow.table({"task_index": np.zeros(1, dtype=np.int64), "task": [_TASK]})
     frame = {
         "index_columns": ["task"],

@@ -1,4 +1,4 @@
-"""Checks of a real controller: hidapi, permission, connection."""
+"""Checks whether a real controller can be used: hidapi, permission to open it, its reports."""
 
 import contextlib
 import os
@@ -21,7 +21,10 @@ _NAME: Final = "controller"
 
 
 def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Sequence[Finding]) -> Finding:
-    """Check whether a controller may be opened: by trial, or by udev's rules (`rules`: file -> text)."""
+    """Check whether a controller may be opened: by the findings of opened `controllers`, else by udev's rules.
+
+    rules: text of each file of rules.
+    """
     name = "udev rule"
     if sys.platform != "linux":
         return Finding(name, Verdict.OK, f"not needed on {sys.platform}")
@@ -39,7 +42,7 @@ def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Se
 
 
 def missing_grants(rules: Mapping[str, str]) -> list[str]:
-    """Return the models and transports that no rule in these files opens to the person at the machine."""
+    """Return the models and transports, as "a DualSense on USB", that no rule in these files lets a user open."""
     lines = [line for text in rules.values() for line in text.splitlines() if not line.lstrip().startswith("#")]
     granting = "\n".join(line for line in lines if "hidraw" in line and re.search(r'uaccess|MODE\s*:?=\s*"066', line))
     wanted = {
@@ -54,7 +57,7 @@ def missing_grants(rules: Mapping[str, str]) -> list[str]:
 
 
 def controllers_seen() -> list[Finding]:
-    """Open each connected controller for a moment; return a finding each, or why there is none."""
+    """Open each connected controller for a moment; return a finding for each, or one that says why none is found."""
     try:
         backend = load_backend()
     except NoDriverError as error:
@@ -68,7 +71,7 @@ def controllers_seen() -> list[Finding]:
 
 
 def udev_rules() -> dict[str, str]:
-    """Read the readable files of udev's rules: text by path."""
+    """Return the text of each readable file of udev's rules, by its path."""
     paths = [path for folder in RULE_FOLDERS for path in sorted(Path(folder).glob("*.rules"))]
     return {str(path): path.read_text(encoding="utf-8", errors="replace") for path in paths if os.access(path, os.R_OK)}
 

@@ -1,4 +1,4 @@
-"""`feelahead calibrate`, and the operator side that uses its stored result."""
+"""`feelahead calibrate`, and how the operator side uses the stored result."""
 
 import math
 import os
@@ -39,7 +39,7 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def willing_hands(now_s: float) -> ControllerState:
-    """Rest, pull L2 up to 0.9, pull R2, turn the sticks, rest: by the clock."""
+    """Return the state of hands that follow a timetable: rest, pull L2 to 0.9, pull R2, turn the sticks, rest."""
     pulled = math.sin(math.pi * now_s) ** 2
     if 2.0 <= now_s < 5.0:
         return ControllerState(l2=0.9 * pulled)
@@ -52,7 +52,7 @@ def willing_hands(now_s: float) -> ControllerState:
 
 
 class PlayedHandle(FakeHandle):
-    """Real controller to hidapi, whose state follows a separate clock."""
+    """Controller that hidapi takes for a real one, and whose state is a function of a separate clock."""
 
     def play(self, hands: Callable[[float], ControllerState | None]) -> None:
         self.hands, self.now_s = hands, 0.0
@@ -107,7 +107,7 @@ def test_a_simulated_controller_is_kept_only_where_asked_for(
 
 
 @pytest.mark.parametrize(
-    ("still_s", "error", "said"), [(math.inf, CalibrationError, "Pull L2"), (1.0, DeviceError, "said nothing for 5 s")]
+    ("still_s", "error", "said"), [(math.inf, CalibrationError, "Pull L2"), (1.0, DeviceError, "sent nothing for 5 s")]
 )
 def test_hands_that_do_not_pull_or_a_silent_controller_end_it_and_nothing_is_stored(
     handle: PlayedHandle, own_folder: Path, still_s: float, error: type[Exception], said: str
@@ -203,7 +203,7 @@ def test_a_file_that_breaks_while_it_runs_is_said_and_the_defaults_hold(
     taken: list[TravelCalibration] = []
 
     def calibrate(_: OperatorSide, calibration: TravelCalibration) -> None:
-        """Store another calibration and unplug each time; the third time is the last."""
+        """At each loading, store another calibration and unplug the controller; the third time ends the test."""
         taken.append(calibration)
         if len(taken) == 1:
             calibration_path(ADDRESS).write_text("version = 7")

@@ -1,4 +1,4 @@
-"""Checks of `feelahead doctor` on invented facts, and the command on this machine."""
+"""Each check of `feelahead doctor` with invented facts, and the whole command on this machine."""
 
 import json
 import os

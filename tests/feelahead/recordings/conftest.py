@@ -1,4 +1,4 @@
-"""One recorded run of both sides in virtual time, for everything that uses recordings."""
+"""One recorded run of both sides in virtual time, for all tests that need a recording."""
 
 import io
 from collections.abc import Callable
@@ -31,7 +31,7 @@ WALL_OFFSET_S = 1.7e9
 
 
 def record_loopback(path: Path, duration_s: float, **settings: Any) -> None:
-    """Record the scripted person's run; `settings` are both sides'."""
+    """Record a run of the scripted person. settings: further settings, given to both sides."""
     robot, operator = RobotSettings(**settings), OperatorSettings(**settings)
     notes: dict[str, list[Any]] = {"robot": [], "operator": []}
     run = Loopback(
@@ -90,7 +90,7 @@ def jpeg(value: int) -> bytes:
 
 @pytest.fixture
 def with_pictures(run: Recording, tmp_path: Path) -> tuple[Recording, list[bytes]]:
-    """Return the same run with a camera: its messages again, and pictures at 10 Hz."""
+    """Return a copy of `run` with pictures of a camera at 10 Hz, and these pictures."""
     path = tmp_path / "pictures.mcap"
     file = RecordingFile(path, 0.0)
     content = Content(file)
