@@ -1,6 +1,7 @@
 """One trial: a scripted person reaches, grasps, lifts and places in one scene, over one link, in virtual time."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
@@ -29,12 +30,15 @@ from robot_side.settings import CameraSettings, RobotSettings
 
 Arm = Literal["off", "mechanical", "reacting"]
 """off: nothing is felt. mechanical: triggers resist, and the person does not react. reacting: the person reacts."""
-_L2, _R2 = 0, 1
+_L2, R2 = 0, 1
 _SAME_CONTACT_S: Final = 0.1
 """Time within which a renewed contact with an object is the same contact, in seconds."""
-_LOOK_S: Final = 0.05
+LOOK_S: Final = 0.05
+"""Period at which the person's progress is looked at, in seconds"""
 _TRUTH_S: Final = 0.01
 _SETTLES_S: Final = 0.3
+MISJUDGES_DEPTH: Final = PersonSettings(aiming="move-and-wait", depth_error_sd_m=0.030, depth_error_mean_m=0.010)
+"""Person who sees no obstacle and misjudges distances"""
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,7 @@ class _Silent:
         return self._law.summary()
 
 
-class _Watch(Listener):
+class Watch(Listener):
     """Watcher of the truth, tick by tick."""
 
     def __init__(self, trial: Trial, seed: int) -> None:
@@ -88,7 +92,7 @@ class _Watch(Listener):
         """Time of R2 pulled, and of full strength under its finger, in seconds"""
         self.placing = Placing()
         self.scene = load_scene(name=trial.scene, seed=seed)
-        self._contact, self._truth = TrueContact(self.scene), GroundTruth(self.scene)
+        self._contact, self.truth = TrueContact(self.scene), GroundTruth(self.scene)
         self._parts = {self.scene.model.geom(geom).name for geom in self.scene.robot.gripper_geoms}
         self._hit_s: dict[str, float] = {}
         self._next_s = -math.inf
@@ -126,10 +130,10 @@ class _Watch(Listener):
                 self._hit(onset.thing, onset.closing_speed_m_s, now_s)
         if now_s >= self._next_s - 1e-9:
             self._next_s = now_s + _TRUTH_S
-            strength = self._strength_of(_R2)
+            strength = self.strength_of(R2)
             self.pulled_s += _TRUTH_S * (strength is not None)
             self.full_s += _TRUTH_S * (strength == MAX_STRENGTH)
-            if (target := self._truth.target()) is not None:
+            if (target := self.truth.target()) is not None:
                 is_target = held is not None and roles[held] is Role.TARGET
                 self.placing.observe(target, is_target, self._felt(), now_s)
 
@@ -142,35 +146,38 @@ class _Watch(Listener):
 
     def _felt(self) -> bool:
         """Return whether a finger meets an effect, or the controller rumbles."""
-        stiff = any((self._strength_of(trigger) or 0) > 0 for trigger in (_L2, _R2))
+        stiff = any((self.strength_of(trigger) or 0) > 0 for trigger in (_L2, R2))
         return stiff or self.loopback.device.rumble.left > 0.0
 
-    def _strength_of(self, trigger: int) -> int | None:
+    def strength_of(self, trigger: int) -> int | None:
         """Return the strength of the zone under the finger; None for a trigger that is not pulled."""
         device = self.loopback.device
         travel = device.travel[trigger]
         return device.strengths[trigger][zone_of(travel)] if travel > 0.0 else None
 
 
-def run_trial(trial: Trial, seed: int) -> Row:
+def run_trial(trial: Trial, seed: int, look: Callable[[Watch], None] = lambda _: None) -> Row:
     """Run until the person is done, or for the trial's duration; the same trial gives the same row.
 
     The seed draws the scene, the errors of camera and encoders, the link and the person.
+    look: called at the start and then every LOOK_S.
     hits: contacts of the gripper with anything but the target, and of the held object with obstacles.
     full_share: share of the time with R2 pulled in which the zone under the finger is at full strength.
     finished_s: from arming until the object is placed and the hand has withdrawn; None if time ran out.
     felt_before_s: how long rumble or a stiff trigger was felt without a break before the object touched its place.
     """
-    watch = _Watch(trial, seed)
+    watch = Watch(trial, seed)
     loopback, person = watch.loopback, watch.loopback.person
     assert isinstance(person, SimulatedOperator)  # noqa: S101  # no other is given
     armed_s = done_s = None
+    look(watch)
     while loopback.clock.now() < trial.duration_s and done_s is None:
-        loopback.run_until(min(loopback.clock.now() + _LOOK_S, trial.duration_s))
+        loopback.run_until(min(loopback.clock.now() + LOOK_S, trial.duration_s))
         if armed_s is None and loopback.robot.session.safety.state == "armed":
             armed_s = loopback.clock.now()
         if person.phase == "done":
             done_s = loopback.clock.now()
+        look(watch)
     # A released object may still fall.
     loopback.run_until(loopback.clock.now() + _SETTLES_S)
     task = loopback.summary()["task"]
