@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import msgspec
 from rich.console import Console
+from rich.table import Table
 
 from common.command.status import Status
 from common.command.stop_signal import StopSignal
@@ -17,11 +18,13 @@ from common.files.output_file import write_json
 from feelahead.commands.demo.settings import DemoSettings
 from feelahead.commands.open_browser import show_address
 
-_TAKEN: Final = frozenset(
-    "compare config console console_port duration link link_model probability scene seed summary".split()
-)
+_TAKEN: Final = {
+    *("compare", "config", "console", "console_port", "duration", "link", "link_model"),
+    *("probability", "scene", "seed", "summary"),
+}
 """Settings that a comparison takes"""
 _LONGEST_S: Final = 45.0
+"""Limit of a run without --duration, in seconds of virtual time"""
 _PAGE: Final = Path(__file__).with_name("compare.html")
 _DATA: Final = "/*DATA*/null"
 _ARMS: Final = {"off": "without haptics", "reacting": "with haptics"}
@@ -34,9 +37,10 @@ def compare(settings: DemoSettings, given: Collection[str]) -> int:
     """
     refuse_others(given)
     runs = compute(settings)
-    console = Console()
-    for line in _lines(settings, runs):
-        console.print(line, markup=False, highlight=False)
+    person = "a simulated person who misjudges depth, in virtual time"
+    sys.stdout.write(f"feelahead demo --compare: {_what(settings)}; {person}\n")
+    Console().print(_table(runs))
+    sys.stdout.write("one seed shows, and does not prove: feelahead try haptics counts over many\n")
     if settings.summary is not None:
         figures = {name: run["figures"] for name, run in zip(("off", "on"), runs, strict=True)}
         asked = {"scene": settings.scene or "wall", "seed": settings.seed, "link": settings.link}
@@ -49,7 +53,7 @@ def compare(settings: DemoSettings, given: Collection[str]) -> int:
 def refuse_others(given: Collection[str]) -> None:
     """Raise ConfigurationError if a field among `given` means nothing for a comparison."""
     for name in sorted(set(given) - _TAKEN):
-        valid = ", ".join(f"--{field.replace('_', '-')}" for field in sorted(_TAKEN - {"compare"}))
+        valid = ", ".join(f"--{field.replace('_', '-')}" for field in sorted(_TAKEN))
         raise ConfigurationError(f"--{name.replace('_', '-')} with --compare; valid: {valid}")
 
 
@@ -67,7 +71,7 @@ def compute(settings: DemoSettings, *, pictures: bool | None = None) -> list[dic
         why = f"--compare: {error.name} is not installed; pip install '.[robot,operator]' in the clone"
         raise ConfigurationError(why) from error
     drawn = settings.console and sys.stdout.isatty() if pictures is None else pictures
-    limit_s = min(settings.duration or _LONGEST_S, _LONGEST_S)
+    limit_s = settings.duration or _LONGEST_S
     runs = []
     with progress("feelahead demo --compare", 2.0 * limit_s) as shown:
         for arm, name in _ARMS.items():
@@ -101,16 +105,12 @@ def _what(settings: DemoSettings) -> str:
     return f"--scene {settings.scene or 'wall'} --seed {settings.seed}, {link}"
 
 
-def _lines(settings: DemoSettings, runs: list[dict[str, Any]]) -> list[Any]:
+def _table(runs: list[dict[str, Any]]) -> Table:
     from feelahead.lab.shown import shown  # noqa: PLC0415  # of the lab
 
-    rows = [(run["name"], *_cells(run["figures"])) for run in runs]
-    headings = "", "contact", "fastest, mm/s", "least gap, mm", "grasped", "placed", "finished, s"
-    return [
-        f"feelahead demo --compare: {_what(settings)}; a simulated person who misjudges depth, in virtual time",
-        shown("", headings, rows),
-        "one seed shows, and does not prove: feelahead try haptics counts over many",
-    ]
+    headings = "haptics", "contact", "mm/s, most", "least gap, mm", "placed", "finished, s"
+    rows = zip(("off", "on"), runs, strict=True)
+    return shown("", headings, ((name, *_cells(run["figures"])) for name, run in rows))
 
 
 def _cells(figures: Mapping[str, Any]) -> list[str | float | None]:
@@ -120,7 +120,6 @@ def _cells(figures: Mapping[str, Any]) -> list[str | float | None]:
         figures["fastest_hit_mm_s"],
         # The truth is sampled: a contact may fall between two samples.
         0.0 if touched else gap_mm,
-        "yes" if figures["grasped"] else "no",
         "yes" if figures["placed"] else "no",
         figures["finished_s"],
     ]
