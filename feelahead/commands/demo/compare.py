@@ -40,7 +40,8 @@ def compare(settings: DemoSettings, given: Collection[str]) -> int:
     person = "a simulated person who misjudges depth, in virtual time"
     sys.stdout.write(f"feelahead demo --compare: {_what(settings)}; {person}\n")
     Console().print(_table(runs))
-    sys.stdout.write("one seed shows, and does not prove: feelahead try haptics counts over many\n")
+    many = f"feelahead try haptics --scenes {settings.scene or 'wall'}"
+    sys.stdout.write(f"one seed shows, and does not prove; over many seeds: {many}\n")
     if settings.summary is not None:
         figures = {name: run["figures"] for name, run in zip(("off", "on"), runs, strict=True)}
         asked = {"scene": settings.scene or "wall", "seed": settings.seed, "link": settings.link}
