@@ -16,6 +16,7 @@ from common.errors import ConfigurationError
 from common.files.output_file import write_json
 from common.recording.side import Recorder
 from feelahead.both_sides.summary import merge_summaries, read_summary
+from feelahead.commands.demo.compare import compare
 from feelahead.commands.demo.page import KeptPage
 from feelahead.commands.demo.run import run_both, too_slow
 from feelahead.commands.demo.settings import DemoSettings
@@ -36,6 +37,8 @@ def demo(arguments: Sequence[str]) -> int:
     if (complaint := too_slow(settings)) is not None:
         raise ConfigurationError(complaint)
     given = given_fields(arguments, DemoSettings)
+    if settings.compare:
+        return compare(settings, given)
     errors: list[str] = []
     try:
         with TerminalStatus("feelahead demo") if settings.tui else Status(settings.status, "feelahead demo") as status:
