@@ -16,6 +16,7 @@ from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core import RobotParts
 from robot_side.drivers.mujoco.arm import MujocoArm, stand
 from robot_side.drivers.mujoco.camera import CameraError, MujocoCamera
+from robot_side.drivers.mujoco.checks.site_axis import site_findings
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_cover import GripperCover
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
@@ -109,7 +110,9 @@ def build_parts(
         raise ConfigurationError(f"{given} is given without {missing}; valid: both, or neither for the built-in arm")
     # A driver's objects are not known yet.
     roles = settings.roles if settings.objects is None else {}
-    scene = scene or load_scene(settings.model, settings.site, roles, settings.scene or "table", settings.seed)
+    scene = scene or load_scene(
+        settings.model, settings.site, roles, settings.scene or "table", settings.seed, settings.site_axis
+    )
     noise, camera_noise = np.random.SeedSequence(settings.seed).generate_state(2)
     encoder = Encoder(settings.encoder.sigma_rad, settings.encoder.resolution_rad, int(noise))
     limits = MotionLimits()
@@ -196,6 +199,8 @@ def _notes(scene: Scene, settings: RobotSettings) -> tuple[str, ...]:
     if settings.arm is not None:
         joints, fingers = (", ".join(names) or "none" for names in _joint_names(scene))
         notes = [f"the driver's joints, in this order: {joints}; of the gripper: {fingers}"]
+    if settings.model is not None:
+        notes += site_findings(scene, settings.site_axis)
     if settings.objects is not None:
         return tuple(notes)
     notes.append(f"objects: {_roles(scene.roles)}")

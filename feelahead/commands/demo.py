@@ -77,6 +77,8 @@ class DemoSettings(RunOptions):
     """MJCF arm with actuators, instead of the built-in one."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Site of the model between the fingertips, with the z axis along the approach."""
+    site_axis: Literal["x", "-x", "y", "-y", "z", "-z"] = "z"
+    """Axis of the site along which R2 advances. The start names the one that fits the fingers, if another does."""
     realtime: bool = False
     """Real-time scheduling and locked memory for both sides, if permitted."""
     console: bool = True
@@ -176,7 +178,7 @@ def _too_slow(settings: DemoSettings) -> str | None:
 def _robot_arguments(settings: DemoSettings, given: Collection[str], summary: Path) -> list[str]:
     # A file decides by itself.
     config = "--permit-tuning" if settings.robot_config is None else f"--config={settings.robot_config}"
-    own = _flags(settings, given, *_SHARED, "scene", "model", "site", "probability", "assist", "law")
+    own = _flags(settings, given, *_SHARED, "scene", "model", "site", "site_axis", "probability", "assist", "law")
     return [*_files(settings, summary), "--bind=tcp://127.0.0.1:0", config, *own]
 
 

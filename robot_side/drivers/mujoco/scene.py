@@ -19,7 +19,7 @@ from robot_side.arm.port import ArmState
 from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.object_primitives import ObjectPrimitives, SceneObject
-from robot_side.drivers.mujoco.robot_model import RobotModel, can_touch, find_robot
+from robot_side.drivers.mujoco.robot_model import RobotModel, SiteAxis, can_touch, find_robot, turn_site
 from robot_side.surroundings.roles import assign_roles
 
 _LOG = logging.getLogger(__name__)
@@ -76,12 +76,14 @@ def load_scene(
     roles: Mapping[str, Role] | None = None,
     name: SceneName = "table",
     seed: int = 0,
+    site_axis: SiteAxis = "z",
 ) -> Scene:
     """Load the built-in arm at its table, or the MJCF file `model_path` whose tool is the site `site`.
 
     A file with only a robot and planes gets the built-in scene `name`, drawn from `seed`, in front of the robot.
     The arm starts at the keyframe `home`, else the first keyframe, else the middle of the joints' ranges.
-    `roles` overrides the roles by name. ConfigurationError, one line, for an unusable file, model or site.
+    `roles` overrides the roles by name. The tool's z axis is the site's `site_axis`.
+    ConfigurationError, one line, for an unusable file, model or site.
     """
     mujoco.set_mju_user_warning(_log_warning)
     with warnings.catch_warnings(record=True) as said:
@@ -92,6 +94,7 @@ def load_scene(
             spec = _read(model_path)
         model = _compile(spec)
         robot = find_robot(model, site)
+        turn_site(model, robot.site, site_axis)
         start, start_pose = _start_configuration(model, robot)
         if all(model.geom_type[geom] == GeomKind.PLANE for thing in _objects(model, robot)[0] for geom in thing.geoms):
             # Attaching extends the keyframes by the attached joints, so that a keyframe preserves the configuration.
@@ -104,6 +107,7 @@ def load_scene(
             _attach(surroundings, spec, model, robot, start)
             model = _compile(spec)
             robot = find_robot(model, site)
+            turn_site(model, robot.site, site_axis)
             start = model.key(start_key).qpos
     if not _SHORTEST_STEP_S <= model.opt.timestep <= _LONGEST_STEP_S:
         raise ConfigurationError(
