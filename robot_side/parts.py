@@ -17,8 +17,10 @@ from robot_side.core import RobotParts
 from robot_side.drivers.mujoco.arm import MujocoArm, stand
 from robot_side.drivers.mujoco.camera import CameraError, MujocoCamera
 from robot_side.drivers.mujoco.checks.site_axis import site_findings
+from robot_side.drivers.mujoco.checks.start_collision import start_collision
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_cover import GripperCover
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
@@ -102,7 +104,8 @@ def build_parts(
 ) -> SceneParts:
     """Make the parts; ConfigurationError for a model that cannot be used.
 
-    scene: used instead of the one that the settings name. announce: called once, with one line, before a long search.
+    scene: used instead of the one that the settings name. announce: called with each note as soon as it is known, so
+    that those about the model come before a long search.
     beside: the connected drivers, whose arm and objects replace simulated ones.
     """
     if (settings.model is None) != (settings.site is None):
@@ -116,7 +119,11 @@ def build_parts(
     noise, camera_noise = np.random.SeedSequence(settings.seed).generate_state(2)
     encoder = Encoder(settings.encoder.sigma_rad, settings.encoder.resolution_rad, int(noise))
     limits = MotionLimits()
-    arm, ends_rad = _arm(scene, encoder, limits, beside)
+    arm, ends_rad, travel = _arm(scene, encoder, limits, beside)
+    notes = _notes(scene, settings, travel)
+    say = announce or (lambda _: None)
+    for text in notes:
+        say(text)
     searching = None if announce is None else cache(lambda: announce(_SEARCHING))
     kinematics = MujocoKinematics(scene, settings.cover_m, searching)
     seen_elsewhere = None if beside is None else beside.objects(settings.roles, settings.camera.sd_m)
@@ -133,6 +140,9 @@ def build_parts(
         settings.motion,
         surroundings,
     )
+    late = *prediction_note, *_cover_notes(kinematics.cover, settings.cover_m, held_covers)
+    for text in late:
+        say(text)
     return SceneParts(
         arm=arm,
         kinematics=kinematics,
@@ -156,26 +166,22 @@ def build_parts(
         assists=settings.assist == "speed",
         full_rate=settings.full_rate,
         seed=settings.seed,
-        notes=(
-            *_notes(scene, settings),
-            *prediction_note,
-            *_cover_notes(kinematics.cover, settings.cover_m, held_covers),
-        ),
+        notes=(*notes, *late),
     )
 
 
 def _arm(
     scene: Scene, encoder: Encoder, limits: MotionLimits, beside: ConnectedDrivers | None
-) -> tuple[MujocoArm | RemoteArm, tuple[FloatArray, FloatArray]]:
-    """Return the arm, simulated or a driver's, and its joints' lower and upper ends, (n,) each."""
+) -> tuple[MujocoArm | RemoteArm, tuple[FloatArray, FloatArray], GripperTravel | None]:
+    """Return the arm, its joints' lower and upper ends, (n,) each, and the gripper's travel; a driver may have the arm."""
     if beside is None or not beside.has_arm:
         simulated = MujocoArm(scene, encoder, limits)
-        return simulated, simulated.ends_rad
+        return simulated, simulated.ends_rad, simulated.travel
     robot, (travel, ends_rad) = scene.robot, stand(scene)
     opening_m = 0.0 if travel is None else float(travel.openings_m[0])
     open_fingers = scene.data.qpos[robot.finger_positions].copy()
     shape = ArmShape(*_joint_names(scene), open_fingers, opening_m)
-    return beside.arm(shape, scene.show), ends_rad
+    return beside.arm(shape, scene.show), ends_rad, travel
 
 
 def _joint_names(scene: Scene) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -193,14 +199,15 @@ def _camera(settings: RobotSettings, scene: Scene, seed: int) -> MujocoCamera:
     return MujocoCamera(scene, CameraError(tuple(thing.name for thing in scene.objects), *error, seed))
 
 
-def _notes(scene: Scene, settings: RobotSettings) -> tuple[str, ...]:
+def _notes(scene: Scene, settings: RobotSettings, travel: GripperTravel | None) -> tuple[str, ...]:
     """Return the notes before the run: start pose, objects and roles, and inexact shapes."""
     notes = [f"starts at {scene.start_pose}"]
     if settings.arm is not None:
         joints, fingers = (", ".join(names) or "none" for names in _joint_names(scene))
         notes = [f"the driver's joints, in this order: {joints}; of the gripper: {fingers}"]
     if settings.model is not None:
-        notes += site_findings(scene, settings.site_axis)
+        notes += site_findings(scene, settings.site_axis, travel)
+        notes += start_collision(scene) if settings.arm is None else []
     if settings.objects is not None:
         return tuple(notes)
     notes.append(f"objects: {_roles(scene.roles)}")

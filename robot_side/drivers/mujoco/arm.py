@@ -73,7 +73,8 @@ class MujocoArm:
         self._clock: Clock | None = None
         self._state: ArmState | None = None
 
-        travel, self.ends_rad = stand(scene)
+        self.travel, self.ends_rad = stand(scene)
+        travel = self.travel
         self._gripper = None if travel is None else GripperDrive(travel, gripper_stroke_time_s)
         start = data.qpos[robot.arm_positions].copy()
         limits = limits or MotionLimits()

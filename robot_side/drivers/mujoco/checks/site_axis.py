@@ -5,6 +5,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from common.arrays import FloatArray
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.robot_model import AXES, SiteAxis
 from robot_side.drivers.mujoco.scene import Scene
 
@@ -15,11 +16,14 @@ _FARTHEST_M = 0.1
 """Largest distance of a usable site from the fingers."""
 
 
-def site_findings(scene: Scene, axis: SiteAxis) -> list[str]:
+def site_findings(scene: Scene, axis: SiteAxis, travel: GripperTravel | None) -> list[str]:
     """Return a line for each reason why the site, approaching along its `axis`, does not suit the gripper."""
     model, robot = scene.model, scene.robot
     data = mujoco.MjData(model)
     data.qpos[:] = scene.data.qpos
+    if travel is not None:
+        # An open jaw on a hinge may point anywhere.
+        data.qpos[robot.finger_positions] = travel.closed_fingers
     mujoco.mj_kinematics(model, data)
     geoms = robot.gripper_geoms[robot.geom_on_finger] if robot.geom_on_finger.any() else robot.gripper_geoms
     if geoms.size == 0:

@@ -25,13 +25,18 @@ def arm_with_site(path: Path, euler: str, place: str = "0 0 0.08") -> Path:
     return model
 
 
+def found(model: Path, axis: SiteAxis = "z") -> list[str]:
+    scene = load_scene(model, "tcp", site_axis=axis)
+    return site_findings(scene, axis, measure_gripper(scene))
+
+
 @pytest.mark.parametrize("fits", ["x", "-x", "y", "-y", "-z"])
 def test_a_site_off_the_fingers_is_told_the_axis_that_fits(tmp_path: Path, fits: SiteAxis) -> None:
     # The axis that lies along the fingers is the inverse rotation's image of z.
     model = arm_with_site(tmp_path, " ".join(str(-float(angle)) for angle in TURNED[fits].split()))
-    [text] = site_findings(load_scene(model, "tcp"), "z")
+    [text] = found(model)
     assert f"--site-axis {fits} fits" in text
-    assert site_findings(load_scene(model, "tcp", site_axis=fits), fits) == []
+    assert found(model, fits) == []
 
 
 def test_the_tool_advances_along_the_named_axis_and_the_law_agrees(tmp_path: Path) -> None:
@@ -47,7 +52,7 @@ def test_the_tool_advances_along_the_named_axis_and_the_law_agrees(tmp_path: Pat
 
 
 def test_a_site_far_from_the_fingers_is_told_so(tmp_path: Path) -> None:
-    [text] = site_findings(load_scene(arm_with_site(tmp_path, "0 0 0", "0 0 0.4"), "tcp"), "z")
+    [text] = found(arm_with_site(tmp_path, "0 0 0", "0 0 0.4"))
     assert "'tcp' stands" in text
 
 
