@@ -290,11 +290,17 @@ def _report(summary: dict[str, Any]) -> list[str]:
     return [
         f"delay: {', '.join(shown) or 'unknown'}",
         f"stiffness: R2 up to {stiffness['r2']['max']:.2f}, L2 up to {stiffness['l2']['max']:.2f}; "
-        f"enlargement {enlargement['min']:.0f} to {enlargement['max']:.0f} mm",
+        f"enlargement {_range_mm(enlargement)}",
         f"target: {grasp}, lifted {task['lifted_mm']:.0f} mm, {_placed(placing)}",
         f"contacts with obstacles: {task['obstacle_contacts']}",
         *recorded,
     ]
+
+
+def _range_mm(figures: Mapping[str, Any]) -> str:
+    if figures["min"] is None:
+        return "unknown"
+    return f"{figures['min']:.0f} to {figures['max']:.0f} mm"
 
 
 def _placed(placing: Mapping[str, Any]) -> str:

@@ -24,6 +24,8 @@ class Situation:
     """t_d of eq. 8; the configured worst case while unknown"""
     loop_age_known: bool
     """Whether the owner has echoed a stamp. Then commands under way are at most `loop_age_s` old."""
+    loop_age_settled: bool
+    """Whether `loop_age_s` no longer contains anything of the worst case; else a distance made of it is no figure."""
     compensation: Compensation
     """The side that compensates the delay; eq. 10 uses its prediction errors."""
     gap_m: float | None
