@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
@@ -32,6 +31,7 @@ from robot_side.drivers.remote.driver_session import ArmShape
 from robot_side.drivers.remote.frame_message import perceived
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.gripper.held_covers import HeldCovers
+from robot_side.gripper.kept_covers import SearchNotes
 from robot_side.laws.explanation import Explains
 from robot_side.laws.named import LAWS
 from robot_side.operators.operator_session import OperatorSession
@@ -42,7 +42,6 @@ from robot_side.settings import RobotSettings
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 
-_SEARCHING = "searching for spheres that cover gripper and objects, seconds for each shape; the next start is quick"
 _NAMED_OBJECTS = 8
 """Most objects that a note names."""
 _LIBRARY = (
@@ -124,12 +123,12 @@ def build_parts(
     say = announce or (lambda _: None)
     for text in notes:
         say(text)
-    searching = None if announce is None else cache(lambda: announce(_SEARCHING))
+    searching = None if announce is None else SearchNotes(announce)
     kinematics = MujocoKinematics(scene, settings.cover_m, searching)
     seen_elsewhere = None if beside is None else beside.objects(settings.roles, settings.camera.sd_m)
     # Before the first tick, as a search for spheres takes far longer than one.
     first = _as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
-    held_covers = HeldCovers(first, settings.cover_m, scene.fixed, searching)
+    held_covers = HeldCovers(first, settings.cover_m, scene.never_held, searching)
     joint_limits = limits.of_joints(arm.joint_count, *ends_rad)
     surroundings = Surroundings()
     prediction, prediction_note = _prediction_errors(settings, scene)
@@ -173,7 +172,7 @@ def build_parts(
 def _arm(
     scene: Scene, encoder: Encoder, limits: MotionLimits, beside: ConnectedDrivers | None
 ) -> tuple[MujocoArm | RemoteArm, tuple[FloatArray, FloatArray], GripperTravel | None]:
-    """Return the arm, its joints' lower and upper ends, (n,) each, and the gripper's travel; a driver may have the arm."""
+    """Return the arm, a driver's or simulated, its joints' lower and upper ends (n,), and the gripper's travel."""
     if beside is None or not beside.has_arm:
         simulated = MujocoArm(scene, encoder, limits)
         return simulated, simulated.ends_rad, simulated.travel

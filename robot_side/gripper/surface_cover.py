@@ -49,8 +49,9 @@ class _Union:
         """Return (n,): lower bound of each point's (n, 3) depth in a true solid; -infinity outside."""
         rooms = []
         for solid in self._solids:
-            depths = solid.depth_m(points_m)
-            rooms.append(np.where(depths >= -_ROUNDING_M, depths - solid.excess_m, -np.inf))
+            excess_m = solid.excess_m if solid.true_depth_m is None else 0.0
+            depths = (solid.true_depth_m or solid.depth_m)(points_m)
+            rooms.append(np.where(depths >= -_ROUNDING_M, depths - excess_m, -np.inf))
         deepest: FloatArray = np.max(rooms, axis=0)
         return deepest
 

@@ -84,7 +84,7 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
     fingers = np.array([joint for body in beyond for joint in _joints(model, body)], dtype=np.int64)
     _require_simple(model, fingers)
     gripper_actuators = np.array(
-        [actuator for actuator in range(model.nu) if _moves_any(model, actuator, fingers)], dtype=np.int64
+        [actuator for actuator in range(model.nu) if moves_any(model, actuator, fingers)], dtype=np.int64
     )
     geoms = _touching_geoms(model, beyond)
     if len(set(model.geom_bodyid[geoms].tolist())) < 2 and (geoms.size == 0 or fingers.size):
@@ -208,7 +208,7 @@ def _joint_name(model: Any, joint: int) -> str:
 
 def _why_no_actuator(model: Any, joint: int) -> str:
     """Return the reason why a joint has no own actuator."""
-    if any(_moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu)):
+    if any(moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu)):
         return "it is pulled by a tendon that it shares"
     if model.nmocap > 0:
         return "the model is moved by a mocap body, which no real robot has"
@@ -243,7 +243,8 @@ def _actuator_of(model: Any, joint: int) -> int:
     )
 
 
-def _moves_any(model: Any, actuator: int, joints: IntArray) -> bool:
+def moves_any(model: Any, actuator: int, joints: IntArray) -> bool:
+    """Return whether an actuator moves one of `joints` (n,), directly or by a tendon."""
     kind, target = int(model.actuator_trntype[actuator]), int(model.actuator_trnid[actuator, 0])
     if kind in {TransmissionKind.JOINT, TransmissionKind.JOINT_IN_PARENT}:
         return target in joints

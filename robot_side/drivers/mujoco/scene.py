@@ -19,7 +19,7 @@ from robot_side.arm.port import ArmState
 from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.object_primitives import ObjectPrimitives, SceneObject
-from robot_side.drivers.mujoco.robot_model import RobotModel, SiteAxis, can_touch, find_robot, turn_site
+from robot_side.drivers.mujoco.robot_model import RobotModel, SiteAxis, can_touch, find_robot, moves_any, turn_site
 from robot_side.surroundings.roles import assign_roles
 
 _LOG = logging.getLogger(__name__)
@@ -58,6 +58,19 @@ class Scene:
         movable = (model.body_weldid != 0) | (model.body_mocapid[model.body_rootid] >= 0)
         moves = movable[model.geom_bodyid]
         return frozenset(thing.name for thing in self.objects if not any(moves[geom] for geom in thing.geoms))
+
+    @property
+    def never_held(self) -> frozenset[str]:
+        """Names of the objects that cannot be held: fixed ones, and machines with actuators, such as another arm"""
+        model = self.model
+        machines = {
+            int(model.body_rootid[model.jnt_bodyid[joint]])
+            for joint in range(model.njnt)
+            if any(moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu))
+        }
+        roots = model.body_rootid[model.geom_bodyid]
+        driven = {thing.name for thing in self.objects if any(int(roots[geom]) in machines for geom in thing.geoms)}
+        return self.fixed | driven
 
     def step(self) -> None:
         """Advance the state by one step, with the actuators' present inputs."""
