@@ -13,8 +13,10 @@ from robot_side.arm.port import ArmState
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GRIPPER_INPUT, GripperDrive
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
+from robot_side.drivers.mujoco.joint_drives import hold_idle
 from robot_side.drivers.mujoco.joint_reference import JointReference, MotionLimits
 from robot_side.drivers.mujoco.plant import LIMITS, PLANT, Plant, drive, inertia_table, sense
+from robot_side.drivers.mujoco.robot_model import moves_any
 from robot_side.drivers.mujoco.scene import Scene
 
 _LONGEST_ADVANCE_S = 2.0
@@ -80,6 +82,8 @@ class MujocoArm:
         limits = limits or MotionLimits()
         self._reference = JointReference(start, *self.ends_rad, limits, robot.drives.windup_rad(limits.windup_rad))
         mujoco.mj_forward(model, data)
+        of_arm = [actuator for actuator in range(model.nu) if moves_any(model, actuator, robot.arm_joints)]
+        hold_idle(model, data, np.union1d(of_arm, robot.gripper_actuators).astype(np.int64))
         # MuJoCo's arrays keep their addresses; fetching one costs more than its use in a step.
         self._unstable = data.warning.number[_UNSTABLE]
         self._borne_nm = data.qfrc_constraint
