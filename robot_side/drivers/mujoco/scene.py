@@ -16,7 +16,7 @@ from common.errors import ConfigurationError
 from common.files.input_file import require_input_file
 from common.roles import Role
 from robot_side.arm.port import ArmState
-from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
+from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish, make_room
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.object_primitives import ObjectPrimitives, SceneObject
 from robot_side.drivers.mujoco.robot_model import RobotModel, SiteAxis, can_touch, find_robot, moves_any, turn_site
@@ -117,7 +117,7 @@ def load_scene(
             spec.add_key(name=start_key, qpos=start)
             surroundings = _read(_ASSETS / f"{name}_scene.xml")
             furnish(surroundings, name, seed)
-            _attach(surroundings, spec, model, robot, start)
+            _attach(surroundings, spec, model, robot, start, room=model_path is not None and name == "table")
             model = _compile(spec)
             robot = find_robot(model, site)
             turn_site(model, robot.site, site_axis)
@@ -238,8 +238,11 @@ def _objects(model: Any, robot: RobotModel) -> tuple[tuple[SceneObject, ...], tu
     return tuple(SceneObject(name, tuple(geoms)) for name, geoms in geoms_of.items()), shared
 
 
-def _attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatArray) -> None:
-    """Attach the scene below the tool's start, at the base's height, turned towards the tool."""
+def _attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatArray, *, room: bool) -> None:
+    """Attach the scene below the tool's start, at the base's height, turned towards the tool.
+
+    room: whether to give a hand that is wider than the built-in one as much room as that one has.
+    """
     data = mujoco.MjData(model)
     data.qpos[:] = start
     mujoco.mj_kinematics(model, data)
@@ -247,6 +250,8 @@ def _attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatAr
     ahead = tool[:2] - base[:2]
     # A tool right above the base has no direction.
     yaw = math.atan2(ahead[1], ahead[0]) if np.hypot(*ahead) > 0.05 else 0.0
+    if room:
+        make_room(table, *_hand_reach_m(model, robot, start, np.array([math.cos(yaw), math.sin(yaw)])))
     home_x, home_y, _ = table.site("tool_home").pos
     if model.geom_type[model.geom_type == GeomKind.PLANE].size:
         table.delete(table.geom("floor"))
@@ -260,3 +265,28 @@ def _attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatAr
             quat=[math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0)],
         ),
     )
+
+
+def _hand_reach_m(model: Any, robot: RobotModel, start: FloatArray, ahead: FloatArray) -> tuple[float, float]:
+    """Return how far the hand reaches from the tool's point, along the horizontal `ahead` (2,) and to its sides.
+
+    The fingers are at the start, and at either end of their ranges.
+    """
+    if robot.gripper_geoms.size == 0:
+        return 0.0, 0.0
+    data, geoms, fingers = mujoco.MjData(model), robot.gripper_geoms, robot.finger_positions
+    of_position = {int(address): joint for joint, address in enumerate(model.jnt_qposadr)}
+    ranges = model.jnt_range[[of_position[int(address)] for address in fingers]].reshape(-1, 2)
+    reaches_m = []
+    for placed in (start[fingers], *ranges.T):
+        data.qpos[:] = start
+        data.qpos[fingers] = placed
+        mujoco.mj_kinematics(model, data)
+        around = np.einsum("gij,gj->gi", data.geom_xmat[geoms].reshape(-1, 3, 3), model.geom_aabb[geoms, :3])
+        half_m = np.einsum("gij,gj->gi", np.abs(data.geom_xmat[geoms].reshape(-1, 3, 3)), model.geom_aabb[geoms, 3:])
+        middle_m = (data.geom_xpos[geoms] + around - data.site_xpos[robot.site])[:, :2]
+        for axis in (ahead, np.array([-ahead[1], ahead[0]])):
+            reaches_m.append((middle_m @ axis, half_m[:, :2] @ np.abs(axis)))
+    forward_m = max(float((middle + half).max()) for middle, half in reaches_m[::2])
+    sideways_m = max(float((np.abs(middle) + half).max()) for middle, half in reaches_m[1::2])
+    return forward_m, sideways_m
