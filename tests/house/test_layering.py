@@ -168,6 +168,7 @@ LIBRARIES = {
         "common/loop",
         "robot_side/viewing",
         "robot_side/compiled/warm_up.py",
+        "robot_side/gripper/kept_covers.py",
         "operator_side/viewing/terminal",
         "feelahead/lab",
         "feelahead/both_sides",
