@@ -74,7 +74,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         core = RobotSide(core_parts, [StageTiming(loop.stages), *recorder, *others])
         sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
         unused = unused_clauses(settings.link_spec(), [("to_operator", stream) for stream in sent])
-        for text in (*parts.notes, *unused):
+        for text in unused:
             process.note(text)
         warm_up(lambda: process.note(_COMPILING), parts.kernels)
         beside.wait()

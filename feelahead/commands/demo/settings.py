@@ -50,6 +50,8 @@ class DemoSettings(RunOptions):
     """MJCF arm with actuators, instead of the built-in one."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Site of the model between the fingertips, with the z axis along the approach."""
+    site_axis: Literal["x", "-x", "y", "-y", "z", "-z"] = "z"
+    """Axis of the site along which R2 advances. The start names the axis that fits the fingers, if another one does."""
     realtime: bool = False
     """Ask for real-time scheduling and locked memory for both sides; without the permission they run without."""
     console: bool = True

@@ -100,8 +100,9 @@ def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
         target = f"{known.target} {way}"
     nearest = f"{robot.nearest or 'nearest thing'} at {millimetres(robot.nearest_mm)}"
     asked = "" if facts.probability is None else f"   P {facts.probability:g}"
-    enlarged_mm = None if facts.screen is None else 1e3 * facts.screen.enlargement_m
-    grown = f"enlargement {_figure(enlarged_mm)} mm   rumble {_figure(facts.rumble)}"
+    enlarged_m = 0.0 if facts.screen is None else facts.screen.enlargement_m
+    enlarged = UNKNOWN if enlarged_m == 0.0 else f"{_figure(1e3 * enlarged_m)} mm"
+    grown = f"enlargement {enlarged}   rumble {_figure(facts.rumble)}"
     return [
         *(*lines, _named(round_trip=round_trip, field_age=field_age, loop_age=loop_age)),
         _named(nearest=nearest, target=target, holding=f"{view.holding or 'nothing'}{view.stands}"),
