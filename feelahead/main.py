@@ -8,6 +8,7 @@ from feelahead.commands.bench_and_try import bench, try_out
 from feelahead.commands.calibrate import calibrate
 from feelahead.commands.demo.command import demo
 from feelahead.commands.doctor.command import doctor
+from feelahead.commands.feel.command import feel
 from feelahead.commands.keys import keys
 from feelahead.commands.recordings import export, plot, replay
 from feelahead.commands.virtual_dualsense import virtual_dualsense
@@ -16,6 +17,7 @@ _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
     "demo": (demo, "both sides on this machine, with a simulated controller and person"),
     "doctor": (doctor, "find what is missing on this machine, or wrong on the path to a robot side, with the remedy"),
     "calibrate": (calibrate, "measure where a controller's triggers and sticks begin and end"),
+    "feel": (feel, "feel the triggers' zones with a controller alone, or measure their forces with a kitchen scale"),
     "keys": (keys, "who may operate the robot side: make key pairs, allow, list and revoke"),
     "virtual-dualsense": (virtual_dualsense, "a controller that every program on this machine sees, with no hardware"),
     "replay": (replay, "show a recording, or compute it again and compare"),

@@ -13,6 +13,7 @@ from common.status.statuses import OperatorStatus
 from operator_side.controller.connection import Connection
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
+from operator_side.dualsense.hid.second_writer import SecondWriters
 from operator_side.robot_link.commanding import ToRobot
 from operator_side.robot_link.sending import Sending
 from operator_side.settings import OperatorSettings
@@ -67,6 +68,7 @@ class OperatorTurns:
         self._process, self._core, self._sockets = process, core, sockets
         self._connection, self._guard, self._person, self._pages, console = desk
         self._sending = Sending(settings.link_spec(), sockets)
+        self._pages.pictures.video_later_s = self._sending.video_later_s
         self._viewing = Viewing(
             core,
             self._surroundings,
@@ -77,7 +79,7 @@ class OperatorTurns:
         self._take, self._feel = timed("messages", self._take_in), timed("feeling", self._tell_controller)
         self.turn = timed("hands", self._move)
         self.wait, self.next_due, self.note = sockets.wait, self._sending.line.next_due, self._viewing.note
-        self._guard_s = 0.0
+        self._guard_s, self._second_writers = 0.0, SecondWriters()
         self._person_waits_s = settings.person_waits if console is not None else 0.0
         self._person_since_s: float | None = None
         """Time of the robot side's first telemetry; None before it"""
@@ -114,6 +116,9 @@ class OperatorTurns:
             self._guard_s = now_s + _GUARD_PERIOD_S
             for text in self._guard.take_notes():
                 self.note(text)
+        controller = self._connection.controller
+        for text in self._second_writers.look(None if controller is None else controller.path, now_s):
+            self.note(text)
         shows, tells = self._viewing.facts_due(now_s), status.due(now_s)
         if shows or tells:
             said = self._status(now_s)
@@ -140,7 +145,7 @@ class OperatorTurns:
         for payload in received:
             self._core.receive(payload, now_s)
         for topic, payload in seen:
-            if not self._viewing.take(topic, payload):
+            if not self._viewing.take(topic, payload, now_s):
                 self._core.receive_view(payload, now_s)
 
     def _tell_controller(self, now_s: float) -> None:
@@ -154,6 +159,7 @@ class OperatorTurns:
         # First, so that the tuning request, sent over the new link, arrives after all messages of the old one.
         if (words := core.tuner.take_link()) is not None:
             self._sending.tune(words)
+            self._pages.pictures.video_later_s = self._sending.video_later_s
         if self._person is not None:
             screen = core.screen if self._person_sees(now_s) else None
             self._person.tick(now_s, screen, core.link.round_trip.mean or 0.0)
@@ -181,7 +187,7 @@ class OperatorTurns:
         person = self._person
         page = self._pages.facts(self._core, now_s, person=person is not None and person.has_person)
         hands = Hands.CONTROLLER if person is None else person.hands
-        return Surroundings(hands, self._sending.line.profile.words, page)
+        return Surroundings(hands, self._sending.line.profile.words, page, self._pages.pictures.facts())
 
     def _status(self, now_s: float) -> OperatorStatus:
         """Return the core's status, completed with the fields that only the process knows."""

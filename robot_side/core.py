@@ -136,6 +136,7 @@ class RobotSide:
             objects=objects,
             loop_age_s=delay_s,
             loop_age_known=parts.loop_age.known,
+            loop_age_settled=parts.loop_age.settled(now_s),
             compensation="operator" if command is None else command.compensation,
             gap_m=state.gripper_opening_m if parts.kinematics.has_fingers else None,
             held=grip.index,
@@ -192,14 +193,15 @@ class RobotSide:
         )
         if self.newest is None or (objects := self.sight.frame) is None:
             return status
-        sensed, pose = self.newest[0], self.newest[1].pose
+        sensed, situation = self.newest
+        pose = situation.pose
         target = self.sight.target
         apart = perceived_distances(pose, self.parts.surroundings.see(objects), target, self.grip.index)
         return msgspec.structs.replace(
             status,
             l2=sensed.l2.stiffness,
             r2=sensed.r2.stiffness,
-            enlargement_mm=1e3 * sensed.enlargement_m,
+            enlargement_mm=1e3 * sensed.enlargement_m if situation.loop_age_settled else None,
             holding=None if self.held is None else self.held[:SHOWN_NAME],
             stands=self.grip.touchdown.stands,
             nearest=None if apart.nearest is None else apart.nearest[:SHOWN_NAME],

@@ -28,6 +28,7 @@ from robot_side.viewing.perceived_shapes import PerceivedModel
 from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.shapes import SceneModel
+from robot_side.viewing.viewpoints import first_person_eye
 
 TICK_PERIOD_S: Final = 1e-3
 _COMPILING: Final = (
@@ -73,14 +74,15 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         core = RobotSide(core_parts, [StageTiming(loop.stages), *recorder, *others])
         sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
         unused = unused_clauses(settings.link_spec(), [("to_operator", stream) for stream in sent])
-        for text in (*parts.notes, *unused):
+        for text in unused:
             process.note(text)
         warm_up(lambda: process.note(_COMPILING), parts.kernels)
         beside.wait()
         if recording is not None:
             recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": parts.notes})
         model = PerceivedModel(parts.scene) if parts.any_objects else SceneModel(parts.scene)
-        view = SceneView(model, parts.kinematics, parts.explains)
+        eye = first_person_eye(parts.scene) if settings.cameras.on else None
+        view = SceneView(model, parts.kinematics, parts.explains, parts.surroundings, eye)
         cameras = Cameras(parts.scene, settings.cameras, process.note) if settings.cameras.on else None
 
         def open_side() -> RobotTurns:

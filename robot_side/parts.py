@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
@@ -16,8 +15,11 @@ from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core import RobotParts
 from robot_side.drivers.mujoco.arm import MujocoArm, stand
 from robot_side.drivers.mujoco.camera import CameraError, MujocoCamera
+from robot_side.drivers.mujoco.checks.site_axis import site_findings
+from robot_side.drivers.mujoco.checks.start_collision import start_collision
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_cover import GripperCover
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
@@ -29,6 +31,7 @@ from robot_side.drivers.remote.driver_session import ArmShape
 from robot_side.drivers.remote.frame_message import perceived
 from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors, load_prediction_errors
 from robot_side.gripper.held_covers import HeldCovers
+from robot_side.gripper.kept_covers import SearchNotes
 from robot_side.laws.explanation import Explains
 from robot_side.laws.named import LAWS
 from robot_side.operators.operator_session import OperatorSession
@@ -39,7 +42,6 @@ from robot_side.settings import RobotSettings
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 
-_SEARCHING = "searching for spheres that cover gripper and objects, seconds for each shape; the next start is quick"
 _NAMED_OBJECTS = 8
 """Maximum number of objects that a note names"""
 _LIBRARY = (
@@ -101,25 +103,32 @@ def build_parts(
 ) -> SceneParts:
     """Make the parts; ConfigurationError for a model that cannot be used.
 
-    scene: used instead of the scene that the settings name. announce: called once, with one line, before a long search.
-    beside: the connected drivers, whose arm and objects replace the simulated ones.
+    scene: used instead of the scene that the settings name. announce: called with each note as soon as it is known, so
+    that those about the model come before a long search. beside: the connected drivers, whose arm and objects replace
+    the simulated ones.
     """
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
         raise ConfigurationError(f"{given} is given without {missing}; valid: both, or neither for the built-in arm")
     # A driver's objects are not known yet.
     roles = settings.roles if settings.objects is None else {}
-    scene = scene or load_scene(settings.model, settings.site, roles, settings.scene or "table", settings.seed)
+    scene = scene or load_scene(
+        settings.model, settings.site, roles, settings.scene or "table", settings.seed, settings.site_axis
+    )
     noise, camera_noise = np.random.SeedSequence(settings.seed).generate_state(2)
     encoder = Encoder(settings.encoder.sigma_rad, settings.encoder.resolution_rad, int(noise))
     limits = MotionLimits()
-    arm, ends_rad = _arm(scene, encoder, limits, beside)
-    searching = None if announce is None else cache(lambda: announce(_SEARCHING))
+    arm, ends_rad, travel = _arm(scene, encoder, limits, beside)
+    notes = _notes(scene, settings, travel)
+    say = announce or (lambda _: None)
+    for text in notes:
+        say(text)
+    searching = None if announce is None else SearchNotes(announce)
     kinematics = MujocoKinematics(scene, settings.cover_m, searching)
     seen_elsewhere = None if beside is None else beside.objects(settings.roles, settings.camera.sd_m)
     # Before the first tick, as a search for spheres takes far longer than one.
     first = _as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
-    held_covers = HeldCovers(first, settings.cover_m, scene.fixed, searching)
+    held_covers = HeldCovers(first, settings.cover_m, scene.never_held, searching)
     joint_limits = limits.of_joints(arm.joint_count, *ends_rad)
     surroundings = Surroundings()
     prediction, prediction_note = _prediction_errors(settings, scene)
@@ -130,6 +139,9 @@ def build_parts(
         settings.motion,
         surroundings,
     )
+    late = *prediction_note, *_cover_notes(kinematics.cover, settings.cover_m, held_covers)
+    for text in late:
+        say(text)
     return SceneParts(
         arm=arm,
         kinematics=kinematics,
@@ -153,26 +165,22 @@ def build_parts(
         assists=settings.assist == "speed",
         full_rate=settings.full_rate,
         seed=settings.seed,
-        notes=(
-            *_notes(scene, settings),
-            *prediction_note,
-            *_cover_notes(kinematics.cover, settings.cover_m, held_covers),
-        ),
+        notes=(*notes, *late),
     )
 
 
 def _arm(
     scene: Scene, encoder: Encoder, limits: MotionLimits, beside: ConnectedDrivers | None
-) -> tuple[MujocoArm | RemoteArm, tuple[FloatArray, FloatArray]]:
-    """Return the arm, simulated or a driver's, and the lower and upper ends of its joints' ranges, (n,) each."""
+) -> tuple[MujocoArm | RemoteArm, tuple[FloatArray, FloatArray], GripperTravel | None]:
+    """Return the arm, simulated or a driver's; its joints' lower and upper ends, (n,) each; the gripper's travel."""
     if beside is None or not beside.has_arm:
         simulated = MujocoArm(scene, encoder, limits)
-        return simulated, simulated.ends_rad
+        return simulated, simulated.ends_rad, simulated.travel
     robot, (travel, ends_rad) = scene.robot, stand(scene)
     opening_m = 0.0 if travel is None else float(travel.openings_m[0])
     open_fingers = scene.data.qpos[robot.finger_positions].copy()
     shape = ArmShape(*_joint_names(scene), open_fingers, opening_m)
-    return beside.arm(shape, scene.show), ends_rad
+    return beside.arm(shape, scene.show), ends_rad, travel
 
 
 def _joint_names(scene: Scene) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -190,12 +198,15 @@ def _camera(settings: RobotSettings, scene: Scene, seed: int) -> MujocoCamera:
     return MujocoCamera(scene, CameraError(tuple(thing.name for thing in scene.objects), *error, seed))
 
 
-def _notes(scene: Scene, settings: RobotSettings) -> tuple[str, ...]:
+def _notes(scene: Scene, settings: RobotSettings, travel: GripperTravel | None) -> tuple[str, ...]:
     """Return the notes shown before the run: start pose, objects and their roles, and shapes that are not exact."""
     notes = [f"the arm starts at {scene.start_pose}"]
     if settings.arm is not None:
         joints, fingers = (", ".join(names) or "none" for names in _joint_names(scene))
         notes = [f"the driver's joints, in this order: {joints}; of the gripper: {fingers}"]
+    if settings.model is not None:
+        notes += site_findings(scene, settings.site_axis, travel)
+        notes += start_collision(scene) if settings.arm is None else []
     if settings.objects is not None:
         return tuple(notes)
     notes.append(f"objects: {_roles(scene.roles)}")

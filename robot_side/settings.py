@@ -13,6 +13,7 @@ from common.limits import check_limits, check_value
 from common.roles import Role
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
+from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.enlargement.distance import Uncertainty, Vector3
 from robot_side.enlargement.prediction_errors import PredictionErrors
 from robot_side.laws.named import LawName
@@ -84,6 +85,8 @@ class RobotSettings(SideOptions):
     the first keyframe, else in the middle of the joints' ranges."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Name of the model's site between the fingertips."""
+    site_axis: SiteAxis = "z"
+    """Axis of the site along which R2 advances. The start names the axis that fits the fingers, if another one does."""
     arm: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Address at which the driver of your arm connects; that arm moves instead of a simulated one (docs/drivers.md).
     --model describes the arm. With --keys the driver needs an allowed key, as an operator does."""

@@ -3,16 +3,26 @@
 from enum import StrEnum
 from typing import Final
 
+from common.protocol.session import SessionState
 from common.status.codes import LinkState, Phase
 from common.status.phase import PhaseFacts
 from common.status.statuses import OperatorStatus, RobotStatus
 
+_LEASE: Final = {
+    SessionState.READY: "ready to arm",
+    SessionState.STOPPED_READY: "stopped, ready to arm",
+}
 _LOST: Final = "nothing heard from the {}"
 
 
 def words(code: StrEnum | str | None) -> str:
     """Return a code in words; empty for None."""
     return "" if code is None else str(code).replace("_", " ")
+
+
+def lease_words(state: SessionState | None) -> str:
+    """Return an operator's state in words; empty for none."""
+    return words(state) if state is None else _LEASE.get(state, words(state))
 
 
 def phase_words(facts: PhaseFacts, side: RobotStatus | OperatorStatus | None) -> tuple[str, str | None]:

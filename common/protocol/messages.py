@@ -297,7 +297,7 @@ class Telemetry(Message, frozen=True, tag="telemetry", array_like=False):
     gripper_opening_m: Annotated[float, Meta(ge=0.0, le=10.0)]
     holding: bool
     enlargement_m: _Far
-    """Largest D_σ of the gripper's spheres."""
+    """Largest D_σ of the gripper's spheres; 0 before the loop age is known."""
     l2: Share
     r2: Share
 

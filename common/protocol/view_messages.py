@@ -72,6 +72,29 @@ class Shape(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=
     """(t, 3) uint32: vertex indices of a mesh's triangles; empty for other kinds"""
 
 
+class Eye(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """Viewpoint of the first-person view at the start, in the tool frame."""
+
+    position_m: Vector3
+    forward: Vector3
+    """Unit vector"""
+    up: Vector3
+    """Unit vector, orthogonal to `forward`"""
+    fovy_deg: float
+    """Angle from the picture's lower edge to its upper one"""
+
+
+class Near(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """What is near the gripper's surface, as perceived; None where unknown."""
+
+    nearest: str | None = None
+    """Nearest object, supports and the held one aside"""
+    nearest_m: float | None = None
+    target_m: float | None = None
+    held: str | None = None
+    """Object between the fingers"""
+
+
 class SceneShapes(Message, frozen=True, tag="shapes"):
     """Shapes of the robot's links and of the objects; sent when an operator begins to watch, and every few seconds."""
 
@@ -85,6 +108,8 @@ class SceneShapes(Message, frozen=True, tag="shapes"):
     object_poses: bytes = b""
     """(objects, 7) float32, rows as in SceneState: poses of all objects, for those that SceneState leaves out. Empty if
     SceneState has all of them"""
+    eye: Eye | None = None
+    """None without pictures"""
 
     def __post_init__(self) -> None:
         if len(self.object_poses) not in (0, _POSE_BYTES * len(self.objects)):
@@ -140,6 +165,7 @@ class SceneState(Message, frozen=True, tag="scene"):
     tick_p50_us: float
     tick_p99_us: float
     overruns: int
+    near: Near | None = None
 
     def __post_init__(self) -> None:
         if len(self.link_poses) % _POSE_BYTES or len(self.spheres) % _SPHERE_BYTES:

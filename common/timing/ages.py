@@ -4,6 +4,9 @@ import math
 
 from common.statistics import SlidingMinimum, SlidingQuantile
 
+_SETTLED = 5.0
+"""Time constants after which what is left of a peak is negligible."""
+
 
 class LoopAge:
     """t_d of eq. 8: age of the robot side's report when the operator's command in response arrives, in seconds.
@@ -28,6 +31,7 @@ class LoopAge:
         self._quantile = SlidingQuantile(window, probability)
         self._held_s = worst_case_s
         self._held_since_s = 0.0
+        self._known_since_s = math.inf
 
     def update(self, age_s: float, now_s: float) -> float:
         """Add a loop age measured at `now_s`; return t_d.
@@ -37,6 +41,8 @@ class LoopAge:
         if not 0.0 <= age_s < math.inf:
             raise ValueError(f"age_s = {age_s}; valid: a finite time of 0 s or more")
         before_s = self.value(now_s)
+        if not self.known:
+            self._known_since_s = now_s
         self._held_s = max(before_s, self._quantile.update(age_s))
         self._held_since_s = now_s
         return self._held_s
@@ -45,11 +51,16 @@ class LoopAge:
         """Forget all samples: t_d is the worst case until the next sample."""
         self._quantile.clear()
         self._held_s = self._worst_case_s
+        self._known_since_s = math.inf
 
     @property
     def known(self) -> bool:
         """Whether there is a sample since the start or the last reset."""
         return self._quantile.value is not None
+
+    def settled(self, now_s: float) -> bool:
+        """Return whether the worst case, assumed before the first sample, has died away to below a hundredth."""
+        return now_s - self._known_since_s > _SETTLED * self._time_constant_s
 
     def value(self, now_s: float) -> float:
         """Return t_d at `now_s`, in seconds; the worst case without samples."""

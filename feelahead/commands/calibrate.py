@@ -22,7 +22,7 @@ from common.files.output_file import require_output_file
 from operator_side.calibration.procedure import CalibrationProcedure, Step
 from operator_side.calibration.store import calibration_path, write_calibration
 from operator_side.controller.feel import RELEASED
-from operator_side.controller.port import Controller, OpenController
+from operator_side.controller.port import Controller, OpenController, check_choice
 from operator_side.controller.state import ControllerState
 from operator_side.dualsense.hid.device import load_backend
 from operator_side.dualsense.hid.finding import find_controller
@@ -45,11 +45,14 @@ class CalibrateSettings:
 
     device: Literal["hid", "simulated"] = "hid"
     """hid: a real controller. simulated: a simulated one with simulated hands; its result is stored only with --out."""
+    controller: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
+    """Measure the controller with this address, as `feelahead doctor` prints it."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """Store the result in this file instead of the configuration folder. The folder must exist; an existing file is
     replaced."""
 
     def __post_init__(self) -> None:
+        check_choice(self.device, self.controller)
         require_output_file("--out", self.out)
 
 
@@ -64,7 +67,7 @@ def calibrate(arguments: Sequence[str]) -> int:
         kept_at = settings.out
     else:
         clock, hands = MonotonicClock(), None
-        controller = find_controller(load_backend())
+        controller = find_controller(load_backend(), settings.controller, others=False)
         kept_at = settings.out
         if kept_at is None and controller.address is not None:
             kept_at = calibration_path(controller.address)

@@ -1,6 +1,7 @@
 """One trial: a scripted person reaches, grasps, lifts and places in one scene, over one link, in virtual time."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
@@ -30,12 +31,15 @@ from robot_side.settings import CameraSettings, RobotSettings
 Arm = Literal["off", "mechanical", "reacting"]
 """Condition (arm of the experiment). off: no haptics. mechanical: the triggers resist, but the person does not react.
 reacting: the triggers resist and the person reacts."""
-_L2, _R2 = 0, 1
+_L2, R2 = 0, 1
 _SAME_CONTACT_S: Final = 0.1
 """Time in seconds after a contact within which another contact with the same object counts as the same one."""
-_LOOK_S: Final = 0.05
+LOOK_S: Final = 0.05
+"""Period at which the person's progress is examined, in seconds"""
 _TRUTH_S: Final = 0.01
 _SETTLES_S: Final = 0.3
+MISJUDGES_DEPTH: Final = PersonSettings(aiming="move-and-wait", depth_error_sd_m=0.030, depth_error_mean_m=0.010)
+"""Person who sees no obstacle and misjudges distances"""
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ class _Silent:
         return self._law.summary()
 
 
-class _Watch(Listener):
+class Watch(Listener):
     """Run of both sides, and what is counted from the simulation's truth in each tick: hits, strengths, placing."""
 
     def __init__(self, trial: Trial, seed: int) -> None:
@@ -89,7 +93,7 @@ class _Watch(Listener):
         """Time for which R2 was pulled, and for which the finger met full strength at R2, in seconds"""
         self.placing = Placing()
         self.scene = load_scene(name=trial.scene, seed=seed)
-        self._contact, self._truth = TrueContact(self.scene), GroundTruth(self.scene)
+        self._contact, self.truth = TrueContact(self.scene), GroundTruth(self.scene)
         self._parts = {self.scene.model.geom(geom).name for geom in self.scene.robot.gripper_geoms}
         self._hit_s: dict[str, float] = {}
         self._next_s = -math.inf
@@ -127,10 +131,10 @@ class _Watch(Listener):
                 self._hit(onset.thing, onset.closing_speed_m_s, now_s)
         if now_s >= self._next_s - 1e-9:
             self._next_s = now_s + _TRUTH_S
-            strength = self._strength_of(_R2)
+            strength = self.strength_of(R2)
             self.pulled_s += _TRUTH_S * (strength is not None)
             self.full_s += _TRUTH_S * (strength == MAX_STRENGTH)
-            if (target := self._truth.target()) is not None:
+            if (target := self.truth.target()) is not None:
                 is_target = held is not None and roles[held] is Role.TARGET
                 self.placing.observe(target, is_target, self._felt(), now_s)
 
@@ -143,36 +147,39 @@ class _Watch(Listener):
 
     def _felt(self) -> bool:
         """Return whether a finger meets resistance at a trigger, or the left motor rumbles."""
-        stiff = any((self._strength_of(trigger) or 0) > 0 for trigger in (_L2, _R2))
+        stiff = any((self.strength_of(trigger) or 0) > 0 for trigger in (_L2, R2))
         return stiff or self.loopback.device.rumble.left > 0.0
 
-    def _strength_of(self, trigger: int) -> int | None:
+    def strength_of(self, trigger: int) -> int | None:
         """Return the strength of the zone that the trigger has reached; None for a trigger that is not pulled."""
         device = self.loopback.device
         travel = device.travel[trigger]
         return device.strengths[trigger][zone_of(travel)] if travel > 0.0 else None
 
 
-def run_trial(trial: Trial, seed: int) -> Row:
+def run_trial(trial: Trial, seed: int, look: Callable[[Watch], None] = lambda _: None) -> Row:
     """Run until the person is done, or until the trial's duration is over. The same trial and seed give the same row.
 
     From the seed the scene, the errors of camera and encoders, the link's delays and the person are drawn.
+    look: called at the start and then every LOOK_S.
     hits: contacts of the gripper with anything but the target, and of the held object with obstacles.
     full_share: share of the time with R2 pulled in which the finger meets full strength.
     finished_s: time from arming until the object is placed and the gripper has drawn back; None if time ran out.
     felt_before_s: time for which rumble or a stiff trigger was felt, without a break, before the held object touched
     the surface on which it was set down.
     """
-    watch = _Watch(trial, seed)
+    watch = Watch(trial, seed)
     loopback, person = watch.loopback, watch.loopback.person
     assert isinstance(person, SimulatedOperator)  # noqa: S101  # no other is given
     armed_s = done_s = None
+    look(watch)
     while loopback.clock.now() < trial.duration_s and done_s is None:
-        loopback.run_until(min(loopback.clock.now() + _LOOK_S, trial.duration_s))
+        loopback.run_until(min(loopback.clock.now() + LOOK_S, trial.duration_s))
         if armed_s is None and loopback.robot.session.safety.state == "armed":
             armed_s = loopback.clock.now()
         if person.phase == "done":
             done_s = loopback.clock.now()
+        look(watch)
     # A released object may still fall.
     loopback.run_until(loopback.clock.now() + _SETTLES_S)
     task = loopback.summary()["task"]

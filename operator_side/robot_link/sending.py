@@ -45,6 +45,12 @@ class Sending:
         self.line.change(self._link.profile("to_robot"))
 
     @property
+    def video_later_s(self) -> float:
+        """Delay that the emulated link gives pictures on top of the control stream's, in seconds."""
+        video, control = (self._link.profile("to_operator", stream).mean_delay_s() for stream in ("video", "haptics"))
+        return max(0.0, video - control)
+
+    @property
     def queue_ms(self) -> float:
         """Present queueing delay of our messages, in milliseconds."""
         return self._budget.status()["queue_ms"]

@@ -61,6 +61,19 @@ class HandsFacts(msgspec.Struct, frozen=True):
     """Reason why the last request to change P or the link was refused; empty if it was not"""
     link_asked: str | None
     """Link that this side last asked to emulate, in netem's words; None before the first request"""
+    counts: float = 1.0
+    """Share of a page's motion that counts, 0 to 1: less while the pictures are old"""
+    reset_first: bool = False
+    """Whether a stop must be reset before a page's hands count"""
+
+
+class PictureFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Limits of the pictures' freshness by view, in the order of VIEW_NAMES."""
+
+    old_s: tuple[float | None, ...]
+    """Age from which a picture is old; None while unknown"""
+    dead_s: tuple[float, ...]
+    """Silence from which a view is dead"""
 
 
 class SceneFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -103,6 +116,7 @@ class OperatorFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Probability P of eq. 10, as the robot side uses it; None while unknown"""
     page: HandsFacts | None = None
     """Facts for console pages; None if pages can neither drive nor stop the arm"""
+    pictures: PictureFacts | None = None
     scene: SceneFacts | None = None
     robot: RobotStatus | None = None
     """Robot side's status, where both sides run in one process or recording; else None"""

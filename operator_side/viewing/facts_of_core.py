@@ -10,7 +10,15 @@ from common.status.codes import Hands
 from common.status.statuses import OperatorStatus
 from operator_side.controller.feel import FREE_TRIGGER, met
 from operator_side.core import OperatorSide
-from operator_side.viewing.facts import DelayFacts, HandsFacts, OperatorFacts, SceneFacts, Ten, TriggerFacts
+from operator_side.viewing.facts import (
+    DelayFacts,
+    HandsFacts,
+    OperatorFacts,
+    PictureFacts,
+    SceneFacts,
+    Ten,
+    TriggerFacts,
+)
 
 _RECENT_S: Final = 1.0
 _TAIL: Final = 0.99
@@ -23,6 +31,7 @@ class Surroundings(msgspec.Struct, frozen=True):
     asked_to_robot: str = ""
     """Delay profile that this side emulates towards the robot, in netem's words"""
     page: HandsFacts | None = None
+    pictures: PictureFacts | None = None
 
 
 def operator_facts(
@@ -78,6 +87,7 @@ def operator_facts(
         may_tune=lease is not None and lease.may_tune,
         probability=None if lease is None else lease.probability,
         page=around.page,
+        pictures=around.pictures,
         scene=scene,
     )
 

@@ -87,16 +87,18 @@ class Viewing:
         if self.console is not None:
             self.console.note(text)
 
-    def take(self, topic: bytes, payload: bytes) -> bool:
+    def take(self, topic: bytes, payload: bytes, now_s: float) -> bool:
         """Take a payload, and show it once its pieces are joined; return False if its topic is not a view's."""
         of, is_piece, _ = topic.partition(PIECE)
         if of not in self._joining:
             return False
         if is_piece:
             whole = self._joining[of].take(payload)
-            return whole is None or self.take(of, whole)
+            return whole is None or self.take(of, whole, now_s)
         if topic == SCENE_TOPIC and self._status.wants_facts:
             self._figures.take(payload)
+        if topic == VIDEO_TOPIC:
+            self._pages.pictures.take(payload, now_s)
         if self.console is not None:
             self.console.view(payload, video=topic == VIDEO_TOPIC)
             self.has_shown_picture |= topic == VIDEO_TOPIC and self.console.pages > 0

@@ -3,9 +3,8 @@
     W(E) = max over 0 <= E' <= E of (V(E') - V(0))⁺,   d = sup{E >= 0 : W(E) = 0}
     s(D) = min(1, W(D + m) / max(W(d + m), m |∇V(0)|, V_min))
 
-V(E) is the overlap after the distance E along û; s(D) is the stiffness after the distance D. V is sampled only as far
-as an onset distance can still become shorter (`bounds_on_rise`). A cubic interpolates between two samples (`samples`).
-Where a strength begins by the cubic, V itself is sampled.
+V(E) is the overlap after the distance E along û, s(D) the stiffness after D. V is sampled while an onset distance can
+still become shorter (`bounds_on_rise`), and where a strength begins by the cubic between two samples (`samples`).
 """
 
 import math

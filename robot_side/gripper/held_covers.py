@@ -1,13 +1,13 @@
 """Spheres of the objects that may be held, found when the objects are first known: a tick is too short for it."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from common.roles import Role
-from robot_side.gripper.kept_covers import kept_cover
+from robot_side.gripper.kept_covers import SearchNotes, kept_cover
 from robot_side.gripper.solids import Solid, convex_solid
 from robot_side.gripper.spheres import cover_boxes
 from robot_side.gripper.surface_cover import cover_surface
@@ -43,12 +43,12 @@ class HeldCovers:
         self,
         objects: PerceivedObjects,
         stand_out_m: float = 0.003,
-        fixed: Collection[str] = (),
-        searching: Callable[[], None] | None = None,
+        never_held: Collection[str] = (),
+        searching: SearchNotes | None = None,
     ) -> None:
-        """Find covers that serve every frame of these objects. fixed: names of immovable objects, which are left out.
+        """Find covers that serve every frame of these objects. never_held: those that cannot be held, left out.
 
-        searching: called before each search, but not for a stored cover.
+        searching: told of each search, but not of a stored cover.
         """
         self._stand_out_m = stand_out_m
         self._meshes: dict[int, _Spheres] = {}
@@ -56,10 +56,12 @@ class HeldCovers:
         coarse: dict[str, float] = {}
         corners = [] if objects.mesh_library is None else objects.mesh_library.corners_m
         first = sorted(range(len(objects.names)), key=lambda index: objects.roles[index] is not Role.TARGET)
-        for index in first:
-            if objects.roles[index] is Role.SUPPORT or objects.names[index] in fixed:
+        for place, index in enumerate(first, 1):
+            if objects.roles[index] is Role.SUPPORT or objects.names[index] in never_held:
                 continue
             name, stand_outs = objects.names[index], [0.0]
+            if searching is not None:
+                searching.what = f"object {name!r}, {place} of {len(first)}"
             for mesh in np.unique(objects.mesh_index[objects.mesh_object == index]).tolist():
                 if objects.mesh_library is not None and mesh not in self._meshes and self._may_search(corners[mesh]):
                     solid = _mesh_solid(objects.mesh_library, mesh, corners[mesh])
@@ -85,15 +87,15 @@ class HeldCovers:
                     stand_outs.append(stand_out)
             if max(stand_outs) > stand_out_m * (1.0 + 1e-9):
                 coarse[name] = max(stand_outs)
-        self._plan_boxes(objects, fixed)
+        self._plan_boxes(objects, never_held)
         self.coarse: tuple[tuple[str, float], ...] = tuple(coarse.items())
         """(name, distance in m) of each object whose spheres protrude from it by more than `stand_out_m`, namely by the
         distance"""
 
-    def _plan_boxes(self, objects: PerceivedObjects, fixed: Collection[str]) -> None:
+    def _plan_boxes(self, objects: PerceivedObjects, never_held: Collection[str]) -> None:
         """Cover a box of each size once, to fill the cache: the first cover of a size takes several ticks."""
         names_and_roles = zip(objects.names, objects.roles, strict=True)
-        lifted = [role is not Role.SUPPORT and name not in fixed for name, role in names_and_roles]
+        lifted = [role is not Role.SUPPORT and name not in never_held for name, role in names_and_roles]
         for kind in KINDS:
             if kind.in_box and kind.derive is None:
                 half_sizes_m = kind.read(objects)[2][np.array(lifted, dtype=np.bool_)[getattr(objects, kind.owner)]]

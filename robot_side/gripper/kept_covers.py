@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import math
 import os
 from collections.abc import Callable
 from functools import cache
@@ -10,7 +11,29 @@ from pathlib import Path
 import numpy as np
 
 from common.arrays import FloatArray
+from common.clock import MonotonicClock
 from common.files.user_folders import cache_folder
+
+_BETWEEN_NOTES_S = 3.0
+
+
+class SearchNotes:
+    """Notes on searches for covers: what is searched and how far, at most one in a few seconds."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        """say: takes one line."""
+        self.what = ""
+        """Shape that comes next, and its number"""
+        self._say, self._clock, self._next_s = say, MonotonicClock(), -math.inf
+
+    def begins(self) -> None:
+        """Say that the search for `what` begins, unless the last note is too young."""
+        if (now_s := self._clock.now()) >= self._next_s:
+            self._next_s = now_s + _BETWEEN_NOTES_S
+            self._say(
+                f"searching for spheres that cover gripper and objects: {self.what}; what is found is kept on disk"
+            )
+
 
 _Cover = tuple[FloatArray, FloatArray, float]
 """Centres (m, 3), radii (m,), and the distance by which the spheres protrude, in m."""
@@ -20,12 +43,12 @@ def kept_cover(
     shape: bytes,
     make: Callable[[], _Cover],
     folder: Path | None = None,
-    searching: Callable[[], None] | None = None,
+    searching: SearchNotes | None = None,
 ) -> _Cover:
     """Return the cover that `make` computes for a `shape`; read it from disk if the same code stored it before.
 
-    An unreadable file is replaced. A folder without write permission stores nothing. `searching` is called before
-    `make`, so that a person learns the reason for the wait.
+    An unreadable file is replaced. A folder without write permission stores nothing. `searching` is told what begins
+    before `make` is called, so that a person learns the reason for the wait.
     """
     name = hashlib.sha256(_code() + shape).hexdigest()[:32]
     path = (cache_folder() / "covers" if folder is None else folder) / f"{name}.npy"
@@ -34,7 +57,7 @@ def kept_cover(
         if rows.ndim == 2 and rows.shape[1] == 5 and len(rows) and np.isfinite(rows).all():
             return rows[:, :3].copy(), rows[:, 3].copy(), float(rows[0, 4])
     if searching is not None:
-        searching()
+        searching.begins()
     centers, radii, stand_out_m = make()
     rows = np.column_stack([centers, radii, np.full(len(radii), stand_out_m)])
     with contextlib.suppress(OSError):

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from common.arrays import FloatArray
 from robot_side.overlap.meshes.mesh_shapes import capsule_mesh, ellipsoid_mesh
@@ -14,6 +14,9 @@ _POINTS_AT_A_TIME = 2048
 # Excess of the prism around a cylinder, as a share of the radius.
 _EXCESS = 0.003
 _SUBDIVISIONS = 16
+_FEW_FACES = 400
+
+_Depth = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -22,17 +25,24 @@ class Solid:
 
     corners_m: FloatArray
     """(t, 3, 3) triangles of the surface; corners anticlockwise as seen from outside"""
-    depth_m: Callable[[FloatArray], FloatArray]
+    depth_m: _Depth
     """Function from points (n, 3) to lower bounds (n,) of their depth below the surface; negative outside"""
     excess_m: float = 0.0
     """Largest distance by which the polyhedron protrudes from the true solid"""
+    true_depth_m: _Depth | None = None
+    """Function from points (n, 3) to depths (n,) below the true solid's surface. Given: `excess_m` is unused"""
 
     def placed(self, rotation: FloatArray, position_m: FloatArray) -> "Solid":
         """Return the solid moved to the pose `rotation` (3, 3), `position_m` (3,)."""
+
+        def at_pose(depth_m: _Depth) -> _Depth:
+            return lambda points: depth_m((points - position_m) @ rotation)
+
         return Solid(
             self.corners_m @ rotation.T + position_m,
-            lambda points: self.depth_m((points - position_m) @ rotation),
+            at_pose(self.depth_m),
             self.excess_m,
+            None if self.true_depth_m is None else at_pose(self.true_depth_m),
         )
 
 
@@ -59,6 +69,36 @@ def convex_solid(points_m: FloatArray, excess_m: float = 0.0) -> Solid | None:
         return np.concatenate([np.empty(0), *nearest])
 
     return Solid(corners, depth_m, excess_m)
+
+
+def simpler_convex_solid(points_m: FloatArray, tolerance_m: float) -> Solid | None:
+    """Return a convex polyhedron with fewer faces around the hull of `points_m` (n, 3); None for coplanar points.
+
+    Each face is moved outwards by at most `tolerance_m`. A search takes minutes for a drawn part's thousands of faces.
+    """
+    whole = convex_solid(points_m)
+    if whole is None or len(whole.corners_m) <= _FEW_FACES:
+        return whole
+    around = np.unique(whole.corners_m.reshape(-1, 3), axis=0)
+    directions = np.array([one for one in np.ndindex(3, 3, 3) if one != (1, 1, 1)], dtype=np.float64) - 1.0
+    chosen = np.unique((around @ directions.T).argmax(axis=0))
+    while True:
+        hull = ConvexHull(around[chosen])
+        normals = hull.equations[:, :3]
+        beyond_m = around @ normals.T + hull.equations[:, 3]
+        farthest, missed_m = beyond_m.argmax(axis=0), beyond_m.max(axis=0)
+        if missed_m.max() <= tolerance_m:
+            break
+        chosen = np.union1d(chosen, farthest[missed_m > tolerance_m])
+    planes = np.column_stack([normals, hull.equations[:, 3] - np.maximum(missed_m, 0.0)])
+    try:
+        corners = HalfspaceIntersection(np.unique(planes.round(12), axis=0), around[chosen].mean(axis=0)).intersections
+    except QhullError:
+        return whole
+    simpler = convex_solid(corners)
+    if simpler is None or len(simpler.corners_m) >= len(whole.corners_m):
+        return whole
+    return Solid(simpler.corners_m, simpler.depth_m, true_depth_m=whole.depth_m)
 
 
 def cylinder(radius_m: float, half_length_m: float) -> Solid | None:

@@ -20,6 +20,8 @@ _MOST_STARTS = 600
 _MOST_CENTERS = 2500
 _MOST_ROUNDS = 40
 _CHOSEN_ANEW = 5
+_MOST_TESTS = 1_000_000_000
+"""Tests of a point in a sphere, some seconds, after which spheres are only added and not chosen anew."""
 _CELL = 0.03
 """Longest edge of the smallest cells, as a share of the distance by which spheres may protrude"""
 _CHOSEN_WITH = 0.97
@@ -49,8 +51,9 @@ class _Union:
         """Return (n,): a lower bound of each point's depth (n, 3) in a true solid; -infinity outside."""
         rooms = []
         for solid in self._solids:
-            depths = solid.depth_m(points_m)
-            rooms.append(np.where(depths >= -_ROUNDING_M, depths - solid.excess_m, -np.inf))
+            excess_m = solid.excess_m if solid.true_depth_m is None else 0.0
+            depths = (solid.true_depth_m or solid.depth_m)(points_m)
+            rooms.append(np.where(depths >= -_ROUNDING_M, depths - excess_m, -np.inf))
         deepest: FloatArray = np.max(rooms, axis=0)
         return deepest
 
@@ -111,7 +114,9 @@ def _cover(union: _Union, stand_out_m: float, frames: Sequence[FloatArray], most
     centers, depths = _alike(union, _below(union, points, normals, stand_out_m, images, origin), origin, images)
     lean_m = _CHOSEN_WITH * stand_out_m - margin_m
     before: Spheres = np.empty((0, 3)), np.empty(0)
+    tests = 0
     for turn in range(_MOST_ROUNDS):
+        tests += len(centers) * len(points) * len(images)
         inside = contained_points(centers - origin, depths + lean_m, points - origin, images)
         rows = greedy_set_cover(inside, _orbit_sizes(centers - origin, images))
         added = _all_images(centers[rows], depths[rows] + stand_out_m, origin, images)
@@ -122,7 +127,7 @@ def _cover(union: _Union, stand_out_m: float, frames: Sequence[FloatArray], most
         if not len(missed):
             return spheres
         missed, _ = _first_images(missed, missed, origin, images)
-        if turn < _CHOSEN_ANEW:
+        if turn < _CHOSEN_ANEW and tests < _MOST_TESTS:
             # Chosen together with the others, such a point hardly costs another sphere.
             points = np.concatenate([points, missed])
         else:

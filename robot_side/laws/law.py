@@ -24,6 +24,8 @@ class Situation:
     """t_d of eq. 8; the configured worst case while no loop age is known"""
     loop_age_known: bool
     """Whether the operator with the lease has echoed a stamp. Then commands under way are at most `loop_age_s` old."""
+    loop_age_settled: bool
+    """Whether `loop_age_s` comes from measurements alone; until then it contains the configured worst case"""
     compensation: Compensation
     """The side that compensates the delay; eq. 10 uses its prediction errors."""
     gap_m: float | None

@@ -51,8 +51,8 @@ class RunFigures(Listener):
         self._start_s: float | None = None
         self._next_truth_s = -np.inf
         self._loop_age = RunningStatistics(seed)
-        self._rows: list[tuple[FloatArray, bool]] = []
-        """Numbers of `Sensed` in the newest ticks, each with whether the arm was armed"""
+        self._rows: list[tuple[FloatArray, bool, bool]] = []
+        """Numbers of `Sensed` in the newest ticks, each with whether the arm was armed and the loop age settled"""
         self._enlargement = RunningStatistics(seed)
         self._enlargement_moving = RunningStatistics(seed)
         self._overlap = RunningStatistics(seed)
@@ -102,17 +102,18 @@ class RunFigures(Listener):
             armed = found.permission.state == "armed"
             if found.situation.loop_age_known:
                 self._loop_age.add(found.situation.loop_age_s)
-            self.tick(found.sensed, armed=armed)
+            self.tick(found.sensed, armed=armed, settled=found.situation.loop_age_settled)
             self.task(armed, found.holds_target, found.target_m, tick.now_s)
         self._unread.clear()
 
-    def tick(self, sensed: Sensed, *, armed: bool = True) -> None:
+    def tick(self, sensed: Sensed, *, armed: bool = True, settled: bool = True) -> None:
         """Add a tick's enlargement, overlap and stiffness.
 
-        Stiffness counts as 0 unless the arm is armed, as nobody feels it.
+        Stiffness counts as 0 unless the arm is armed, as nobody feels it. settled: whether the loop age is; until then
+        the enlargement is unknown.
         """
         self._newest = sensed.numbers
-        self._rows.append((sensed.numbers, armed))
+        self._rows.append((sensed.numbers, armed, settled))
         self.ticks += 1
         if len(self._rows) == _MOST_ROWS:
             self._take_in()
@@ -120,11 +121,11 @@ class RunFigures(Listener):
     def _take_in(self) -> None:
         if not self._rows:
             return
-        numbers, armed = np.array([row for row, _ in self._rows]), np.array([armed for _, armed in self._rows])
+        numbers, armed, settled = (np.array(column) for column in zip(*self._rows, strict=True))
         self._rows.clear()
-        enlargement_m = numbers[:, ENLARGEMENT]
+        enlargement_m = numbers[settled, ENLARGEMENT]
         self._enlargement.extend(enlargement_m.tolist())
-        self._enlargement_moving.extend(enlargement_m[numbers[:, TOOL_SPEED] > MOVING_M_S].tolist())
+        self._enlargement_moving.extend(enlargement_m[numbers[settled, TOOL_SPEED] > MOVING_M_S].tolist())
         self._overlap.extend(numbers[:, OVERLAP].tolist())
         self._l2.extend((armed * numbers[:, _L2_STIFFNESS]).tolist())
         self._r2.extend((armed * numbers[:, _R2_STIFFNESS]).tolist())

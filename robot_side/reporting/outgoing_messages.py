@@ -94,10 +94,11 @@ def telemetry(
     target: tuple[str, FloatArray | None] | None,
     *,
     holding: bool,
+    settled: bool,
 ) -> Telemetry:
     """Return the telemetry for viewers; its header is filled in later.
 
-    target: the target's name, and its centre (3,) in metres, NaN if unknown.
+    target: the target's name, and its centre (3,) in metres, NaN if unknown. settled: whether the loop age is.
     """
     target_in_tool = None
     if target is not None and target[1] is not None and np.isfinite(target[1]).all():
@@ -112,7 +113,7 @@ def telemetry(
         up_in_tool=_vector3(pose.tool_rotation[2]),
         gripper_opening_m=max(0.0, arm.gripper_opening_m),
         holding=holding,
-        enlargement_m=min(sensed.enlargement_m, _LARGEST_M),
+        enlargement_m=min(sensed.enlargement_m, _LARGEST_M) if settled else 0.0,
         l2=sensed.stiffness(L2),
         r2=sensed.stiffness(R2),
     )

@@ -61,7 +61,8 @@ class Reports:
         holding = grip.held is not None
         if self._seen.may_be_due((session.lease.token, permission.state, sight.target, holding), now_s):
             target = None if sight.target is None else (situation.objects.names[sight.target], sight.target_m)
-            view = telemetry(permission.state, situation.pose, sensed, state, target, holding=holding)
+            settled = situation.loop_age_settled
+            view = telemetry(permission.state, situation.pose, sensed, state, target, holding=holding, settled=settled)
             if self._seen.due(view, now_s):
                 view = msgspec.structs.replace(view, header=session.view_header(now_s))
                 outgoing.append(Outgoing("telemetry", b"", encode(view)))

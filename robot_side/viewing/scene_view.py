@@ -10,13 +10,16 @@ from scipy.spatial.transform import Rotation
 from common.arrays import FloatArray, IntArray
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, Prepared
 from common.protocol.messages import Header
-from common.protocol.view_messages import SceneShapes, SceneState, Shape
-from common.roles import ROLES
+from common.protocol.view_messages import Eye, Near, SceneShapes, SceneState, Shape
+from common.roles import ROLES, Role
 from robot_side.drivers.mujoco.kinematics import MujocoKinematics
+from robot_side.gripper.perceived_distances import perceived_distances
 from robot_side.laws.explanation import Explains, Trigger, TriggerExplained
 from robot_side.laws.law import Situation
 from robot_side.laws.sensed import Sensed
+from robot_side.reporting.outgoing_messages import SHOWN_NAME
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.surroundings import Surroundings
 from robot_side.viewing.shapes import SceneModel, bytes_of
 
 _TRIGGERS: Final[tuple[Trigger, Trigger]] = ("l2", "r2")
@@ -55,7 +58,15 @@ class _Begun:
 class SceneView:
     """Maker of the messages SceneShapes and SceneState. Shapes stay the same until `begin_shapes` is called."""
 
-    def __init__(self, model: SceneModel, kinematics: MujocoKinematics, law: Explains) -> None:
+    def __init__(
+        self,
+        model: SceneModel,
+        kinematics: MujocoKinematics,
+        law: Explains,
+        surroundings: Surroundings,
+        eye: Eye | None = None,
+    ) -> None:
+        """eye: viewpoint of the first-person view; None without pictures."""
         self.version = 0
         self.shapes: Prepared | None = None
         """Newest finished SceneShapes message; None before `work_on_shapes` has finished the first"""
@@ -64,6 +75,7 @@ class SceneView:
         self._model = model
         self._kinematics = kinematics
         self._law = law
+        self._surroundings, self._eye = surroundings, eye
         self._links: tuple[tuple[Shape, ...], int] | None = None
         self._base: PerceivedObjects | None = None
         """Objects as they were when the shapes were made"""
@@ -134,7 +146,16 @@ class SceneView:
             tick_p50_us=ticks.p50_us,
             tick_p99_us=ticks.p99_us,
             overruns=ticks.overruns,
+            near=self._near(begun.situation),
         )
+
+    def _near(self, situation: Situation) -> Near:
+        objects, held = situation.objects, situation.held
+        target = objects.roles.index(Role.TARGET) if Role.TARGET in objects.roles else None
+        apart = perceived_distances(situation.pose, self._surroundings.see(objects), target, held)
+        names = apart.nearest, None if held is None else objects.names[held]
+        nearest, holding = (None if name is None else name[:SHOWN_NAME] for name in names)
+        return Near(nearest, apart.nearest_m, apart.target_m, holding)
 
     def _moved(self, objects: PerceivedObjects) -> IntArray:
         """Return the indices of the objects whose poses must be sent."""
@@ -175,7 +196,9 @@ class SceneView:
             yield
         self.version += 1
         self._base, self.left_out = objects, left_out
-        said = SceneShapes(header, self.version, model.links, model.objects, tuple(shapes), left_out, _row_bytes(poses))
+        said = SceneShapes(
+            header, self.version, model.links, model.objects, tuple(shapes), left_out, _row_bytes(poses), self._eye
+        )
         self.shapes = Prepared(said)
         self.shapes_bytes = len(self.shapes.under(header))
 

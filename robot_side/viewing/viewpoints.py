@@ -3,7 +3,7 @@
 import numpy as np
 
 from common.arrays import FloatArray
-from common.protocol.view_messages import ViewName
+from common.protocol.view_messages import Eye, ViewName
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.viewing.exchange import Triple, Viewpoint
 
@@ -21,6 +21,21 @@ _WIDE_DEG = 70.0
 def viewpoints(scene: Scene) -> dict[ViewName, Viewpoint]:
     """Return the viewpoints of both views, for a scene at its start."""
     return {"overview": _overview(scene), "first_person": _first_person(scene)}
+
+
+def first_person_eye(scene: Scene) -> Eye:
+    """Return the first-person viewpoint in the tool frame, for a scene at its start."""
+    model, data, view = scene.model, scene.data, _first_person(scene)
+    tool_m, tool = data.site_xpos[scene.robot.site], data.site_xmat[scene.robot.site].reshape(3, 3)
+    if view.camera is not None:
+        # A camera looks along its own -z, with y upwards.
+        axes, place_m = data.cam_xmat[view.camera].reshape(3, 3), data.cam_xpos[view.camera]
+        forward, up, fovy_deg = -axes[:, 2], axes[:, 1], float(model.cam_fovy[view.camera])
+    else:
+        axes, fovy_deg = data.xmat[view.body].reshape(3, 3), view.fovy_deg
+        place_m = data.xpos[view.body] + axes @ view.position_m
+        forward, up = axes @ view.forward, axes @ view.up
+    return Eye(_triple(tool.T @ (place_m - tool_m)), _triple(tool.T @ forward), _triple(tool.T @ up), fovy_deg)
 
 
 def _overview(scene: Scene) -> Viewpoint:

@@ -33,6 +33,18 @@ def test_loop_age_is_the_worst_case_until_known_and_after_reset() -> None:
     assert loop_age.value(1e6) == 0.5
 
 
+def test_loop_age_is_settled_when_the_worst_case_has_died_away() -> None:
+    loop_age = LoopAge(worst_case_s=1.0, time_constant_s=0.5)
+    assert not loop_age.settled(100.0)
+    loop_age.update(0.020, 100.0)
+    first = next(now_s for now_s in np.arange(100.0, 110.0, 0.1) if loop_age.settled(now_s))
+    assert loop_age.value(first) < 0.030
+    loop_age.update(0.5, first)
+    assert loop_age.settled(first)
+    loop_age.reset()
+    assert not loop_age.settled(first + 10.0)
+
+
 @pytest.mark.parametrize("elapsed_s", [0.0, 0.1, 0.5, 3.0])
 def test_loop_age_falls_exponentially(elapsed_s: float) -> None:
     loop_age = LoopAge(worst_case_s=0.4, window=1, time_constant_s=0.5)

@@ -23,7 +23,7 @@ SMALL: Final = (1280, 720)
 LARGE: Final = (1920, 1080)
 _LIMIT_MS: Final = 60_000
 """Time limit of one step of the browser in milliseconds, long enough for a busy machine"""
-_DRAWS_SCENE: Final = "button#drawn[aria-pressed=true]"
+_DRAWS_SCENE: Final = "button#drawn[aria-pressed={}]"
 _BRIGHTNESS: Final = (0.2126, 0.7152, 0.0722)
 _FAKE_GAMEPAD: Final = """
 window.pretended = null;
@@ -62,7 +62,7 @@ class Browser:
             opened.add_init_script(script + (_FAKE_GAMEPAD if gamepad else ""))
             page = Page(opened, self._out)
             opened.goto(address)
-            if not scene and (button := opened.query_selector(_DRAWS_SCENE)) is not None:
+            if (button := opened.query_selector(_DRAWS_SCENE.format("false" if scene else "true"))) is not None:
                 button.click()
             yield page
             assert page.complaints == []

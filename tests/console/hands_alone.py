@@ -26,6 +26,7 @@ from tests.helpers.simulated_desk import VIEW
 _PLACE: Final = ROOT / "operator_side" / "viewing" / "console" / "page"
 _FRAME_MS: Final = 20
 _PAGE: Final = b"""<!doctype html><meta charset="utf-8"><title>hands</title><link rel="icon" href="data:,">
+<section id="stopping"></section><section id="driving"></section>
 <section id="hands"></section><section id="tuning"></section>
 <p><input id="field" aria-label="a field"><button id="other" type="button">other</button></p>
 <iframe id="scene" srcdoc="<p tabindex=0>scene</p>"></iframe>
@@ -138,6 +139,8 @@ class HandsAlone:
                 "person": self.person,
                 "tuning_refused": "",
                 "link_asked": None,
+                "counts": self.pages.pictures.hands,
+                "reset_first": self.pages.reset_first,
             },
         } | self.facts
 

@@ -9,6 +9,7 @@ from typing import Final
 import pytest
 
 from common.errors import FeelaheadError
+from tests.console.film_of_compare import make_compare_film
 from tests.console.film_of_replay import make_film
 from tests.console.pictures_of_page import make_first_minute
 from tests.console.pictures_of_recording import make_pictures_of_recording
@@ -19,6 +20,7 @@ PARTS: Final[Mapping[str, tuple[Sequence[str], Callable[[Path, Sequence[Path]], 
     "first-minute": ([f"console/first-minute-{step}.png" for step in range(1, 6)], make_first_minute),
     "recording": (["console/terminal.svg", "recording/run.png"], make_pictures_of_recording),
     "film": (["console/demo.webp"], make_film),
+    "compare": (["console/compare.webp"], make_compare_film),
 }
 """Files within docs/ of each part, and the function that makes them"""
 _TRIES: Final = 3

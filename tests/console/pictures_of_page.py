@@ -14,7 +14,7 @@ from tests.console.test_hands import is_armed, pull, take_over
 _COLORS: Final = 256
 _STIFF: Final = 1
 _MEETS: Final = "parseInt(document.querySelector('#r2 .meets').textContent.match(/[0-9]+/)[0])"
-_FRESH: Final = f"{DRAWN} && document.querySelector('.view.old') === null"
+_FRESH: Final = f"{DRAWN} && document.querySelector('.view:not([data-age=fresh])') === null"
 _PULLED: Final = 0.2
 _CALM_S: Final = 1.0
 _SETTLES_S: Final = 60.0
@@ -80,7 +80,7 @@ def _keep_stiffest(page: Page, run: Run, folder: Path, path: Path) -> None:
 
 
 def _doing(run: Run) -> str:
-    return str(run.facts[-1]["page"]["doing"])
+    return str(run.status["person"])
 
 
 def _keep(page: Page, folder: Path, path: Path) -> None:

@@ -5,6 +5,7 @@ from typing import Final
 import pytest
 
 from tests.console.browser import LARGE, SMALL, Browser, Page
+from tests.console.fed_page import fed_page
 from tests.console.run import DRAWN, Run
 
 pytestmark = [pytest.mark.console, pytest.mark.processes]
@@ -29,6 +30,11 @@ _CUT: Final = """() => {
 }"""
 
 
+_TINY: Final = """() => [...document.querySelectorAll('body *')].filter((one) => one.checkVisibility()
+    && [...one.childNodes].some((node) => node.nodeType === 3 && node.data.trim())
+    && parseFloat(getComputedStyle(one).fontSize) < 12).map((one) => one.outerHTML)"""
+
+
 @pytest.mark.parametrize("size", [SMALL, LARGE])
 def test_nothing_overflows(browser: Browser, demo: Run, size: tuple[int, int]) -> None:
     """At 1280x720 and 1920x1080 the page has no scroll bars, no word is cut, and both views are large."""
@@ -45,6 +51,22 @@ def test_nothing_overflows(browser: Browser, demo: Run, size: tuple[int, int]) -
         demo.wait_until("the page's hands", lambda run: run.facts[-1]["hands"] == "browser", 10.0)
         for selector in ("#hands", "#tuning"):
             _inside(page, selector, size)
+        page.picture(f"page-{size[0]}x{size[1]}")
+
+
+@pytest.mark.parametrize("size", [(640, 800), (900, 600), (640, 360), SMALL])
+def test_small_windows_cut_nothing_and_keep_stop_and_triggers_in_view(browser: Browser, size: tuple[int, int]) -> None:
+    """Also 200 % zoom, 640x360: scrolling and notes move neither stop nor triggers out of it, and all can be read."""
+    with fed_page(browser, size) as (fed, page):
+        fed.notes = [f"note {number}: something has happened that takes a line or two" for number in range(40)]
+        page.wait("document.querySelectorAll('#notes li').length >= 40", "notes", 20.0)
+        for place in ("#overview", "#notes", "#charts", "#terms"):
+            page.raw.locator(place).scroll_into_view_if_needed()
+            for selector in ("#stop", "#r2", "#l2"):
+                _inside(page, selector, size)
+        assert page.ask("document.documentElement.scrollWidth") == size[0]
+        assert not page.ask(_CUT)
+        assert not page.ask(_TINY)
         page.picture(f"page-{size[0]}x{size[1]}")
 
 

@@ -29,8 +29,8 @@ def test_frozen_robot_is_unmistakable(browser: Browser, demo: Run) -> None:
             page.wait(f"{STATE} == 'lost'", "shown as lost", _LIMIT_S)
             print(f"lost after {time.monotonic() - began_s:.2f} s (asked: {_ASKED_S:g} s)")
             page.wait_for_text("#link", "lost", _LIMIT_S)
-            page.wait_for_text("#overview .stale", "stale", _LIMIT_S)
-            page.wait_for_text("#first_person .stale", "stale", _LIMIT_S)
+            page.wait_for_text("#overview .dead", "no new picture", _LIMIT_S)
+            page.wait_for_text("#first_person .dead", "no new picture", _LIMIT_S)
             words = page.text("#state")
             lost, views_lost = border(page.pixels()), page.pixels("#overview")
             page.picture("link-lost")
@@ -42,19 +42,19 @@ def test_frozen_robot_is_unmistakable(browser: Browser, demo: Run) -> None:
         flat, striped = brightness(before).std(), brightness(lost).std()
         assert flat < 10
         assert striped > 50
-        greyed = np.abs(brightness(views_before) - brightness(views_lost)).mean()
-        assert greyed > 5
+        hatched = np.abs(brightness(views_before) - brightness(views_lost)).mean()
+        assert hatched > 5
         page.wait("document.querySelector('#link').textContent == 'up'", "back", 30.0)
-        page.wait("document.querySelector('#overview .stale').hidden", "fresh again", 30.0)
+        page.wait("document.querySelector('#overview .dead').hidden", "fresh again", 30.0)
 
 
 def _fresh_view(page: Page) -> np.ndarray[Any, np.dtype[np.uint8]]:
     """Return the pixels of the overview at a time when it is not stale, as a busy machine may delay it."""
     end_s = time.monotonic() + 60.0
     while time.monotonic() < end_s:
-        page.wait("document.querySelector('#overview.old') === null", "a fresh view", 60.0)
+        page.wait("document.querySelector('#overview:not([data-age=fresh])') === null", "a fresh view", 60.0)
         pixels = page.pixels("#overview")
-        if page.ask("document.querySelector('#overview.old') === null"):
+        if page.ask("document.querySelector('#overview:not([data-age=fresh])') === null"):
             return pixels
     raise AssertionError("the overview was stale for a minute")
 

@@ -29,7 +29,7 @@ ARROWS = """
     common/video: common/protocol
     common/sockets: common common/files
     common/status: common/protocol
-    common/command: common common/emulation common/files common/recording common/status
+    common/command: common common/emulation common/files common/protocol common/recording common/status
     common/loop: common common/command common/files common/realtime common/recording
 
     robot_side/compiled: common common/companion common/files
@@ -60,6 +60,7 @@ ARROWS = """
     robot_side/drivers/mujoco: common common/files robot_side/arm robot_side/compiled robot_side/field
         robot_side/gripper robot_side/outcome/truth.py robot_side/overlap/meshes robot_side/surroundings
         robot_side/surroundings/kinds
+    robot_side/drivers/mujoco/checks: common robot_side/drivers/mujoco
     robot_side/motion.py: common robot_side/arm robot_side/gripper robot_side/laws robot_side/operators
     robot_side/reporting: common common/emulation common/protocol common/rate common/sockets robot_side/arm
         robot_side/compiled robot_side/gripper robot_side/laws robot_side/motion.py robot_side/operators
@@ -72,14 +73,15 @@ ARROWS = """
         robot_side/surroundings
     robot_side/drivers/remote: common common/sockets common/timing robot_side/arm robot_side/surroundings
     robot_side/viewing: common common/companion common/protocol robot_side/core.py robot_side/drivers/mujoco
-        robot_side/laws robot_side/reporting robot_side/surroundings
+        robot_side/gripper robot_side/laws robot_side/reporting robot_side/surroundings
     robot_side/settings.py: common common/command robot_side/arm robot_side/drivers/mujoco robot_side/enlargement
         robot_side/laws/named.py robot_side/operators robot_side/viewing
     robot_side/recording: common common/recording robot_side/arm robot_side/compiled robot_side/events.py
         robot_side/settings.py robot_side/surroundings
     robot_side/parts.py: common common/protocol common/timing robot_side/compiled robot_side/core.py
-        robot_side/drivers/mujoco robot_side/drivers/remote robot_side/enlargement robot_side/gripper robot_side/laws
-        robot_side/laws/named.py robot_side/operators robot_side/outcome robot_side/settings.py robot_side/surroundings
+        robot_side/drivers/mujoco robot_side/drivers/mujoco/checks robot_side/drivers/remote robot_side/enlargement
+        robot_side/gripper robot_side/laws robot_side/laws/named.py robot_side/operators robot_side/outcome
+        robot_side/settings.py robot_side/surroundings
     robot_side: common common/command common/emulation common/loop common/protocol common/realtime common/sockets
         common/status robot_side/arm robot_side/compiled robot_side/core.py robot_side/drivers/remote
         robot_side/events.py robot_side/parts.py robot_side/recording robot_side/reporting robot_side/settings.py
@@ -103,8 +105,8 @@ ARROWS = """
         operator_side/dualsense/simulated operator_side/hands
     operator_side/core.py: common common/protocol common/status operator_side/controller operator_side/events.py
         operator_side/feel operator_side/hands operator_side/robot_link
-    operator_side/settings.py: common common/command common/protocol common/sockets operator_side/feel
-        operator_side/hands operator_side/people
+    operator_side/settings.py: common common/command common/protocol common/sockets operator_side/controller
+        operator_side/feel operator_side/hands operator_side/people
     operator_side/viewing/facts.py: common/protocol common/status
     operator_side/viewing/terminal: common common/command common/companion common/status operator_side/controller
         operator_side/viewing/facts.py
@@ -166,6 +168,7 @@ LIBRARIES = {
         "common/loop",
         "robot_side/viewing",
         "robot_side/compiled/warm_up.py",
+        "robot_side/gripper/kept_covers.py",
         "operator_side/viewing/terminal",
         "feelahead/lab",
         "feelahead/both_sides",

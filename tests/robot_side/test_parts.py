@@ -19,7 +19,7 @@ from robot_side.laws.paper import PaperLaw
 from robot_side.laws.swept import SweptLaw
 from robot_side.parts import build_parts
 from robot_side.settings import CameraSettings, EncoderSettings, RobotSettings
-from tests.helpers.arm_models import planar_arm
+from tests.helpers.arm_models import COUPLING, planar_arm
 from tests.helpers.repository import ROOT
 
 ROWS = "[[{0}]]\nloop_age_ms = 100.0\nmu_mm = 1.0\nsigma_mm = 2.0\n"
@@ -126,10 +126,26 @@ def test_a_search_for_spheres_is_announced_once_and_only_at_the_first_start(
     for told in said:
         build_parts(RobotSettings(model=model, site="tcp", cover_m=0.01), 1, "clock", announce=told.append)
     first, again = said
-    assert [line.partition(",")[0] for line in first] == (
+    searching = [line for line in first if line not in again]
+    # One line in a few seconds; each of these searches is shorter.
+    assert [line.partition(":")[0] for line in searching] == (
         ["searching for spheres that cover gripper and objects"] if searches else []
     )
-    assert again == []
+    # What is known of the model is said before.
+    untargeted = next(line for line in again if "no object is a target" in line)
+    assert first.index(untargeted) < min([first.index(line) for line in searching], default=len(first))
+
+
+STRAIGHT = f'{COUPLING}<keyframe><key name="home" qpos="0 0 0 0"/></keyframe>'
+
+
+@pytest.mark.parametrize(
+    ("height_m", "says"), [(0.6, []), (0.26, ["'hand' is 10 mm inside 'carton', 'lower' is 3 mm inside 'carton'"])]
+)
+def test_a_start_in_collision_is_said(tmp_path: Path, height_m: float, says: list[str]) -> None:
+    world = f'<body name="carton" pos="0.6 0 {height_m}"><geom type="box" size="0.03 0.03 0.03"/></body>'
+    notes = built(model=planar_arm(tmp_path, world=world, extra_bottom=STRAIGHT), site="tcp").parts.notes
+    assert [text.split(": ")[1].split(" (")[0] for text in notes if "starts in collision" in text] == says
 
 
 BALL = '<body name="ball" pos="0.9 0 0.3"><freejoint/><geom size="0.02"/></body>'

@@ -16,6 +16,7 @@ from common.errors import ConfigurationError
 from common.files.output_file import write_json
 from common.recording.side import Recorder
 from feelahead.both_sides.summary import merge_summaries, read_summary
+from feelahead.commands.demo.compare import compare
 from feelahead.commands.demo.page import KeptPage
 from feelahead.commands.demo.run import run_both, too_slow
 from feelahead.commands.demo.settings import DemoSettings
@@ -36,6 +37,8 @@ def demo(arguments: Sequence[str]) -> int:
     if (complaint := too_slow(settings)) is not None:
         raise ConfigurationError(complaint)
     given = given_fields(arguments, DemoSettings)
+    if settings.compare:
+        return compare(settings, given)
     errors: list[str] = []
     try:
         with TerminalStatus("feelahead demo") if settings.tui else Status(settings.status, "feelahead demo") as status:
@@ -77,11 +80,11 @@ def _report(summary: dict[str, Any]) -> list[str]:
     recorded = [] if kept is None else [f"recorded: {kept['kept_s']:.1f} s, {kept['bytes'] / 1e6:.1f} MB"]
     task, stiffness, enlargement = summary["task"], summary["stiffness"], summary["enlargement_mm"]
     grasp = "not grasped" if task["time_to_grasp_s"] is None else f"grasped after {task['time_to_grasp_s']:.1f} s"
+    grown = "unknown" if enlargement["min"] is None else f"{enlargement['min']:.0f} to {enlargement['max']:.0f} mm"
     placing = task["placing"]
     return [
         f"delay: {', '.join(shown) or 'unknown'}",
-        f"stiffness: R2 up to {stiffness['r2']['max']:.2f}, L2 up to {stiffness['l2']['max']:.2f}; "
-        f"enlargement {enlargement['min']:.0f} to {enlargement['max']:.0f} mm",
+        f"stiffness: R2 up to {stiffness['r2']['max']:.2f}, L2 up to {stiffness['l2']['max']:.2f}; enlargement {grown}",
         f"target: {grasp}, lifted {task['lifted_mm']:.0f} mm, {_placed(placing)}",
         f"contacts with obstacles: {task['obstacle_contacts']}",
         *recorded,

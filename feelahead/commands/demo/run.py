@@ -83,7 +83,7 @@ def robot_arguments(
     """Return the robot side's flags; of the demo's flags only those that the user gave: they override its file."""
     # With a file of settings, the file decides whether tuning is permitted.
     config = "--permit-tuning" if settings.robot_config is None else f"--config={settings.robot_config}"
-    own = _flags(settings, given, *_SHARED, "scene", "model", "site", "probability", "assist", "law")
+    own = _flags(settings, given, *_SHARED, "scene", "model", "site", "site_axis", "probability", "assist", "law")
     ports = f"--bind={listening['control']}", f"--view-bind={listening['view']}"
     return [*_files(settings, summary), *ports, config, *own]
 

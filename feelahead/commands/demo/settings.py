@@ -23,6 +23,9 @@ class DemoSettings(RunOptions):
     Try: feelahead demo --link "delay 50ms 10ms distribution normal", then the same with --no-haptics.
     """
 
+    compare: bool = False
+    """Run the same seed without and with haptics, by a person who misjudges depth, and play both side by side. Computed
+    first, in virtual time. Default scene: wall."""
     scene: Literal["table", "wall", "slot", "shelf"] | None = None
     """Objects around the built-in arm's target. table: a cluttered table (default). wall: a wall 10 to 60 mm behind the
     target. slot: two posts in front of the target, with 15 to 40 mm to spare on each side. shelf: the target stands on
@@ -47,6 +50,8 @@ class DemoSettings(RunOptions):
     """MJCF arm with actuators, instead of the built-in one."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Site of the model between the fingertips, with the z axis along the approach."""
+    site_axis: Literal["x", "-x", "y", "-y", "z", "-z"] = "z"
+    """Axis of the site along which R2 advances. The start names the axis that fits the fingers, if another one does."""
     realtime: bool = False
     """Ask for real-time scheduling and locked memory for both sides; without the permission they run without."""
     console: bool = True

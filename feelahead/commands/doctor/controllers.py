@@ -12,6 +12,7 @@ from common.errors import DeviceError, NoDriverError, RemoteProtocolError
 from feelahead.commands.doctor.finding import Finding, Verdict
 from operator_side.dualsense.hid.device import HidBackend, HidDualSense, load_backend
 from operator_side.dualsense.hid.finding import sightings
+from operator_side.dualsense.hid.second_writer import PROC, REMEDY, writers_of
 from operator_side.dualsense.hid.udev import RULE_FILE, RULE_FOLDERS, installing_command
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.models import PRODUCT_IDS, SONY_VENDOR_ID
@@ -27,7 +28,7 @@ def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Se
     name = "udev rule"
     if sys.platform != "linux":
         return Finding(name, Verdict.OK, f"not needed on {sys.platform}")
-    if all(seen.verdict is Verdict.OK for seen in controllers):
+    if all(seen.verdict is Verdict.OK for seen in controllers if seen.name == _NAME):
         return Finding(name, Verdict.OK, "the controller can be opened")
     if not (missing := missing_grants(rules)):
         return Finding(name, Verdict.OK, "there, for USB and Bluetooth")
@@ -64,13 +65,20 @@ def controllers_seen() -> list[Finding]:
         return [Finding(_NAME, Verdict.NOTE, f"cannot be looked for: {said}", remedy)]
     how = "connect one by USB, or pair one by Bluetooth: hold Create and PS until its light flashes"
     none = Finding(_NAME, Verdict.NOTE, "none is connected (the demo simulates one)", how)
-    return [_look_at(backend, seen.path, seen.model) for seen in sightings(backend)] or [none]
+    found = sightings(backend)
+    looks = [_look_at(backend, seen.path, seen.model) for seen in found] or [none]
+    return looks + [_other_writer(name, seen.path) for seen in found for name in writers_of(seen.path, PROC)]
 
 
 def udev_rules() -> dict[str, str]:
     """Return the text of each readable file of udev's rules, by its path."""
     paths = [path for folder in RULE_FOLDERS for path in sorted(Path(folder).glob("*.rules"))]
     return {str(path): path.read_text(encoding="utf-8", errors="replace") for path in paths if os.access(path, os.R_OK)}
+
+
+def _other_writer(name: str, path: bytes) -> Finding:
+    said = f"{name} holds {os.fsdecode(path)} open for writing"
+    return Finding("second writer", Verdict.NOTE, said, REMEDY)
 
 
 def _look_at(backend: HidBackend, path: bytes, model: str) -> Finding:

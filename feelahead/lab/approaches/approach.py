@@ -20,6 +20,7 @@ from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.people.pulling_hands import Pull, PullingHands, constant_force
 from operator_side.settings import OperatorSettings
 from robot_side.compiled.warm_up import import_kernels, warm_up
+from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.drivers.mujoco.true_contact import ContactOnset, TrueContact
 from robot_side.events import Listener
@@ -50,6 +51,7 @@ class Approach:
     model: Path
     force_n: float
     site: str = "tool"
+    site_axis: SiteAxis = "z"
     strongest_n: float = 2.0
     """Force in newtons with which the strongest effect resists (assumed: no trigger has been measured)."""
     link: str = ""
@@ -89,7 +91,7 @@ class PullRun(Listener):
             compensation=compensation_of(approach.law),
             full_rate=approach.full_rate,
         )
-        scene = load_scene(robot.model, robot.site, robot.roles)
+        scene = load_scene(robot.model, robot.site, robot.roles, site_axis=robot.site_axis)
         self.truth = TrueContact(scene)
         kind = FullDualSense if approach.law == "full" else SimulatedDualSense
         device = kind(strength_step_n=approach.strongest_n / MAX_STRENGTH)
@@ -161,6 +163,7 @@ def robot_settings(approach: Approach) -> RobotSettings:
     return RobotSettings(
         model=approach.model,
         site=approach.site,
+        site_axis=approach.site_axis,
         link=approach.link,
         link_model=approach.link_model,
         seed=approach.seed,

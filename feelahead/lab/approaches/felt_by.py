@@ -128,6 +128,7 @@ class Judged:
             objects=draw.objects_at(float(record.pose_time_s[row])),
             loop_age_s=float(record.loop_age_s[row]),
             loop_age_known=True,
+            loop_age_settled=True,
             compensation=compensation_of(self.law),
             gap_m=None,
             held=None,

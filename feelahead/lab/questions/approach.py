@@ -29,6 +29,7 @@ from feelahead.lab.figures import LAW_COLOURS, figure
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
+from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.settings import Assist
 
 _QUICK: Final = ("wall", "edge")
@@ -52,7 +53,9 @@ class ApproachSettings(Sweep):
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
     """MJCF files, each with an arm and objects ahead of its tool. Unless given: the frozen scenes."""
     site: Annotated[str, tyro.conf.arg(metavar="NAME")] = SITE
-    """Name of the site between the fingertips, whose z axis is the approach."""
+    """Name of the site between the fingertips."""
+    site_axis: SiteAxis = "z"
+    """Axis of the site along which R2 advances."""
     force: Annotated[tuple[_Force, ...], tyro.conf.arg(metavar="N...")] = (3.0,)
     """Force on R2 in newtons, 0 to 20: 2 is a light pull, 3.7 a normal one."""
     strongest_effect: Annotated[tuple[_Force, ...], tyro.conf.arg(metavar="N...")] = (2.0,)
@@ -128,6 +131,7 @@ def cells(settings: ApproachSettings) -> Iterator[Approach]:
             model=model,
             force_n=force_n,
             site=settings.site,
+            site_axis=settings.site_axis,
             strongest_n=strongest_n,
             link=link,
             link_model=settings.link_model,

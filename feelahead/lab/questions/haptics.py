@@ -21,7 +21,7 @@ from feelahead.lab.intervals import mcnemar_p, mean_interval, share_interval
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
-from feelahead.lab.trial import Arm, Trial, run_trial
+from feelahead.lab.trial import MISJUDGES_DEPTH, Arm, Trial, run_trial
 from operator_side.people.settings import PersonSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 
@@ -59,9 +59,7 @@ class HapticsSettings(Sweep):
     tick: Annotated[float, Meta(ge=1.0, le=10.0), tyro.conf.arg(metavar="MS")] = 4.0
     """Period of the robot side's ticks, in milliseconds. 1 is that of the real robot side, and makes trials take more
     than twice the time."""
-    person: PersonSettings = field(
-        default_factory=lambda: PersonSettings(aiming="move-and-wait", depth_error_sd_m=0.030, depth_error_mean_m=0.010)
-    )
+    person: PersonSettings = field(default_factory=lambda: MISJUDGES_DEPTH)
 
     def __post_init__(self) -> None:
         super().__post_init__()

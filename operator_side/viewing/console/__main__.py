@@ -22,9 +22,10 @@ from pathlib import Path
 from typing import Any, Final
 
 import msgspec
+import numpy as np
 
 from common.command.live_view import LiveView
-from common.command.words import link_words, words
+from common.command.words import lease_words, link_words, words
 from common.companion.channel import Channel
 from common.companion.process import companion_channel
 from common.errors import RemoteProtocolError
@@ -40,6 +41,7 @@ from common.protocol.view_messages import (
 from common.roles import ROLES, Role
 from common.status.codes import Hands, Look
 from operator_side.controller.feel import SENSED_TRAVEL
+from operator_side.viewing.console.outlines import outline
 from operator_side.viewing.facts import OperatorFacts, ShownKind
 
 _NICENESS: Final = 5
@@ -61,6 +63,8 @@ class _Process:
         self._channel = channel
         self._facts: OperatorFacts | None = None
         self._shapes: SceneShapes | None = None
+        self._objects: Any = None
+        """Poses (n, 7) of the objects of `_shapes`"""
         self._ended = threading.Event()
         self._drawing: Any = None
         self._pages: Any = None
@@ -169,6 +173,11 @@ class _Process:
             before = _FRAME.pack(VIEW_NAMES.index(seen.view), seen.captured_s)
             self._pages.show(seen.view, before + seen.jpeg)
         elif isinstance(seen, SceneShapes):
+            if self._shapes is None or self._shapes.version != seen.version:
+                self._objects = np.zeros((len(seen.objects), 7))
+                self._objects[:, 3] = 1.0
+                if seen.object_poses:
+                    self._objects[:] = np.frombuffer(seen.object_poses, np.float32).reshape(-1, 7)
             self._shapes = seen
             self._drawing.shapes(seen)
         elif isinstance(seen, SceneState):
@@ -205,8 +214,24 @@ class _Process:
             "left_out": 0 if self._shapes is None else self._shapes.left_out,
             "sigma_mm": (1e3 * state.l2.sigma_m, 1e3 * state.r2.sigma_m),
             "tick_us": (state.tick_p50_us, state.tick_p99_us),
+            "near": None if state.near is None else msgspec.structs.asdict(state.near),
+            "target": self._target(state),
         }
         self._pages.show(ShownKind.SCENE, msgspec.json.encode(scene).decode())
+
+    def _target(self, state: SceneState) -> dict[str, Any] | None:
+        """Return the target's name and its outline in the first-person view; None without either."""
+        shapes, role = self._shapes, ROLES.index(Role.TARGET)
+        if shapes is None or shapes.eye is None or shapes.version != state.version or role not in state.roles:
+            return None
+        index, target = np.frombuffer(state.object_index, np.uint32), state.roles.index(role)
+        known = index < len(self._objects)
+        self._objects[index[known]] = np.frombuffer(state.object_poses, np.float32).reshape(-1, 7)[known]
+        if target >= len(self._objects):
+            return None
+        own = [shape for shape in shapes.shapes if shape.owner == target and not shape.of_robot]
+        box = outline(own, self._objects[target], np.array(state.tool_pose), shapes.eye)
+        return None if box is None else {"name": shapes.objects[target], "box": box}
 
 
 def said(facts: OperatorFacts) -> dict[str, Any]:
@@ -218,7 +243,7 @@ def said(facts: OperatorFacts) -> dict[str, Any]:
         "state": state.upper(),
         "why": (None if state == view.phase else view.phase, view.reason),
         "link": link_words(status),
-        "lease": words(status.owner) or None,
+        "lease": lease_words(status.owner) or None,
         "whose": "scripted person" if facts.hands is Hands.PERSON else words(facts.hands),
         "holding": None if status.holding is None else f"{view.holding or 'nothing'}{view.stands}",
     }

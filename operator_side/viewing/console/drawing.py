@@ -4,7 +4,7 @@ It has the robot as the robot side estimates it, the objects as perceived, and t
 each trigger's distance D. Only changes are sent to the browser: one batch of poses for all shapes that share a mesh.
 """
 
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import viser
@@ -18,18 +18,11 @@ from operator_side.viewing.console.solids import Solid, solid_of, sphere
 Floats = NDArray[np.float64]
 """Array of float64; a pose is a row of x, y, z and the quaternion w, x, y, z"""
 
-_COLOR_OF: Final = {
-    Role.OBSTACLE: (150, 150, 156),
-    Role.TARGET: (245, 240, 225),
-    Role.SUPPORT: (104, 108, 118),
-    Role.IGNORED: (200, 200, 204),
-}
-_ROLE_COLORS: Final = np.array([_COLOR_OF[role] for role in ROLES], np.float64)
 L2_COLOR: Final = (0, 114, 189)
 R2_COLOR: Final = (230, 130, 0)
 """Blue and orange, which the colour-blind can tell apart; style.css has the same colours"""
 _HALF_TINTED_M3: Final = 2e-6
-"""Overlap, in cubic metres, at which an object's colour is half its role's and half the trigger's"""
+"""Overlap, in cubic metres, at which an object's colour is half its own and half the trigger's"""
 _GHOST_OPACITY: Final = 0.16
 _SEEN_FROM_M: Final = (0.42, -0.5, 0.34)
 """First camera position, relative to the tool"""
@@ -72,12 +65,14 @@ class _Batch:
         self.of_robot = np.array([shape.of_robot for shape in shapes])
         self.owner = np.array([shape.owner for shape in shapes])
         self._inner = np.array([shape.pose for shape in shapes], np.float64)
-        self._colors = (255.0 * np.array([shape.color[:3] for shape in shapes])).astype(np.uint8)
+        self._own_colors = 255.0 * np.array([shape.color[:3] for shape in shapes])
+        """As in the cameras' pictures"""
+        self._colors = self._own_colors.astype(np.uint8)
         places, scales = np.zeros((len(members), 3)), np.array([scale for _, scale in members])
         self._handle = _add(scene, name, solid, places, batched_scales=scales, batched_colors=self._colors)
         self._poses = np.full((len(members), 7), np.nan, np.float32)
 
-    def place(self, links: Floats, objects: Floats, object_colors: NDArray[np.uint8]) -> None:
+    def place(self, links: Floats, objects: Floats, tints: "_Tints") -> None:
         """Move and colour the shapes. links, objects: poses (n, 7) of the robot's links and of the objects."""
         outer = np.empty((len(self.owner), 7))
         outer[self.of_robot] = links[self.owner[self.of_robot]]
@@ -88,8 +83,9 @@ class _Batch:
         if not np.array_equal(poses[:, 3:], self._poses[:, 3:]):
             self._handle.batched_wxyzs = poses[:, 3:]
         self._poses = poses
-        colors = self._colors.copy()
-        colors[~self.of_robot] = object_colors[self.owner[~self.of_robot]]
+        mixed, owner = self._own_colors.copy(), self.owner[~self.of_robot]
+        mixed[~self.of_robot] += tints.shares[owner] * (tints.colors[owner] - mixed[~self.of_robot])
+        colors = mixed.astype(np.uint8)
         if not np.array_equal(colors, self._colors):
             self._colors = colors
             self._handle.batched_colors = colors
@@ -178,10 +174,10 @@ class Drawing:
         roles = np.zeros(len(shapes.objects), np.uint8)
         roles_sent = np.frombuffer(state.roles, np.uint8)[: len(roles)]
         roles[: len(roles_sent)] = np.minimum(roles_sent, len(ROLES) - 1)
-        colors = _colors(roles, state)
+        tints = _tints(len(roles), state)
         with self._server.atomic():
             for batch in self._batches:
-                batch.place(links, self._objects, colors)
+                batch.place(links, self._objects, tints)
             self._place_label(shapes, roles)
             spheres = np.frombuffer(state.spheres, np.float32).reshape(-1, 4)
             along = Rotation.from_quat(state.tool_pose[3:], scalar_first=True).apply([0.0, 0.0, 1.0])
@@ -213,14 +209,21 @@ class Drawing:
             self._label.text, self._label.position, self._label.visible = text, position, True
 
 
-def _colors(roles: NDArray[np.uint8], state: SceneState) -> NDArray[np.uint8]:
-    """Compute each object's colour: its role's, tinted with the colour of the trigger along which it overlaps more."""
-    colors = _ROLE_COLORS[roles]
+class _Tints(NamedTuple):
+    """Colours that the objects turn towards, by the overlap that a trigger causes."""
+
+    shares: Floats
+    """(n, 1) 0 to 1"""
+    colors: Floats
+    """(n, 3)"""
+
+
+def _tints(count: int, state: SceneState) -> _Tints:
+    """Compute the tints of `count` objects: towards the colour of the trigger with more overlap."""
+    shares, colors = np.zeros((count, 1)), np.zeros((count, 3))
     for index, by_l2_m3, by_r2_m3 in state.overlaps:
-        if 0 <= index < len(roles):
+        if 0 <= index < count:
             strongest_m3 = max(by_l2_m3, by_r2_m3)
-            tint = np.array(L2_COLOR if by_l2_m3 > by_r2_m3 else R2_COLOR)
-            share = strongest_m3 / (strongest_m3 + _HALF_TINTED_M3) if strongest_m3 > 0.0 else 0.0
-            colors[index] += share * (tint - colors[index])
-    tinted: NDArray[np.uint8] = colors.astype(np.uint8)
-    return tinted
+            shares[index] = strongest_m3 / (strongest_m3 + _HALF_TINTED_M3) if strongest_m3 > 0.0 else 0.0
+            colors[index] = L2_COLOR if by_l2_m3 > by_r2_m3 else R2_COLOR
+    return _Tints(shares, colors)

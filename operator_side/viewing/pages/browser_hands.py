@@ -14,6 +14,8 @@ from operator_side.viewing.pages.page_messages import PageHands
 
 _PRESS_S: Final = 0.2
 """Seconds for which the arming button is pressed, then released, and so on until the arm is armed"""
+_MOVES_GRIPPER: Final = 0.5
+"""Share of the hands that must count for the gripper to move"""
 _GRIPPER: Final = {1: Action.CLOSE_GRIPPER, -1: Action.OPEN_GRIPPER}
 
 
@@ -34,7 +36,7 @@ class BrowserHands:
         self._calibrate = calibrate
         self._swap_sides = swap_sides
         self._began_s: float | None = None
-        self._was_armed = False
+        self._was_armed = self._was_stopped = False
         self._moves = False
         self._state = ControllerState()
         self._commanded = RELEASED
@@ -55,6 +57,10 @@ class BrowserHands:
         """Make the controller's state from the page's inputs. screen: telemetry, which has the arm's state."""
         del delay_s
         self._calibrate(IDENTITY)
+        stopped = self._was_stopped if screen is None else screen.state == "stopped"
+        if stopped and not self._was_stopped:
+            self._pages.require_reset()
+        self._was_stopped = stopped
         hands = self._pages.hands(now_s)
         armed = screen is not None and screen.state == "armed"
         if hands is not None and self._was_armed and not armed:
@@ -98,12 +104,14 @@ class BrowserHands:
     def _held(self, hands: PageHands, pressed: set[Action]) -> ControllerState:
         pressed |= {Action.NEXT_TARGET} if hands.next_target else set()
         pressed |= {Action.HAND_OVER} if hands.hand_over else set()
-        if self._moves and hands.gripper in _GRIPPER:
+        counts = self._pages.pictures.hands
+        if self._moves and counts > _MOVES_GRIPPER and hands.gripper in _GRIPPER:
             pressed.add(_GRIPPER[hands.gripper])
         button = button_of(swap_sides=self._swap_sides)
         held = frozenset(button[action] for action in pressed)
         if not self._moves:
             return ControllerState(pressed=held)
         order = -1 if self._swap_sides else 1
-        (l2, r2), (left, right) = (hands.l2, hands.r2)[::order], (hands.lateral, hands.turning)[::order]
+        l2, r2 = (counts * hands.l2, counts * hands.r2)[::order]
+        left, right = ((counts * x, counts * y) for x, y in (hands.lateral, hands.turning)[::order])
         return ControllerState(left, right, l2, r2, held)

@@ -6,6 +6,7 @@ nobody ─▶ resting ─▶ ready ─▶ running         the first page that as
              ▲         │         │            resting: all keys must be up for 1 s; ready: hold-to-run counts
              └─────────┴─────────┘  on another key before hold-to-run, hold-to-run released, a stop, a disarmed arm
 
+After a stop the inputs rest until the stop is reset: hold-to-run alone never arms again.
 After 150 ms of silence, or when the driving page stops driving or closes, nobody drives; the next page rests first.
 """
 
@@ -18,6 +19,7 @@ from common.status.codes import Doing
 from operator_side.core import OperatorSide
 from operator_side.viewing.facts import HandsFacts
 from operator_side.viewing.pages.page_messages import PageHands, PageMessage, TuneWish
+from operator_side.viewing.pages.pictures import Pictures
 
 SILENCE_S: Final = 0.15
 """Seconds of silence after which a page no longer drives, and its emergency stop counts as released."""
@@ -35,6 +37,8 @@ class DrivingPage:
         self.may_drive = may_drive
         self.rejected = 0
         """Number of invalid messages."""
+        self.pictures = Pictures()
+        """Freshness of what pages show"""
         self.stale = 0
         """Number of messages that arrived after a newer one of the same page; of these only the stop counts."""
         self.silences = 0
@@ -49,6 +53,8 @@ class DrivingPage:
         self.doing = Doing.NOBODY_DRIVES
         """Present action of the driving page, as of the last call"""
         self._stop_s: float | None = None
+        self.reset_first = False
+        """Whether a stop waits for its reset, so that no page's hands count"""
         self._giving_back: set[int] = set()
         self._give_back = False
         self.wishes: deque[TuneWish] = deque(maxlen=_MOST_WISHES)
@@ -99,6 +105,11 @@ class DrivingPage:
         if self._driver is not None:
             self.doing, self._up_since_s = Doing.ALL_KEYS_UP_FIRST, None
 
+    def require_reset(self) -> None:
+        """Let no page's hands count before a reset, as the arm was stopped."""
+        self.reset_first = self.may_drive
+        self.rest_anew()
+
     def take_give_back(self) -> bool:
         """Return whether a page has handed the controls back to the scripted person since the last call."""
         given, self._give_back = self._give_back, False
@@ -106,6 +117,7 @@ class DrivingPage:
 
     def follow(self, core: OperatorSide, now_s: float) -> None:
         """Apply the pages' emergency stops and tuning requests; call it in every turn of the loop."""
+        self.pictures.follow(core, None if self._newest is None else self._newest.shown_s, now_s)
         if self.stopping(now_s):
             core.press_stop(now_s)
         while self.wishes:
@@ -115,16 +127,19 @@ class DrivingPage:
     def facts(self, core: OperatorSide, now_s: float, *, person: bool) -> HandsFacts:
         """Return the facts for the pages. person: whether they may hand the controls back to a scripted person."""
         self._expire(now_s)
-        return HandsFacts(self.may_drive, self.driver, person, core.tuner.why, core.tuner.link)
+        known = (self.may_drive, self.driver, person, core.tuner.why, core.tuner.link)
+        return HandsFacts(*known, counts=self.pictures.hands, reset_first=self.reset_first)
 
     def _take(self, page: int, hands: PageHands, now_s: float) -> None:
         if hands.stop:  # even an overtaken one
             self._stop_s = now_s
-            self.rest_anew()
+            self.require_reset()
         if hands.number <= self._numbers.get(page, -1):
             self.stale += 1
             return
         self._numbers[page] = hands.number
+        if hands.reset and self._driver in (None, page) and not self.stopping(now_s):
+            self.reset_first = False
         self._choose(page, hands)
         if page == self._driver:
             self._newest, self._heard_s = hands, now_s
@@ -132,7 +147,7 @@ class DrivingPage:
 
     def _choose(self, page: int, hands: PageHands) -> None:
         """Update the driving page by this message. No page can take over from a page that drives."""
-        may_give_back = self._driver in (None, page) and page not in self._giving_back
+        may_give_back = self._driver in (None, page) and page not in self._giving_back and not self.reset_first
         (self._giving_back.add if hands.give_back else self._giving_back.discard)(page)
         if hands.give_back and may_give_back:
             self._give_back = True
@@ -154,7 +169,7 @@ class DrivingPage:
                 if since_s is not None and now_s - since_s >= REST_S:
                     self.doing = Doing.READY
                     self._follow(hands, now_s)
-                elif not hands.all_up:
+                elif self.reset_first or not hands.all_up:
                     self._up_since_s = None
                 elif since_s is None:
                     self._up_since_s = now_s

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from common.limits import Share
+from common.limits import Finite, Share
 
 Deflection = tuple[Annotated[float, Meta(ge=-1.0, le=1.0)], Annotated[float, Meta(ge=-1.0, le=1.0)]]
 _LARGEST = 2**53 - 1
@@ -37,8 +37,12 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     hand_over: bool = False
     stop: bool = False
     """Whether the emergency stop is pressed"""
+    reset: bool = False
+    """Whether the person resets the stop"""
     give_back: bool = False
     """Whether the operator hands the controls back to the scripted person"""
+    shown_s: Finite | None = None
+    """Capture time of the picture shown in the first view, on the robot side's clock; None without one"""
 
     @property
     def moves_nothing(self) -> bool:
@@ -48,7 +52,7 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def all_up(self) -> bool:
         """Whether no trigger, stick, key or button is used."""
-        pressed = self.run or self.gripper != 0 or self.next_target or self.hand_over or self.stop
+        pressed = self.run or self.gripper != 0 or self.next_target or self.hand_over or self.stop or self.reset
         return self.moves_nothing and not pressed
 
 

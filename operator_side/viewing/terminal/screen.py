@@ -11,7 +11,7 @@ from rich.text import Text
 
 from common.command.live_line import UNKNOWN, millimetres, percent
 from common.command.live_view import LiveView, number
-from common.command.words import link_words, printable, words
+from common.command.words import lease_words, link_words, printable, words
 from common.status.codes import Sight
 from operator_side.controller.feel import SENSED_TRAVEL
 from operator_side.viewing.facts import OperatorFacts
@@ -82,7 +82,7 @@ def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
     """Draw figures of the link over the last second, of the nearest object, the target and the held object."""
     status, robot, known = view.operator, view.robot, view.scene
     felt = {} if status.feel in (None, Sight.SEEING) else {"feel": words(status.feel)}
-    who = {"lease": words(status.owner), "hands": words(facts.hands), "controller": words(status.controller)}
+    who = {"lease": lease_words(status.owner), "hands": words(facts.hands), "controller": words(status.controller)}
     lines = [_named(link=link_words(status), **who, **felt)]
     for name, delay in (("to operator", facts.to_operator), ("to robot   ", facts.to_robot)):
         mean, p99, newest = (_figure(value, 5) for value in (delay.mean_ms, delay.p99_ms, delay.newest_ms))
@@ -100,8 +100,9 @@ def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
         target = f"{known.target} {way}"
     nearest = f"{robot.nearest or 'nearest thing'} at {millimetres(robot.nearest_mm)}"
     asked = "" if facts.probability is None else f"   P {facts.probability:g}"
-    enlarged_mm = None if facts.screen is None else 1e3 * facts.screen.enlargement_m
-    grown = f"enlargement {_figure(enlarged_mm)} mm   rumble {_figure(facts.rumble)}"
+    enlarged_m = 0.0 if facts.screen is None else facts.screen.enlargement_m
+    enlarged = UNKNOWN if enlarged_m == 0.0 else f"{_figure(1e3 * enlarged_m)} mm"
+    grown = f"enlargement {enlarged}   rumble {_figure(facts.rumble)}"
     return [
         *(*lines, _named(round_trip=round_trip, field_age=field_age, loop_age=loop_age)),
         _named(nearest=nearest, target=target, holding=f"{view.holding or 'nothing'}{view.stands}"),
@@ -115,6 +116,7 @@ def _trigger(facts: OperatorFacts, name: str, cells: int) -> Group:
     raw, metres, cells = number(trigger.raw), number(trigger.needed_m), max(1, cells)
     reached = math.ceil(min(1.0, max(0.0, (raw or 0.0) * SENSED_TRAVEL)) * cells * 10)
     rest = (UNKNOWN if raw is None else "·") * (cells * 10 - reached)
+    behind = " behind" if round(1e3 * (metres or 0.0)) < 0 else " ahead"
     travel, free = percent(number(trigger.travel), 3), percent(number(trigger.free))
     meets = (f"{trigger.meets} of 8", _FELT if trigger.meets else "")
     return Group(
@@ -122,7 +124,7 @@ def _trigger(facts: OperatorFacts, name: str, cells: int) -> Group:
         _line("finger  ", ("━" * (reached - 1) + "┫" * (reached > 0), _PULL), (rest, _FAINT)),
         _line("zones   ", *((f"{zone or '.'}".ljust(cells), _FELT if zone else "") for zone in trigger.zones)),
         _line("meets   ", meets, f"  stiffness {_figure(trigger.stiffness)}"),
-        _line("D       ", (f"{UNKNOWN if metres is None else f'{1e3 * metres:z.0f}'} mm", _TITLE), " ahead"),
+        _line("D       ", (f"{UNKNOWN if metres is None else f'{1e3 * abs(metres):.0f}'} mm", _TITLE), behind),
         _line("fast mm ", " ".join(f"{1e3 * way:z.0f}" for way in trigger.fast_m) or UNKNOWN),
         _line("slow mm ", " ".join(f"{1e3 * way:z.0f}" for way in trigger.slow_m) or UNKNOWN),
     )

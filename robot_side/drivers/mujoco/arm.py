@@ -13,8 +13,10 @@ from robot_side.arm.port import ArmState
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GRIPPER_INPUT, GripperDrive
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
+from robot_side.drivers.mujoco.joint_drives import hold_idle
 from robot_side.drivers.mujoco.joint_reference import JointReference, MotionLimits
 from robot_side.drivers.mujoco.plant import LIMITS, PLANT, Plant, drive, inertia_table, sense
+from robot_side.drivers.mujoco.robot_model import moves_any
 from robot_side.drivers.mujoco.scene import Scene
 
 _LONGEST_ADVANCE_S = 2.0
@@ -73,12 +75,15 @@ class MujocoArm:
         self._clock: Clock | None = None
         self._state: ArmState | None = None
 
-        travel, self.ends_rad = stand(scene)
+        self.travel, self.ends_rad = stand(scene)
+        travel = self.travel
         self._gripper = None if travel is None else GripperDrive(travel, gripper_stroke_time_s)
         start = data.qpos[robot.arm_positions].copy()
         limits = limits or MotionLimits()
         self._reference = JointReference(start, *self.ends_rad, limits, robot.drives.windup_rad(limits.windup_rad))
         mujoco.mj_forward(model, data)
+        of_arm = [actuator for actuator in range(model.nu) if moves_any(model, actuator, robot.arm_joints)]
+        hold_idle(model, data, np.union1d(of_arm, robot.gripper_actuators).astype(np.int64))
         # MuJoCo's arrays keep their addresses; fetching one costs more than its use in a step.
         self._unstable = data.warning.number[_UNSTABLE]
         self._borne_nm = data.qfrc_constraint

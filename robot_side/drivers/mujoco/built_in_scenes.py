@@ -1,5 +1,6 @@
 """Scenes of the built-in arm: objects around the target, with some dimensions drawn from the seed."""
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, Final, Literal
 
@@ -15,12 +16,37 @@ _HALF_WIDTH_M: Final = 0.0565
 _HALF_HEIGHT_M: Final = 0.032
 """Half height of the palm"""
 _HALF_TARGET_M: Final = 0.06
+_TIPS_BEYOND_TOOL_M: Final = 0.015
+_ALONG_M: Final = 0.06
+"""Distance from the line ahead within which an object is behind the target and not beside it"""
+_MOST_ROOM_M: Final = 0.15
+"""Room beyond which objects would leave the table"""
 
 
 def furnish(spec: Any, name: SceneName, seed: int) -> None:
     """Draw the scene's variable dimensions from `seed`, and apply them to `spec`, an MjSpec."""
     # Not the seed's first streams: the errors of arm and camera are drawn from those.
     _DRAWN[name](spec, np.random.default_rng(np.random.SeedSequence([seed, 0x5CE7E])))
+
+
+def make_room(spec: Any, forward_m: float, sideways_m: float) -> None:
+    """Move the table's objects aside, and those behind the target back, for a hand that reaches farther than ours.
+
+    forward_m, sideways_m: reach from the tool's point, horizontally.
+    """
+    back_m = min(max(forward_m - _TIPS_BEYOND_TOOL_M, 0.0), _MOST_ROOM_M)
+    aside_m = min(max(sideways_m - _HALF_WIDTH_M, 0.0), _MOST_ROOM_M)
+    target_x, target_y, _ = spec.body("target").pos
+    for body in spec.bodies:
+        if body.name in ("world", "table", "target"):
+            continue
+        x, y, z = body.pos
+        across_m = y - target_y
+        if abs(across_m) > _ALONG_M:
+            y += math.copysign(aside_m, across_m)
+        elif x > target_x:
+            x += back_m
+        body.pos = [x, y, z]
 
 
 def _table(spec: Any, generator: np.random.Generator) -> None:

@@ -1,6 +1,6 @@
 """Cover of a simulated gripper: spheres that contain its colliding geoms, in the frames of its links."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -12,14 +12,16 @@ from common.arrays import FloatArray, IntArray
 from robot_side.drivers.mujoco.mesh_arrays import mesh_vertices
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.gripper.capsule_cover import cover_capsule
-from robot_side.gripper.kept_covers import kept_cover
-from robot_side.gripper.solids import Solid, capsule, convex_solid, cylinder, ellipsoid
+from robot_side.gripper.kept_covers import SearchNotes, kept_cover
+from robot_side.gripper.solids import Solid, capsule, convex_solid, cylinder, ellipsoid, simpler_convex_solid
 from robot_side.gripper.spheres import cover_boxes
 from robot_side.gripper.surface_cover import cover_surface
 
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _WITH_ROWS = (GeomKind.SPHERE, GeomKind.CAPSULE, GeomKind.BOX)
 """Kinds of geoms whose cover is computed directly, with the fewest spheres; other kinds need a search."""
+_SIMPLER = 0.05
+"""Share of the largest protrusion by which a mesh's faces may be moved outwards, so that they are fewer"""
 
 
 @dataclass(frozen=True)
@@ -49,17 +51,20 @@ class _Part:
 
 
 def cover_gripper(
-    model: Any, geoms: IntArray, stand_out_m: float = 0.003, searching: Callable[[], None] | None = None
+    model: Any, geoms: IntArray, stand_out_m: float = 0.003, searching: SearchNotes | None = None
 ) -> GripperCover:
     """Cover the colliding geoms `geoms` (k,) of a compiled MuJoCo model.
 
     A mesh counts as its convex hull, which is the colliding shape. No sphere protrudes from the link's geoms by more
     than `stand_out_m`, unless a geom would need more than 2000 spheres. Links of the same shape get the same spheres.
-    searching: called before each search, but not for a stored cover.
+    searching: told of each search, but not of a stored cover. Each link's spheres are stored as soon as they are found.
     """
     centers, radii, bodies, stand_outs = [], [], [], []
     # Sorted, as a set has no defined order.
-    for body in sorted(set(model.geom_bodyid[geoms].tolist())):
+    links = sorted(set(model.geom_bodyid[geoms].tolist()))
+    for number, body in enumerate(links, 1):
+        if searching is not None:
+            searching.what = f"link {number} of {len(links)} of the gripper, {model.body(body).name!r}"
         of_body = geoms[model.geom_bodyid[geoms] == body].tolist()
         # In the first geom's frame, which does not depend on the choice of the link's frame.
         first = Rotation.from_quat(model.geom_quat[of_body[0]], scalar_first=True)
@@ -93,11 +98,15 @@ def _box_corners(box: FloatArray) -> FloatArray:
 
 @lru_cache(maxsize=64)
 def _cover_link(
-    parts: tuple[_Part, ...], stand_out_m: float, searching: Callable[[], None] | None
+    parts: tuple[_Part, ...], stand_out_m: float, searching: SearchNotes | None
 ) -> tuple[FloatArray, FloatArray, float]:
     rotations = [Rotation.from_quat(part.quaternion).as_matrix() for part in parts]
     positions = [np.array(part.position_m) for part in parts]
-    solids = [] if all(part.kind in _WITH_ROWS for part in parts) else [_solid(part) for part in parts]
+    solids = (
+        []
+        if all(part.kind in _WITH_ROWS for part in parts)
+        else [_solid(part, _SIMPLER * stand_out_m) for part in parts]
+    )
     if solids and all(solid is not None for solid in solids):
         placed = [
             solid.placed(rotation, position)
@@ -118,8 +127,8 @@ def _cover_link(
     return np.concatenate(centers), np.concatenate(radii), max(stand_outs)
 
 
-def _solid(part: _Part) -> Solid | None:
-    """Return the solid of a geom; None if it encloses nothing."""
+def _solid(part: _Part, simpler_by_m: float = 0.0) -> Solid | None:
+    """Return the solid of a part, a mesh's with faces up to `simpler_by_m` outside; None if it encloses nothing."""
     match part.kind:
         case GeomKind.CYLINDER:
             return cylinder(part.size[0], part.size[1])
@@ -130,7 +139,8 @@ def _solid(part: _Part) -> Solid | None:
         case GeomKind.ELLIPSOID:
             return ellipsoid(np.array(part.size))
         case _:
-            return convex_solid(_points(part))
+            points = _points(part)
+            return simpler_convex_solid(points, simpler_by_m) if simpler_by_m > 0.0 else convex_solid(points)
 
 
 def _points(part: _Part) -> FloatArray:

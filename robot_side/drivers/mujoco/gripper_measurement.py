@@ -53,6 +53,8 @@ class GripperTravel:
     """(g,) inputs of the actuators when closed"""
     open_fingers: FloatArray
     """(f,) positions of the fingers' joints when open"""
+    closed_fingers: FloatArray
+    """(f,) positions of the fingers' joints when closed"""
     references: FloatArray
     """(k,) inputs as shares of the way from open (0) to closed (1), rising"""
     lengths: FloatArray
@@ -170,6 +172,7 @@ def travel_from_sweep(sweep: GripperSweep, force_lead: float, lag_s: float) -> G
         open_control=controls[0],
         closed_control=controls[-1],
         open_fingers=fingers[0],
+        closed_fingers=fingers[-1],
         references=np.linspace(0.0, 1.0, len(lengths))[moving],
         lengths=lengths[moving],
         openings_m=openings[moving],

@@ -3,10 +3,12 @@
 from dataclasses import dataclass
 from typing import Any, Final
 
+import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
-from common.arrays import FloatArray
+from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import inlined
+from robot_side.drivers.mujoco.model_enums import BiasKind, JointKind, TransmissionKind
 
 DRIVE: Final = np.dtype(
     [
@@ -27,6 +29,8 @@ acceleration: commanded acceleration, rad/s². load: torque that this accelerati
 _MOTOR_BANDWIDTH_RAD_S = 50.0
 _VELOCITY_SERVO_BANDWIDTH_RAD_S = 20.0
 _MOST_WINDUP_RAD = 0.02
+_IDLE_BANDWIDTH_RAD_S = 30.0
+"""Bandwidth of the servos that hold idle joints driven by motors."""
 
 
 @dataclass(frozen=True)
@@ -87,3 +91,30 @@ def control(drive: Any, position_error: float, position: float, velocity: float,
     servo = drive.gear * (drive.stiffness * position + drive.damping * velocity)
     force: float = (load / drive.gear - drive.offset + servo) / drive.gain
     return force
+
+
+def hold_idle(model: Any, data: Any, busy: IntArray) -> None:
+    """Let every actuator on a joint, but those at `busy` (b,), hold its joint where it is, against gravity.
+
+    The forward dynamics of `data` must be known. A servo gets the input at which it rests; another actuator becomes a
+    servo, unless it has a state of its own.
+    """
+    inertia: FloatArray = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, inertia)
+    for actuator in np.setdiff1d(np.arange(model.nu), busy).tolist():
+        on_joint = model.actuator_trntype[actuator] in (TransmissionKind.JOINT, TransmissionKind.JOINT_IN_PARENT)
+        joint, place = int(model.actuator_trnid[actuator, 0]), int(model.actuator_ctrladr[actuator])
+        gear = float(model.actuator_gear[actuator, 0])
+        if not on_joint or model.jnt_type[joint] < JointKind.SLIDE or model.actuator_dyntype[actuator] or gear == 0.0:
+            continue
+        velocity = int(model.jnt_dofadr[joint])
+        load = (data.qfrc_bias - data.qfrc_passive)[velocity] / gear
+        length = float(data.actuator_length[actuator])
+        gain, bias = model.actuator_gainprm[actuator], model.actuator_biasprm[actuator]
+        if bias[1] < 0.0 and gain[0] != 0.0:
+            data.ctrl[place] = (load - bias[0] - bias[1] * length) / gain[0]
+            continue
+        stiffness = inertia[velocity, velocity] * (_IDLE_BANDWIDTH_RAD_S / gear) ** 2
+        model.actuator_biastype[actuator] = BiasKind.AFFINE
+        bias[:3] = load + stiffness * length, -stiffness, -2.0 * stiffness / _IDLE_BANDWIDTH_RAD_S
+        gain[:] = 0.0

@@ -1,6 +1,5 @@
 """Forward kinematics of the simulated robot's gripper from encoder readings (eq. 4)."""
 
-from collections.abc import Callable
 from typing import Any
 
 import mujoco  # type: ignore[import-untyped]
@@ -16,17 +15,18 @@ from robot_side.drivers.mujoco.model_enums import JointKind
 from robot_side.drivers.mujoco.robot_model import RobotModel
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.field.scratch import CLUSTER
+from robot_side.gripper.kept_covers import SearchNotes
 from robot_side.gripper.near_order import near_order
 
 
 class MujocoKinematics:
     """Kinematics of the scene's robot (port GripperKinematics), from its encoders, never the simulation's truth."""
 
-    def __init__(self, scene: Scene, stand_out_m: float = 0.003, searching: Callable[[], None] | None = None) -> None:
+    def __init__(self, scene: Scene, stand_out_m: float = 0.003, searching: SearchNotes | None = None) -> None:
         """Cover the gripper's geoms with spheres that protrude by at most `stand_out_m`.
 
-        searching: called before each search for spheres, but not for a stored cover. ConfigurationError if the robot
-        has no colliding geoms at the tool.
+        searching: told of each search for spheres, but not of a stored cover. ConfigurationError if the robot has no
+        colliding geoms at the tool.
         """
         model, robot = scene.model, scene.robot
         geoms = robot.gripper_geoms

@@ -2,14 +2,26 @@
 
 import hashlib
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final, Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from common.arrays import BoolArray, FloatArray, IntArray
 from common.errors import ConfigurationError
 from robot_side.drivers.mujoco.joint_drives import JointDrives
 from robot_side.drivers.mujoco.model_enums import BiasKind, GainKind, JointKind, TransmissionKind, WrappedKind
+
+SiteAxis = Literal["x", "-x", "y", "-y", "z", "-z"]
+
+AXES: Final[dict[SiteAxis, tuple[float, float, float]]] = {
+    "x": (1.0, 0.0, 0.0),
+    "-x": (-1.0, 0.0, 0.0),
+    "y": (0.0, 1.0, 0.0),
+    "-y": (0.0, -1.0, 0.0),
+    "z": (0.0, 0.0, 1.0),
+    "-z": (0.0, 0.0, -1.0),
+}
 
 _TURNING_OR_SLIDING = (JointKind.HINGE, JointKind.SLIDE)
 
@@ -46,7 +58,7 @@ class RobotModel:
     fingerprint: str
     """Twelve hexadecimal digits that identify an arm by its joints, links and limits, wherever its base is"""
     gripper_geoms: IntArray
-    """(k,) colliding geoms beyond the last arm link; on that link if there are none beyond"""
+    """(k,) colliding geoms beyond the last arm link, or on that link, too, if fewer than two bodies beyond have any"""
     geom_on_finger: BoolArray
     """(k,) whether a finger joint moves the geom"""
 
@@ -75,11 +87,12 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
     fingers = np.array([joint for body in beyond for joint in _joints(model, body)], dtype=np.int64)
     _require_simple(model, fingers)
     gripper_actuators = np.array(
-        [actuator for actuator in range(model.nu) if _moves_any(model, actuator, fingers)], dtype=np.int64
+        [actuator for actuator in range(model.nu) if moves_any(model, actuator, fingers)], dtype=np.int64
     )
     geoms = _touching_geoms(model, beyond)
-    if geoms.size == 0:
-        geoms = _touching_geoms(model, [last_link])
+    if len(set(model.geom_bodyid[geoms].tolist())) < 2 and (geoms.size == 0 or fingers.size):
+        # A single moving jaw grips against the link that carries it.
+        geoms = _touching_geoms(model, [*beyond, last_link])
     moved = {int(body) for body in beyond if set(_chain(model, body)) & set(model.jnt_bodyid[fingers].tolist())}
     limited = model.jnt_limited[joints].astype(bool)
     return RobotModel(
@@ -107,6 +120,17 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
         gripper_geoms=geoms,
         geom_on_finger=np.array([int(model.geom_bodyid[geom]) in moved for geom in geoms], dtype=bool),
     )
+
+
+def turn_site(model: Any, site: int, axis: SiteAxis) -> None:
+    """Turn the site's frame in a compiled model so that its new z axis is its present `axis`."""
+    if axis == "z":
+        return
+    turned = Rotation.align_vectors([AXES[axis]], [AXES["z"]])[0]
+    own = Rotation.from_quat(model.site_quat[site], scalar_first=True)
+    model.site_quat[site] = (own * turned).as_quat(scalar_first=True)
+    # MuJoCo takes the body's frame for a site that had the same one.
+    model.site_sameframe[site] = 0
 
 
 def _strongest(model: Any, actuators: IntArray) -> FloatArray:
@@ -189,7 +213,7 @@ def _joint_name(model: Any, joint: int) -> str:
 
 def _why_no_actuator(model: Any, joint: int) -> str:
     """Return the reason why a joint has no actuator of its own."""
-    if any(_moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu)):
+    if any(moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu)):
         return "it shares the tendon that pulls it with another joint"
     if model.nmocap > 0:
         return "the model is moved by a mocap body, which no real robot has"
@@ -224,7 +248,8 @@ def _actuator_of(model: Any, joint: int) -> int:
     )
 
 
-def _moves_any(model: Any, actuator: int, joints: IntArray) -> bool:
+def moves_any(model: Any, actuator: int, joints: IntArray) -> bool:
+    """Return whether an actuator moves one of `joints` (n,), directly or by a tendon."""
     kind, target = int(model.actuator_trntype[actuator]), int(model.actuator_trnid[actuator, 0])
     if kind in {TransmissionKind.JOINT, TransmissionKind.JOINT_IN_PARENT}:
         return target in joints

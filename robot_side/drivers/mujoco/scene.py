@@ -16,10 +16,10 @@ from common.errors import ConfigurationError
 from common.files.input_file import require_input_file
 from common.roles import Role
 from robot_side.arm.port import ArmState
-from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
+from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish, make_room
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.object_primitives import ObjectPrimitives, SceneObject
-from robot_side.drivers.mujoco.robot_model import RobotModel, can_touch, find_robot
+from robot_side.drivers.mujoco.robot_model import RobotModel, SiteAxis, can_touch, find_robot, moves_any, turn_site
 from robot_side.surroundings.roles import assign_roles
 
 _LOG = logging.getLogger(__name__)
@@ -59,6 +59,19 @@ class Scene:
         moves = movable[model.geom_bodyid]
         return frozenset(thing.name for thing in self.objects if not any(moves[geom] for geom in thing.geoms))
 
+    @property
+    def never_held(self) -> frozenset[str]:
+        """Names of the objects that cannot be held: fixed ones, and machines with actuators, such as another arm"""
+        model = self.model
+        machines = {
+            int(model.body_rootid[model.jnt_bodyid[joint]])
+            for joint in range(model.njnt)
+            if any(moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu))
+        }
+        roots = model.body_rootid[model.geom_bodyid]
+        driven = {thing.name for thing in self.objects if any(int(roots[geom]) in machines for geom in thing.geoms)}
+        return self.fixed | driven
+
     def step(self) -> None:
         """Advance the state by one step, with the actuators' present inputs."""
         mujoco.mj_step(self.model, self.data)
@@ -76,13 +89,14 @@ def load_scene(
     roles: Mapping[str, Role] | None = None,
     name: SceneName = "table",
     seed: int = 0,
+    site_axis: SiteAxis = "z",
 ) -> Scene:
     """Load the built-in arm, or the MJCF file `model_path`, whose tool is the site `site`.
 
     A file with only a robot and planes gets the built-in scene `name`, drawn from `seed`, in front of the robot; so
     does the built-in arm. The arm starts at the keyframe `home`, else at the first keyframe, else in the middle of the
-    joints' ranges. roles: override the roles that objects' names tell. ConfigurationError, of one line, for a file,
-    model or site that cannot be used.
+    joints' ranges. roles: override the roles that objects' names tell. The tool's z axis is the site's `site_axis`.
+    ConfigurationError, of one line, for a file, model or site that cannot be used.
     """
     mujoco.set_mju_user_warning(_log_warning)
     with warnings.catch_warnings(record=True) as said:
@@ -93,6 +107,7 @@ def load_scene(
             spec = _read(model_path)
         model = _compile(spec)
         robot = find_robot(model, site)
+        turn_site(model, robot.site, site_axis)
         start, start_pose = _start_configuration(model, robot)
         if all(model.geom_type[geom] == GeomKind.PLANE for thing in _objects(model, robot)[0] for geom in thing.geoms):
             # Attaching extends the keyframes by the attached joints, so that a keyframe preserves the configuration.
@@ -102,9 +117,10 @@ def load_scene(
             spec.add_key(name=start_key, qpos=start)
             surroundings = _read(_ASSETS / f"{name}_scene.xml")
             furnish(surroundings, name, seed)
-            _attach(surroundings, spec, model, robot, start)
+            _attach(surroundings, spec, model, robot, start, room=model_path is not None and name == "table")
             model = _compile(spec)
             robot = find_robot(model, site)
+            turn_site(model, robot.site, site_axis)
             start = model.key(start_key).qpos
     if not _SHORTEST_STEP_S <= model.opt.timestep <= _LONGEST_STEP_S:
         raise ConfigurationError(
@@ -227,8 +243,11 @@ def _objects(model: Any, robot: RobotModel) -> tuple[tuple[SceneObject, ...], tu
     return tuple(SceneObject(name, tuple(geoms)) for name, geoms in geoms_of.items()), shared
 
 
-def _attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatArray) -> None:
-    """Attach the built-in scene below the tool's start position, at the base's height, turned towards the tool."""
+def _attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatArray, *, room: bool) -> None:
+    """Attach the scene below the tool's start, at the base's height, turned towards the tool.
+
+    room: whether to give a hand that is wider than the built-in one as much room as that one has.
+    """
     data = mujoco.MjData(model)
     data.qpos[:] = start
     mujoco.mj_kinematics(model, data)
@@ -236,6 +255,8 @@ def _attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatAr
     ahead = tool[:2] - base[:2]
     # A tool right above the base has no direction.
     yaw = math.atan2(ahead[1], ahead[0]) if np.hypot(*ahead) > 0.05 else 0.0
+    if room:
+        make_room(table, *_hand_reach_m(model, robot, start, np.array([math.cos(yaw), math.sin(yaw)])))
     home_x, home_y, _ = table.site("tool_home").pos
     if model.geom_type[model.geom_type == GeomKind.PLANE].size:
         table.delete(table.geom("floor"))
@@ -249,3 +270,28 @@ def _attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatAr
             quat=[math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0)],
         ),
     )
+
+
+def _hand_reach_m(model: Any, robot: RobotModel, start: FloatArray, ahead: FloatArray) -> tuple[float, float]:
+    """Return how far the hand reaches from the tool's point, along the horizontal `ahead` (2,) and to its sides.
+
+    The fingers are at the start, and at either end of their ranges.
+    """
+    if robot.gripper_geoms.size == 0:
+        return 0.0, 0.0
+    data, geoms, fingers = mujoco.MjData(model), robot.gripper_geoms, robot.finger_positions
+    of_position = {int(address): joint for joint, address in enumerate(model.jnt_qposadr)}
+    ranges = model.jnt_range[[of_position[int(address)] for address in fingers]].reshape(-1, 2)
+    reaches_m = []
+    for placed in (start[fingers], *ranges.T):
+        data.qpos[:] = start
+        data.qpos[fingers] = placed
+        mujoco.mj_kinematics(model, data)
+        around = np.einsum("gij,gj->gi", data.geom_xmat[geoms].reshape(-1, 3, 3), model.geom_aabb[geoms, :3])
+        half_m = np.einsum("gij,gj->gi", np.abs(data.geom_xmat[geoms].reshape(-1, 3, 3)), model.geom_aabb[geoms, 3:])
+        middle_m = (data.geom_xpos[geoms] + around - data.site_xpos[robot.site])[:, :2]
+        for axis in (ahead, np.array([-ahead[1], ahead[0]])):
+            reaches_m.append((middle_m @ axis, half_m[:, :2] @ np.abs(axis)))
+    forward_m = max(float((middle + half).max()) for middle, half in reaches_m[::2])
+    sideways_m = max(float((np.abs(middle) + half).max()) for middle, half in reaches_m[1::2])
+    return forward_m, sideways_m

@@ -1,6 +1,7 @@
 """`feelahead calibrate`, and how the operator side uses the stored result."""
 
 import math
+import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -9,19 +10,23 @@ import pytest
 
 import feelahead.commands.calibrate
 import operator_side.main
-from common.errors import ConfigurationError, DeviceError
+import operator_side.turns
+from common.errors import ConfigurationError, DeviceError, NoDeviceError
 from common.loop import process
 from feelahead.main import command
+from operator_side.calibration.forces import ControllerForces, TriggerForces, forces_path, write_forces
 from operator_side.calibration.procedure import CalibrationError
 from operator_side.calibration.store import calibration_path, load_calibration, read_calibration, write_calibration
 from operator_side.controller import connection
 from operator_side.controller.feel import RELEASED
 from operator_side.controller.state import ControllerState
 from operator_side.core import OperatorSide
+from operator_side.dualsense.hid.second_writer import SecondWriters
 from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 from tests.helpers.fake_hid import ADDRESS, FakeBackend, FakeHandle
+from tests.helpers.machines.fake_proc import add_process
 
 REPORT_S = 0.004
 MEASURED = TravelCalibration(l2=TriggerTravel(0.1, 0.7))
@@ -125,6 +130,17 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_anything_is_meas
     assert list(tmp_path.iterdir()) == []
 
 
+def test_the_controller_that_was_asked_for_is_measured_or_the_others_are_named(handle: PlayedHandle) -> None:
+    with pytest.raises(NoDeviceError, match=f"aa:bb:cc:dd:ee:ff is not connected, only: {ADDRESS}"):
+        command(["calibrate", "--controller", "aa:bb:cc:dd:ee:ff"])
+    with pytest.raises(ConfigurationError, match="--controller with --device simulated; valid"):
+        command(["calibrate", "--controller", ADDRESS, "--device", "simulated"])
+    assert load_calibration(ADDRESS) is None
+    assert command(["calibrate", "--controller", ADDRESS]) == 0
+    assert load_calibration(ADDRESS) is not None
+    assert handle.closed == handle.times_opened
+
+
 # The operator side
 
 
@@ -151,6 +167,31 @@ def test_the_operator_side_uses_what_is_given_else_what_is_stored_for_its_contro
     calibration_path(ADDRESS).write_text("version = 7")
     with pytest.raises(ConfigurationError, match="feelahead calibrate"):
         run()
+
+
+def test_the_operator_side_names_a_second_writer_measured_forces_and_the_controllers_it_does_not_take(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    backend = FakeBackend({0x0CE6: {b"/dev/hidraw93": FakeHandle()}})
+    monkeypatch.setattr(process, "raise_priority", lambda: False)
+    add_process(tmp_path / "proc", 11, "steam", {"/dev/hidraw93": os.O_RDWR})
+    monkeypatch.setattr(operator_side.turns, "SecondWriters", lambda: SecondWriters(tmp_path / "proc"))
+    forces = ControllerForces(r2=TriggerForces(tuple(2.0 + 0.2 * strength for strength in range(9))))
+    write_forces(forces_path(ADDRESS), ADDRESS, forces)
+
+    def run(address: str) -> str:
+        options = ["--connect", "tcp://127.0.0.1:9", "--duration", "0.5", "--no-haptics", "--controller", address]
+        operator_side.main.command(options, backend)
+        return capsys.readouterr().out
+
+    said = run(ADDRESS)
+    assert said.count("steam (11) holds the controller open for writing, too: ") == 1
+    assert "measured: R2 yields to 2.0 N without an effect; strengths 1 to 8 add 0.2 0.4 0.6 " in said
+    assert f"the controller aa:bb:cc:dd:ee:ff is not connected, only: {ADDRESS}; waiting for a controller" in run(
+        "aa:bb:cc:dd:ee:ff"
+    )
+    forces_path(ADDRESS).write_text("version = 7")
+    assert "feelahead feel --measure" in run(ADDRESS)
 
 
 def test_a_file_that_breaks_while_it_runs_is_said_and_the_defaults_hold(

@@ -51,6 +51,7 @@ def situation(pose: GripperPose, objects: PerceivedObjects | None = None, **chan
         objects=Scene().objects() if objects is None else objects,
         loop_age_s=0.1,
         loop_age_known=True,
+        loop_age_settled=True,
         compensation="operator",
         gap_m=None,
         held=None,

@@ -189,7 +189,7 @@ def test_unplugged_it_is_lost_at_once_and_looked_for_a_second_later(world: World
     assert world.log[-3:] == ["lost", "close", "let go"]
     [note] = world.connection.take_notes()
     assert "the controller is gone" in note
-    assert "release the triggers and arm the robot again" in note
+    assert "release its triggers and arm again" in note
     world.run(LOOK_PERIOD_S - 2 * PERIOD_S)
     assert len(world.search.looks) == looks
     world.run(5.0)

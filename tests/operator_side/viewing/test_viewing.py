@@ -209,9 +209,9 @@ def test_a_picture_that_is_lacking_is_asked_for_at_once_and_then_four_times_a_se
 
 def test_pictures_and_scenes_go_to_the_console_and_the_rest_to_the_core() -> None:
     looking = Looking()
-    assert looking.viewing.take(VIDEO_TOPIC, b"a picture")
-    assert looking.viewing.take(SCENE_TOPIC, b"a scene")
-    assert not looking.viewing.take(b"telemetry", b"a view")
+    assert looking.viewing.take(VIDEO_TOPIC, b"a picture", 1.0)
+    assert looking.viewing.take(SCENE_TOPIC, b"a scene", 1.0)
+    assert not looking.viewing.take(b"telemetry", b"a view", 1.0)
     assert looking.console.views == [(b"a picture", True), (b"a scene", False)]
 
 
@@ -220,7 +220,7 @@ def test_without_a_console_nothing_is_asked_for_and_pictures_are_passed_over() -
     viewing = Viewing(bench.side, surroundings, Status("none", "test"), DrivingPage(), None)
     assert viewing.requests(1.0) == []
     assert not viewing.facts_due(1.0)
-    assert viewing.take(VIDEO_TOPIC, b"a picture")
+    assert viewing.take(VIDEO_TOPIC, b"a picture", 1.0)
     assert view_topics(OperatorSettings()) == (b"telemetry",)
     assert set(view_topics(OperatorSettings(console=True))) == {b"telemetry", VIDEO_TOPIC, SCENE_TOPIC}
 

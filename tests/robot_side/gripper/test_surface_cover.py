@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from common.arrays import FloatArray
 from robot_side.gripper.capsule_cover import cover_capsule
-from robot_side.gripper.kept_covers import kept_cover
-from robot_side.gripper.solids import Solid, convex_solid, cylinder, ellipsoid
+from robot_side.gripper.kept_covers import SearchNotes, kept_cover
+from robot_side.gripper.solids import Solid, convex_solid, cylinder, ellipsoid, simpler_convex_solid
 from robot_side.gripper.surface_cover import cover_surface
 from tests.helpers.perceived_scenes import random_rotation
 
@@ -83,6 +83,19 @@ def test_the_convex_hull_of_points(seed: int) -> None:
     check([solid], lambda c: (offsets - c @ normals.T).min(axis=1))
 
 
+def test_a_finely_drawn_part_is_covered_by_way_of_few_faces() -> None:
+    turns = np.linspace(0.0, 2.0 * np.pi, 1000, endpoint=False)
+    ring = np.column_stack([0.02 * np.cos(turns), 0.015 * np.sin(turns)])
+    drawn = np.concatenate([np.column_stack([ring, np.full(1000, z)]) for z in (-0.02, 0.03)])
+    whole, simpler = convex_solid(drawn), simpler_convex_solid(drawn, 0.05 * STAND_OUT_M)
+    assert whole is not None
+    assert simpler is not None
+    assert len(simpler.corners_m) < 0.2 * len(whole.corners_m)
+    assert simpler.depth_m(drawn).min() >= -1e-9
+    assert simpler.depth_m(drawn).max() <= 0.05 * STAND_OUT_M + 1e-9
+    check([simpler], whole.depth_m)
+
+
 def test_the_spheres_are_mirror_symmetric_where_the_shape_is() -> None:
     turn = random_rotation(np.random.default_rng(2))
     # A wedge: symmetric to one plane, and not to the other two.
@@ -121,6 +134,16 @@ def test_a_row_of_spheres_covers_a_capsule(radius: float, half: float, stand_out
     ends[:, 2] += np.copysign(half, ends[:, 2])
     assert outside_m(np.concatenate([side, ends]), centers, radii).max() <= 1e-12
     np.testing.assert_array_equal(np.sort(centers[:, 2]), np.sort(-centers[:, 2]))
+
+
+def test_searches_in_a_row_are_said_once_in_a_few_seconds() -> None:
+    said: list[str] = []
+    notes = SearchNotes(said.append)
+    for number in range(5):
+        notes.what = f"link {number}"
+        notes.begins()
+    [line] = said
+    assert "link 0" in line
 
 
 def test_a_cover_is_found_once_and_a_broken_file_is_made_anew(tmp_path: Path) -> None:

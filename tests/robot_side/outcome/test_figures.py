@@ -44,8 +44,9 @@ def test_figures_are_in_the_units_of_their_names() -> None:
     figures = RunFigures()
     figures.tick(sensed(0.030, 2e-6, l2=1, r2=8))
     figures.tick(sensed(0.050, 4e-6, l2=3, r2=4))
+    figures.tick(sensed(0.509, 3e-6, l2=2, r2=6), settled=False)
     summary = figures.summary()
-    assert summary["ticks"] == 2
+    assert summary["ticks"] == 3
     assert summary["enlargement_mm"] == pytest.approx({"min": 30.0, "mean": 40.0, "max": 50.0, "mean_moving": None})
     assert summary["overlap_mm3"] == pytest.approx({"max": 4000.0, "mean": 3000.0})
     assert summary["stiffness"]["l2"] == pytest.approx({"mean": 0.25, "max": 0.375})

@@ -9,6 +9,7 @@ from common.arrays import FloatArray
 from common.protocol.codec import VIEW_MAXIMUM_BYTES, decode_view
 from common.protocol.messages import Header
 from common.protocol.view_messages import SceneShapes, SceneState, Shape
+from common.roles import Role
 from robot_side.core import RobotSide
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.laws.law import Situation
@@ -27,7 +28,7 @@ def looked_at(settings: RobotSettings, scene: Scene | None = None) -> tuple[Robo
     parts = build_parts(settings, 1, "clock", scene=scene)
     robot = RobotSide(parts)
     robot.tick(0.0)
-    return robot, SceneView(SceneModel(parts.scene), parts.kinematics, parts.explains)
+    return robot, SceneView(SceneModel(parts.scene), parts.kinematics, parts.explains, parts.surroundings)
 
 
 def shapes_of(robot: RobotSide, view: SceneView) -> SceneShapes:
@@ -94,6 +95,21 @@ def test_every_kind_of_geom_is_where_the_model_has_it(tmp_path: Path) -> None:
 def _offset(scene: Scene, poses: FloatArray, index: int) -> FloatArray:
     offset: FloatArray = poses[index, :3] - scene.data.geom_xpos[scene.objects[index].geoms[0]]
     return offset
+
+
+def test_what_is_near_the_gripper_is_said_as_perceived() -> None:
+    robot, view = looked_at(RobotSettings())
+    sensed, situation = robot.newest or pytest.fail("no tick")
+    near, status = state_of(view, sensed, situation).near, robot.status(0.0)
+    assert near is not None
+    assert (near.nearest, near.held) == (status.nearest, None)
+    assert status.nearest_mm is not None
+    assert status.target_mm is not None
+    assert (near.nearest_m, near.target_m) == pytest.approx((1e-3 * status.nearest_mm, 1e-3 * status.target_mm))
+    target = situation.objects.roles.index(Role.TARGET)
+    held = state_of(view, sensed, replace(situation, held=target)).near
+    assert held is not None
+    assert (held.held, held.target_m) == (situation.objects.names[target], None)
 
 
 def test_links_are_the_robots_bodies_and_their_shapes_go_with_them() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from robot_side.drivers.mujoco.scene import load_scene
-from robot_side.viewing.viewpoints import viewpoints
+from robot_side.viewing.viewpoints import first_person_eye, viewpoints
 from tests.helpers.arm_models import planar_arm
 from tests.robot_side.viewing.picture_taking import HEIGHT, WIDTH, project
 
@@ -52,3 +52,18 @@ def test_the_first_person_is_behind_the_palm_and_beside_it(tmp_path: Path) -> No
         row, column, _ = project(scene, view, finger_m)
         assert 0 < row < HEIGHT
         assert 0 < column < WIDTH
+
+
+@pytest.mark.parametrize("built_in", [True, False])
+def test_the_eye_in_the_tool_frame_sees_points_where_the_picture_has_them(built_in: bool, tmp_path: Path) -> None:
+    scene = load_scene() if built_in else load_scene(planar_arm(tmp_path, yaw_deg=70.0), "tcp")
+    tool, eye = scene.data.site(scene.robot.site), first_person_eye(scene)
+    for point_m in ((0.0, 0.0, 0.1), (0.03, -0.02, 0.3)):
+        row, column, depth_m = project(
+            scene, viewpoints(scene)["first_person"], tool.xpos + tool.xmat.reshape(3, 3) @ point_m
+        )
+        seen = np.array(point_m) - eye.position_m
+        half_m = depth_m * np.tan(np.radians(0.5 * eye.fovy_deg))
+        assert seen @ eye.forward == pytest.approx(depth_m)
+        assert 0.5 * HEIGHT * (1.0 - seen @ eye.up / half_m) == pytest.approx(row)
+        assert 0.5 * (WIDTH + HEIGHT * (seen @ np.cross(eye.forward, eye.up)) / half_m) == pytest.approx(column)

@@ -44,7 +44,9 @@ class Table:
             stream: DelayLine(self.link.profile("to_operator", stream))
             for stream in ("haptics", "telemetry", "video", "scene")
         }
-        view = SceneView(SceneModel(self.parts.scene), self.parts.kinematics, self.parts.explains)
+        view = SceneView(
+            SceneModel(self.parts.scene), self.parts.kinematics, self.parts.explains, self.parts.surroundings
+        )
         self.looking = ViewScheduler(self.robot, view, self.desk.cameras, self, always=self.always)
         self.end = LinkEnd("operator", 5, "clock")
         self.watching: dict[str, Any] = {}

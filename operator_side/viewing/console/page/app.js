@@ -2,7 +2,8 @@
 import { Chart } from "./charts.js";
 import { Hands as PageHands } from "./hands.js";
 import { make } from "./make.js";
-import { LinkState, ShownKind, VIEWS } from "./names.js";
+import { Hands, LinkState, MotionState, ShownKind, VIEWS } from "./names.js";
+import { Overlay } from "./overlay.js";
 import { Player } from "./player.js";
 import { Clock, View } from "./views.js";
 import { Trigger } from "./triggers.js";
@@ -29,6 +30,7 @@ for (const [id, title] of Object.entries(FIGURES)) {
 
 const clock = new Clock();
 const views = VIEWS.map((name) => new View(byId(name), clock));
+const overlay = new Overlay(byId("first_person"));
 const triggers = { l2: new Trigger(byId("l2"), "L2"), r2: new Trigger(byId("r2"), "R2") };
 const charts = {
   delay: new Chart(byId("delay_chart"), "delay", "ms", [["to here", "--l2"], ["to the robot", "--r2", [5, 3]]]),
@@ -41,7 +43,7 @@ let heardMs = performance.now();
 let everHeard = false;
 let closedBecause = "";
 let facts = null;
-let drawn = true;
+let drawn = false;
 const frame = document.querySelector("#scene iframe");
 const slow = drawsSlowly();
 let run = { title: "", live: true };
@@ -50,7 +52,7 @@ let ended = ""; // why the connection is expected to end
 const send = (object) => {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(object));
 };
-const hands = new PageHands(document, send);
+const hands = new PageHands(document, send, () => views[0].capturedS);
 const player = new Player(byId("player"), send);
 
 function connect() {
@@ -130,6 +132,17 @@ function showFacts(message) {
   charts.delay.said = asked.map(([side, words]) => `emulated to the ${side}: ${words}`).join("; ");
   charts.stiffness.add(clock.nowMs, [facts.l2.stiffness, facts.r2.stiffness]);
   hands.show(facts);
+  showCounts(facts);
+}
+
+// The operator side lets a page's hands fade while the pictures are old.
+function showCounts({ page, hands: whose, status }) {
+  const drives = run.live && whose === Hands.BROWSER && page?.driver && status.state === MotionState.ARMED;
+  const off = drives && page.counts < 1;
+  document.body.classList.toggle("hands_off", Boolean(off));
+  byId("hands_off").hidden = !off;
+  const share = off && page.counts > 0 ? `hands at ${Math.round(100 * page.counts)} %` : "hands off";
+  if (off) text("hands_off", `PICTURES ARE OLD: ${share} until they are fresh`);
 }
 
 // Show rate and queueing delay as measured by the robot side, lost packets, and streams that are held back.
@@ -146,16 +159,18 @@ byId("again").onclick = () => {
   ended = "STARTING AGAIN";
 };
 
-byId("drawn").onclick = ({ currentTarget }) => {
-  drawn = !drawn;
-  currentTarget.textContent = `3-D drawing: ${drawn ? "on" : "off"}`;
-  currentTarget.setAttribute("aria-pressed", drawn);
+function draw(wanted) {
+  drawn = wanted;
+  byId("drawn").textContent = `3-D drawing: ${drawn ? "on" : slow ? "off, as this browser has no graphics processor" : "off"}`;
+  byId("drawn").setAttribute("aria-pressed", drawn);
   frame.hidden = true;
   if (!drawn) frame.removeAttribute("src");
-};
+}
+byId("drawn").onclick = () => draw(!drawn);
+draw(!slow);
 
-// Whether the browser draws without a graphics processor: the scene then takes much processor time, so it is updated
-// less often.
+// Whether the browser draws without a graphics processor: the scene then takes much processor time, so it is drawn only
+// on request, and updated less often.
 function drawsSlowly() {
   const context = document.createElement("canvas").getContext("webgl");
   const renderer = context?.getParameter(context.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? 0);
@@ -175,6 +190,7 @@ function showScene(scene) {
   // Only now, as viser has no camera position before the first scene.
   if (drawn && !frame.src) frame.src = sceneAddress();
   frame.hidden = !drawn;
+  overlay.show(scene, facts);
   charts.overlap.add(clock.nowMs, scene.overlap_mm3);
   charts.tick.add(clock.nowMs, scene.tick_us);
   const rows = scene.objects.map(({ name, role, overlap_mm3: [l2, r2] }) => {
@@ -197,7 +213,7 @@ function showNote(note) {
   const item = make("li", {}, note);
   byId("notes").append(item);
   while (byId("notes").childElementCount > MOST_NOTES) byId("notes").firstChild.remove();
-  item.scrollIntoView({ block: "nearest" });
+  byId("notes").scrollTop = byId("notes").scrollHeight;
 }
 
 function look() {
@@ -211,7 +227,8 @@ function look() {
     const old = everHeard ? `What you see is ${(silentMs / 1000).toFixed(1)} s old. ` : "";
     because.textContent = ended ? "" : old + (open ? "The operator side is silent." : `The console: ${closedBecause || "not reached yet"}.`);
   }
-  for (const view of views) view.look();
+  const limits = facts?.pictures;
+  views.forEach((view, k) => view.look(limits?.old_s[k] ?? null, limits?.dead_s[k]));
 }
 
 document.addEventListener("visibilitychange", () => send({ looks: !document.hidden }));

@@ -52,7 +52,7 @@ export class Chart {
 
     context.strokeStyle = color("--line");
     context.lineWidth = 1;
-    context.font = `11px ${FONT}`;
+    context.font = `12px ${FONT}`;
     context.fillStyle = color("--weak");
     for (const value of [0, top / 2, top]) {
       context.beginPath();
@@ -67,7 +67,7 @@ export class Chart {
     context.fillText(title, left, 13);
     if (this.said) {
       const beside = left + context.measureText(title).width + 8;
-      context.font = `11px ${FONT}`;
+      context.font = `12px ${FONT}`;
       context.fillStyle = color("--weak");
       context.fillText(this.#fitting(context, this.said, width - beside), beside, 13);
     }
@@ -82,7 +82,7 @@ export class Chart {
       context.lineTo(along + 18, 23);
       context.stroke();
       const newest = this.#samples.at(-1)?.[1][index];
-      context.font = `11px ${FONT}`;
+      context.font = `12px ${FONT}`;
       const words = `${name} ${Number.isFinite(newest) ? newest.toFixed(newest < 10 ? 2 : 0) : "?"}`;
       context.fillText(words, along + 22, 27);
       along += 32 + context.measureText(words).width;

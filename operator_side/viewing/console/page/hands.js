@@ -40,15 +40,22 @@ export class Hands {
   #factsMs = 0;
   #stopMs = null; // time of the last press of the stop
   #stopHeld = new Set();
+  #confirmed = false; // since that press, the arm was stopped: the same press stops it no second time
   #giveBack = false;
+  #reset = false;
   #why = "";
 
-  constructor(document, send) {
+  #shownS;
+
+  // shownS(): capture time of the first view's picture, on the robot side's clock; null without one.
+  constructor(document, send, shownS = () => null) {
     this.#document = document;
     this.#send = send;
+    this.#shownS = shownS;
     this.#panel = new Panel(document, {
       drive: () => (this.#state === "watching" ? this.#begin() : this.#end("You stopped driving.")),
       stop: (held) => this.#stop("pointer", held),
+      reset: () => this.#resetNow(),
       giveBack: () => this.#giveBackNow(),
     });
     this.#panel.grip(this.#grips);
@@ -70,6 +77,7 @@ export class Hands {
   show(facts) {
     this.#facts = facts;
     this.#factsMs = performance.now();
+    this.#confirmed ||= facts.status.state === MotionState.STOPPED;
     this.#agree();
     this.#tuning.show(facts);
     this.#draw();
@@ -95,6 +103,7 @@ export class Hands {
       return;
     }
     if (event.target.matches?.(EDITS)) return;
+    if (event.code === "KeyX" && !event.repeat) this.#resetNow();
     if (event.ctrlKey || event.altKey || event.metaKey) {
       this.#release("A browser shortcut was pressed."); // the browser may not report its release
       return;
@@ -163,6 +172,7 @@ export class Hands {
     if (held && !this.#stopHeld.has(by)) {
       this.#stopHeld.add(by);
       this.#stopMs = performance.now();
+      this.#confirmed = false;
       this.#release("You pressed the emergency stop.");
       this.#step();
     } else if (!held) this.#stopHeld.delete(by);
@@ -176,10 +186,19 @@ export class Hands {
     this.#say(REST);
   }
 
+  #resetNow() {
+    if (this.#stops || !this.#hands?.reset_first) return;
+    this.#release("The stop was reset.");
+    this.#reset = true;
+    this.#say(REST);
+    this.#reset = false;
+    this.#say(REST);
+  }
+
   get #stops() {
     if (this.#stopMs === null) return false;
     const sinceMs = performance.now() - this.#stopMs;
-    const goesOn = this.#facts?.status.state !== MotionState.STOPPED && sinceMs < STOP_TRIES_MS;
+    const goesOn = !this.#confirmed && sinceMs < STOP_TRIES_MS;
     return this.#stopHeld.size > 0 || sinceMs < STOP_MS || goesOn;
   }
 
@@ -190,6 +209,7 @@ export class Hands {
     const pads = readGamepads(this.#facts?.advancing === "L2");
     const there = this.#document.hasFocus();
     this.#stop("gamepad", there && pads.stop);
+    if (there && pads.reset) this.#resetNow();
     this.#panel.showGamepad(pads, there);
     if (this.#state !== "watching") {
       if (passedMs > HELD_UP_MS) this.#release("This page was suspended.");
@@ -207,7 +227,7 @@ export class Hands {
 
   #follow(hands, allUp, nowMs) {
     if (this.#state === "resting") {
-      this.#upSinceMs = allUp ? this.#upSinceMs ?? nowMs : null;
+      this.#upSinceMs = allUp && !this.#hands?.reset_first ? this.#upSinceMs ?? nowMs : null;
       const agreed = this.#hands?.driver === this.#page && this.#facts.status.person === Doing.READY;
       if (allUp && agreed && nowMs - this.#upSinceMs >= REST_MS) this.#enter("ready", "");
     } else if (this.#state === "ready" && !allUp) {
@@ -235,15 +255,15 @@ export class Hands {
   #say(hands) {
     const stop = this.#stops;
     const driving = this.#state !== "watching";
-    const said = { ...hands, driving, stop, give_back: this.#giveBack };
+    const said = { ...hands, driving, stop, reset: this.#reset, give_back: this.#giveBack };
     const text = JSON.stringify(said);
     const nowMs = performance.now();
     const changed = text !== this.#sent;
     if (!changed && (!(driving || stop) || nowMs - this.#sentMs < PERIOD_MS - 2)) return;
-    if (this.#sent === "" && !driving && !stop && !this.#giveBack) return; // nothing to send yet
+    if (this.#sent === "" && !driving && !stop && !this.#reset && !this.#giveBack) return; // nothing to send yet
     this.#sent = text;
     this.#sentMs = nowMs;
-    this.#send({ hands: { page: this.#page, number: this.#number++, ...said } });
+    this.#send({ hands: { page: this.#page, number: this.#number++, shown_s: this.#shownS(), ...said } });
   }
 
   #draw() {

@@ -100,7 +100,7 @@ function stick(x, y) {
 export function readGamepads(swapped) {
   const found = [...(navigator.getGamepads?.() ?? [])].filter((pad) => pad?.connected);
   const known = found.filter((pad) => pad.mapping === "standard");
-  let hands = REST, stop = false;
+  let hands = REST, stop = false, reset = false;
   for (const pad of known) {
     const value = (number) => pad.buttons[number]?.value ?? 0;
     const pressed = (number) => pad.buttons[number]?.pressed ?? false;
@@ -108,6 +108,7 @@ export function readGamepads(swapped) {
     const sticks = [stick(pad.axes[0] ?? 0, pad.axes[1] ?? 0), stick(pad.axes[2] ?? 0, pad.axes[3] ?? 0)];
     if (swapped) sticks.reverse();
     stop ||= pressed(1);
+    reset ||= pressed(9);
     hands = both(hands, {
       run: pressed(swapped ? 5 : 4),
       l2: swapped ? right : left,
@@ -119,7 +120,7 @@ export function readGamepads(swapped) {
       hand_over: pressed(8),
     });
   }
-  return { hands, stop, name: known[0]?.id ?? null, unknown: known.length ? null : found[0]?.id ?? null };
+  return { hands, stop, reset, name: known[0]?.id ?? null, unknown: known.length ? null : found[0]?.id ?? null };
 }
 
 // Merge two sets of inputs: the larger value of each input.

@@ -1,19 +1,23 @@
 // Panel for driving: its texts, buttons and elements to hold.
 import { KEYS, keyWords } from "./inputs.js";
 import { make } from "./make.js";
-import { Doing, Hands, MotionState, SessionState } from "./names.js";
+import { Doing, Hands, LinkState, MotionState, SessionState } from "./names.js";
 
 const FULL = "Travel of keys: 1 to 9";
 
 export class Panel {
+  #document;
   #section;
   #places = {};
   #shown = new Map();
 
-  constructor(document, { drive, stop, giveBack }) {
+  constructor(document, { drive, stop, reset, giveBack }) {
+    this.#document = document;
     const place = (name, element) => (this.#places[name] = element);
     this.#section = document.getElementById("hands");
-    const stopButton = place("stop", make("button", { type: "button", id: "stop", title: "Esc" }, "Emergency stop (Esc)"));
+    const stopButton = place("stop", make("button", { type: "button", id: "stop", title: "Esc" }, "STOP", make("small", {}, " Esc")));
+    const resetButton = place("reset", make("button", { type: "button", id: "reset", onclick: reset, hidden: true },
+      "RESET", make("small", {}, " X")));
     stopButton.addEventListener("pointerdown", () => stop(true));
     for (const end of ["pointerup", "pointercancel", "pointerleave"]) stopButton.addEventListener(end, () => stop(false));
     stopButton.addEventListener("click", () => (stop(true), stop(false)));
@@ -24,15 +28,16 @@ export class Panel {
       return place(name, element);
     };
     const keys = place("keys", make("dl"));
-    this.#section.replaceChildren(
-      make("h2", {}, "Hands"),
+    document.getElementById("stopping").replaceChildren(stopButton, resetButton);
+    document.getElementById("driving").replaceChildren(
       place("drive", make("button", { type: "button", id: "drive", onclick: drive }, "Drive from here")),
-      stopButton,
-      place("giveBack", make("button", { type: "button", id: "give_back", onclick: giveBack, hidden: true },
-        "Let the person continue")),
+      place("giveBack", make("button", { type: "button", id: "give_back", onclick: giveBack, hidden: true,
+        title: "The scripted person goes on" }, "Hand back")),
       place("state", make("p", { id: "hands_state", tabIndex: -1, role: "status" })),
       place("rest", make("p", { id: "hands_rest" })),
-      place("stopped", make("p", { id: "hands_stopped", role: "alert" })),
+      place("stopped", make("p", { id: "hands_stopped", role: "alert" })));
+    this.#section.replaceChildren(
+      make("h2", {}, "Hands"),
       place("level", make("p", { id: "hands_level" })),
       make("div", { className: "grips" },
         held("run", "hold to run", "Hold to run, with the pointer"),
@@ -49,7 +54,8 @@ export class Panel {
       keys.replaceChildren(...KEYS.flatMap(([, codes, does]) => [
         make("dt", {}, ...codes.flatMap((code, k) => [k ? " or " : "", make("kbd", {}, word(code))])), make("dd", {}, does),
       ]), make("dt", {}, make("kbd", {}, "1"), " … ", make("kbd", {}, "9")), make("dd", {}, "travel of keys"),
-      make("dt", {}, make("kbd", {}, "Esc")), make("dd", {}, "emergency stop, for any driver"));
+      make("dt", {}, make("kbd", {}, "Esc")), make("dd", {}, "emergency stop, for any driver"),
+      make("dt", {}, make("kbd", {}, word("KeyX"))), make("dd", {}, "reset a stop"));
     });
   }
 
@@ -66,7 +72,8 @@ export class Panel {
   }
 
   focus() {
-    this.#places.state.focus();
+    this.#places.state.focus({ preventScroll: true });
+    this.#document.getElementById("overview")?.scrollIntoView({ block: "nearest" }); // in a small window
   }
 
   #text(name, text) {
@@ -82,31 +89,36 @@ export class Panel {
   }
 
   show({ state, why, restMs, moves, facts, hands, mine, level, stop }) {
-    const { drive, giveBack } = this.#places;
-    this.#section.dataset.state = state;
+    const { drive, reset, giveBack } = this.#places;
+    for (const id of ["hands", "driving"]) this.#document.getElementById(id).dataset.state = state;
     const cannot = hands === null ? "No robot to drive yet."
       : !hands.may_drive ? "A real controller drives here; this page can stop the robot."
       : facts.status.owner === SessionState.OBSERVING ? "Another operator owns the robot; this one observes."
-      : "";
+      : facts.status.link !== LinkState.UP ? "The robot is not heard: nothing can be driven." : "";
     const taken = hands?.driver && !mine && state === "watching" ? "Another page drives." : "";
     const words = state === "watching" ? "Drive from here" : "Stop driving";
     if (drive.textContent !== words) drive.textContent = words;
     drive.disabled = state === "watching" && (hands === null || !hands.may_drive || taken !== "");
-    giveBack.hidden = !(hands?.person && facts.hands === Hands.BROWSER && (mine || !hands.driver));
+    const may = mine || !hands?.driver; // nobody resets or hands back for another page
+    reset.hidden = !(hands?.reset_first && may && !stop?.goesOn);
+    giveBack.hidden = !(hands?.person && facts.hands === Hands.BROWSER && may && !hands.reset_first);
     this.#text("state", {
       watching: [why, taken, cannot || (taken ? "" : "You are watching.")].filter(Boolean).join(" "),
-      resting: [why, "All keys up for a second."].filter(Boolean).join(" "),
-      ready: "Ready: hold Space to arm and run.",
-      running: moves ? "You drive." : facts?.status.person === Doing.AT_REST_FIRST ? "Release all but hold-to-run." : "Arming: keep holding.",
+      resting: [why, cannot || (hands?.reset_first ? "Reset the stop first." : "All keys up for a second.")].filter(Boolean).join(" "),
+      ready: cannot || "Ready: hold Space to arm and run.",
+      running: hands?.counts < 1 ? "Pictures are old: the hands are off until they are fresh." : moves ? "You drive." : facts?.status.person === Doing.AT_REST_FIRST ? "Release all but hold-to-run." : "Arming: keep holding.",
     }[state]);
-    this.#text("rest", state === "resting" ? `still ${(restMs / 1000).toFixed(1)} s` : "");
+    this.#text("rest", state === "resting" && !hands?.reset_first ? `still ${(restMs / 1000).toFixed(1)} s` : "");
     this.#text("level", state === "watching" ? "" : `${FULL}; now ${level}`);
-    this.#text("stopped", this.#aboutStop(stop, facts));
+    this.#text("stopped", this.#aboutStop(stop, facts, hands));
   }
 
-  #aboutStop(stop, facts) {
+  #aboutStop(stop, facts, hands) {
+    if (facts?.status.state === MotionState.STOPPED) {
+      return hands?.reset_first ? "STOPPED."
+        : hands?.may_drive ? "Stopped, and reset." : "STOPPED. The controller arms again.";
+    }
     if (stop === null) return "";
-    if (facts?.status.state === MotionState.STOPPED) return "STOPPED. Hold-to-run arms again after a second of rest.";
     if (facts?.status.owner === SessionState.OBSERVING) return "Only the owner can stop the robot: this operator observes.";
     if (stop.goesOn) return "Stop sent; the robot side has not confirmed it yet.";
     return stop.sinceMs < 10_000 ? "THE STOP WAS NOT CONFIRMED by the robot side." : "";

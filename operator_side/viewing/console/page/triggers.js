@@ -34,8 +34,9 @@ export class Trigger {
     this.#finger.style.left = `${100 * Math.min(Math.max(finger ?? 0.1, 0.02), 0.98)}%`;
     const percent = (value) => (value === null ? "?" : `${Math.round(100 * value)} %`);
     this.#words[0].textContent = `pulled ${percent(facts.travel)} · free to ${percent(facts.free)}`;
-    const ahead = facts.needed_m === null ? "?" : `${Math.round(1000 * facts.needed_m) + 0} mm`; // no -0
+    const mm = facts.needed_m === null ? null : Math.round(1000 * facts.needed_m);
+    const ahead = mm === null ? "?" : `${Math.abs(mm)} mm ${mm < 0 ? "behind" : "ahead"}`;
     const stiffness = facts.stiffness === null ? "?" : facts.stiffness.toFixed(2);
-    this.#words[1].textContent = `D = ${ahead} ahead · stiffness s(δ) ${stiffness}`;
+    this.#words[1].textContent = `D = ${ahead} · s(δ) = ${stiffness}`;
   }
 }

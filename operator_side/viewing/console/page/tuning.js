@@ -1,6 +1,6 @@
 // Tuning during a run, if the run permits it: probability P of eq. 10, and the emulated link.
 import { make } from "./make.js";
-import { SessionState } from "./names.js";
+import { LinkState, SessionState } from "./names.js";
 
 const PROBABILITIES = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998, 0.999];
 const PAUSE_MS = 250; // a slider's value is sent once it rests
@@ -54,7 +54,8 @@ export class Tuning {
   show(facts) {
     const asked = [facts.to_robot.asked, facts.to_operator.asked || facts.page?.link_asked || ""];
     const owns = facts.status.owner !== SessionState.OBSERVING;
-    const reason = !owns ? "Only the owner may tune; this operator observes."
+    const lost = facts.status.link !== LinkState.UP;
+    const reason = owns && lost ? "The robot is not heard: nothing can be tuned." : !owns ? "Only the owner may tune; this operator observes."
       : !facts.may_tune ? "This run does not permit tuning (robot side: --permit-tuning)."
       : facts.page?.tuning_refused ?? "";
     if (this.#reason.textContent !== reason) this.#reason.textContent = reason;
@@ -62,14 +63,14 @@ export class Tuning {
     const link = readWords(asked[0]);
     const holds = { probability: facts.probability === null ? null : nearest(facts.probability), ...link };
     for (const [name, { slider, now, words }] of Object.entries(this.#sliders)) {
-      slider.disabled = !(owns && facts.may_tune);
+      slider.disabled = lost || !(owns && facts.may_tune);
       const wishedMs = this.#wishedMs[name === "probability" ? name : "link"];
       const follows = performance.now() - wishedMs > FOLLOWS_MS && this.#timers[name === "probability" ? name : "link"] == null;
       if (follows && holds[name] !== null) slider.value = holds[name];
       const value = Number(slider.value);
       slider.setAttribute("aria-valuetext", words(value));
       const has = name === "probability" ? facts.probability === null ? "?" : `${facts.probability}` : words(holds[name]);
-      const said = has === words(value) ? has : `${words(value)}; the run has ${has}`;
+      const said = slider.disabled || has === words(value) ? has : `${words(value)}; the run has ${has}`;
       if (now.textContent !== said) now.textContent = said;
     }
   }

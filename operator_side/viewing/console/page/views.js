@@ -1,6 +1,5 @@
-// Camera views: the newest picture of each, with its age.
-const OLD_S = 0.3;
-const SILENT_MS = 500;
+// Camera views: the newest picture of each, with its age. The operator side works out what age is old.
+const DEAD_S = 0.5; // without the operator side's limits, as in an old recording
 
 // Estimate of the operator side's clock, from the message with the least delay.
 export class Clock {
@@ -32,10 +31,10 @@ export class Clock {
 }
 
 export class View {
-  #place; #clock; #context; #age; #stale;
+  capturedS = null; // of the picture shown, on the robot side's clock
+  #place; #clock; #context; #age; #dead;
   #waiting = null;
   #busy = false;
-  #capturedS = null;
   #shownMs = -Infinity;
 
   constructor(place, clock) {
@@ -43,7 +42,7 @@ export class View {
     this.#clock = clock;
     this.#context = place.querySelector("canvas").getContext("2d");
     this.#age = place.querySelector(".age");
-    this.#stale = place.querySelector(".stale");
+    this.#dead = place.querySelector(".dead");
   }
 
   receive(data) {
@@ -64,7 +63,7 @@ export class View {
         }
         this.#context.drawImage(picture, 0, 0);
         picture.close();
-        this.#capturedS = new DataView(data).getFloat64(1, true);
+        this.capturedS = new DataView(data).getFloat64(1, true);
         this.#shownMs = this.#clock.nowMs;
         this.#place.dataset.frames = Number(this.#place.dataset.frames ?? 0) + 1;
       } catch {
@@ -74,17 +73,18 @@ export class View {
     this.#busy = false;
   }
 
-  look() {
-    if (this.#capturedS === null) {
-      this.#place.classList.add("old");
-      return;
-    }
-    const silent = this.#clock.nowMs - this.#shownMs > SILENT_MS;
-    const ageS = this.#clock.ageS(this.#capturedS);
-    const old = silent || (ageS !== null && ageS > OLD_S);
-    this.#age.textContent = ageS === null ? "age unknown" : `${Math.max(0, ageS * 1000).toFixed(0)} ms old`;
-    this.#place.classList.toggle("old", old);
-    this.#stale.hidden = !old;
-    if (old) this.#stale.textContent = `STALE ${(ageS ?? (this.#clock.nowMs - this.#shownMs) / 1000).toFixed(1)} s`;
+  // oldS: age from which it is old, null while unknown; deadS: silence from which it is dead.
+  look(oldS, deadS = DEAD_S) {
+    if (this.capturedS === null) return;
+    const silentS = (this.#clock.nowMs - this.#shownMs) / 1000;
+    const ageS = this.#clock.ageS(this.capturedS);
+    const dead = silentS > deadS;
+    const old = oldS !== null && ageS !== null && ageS > oldS;
+    this.#place.dataset.age = dead ? "dead" : old ? "old" : "fresh";
+    const ms = (seconds) => Math.max(0, 1000 * seconds).toFixed(0);
+    this.#age.textContent = ageS === null ? "age unknown" : `${ms(ageS)} ms old`;
+    this.#age.title = oldS === null ? "" : `amber beyond ${ms(oldS)} ms on this link`;
+    this.#dead.hidden = !dead;
+    if (dead) this.#dead.textContent = `NO NEW PICTURE for ${silentS.toFixed(1)} s`;
   }
 }

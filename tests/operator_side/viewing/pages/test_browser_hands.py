@@ -3,6 +3,7 @@
 from itertools import pairwise
 from typing import Any
 
+import msgspec
 import pytest
 
 from common.protocol.messages import Telemetry
@@ -161,6 +162,17 @@ def test_a_stop_takes_the_controller_from_the_person_for_good() -> None:
     alone.page.say(0.0, driving=False, give_back=True)
     assert not any(one.run for one in alone.let_pass(3.0, says=False))
     assert (alone.hands.hands, alone.hands.has_person) == (Hands.BROWSER, False)
+
+
+def test_a_stop_from_elsewhere_needs_a_reset_too_and_hold_to_run_does_not_arm_before_it() -> None:
+    desk = Desk()
+    desk.arm()
+    desk.screen = msgspec.structs.replace(VIEW, state="stopped")
+    desk.let_pass(1.3)
+    assert not any(one.arm or one.run for one in desk.let_pass(1.0, run=True))
+    desk.let_pass(0.02, reset=True)
+    desk.let_pass(1.1)
+    assert any(one.arm for one in desk.let_pass(0.5, run=True))
 
 
 def test_the_hands_press_no_button_that_was_not_asked_for() -> None:

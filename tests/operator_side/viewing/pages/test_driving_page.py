@@ -101,6 +101,24 @@ def test_any_page_stops_and_then_all_keys_are_up_first(pages: DrivingPage) -> No
     assert pages.hands(now_s + 0.02) is None
 
 
+def test_hold_to_run_counts_again_only_after_a_reset_by_the_page_that_drives(pages: DrivingPage) -> None:
+    one, two = TalkingPage(pages, 1), TalkingPage(pages, 2)
+    now_s = one.go_on(running(pages, one), 0.1, stop=True)
+    now_s = one.go_on(now_s, 2.0)
+    assert (pages.doing, pages.reset_first) == (Doing.ALL_KEYS_UP_FIRST, True)
+    one.say(now_s, reset=True, stop=True)  # pressed together, the stop counts
+    two.say(now_s + 0.01, driving=False, reset=True)
+    two.say(now_s + 0.01, driving=False, give_back=True)
+    assert (pages.reset_first, pages.take_give_back()) == (True, False)
+    one.say(now_s + 1.0, reset=True)
+    assert pages.reset_first is False
+    now_s = one.go_on(now_s + 1.02, 1.1)
+    assert pages.doing is Doing.READY
+    pages.require_reset()
+    one.say(now_s, run=True)
+    assert pages.hands(now_s) is None
+
+
 def test_an_overtaken_message_counts_only_for_its_stop(pages: DrivingPage) -> None:
     page = TalkingPage(pages)
     late, late_stop = page.content(run=True, r2=1.0), page.content(stop=True)
@@ -156,6 +174,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "stick": {"run": True, "lateral": [0.0, -1.0]},
     "grip": {"gripper": 1},
     "stop": {"stop": True},
+    "reset": {"reset": True},
     "look on": {"driving": False},
     "give back": {"give_back": True},
 }

@@ -250,3 +250,33 @@ def test_a_bad_command_is_named_and_changes_nothing() -> None:
     before = scene.data.ctrl.copy()
     arm.state(0.5)
     np.testing.assert_allclose(scene.data.ctrl, before, atol=1e-3)
+
+
+SECOND_ARM = """
+  <body name="second" pos="0 1 0.5"><joint name="idle" axis="0 1 0" armature="0.01"/>
+    <geom name="second_link" type="capsule" fromto="0 0 0 0.4 0 0" size="0.03" mass="2"/></body>
+"""
+
+
+@pytest.mark.parametrize(
+    "actuator",
+    [
+        '<position name="idle" joint="idle" kp="300" kv="20"/>',
+        '<velocity name="idle" joint="idle" kv="20"/>',
+        '<motor name="idle" joint="idle" gear="5"/>',
+    ],
+    ids=["position", "velocity", "motor"],
+)
+def test_joints_that_are_neither_arm_nor_fingers_are_held(tmp_path: Path, actuator: str) -> None:
+    home = '<keyframe><key name="home" qpos="0 0.4 -1 0 0"/></keyframe>'
+    model = planar_arm(
+        tmp_path, arm_actuators=POSITION_SERVOS + actuator, world=SECOND_ARM, extra_bottom=COUPLING + home
+    )
+    scene = load_scene(model, "tcp")
+    joint = scene.data.joint("idle")
+    joint.qpos[0] = 0.7
+    arm = perfect_arm(scene)
+    for tick in range(1000):
+        arm.state(1e-3 * tick)
+    assert abs(joint.qpos[0] - 0.7) < 0.005
+    assert scene.never_held >= {"second"}

@@ -1,16 +1,22 @@
 """Places and sizes in the built-in scenes, drawn by the seed, stay within the ranges that docs/scenes.md states."""
 
+from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
 import pytest
 
 from common.roles import Role
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
 from robot_side.drivers.mujoco.scene import Scene, load_scene
+from tests.helpers.arm_models import COUPLING, planar_arm
 
 SEEDS = range(12)
 NAMES: tuple[SceneName, ...] = get_args(SceneName)
+
+MOVED = ("target", "carton", "tin", "orange", "ball")
+HOME = f'{COUPLING}<keyframe><key name="home" qpos="0.4 -1 0 0"/></keyframe>'
 
 
 def box(scene: Scene, name: str) -> tuple[Any, Any]:
@@ -60,3 +66,16 @@ def test_what_is_drawn_stays_within_what_is_said_of_it() -> None:
         assert 0.030 <= board[2] + board_half[2] <= 0.090
         assert edge[2] + edge_half[2] > board[2] + board_half[2]
     assert 0.010 <= min(behind_m) < max(behind_m) - 0.02 <= 0.040
+
+
+def test_a_wide_hand_gets_as_much_room_as_the_built_in_one(tmp_path: Path) -> None:
+    places = {}
+    for half_width_m in (0.06, 0.12):
+        model = planar_arm(tmp_path, extra_bottom=HOME)
+        model.write_text(model.read_text().replace('size="0.02 0.06 0.02"', f'size="0.02 {half_width_m} 0.02"'))
+        data = load_scene(model, "tcp").data
+        places[half_width_m] = {name: data.body(f"table_scene/{name}").xpos[:2].copy() for name in MOVED}
+    moved = {name: places[0.12][name] - places[0.06][name] for name in MOVED}
+    for name, sideways_m in {"target": 0.0, "carton": 0.0, "tin": 0.06, "orange": 0.06, "ball": -0.06}.items():
+        np.testing.assert_allclose(moved[name], [0.0, sideways_m], atol=1e-9)
+    assert float(load_scene().data.body("table_scene/tin").xpos[1]) == pytest.approx(0.14, abs=1e-5)

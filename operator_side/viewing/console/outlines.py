@@ -1,0 +1,55 @@
+"""Outline of an object in the first-person view, from the scene and the robot side's viewpoint."""
+
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from common.protocol.view_messages import Eye, Shape
+
+Floats = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+"""Left, lower, right and upper edge, in half heights of the picture from its centre; right and up are positive"""
+_SIGNS: Final = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
+_NEAREST_M: Final = 0.005
+"""Least distance before the eye; a corner behind it has no place in the picture"""
+
+
+def corners_m(shape: Shape) -> Floats:
+    """Return the corners (8, 3) of a box around a shape, in its owner's frame."""
+    x, y, z = shape.size_m
+    low, high = np.zeros(3), np.zeros(3)
+    if shape.kind == "mesh":
+        vertices = np.frombuffer(shape.vertices_m, np.float32).reshape(-1, 3)
+        low, high = vertices.min(axis=0).astype(np.float64), vertices.max(axis=0).astype(np.float64)
+    else:
+        half = {"sphere": (x, x, x), "cylinder": (x, x, y), "capsule": (x, x, x + y)}.get(shape.kind, (x, y, z))
+        low, high = -np.array(half), np.array(half)
+    box = 0.5 * (low + high) + 0.5 * _SIGNS * (high - low)
+    return _moved(np.array(shape.pose), box)
+
+
+def outline(shapes: Iterable[Shape], owner_pose: Floats, tool_pose: Floats, eye: Eye) -> Box | None:
+    """Return the box around the shapes of one owner as the eye sees them; None if part of it is behind the eye.
+
+    owner_pose, tool_pose: (7,) in the world frame, positions and quaternions, w first.
+    """
+    corners = [_moved(owner_pose, corners_m(shape)) for shape in shapes]
+    if not corners:
+        return None
+    turn = Rotation.from_quat(tool_pose[3:], scalar_first=True)
+    seen = turn.inv().apply(np.concatenate(corners) - tool_pose[:3]) - np.array(eye.position_m)
+    forward, up = np.array(eye.forward), np.array(eye.up)
+    depth_m = seen @ forward
+    if depth_m.min() < _NEAREST_M:
+        return None
+    half_height = depth_m * np.tan(np.radians(0.5 * eye.fovy_deg))
+    right, above = (seen @ np.cross(forward, up)) / half_height, (seen @ up) / half_height
+    return float(right.min()), float(above.min()), float(right.max()), float(above.max())
+
+
+def _moved(pose: Floats, points: Floats) -> Floats:
+    moved: Floats = Rotation.from_quat(pose[3:], scalar_first=True).apply(points) + pose[:3]
+    return moved

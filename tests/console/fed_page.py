@@ -1,0 +1,69 @@
+"""Console that a thread feeds with facts and pictures in a test's hands: no robot side takes part."""
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import msgspec
+
+from common.clock import MonotonicClock
+from common.protocol.view_messages import VIEW_NAMES
+from common.status.codes import Hands
+from operator_side.viewing.console.console import Console
+from operator_side.viewing.facts import HandsFacts, PictureFacts
+from tests.console.browser import SMALL, Browser, Page
+from tests.helpers.machines.waiting import wait_until
+from tests.operator_side.console_feed import Pictures, facts, shapes, state
+
+OLD_S: Final = 30.0
+"""Limit of age: no machine is as slow as that"""
+AGE: Final = "document.querySelector('#overview').dataset.age"
+
+
+@dataclass
+class Fed:
+    """Facts and pictures of a console, fed in a thread; a test changes them."""
+
+    age_s: float = 0.0
+    sends: bool = True
+    """Whether pictures come"""
+    page: HandsFacts = field(default_factory=lambda: HandsFacts(True, "page", False, "", None))
+    pictures: PictureFacts = field(default_factory=lambda: PictureFacts((OLD_S,) * 2, (OLD_S,) * 2))
+    notes: list[str] = field(default_factory=list)
+    address: str | None = None
+    ends: threading.Event = field(default_factory=threading.Event)
+
+    def feed(self) -> None:
+        """Feed 20 times a second until the end."""
+        clock, pictures, step = MonotonicClock(), Pictures(), 0
+        with Console("test") as console:
+            while not self.ends.wait(0.05):
+                console.receive()
+                self.address, now_s, step = console.address, clock.now(), step + 1
+                told: dict[str, Any] = {"hands": Hands.BROWSER, "page": self.page, "pictures": self.pictures}
+                while self.notes:
+                    console.note(self.notes.pop())
+                if step % 20 == 0:
+                    console.view(shapes(), video=False)
+                console.view(state(now_s), video=False)
+                console.facts(msgspec.structs.replace(facts(now_s), **told))
+                for view in VIEW_NAMES if self.sends else ():
+                    console.view(pictures.frame(view, now_s, step, now_s - self.age_s), video=True)
+
+
+@contextmanager
+def fed_page(browser: Browser, size: tuple[int, int] = SMALL) -> Iterator[tuple[Fed, Page]]:
+    """Yield the page open at `size`, with fresh pictures, and what feeds it."""
+    fed = Fed()
+    thread = threading.Thread(target=fed.feed)
+    thread.start()
+    try:
+        wait_until("a console's address", lambda: fed.address, 60.0)
+        with browser.page(str(fed.address), size) as page:
+            page.wait(f"{AGE} == 'fresh'", "fresh pictures", 30.0)
+            yield fed, page
+    finally:
+        fed.ends.set()
+        thread.join()

@@ -1,0 +1,60 @@
+"""Amber, dead, hands off, stop and reset, as the page shows them: the operator side's facts are given."""
+
+import msgspec
+import pytest
+
+from operator_side.viewing.facts import PictureFacts
+from tests.console.browser import Browser
+from tests.console.fed_page import AGE, OLD_S, fed_page
+from tests.console.hands_alone import hands_alone
+
+pytestmark = [pytest.mark.console, pytest.mark.processes]
+
+
+def test_old_pictures_are_amber_in_a_corner_and_keep_their_colours_and_dead_ones_say_so(browser: Browser) -> None:
+    with fed_page(browser) as (fed, page):
+        fed.age_s = 2.0
+        fed.pictures = PictureFacts((0.4,) * 2, (OLD_S,) * 2)
+        page.wait(f"{AGE} == 'old'", "amber", 30.0)
+        looks = "getComputedStyle(document.querySelector('#overview {}')).{}"
+        assert page.ask(looks.format(".age", "backgroundColor")) == "rgb(255, 193, 77)"
+        assert page.ask(looks.format("canvas", "filter + getComputedStyle(document.body).opacity")) == "none1"
+        assert not page.raw.is_visible("#overview .dead")
+        page.picture("pictures-old")
+        fed.sends, fed.pictures = False, PictureFacts((OLD_S,) * 2, (0.5,) * 2)
+        page.wait_for_text("#overview .dead", "NO NEW PICTURE for 2", 30.0)
+        assert page.ask(AGE) == "dead"
+        assert page.raw.is_visible("#overview .dead")
+        page.picture("pictures-dead")
+
+
+def test_the_border_says_that_hands_are_off_until_they_count_again(browser: Browser) -> None:
+    with fed_page(browser) as (fed, page):
+        for counts, words in ((0.4, "hands at 40 %"), (0.0, "hands off")):
+            fed.page = msgspec.structs.replace(fed.page, counts=counts)
+            page.wait_for_text("#hands_off", words)
+            assert page.raw.is_visible("#hands_off")
+        page.picture("hands-off")
+        fed.page = msgspec.structs.replace(fed.page, counts=1.0)
+        page.wait("document.querySelector('#hands_off').hidden", "hands that count", 20.0)
+
+
+def test_after_a_stop_only_the_reset_lets_hold_to_run_count(browser: Browser) -> None:
+    """By the red button and its own reset; neither a rest nor Space is one."""
+    with hands_alone(browser) as alone:
+        alone.run()
+        assert not alone.page.raw.is_visible("#reset")
+        alone.page.raw.click("#stop")
+        alone.page.raw.keyboard.up("Space")
+        alone.let_pass(1.5)
+        alone.expect("Reset the stop first")
+        alone.page.raw.keyboard.down("Space")
+        alone.let_pass(0.5)
+        alone.page.raw.keyboard.up("Space")
+        assert (alone.state, alone.runs) == ("stopped", False)
+        alone.page.raw.click("#reset")
+        alone.let_pass(1.3)
+        alone.expect("Ready")
+        alone.page.raw.keyboard.down("Space")
+        alone.let_pass(0.3)
+        assert alone.state == "armed"

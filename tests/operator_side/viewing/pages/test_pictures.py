@@ -1,0 +1,132 @@
+"""Old and dead pictures, and the hands that fade with them, in virtual time."""
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import msgspec
+import pytest
+
+from common.protocol.codec import encode
+from common.protocol.view_messages import VIEW_NAMES, VideoFrame
+from operator_side.viewing.pages.pictures import FIRST, Pictures, dead_after_s, old_after_s
+from tests.helpers.felt import felt
+from tests.operator_side.operator_bench import Bench
+from tests.operator_side.viewing.pages.test_browser_hands import Desk
+
+TICK_S, INTERVAL_S = 0.01, 0.05
+Delay = Callable[[float], float | None]
+"""Delay of a picture captured at a time, in seconds; None if it never comes"""
+
+
+def test_the_limits_are_the_sum_of_what_is_known_of_the_link() -> None:
+    known = {"control_p95_s": 0.12, "video_later_s": 0.03, "size_bytes": 25_000, "interval_s": 0.05}
+    assert old_after_s(**known, rate_bit_s=2e6) == pytest.approx(0.12 + 0.03 + 0.1 + 0.1 + 0.1)
+    assert old_after_s(**known, rate_bit_s=None) == pytest.approx(0.35)
+    assert dead_after_s(0.05) == 0.5
+    assert dead_after_s(0.4) == pytest.approx(1.2)
+
+
+class Watched:
+    """Operator side that is sent pictures of both views 20 times a second, and control messages 100 times."""
+
+    def __init__(self, control_s: float, video: Delay) -> None:
+        self.bench, self.pictures = Bench(), Pictures()
+        self._control_s, self._video = control_s, video
+        self._under_way: list[tuple[float, bytes]] = []
+        self._captured_s = self.start_s = self.bench.now_s
+        self.shown: Delay | None = None
+        """Delay of the picture that the page shows, if it says so"""
+
+    @property
+    def passed_s(self) -> float:
+        return self.bench.now_s - self.start_s
+
+    def let_pass(self, for_s: float) -> list[float]:
+        """Return the share of the hands after each tick."""
+        shares, bench = [], self.bench
+        for _ in range(round(for_s / TICK_S)):
+            bench.now_s += TICK_S
+            bench.side.receive(encode(felt(bench.robot.stamp(bench.now_s - self._control_s))), bench.now_s)
+            while self._captured_s + INTERVAL_S <= bench.now_s:
+                self._captured_s += INTERVAL_S
+                if (delay_s := self._video(self._captured_s - self.start_s)) is not None:
+                    for view in VIEW_NAMES:
+                        frame = VideoFrame(bench.robot.stamp(self._captured_s), view, self._captured_s, 8, 8, bytes(99))
+                        self._under_way.append((self._captured_s + delay_s, encode(frame)))
+            for due_s, payload in self._under_way:
+                if due_s <= bench.now_s:
+                    self.pictures.take(payload, bench.now_s)
+            self._under_way = [one for one in self._under_way if one[0] > bench.now_s]
+            shown = None if self.shown is None else self.shown(bench.now_s)
+            self.pictures.follow(bench.side, None if shown is None else bench.now_s - shown, bench.now_s)
+            shares.append(self.pictures.hands)
+        return shares
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.15, 0.3, 1.0])
+def test_pictures_as_late_as_the_link_are_not_old(delay_s: float) -> None:
+    watched = Watched(delay_s, lambda _: delay_s + 0.02)
+    watched.let_pass(2.0 + delay_s)
+    assert set(watched.let_pass(3.0)) == {1.0}
+    assert watched.pictures.facts().old_s[0] == pytest.approx(delay_s + 2 * INTERVAL_S + 0.1, abs=0.005)
+
+
+@pytest.mark.parametrize("control_s", [0.0, 0.3])
+def test_within_a_second_of_an_outage_the_hands_are_off_without_a_jump_and_return_by_themselves(
+    control_s: float,
+) -> None:
+    watched = Watched(control_s, lambda at_s: None if 3.0 <= at_s < 8.0 else control_s)
+    assert watched.let_pass(3.0 + control_s)[-1] == 1.0
+    old_after_s = watched.pictures.facts().old_s[VIEW_NAMES.index(FIRST)]
+    assert old_after_s is not None
+    fading = watched.let_pass(old_after_s - control_s + 1.0)
+    assert fading[-1] == 0.0
+    assert max(before - after for before, after in pairwise(fading)) < 0.03
+    assert set(watched.let_pass(8.0 - watched.passed_s)) == {0.0}
+    assert watched.let_pass(control_s + 1.0)[-1] == 1.0
+
+
+def test_a_queue_of_pictures_alone_is_not_excused() -> None:
+    """Pictures come at their rate, each later than the one before; control messages stay fast."""
+    watched = Watched(0.02, lambda at_s: 0.02 + 0.3 * at_s)
+    assert watched.let_pass(0.4)[-1] == 1.0
+    assert watched.let_pass(3.0)[-1] == 0.0
+
+
+def test_a_page_that_shows_them_late_counts_as_old_too() -> None:
+    watched = Watched(0.02, lambda _: 0.02)
+    watched.shown = lambda _: 0.1
+    assert watched.let_pass(2.0)[-1] == 1.0
+    watched.shown = lambda _: 2.0
+    assert watched.let_pass(1.0)[-1] == 0.0
+    watched.shown = lambda _: -9.0  # a page cannot show what has not come
+    assert watched.let_pass(1.0)[-1] == 1.0
+
+
+def test_another_clock_of_a_robot_side_started_anew_is_followed_and_what_is_broken_passed_over() -> None:
+    pictures, bench = Pictures(), Bench()
+    for captured_s in (500.0, 500.05, 3.0, 3.05):
+        payload = encode(VideoFrame(bench.robot.stamp(1.0), FIRST, captured_s, 8, 8, b"1"))
+        for one in (payload, payload[:-1], b""):
+            pictures.take(one, captured_s)
+    pictures.follow(bench.side, None, 3.06)
+    assert pictures.facts().dead_s[0] == 0.5
+    assert pictures.hands == 1.0
+    pictures.follow(bench.side, None, 3.5)
+    assert pictures.hands < 1.0
+
+
+def test_hands_are_scaled_and_hold_to_run_stays_the_persons() -> None:
+    desk = Desk()
+    desk.arm()
+    for counts in (1.0, 0.5, 0.0):
+        desk.pages.pictures.hands = counts
+        moved: dict[str, Any] = {"r2": 0.8, "lateral": (0.4, -0.2), "turning": (0.0, 1.0), "gripper": 1}
+        meant = desk.let_pass(0.1, run=True, **moved)[-1]
+        assert meant.run
+        assert (meant.r2, *meant.lateral, *meant.turning) == pytest.approx(
+            tuple(counts * value for value in (0.8, 0.4, -0.2, 0.0, 1.0))
+        )
+        assert meant.gripper == (1 if counts == 1.0 else 0)
+    assert msgspec.to_builtins(desk.pages.facts(Bench().side, desk.now_s, person=False))["counts"] == 0.0
