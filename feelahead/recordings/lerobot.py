@@ -9,78 +9,46 @@ import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
 from common.arrays import FloatArray
-from common.errors import ConfigurationError
-from common.protocol.view_messages import VIEW_NAMES
-from common.recording.images import read_image
 from common.recording.reading import Recording
-from feelahead.recordings.tables import Table, Tables
+from feelahead.recordings.demonstrations import Demonstrations, Picture
 
-FRAMES_HZ: Final = 30
 _VERSION: Final = "v3.0"
 _FILE: Final = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 _TASK: Final = "reach the target, grasp it, lift it and set it down"
-_STRENGTHS: Final = 8
-_ZONES: Final = 10
 _SAMPLED_PICTURES: Final = 20
 """Largest number of pictures, roughly, in the statistics."""
 _ENLARGED_QUALITY: Final = 90
-_ACTION: Final = {
-    "l2": "command.l2",
-    "r2": "command.r2",
-    "lateral_right": "command.lateral.0",
-    "lateral_up": "command.lateral.1",
-    "turning_right": "command.turning.0",
-    "turning_up": "command.turning.1",
-    "gripper": "command.gripper",
-}
 
 
-class Picture(NamedTuple):
-    """Picture of a camera."""
-
-    time_s: float
-    """Time since the recording began"""
-    jpeg: bytes
-
-
-def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
-    """Write the dataset; return the number of frames. Raises ConfigurationError without an arm or commands."""
+def export_lerobot(recording: Recording, frames: Demonstrations, folder: Path) -> None:
+    """Write the dataset into `folder`."""
     import pyarrow  # noqa: PLC0415
     from pyarrow import parquet  # noqa: PLC0415
 
-    joined = tables.joined(FRAMES_HZ)
-    seen = {view: pictures(recording, view) for view in VIEW_NAMES}
-    vectors = _vectors(joined)
-    first = _first_whole_row(vectors, {view: found for view, found in seen.items() if found}, joined)
-    times_s = np.array(joined.times_s[first:])
-    count = len(times_s)
+    count = len(frames.times_s)
     features: dict[str, Any] = {}
     columns: dict[str, Any] = {}
     stats: dict[str, Any] = {}
-    for name, parts in vectors.items():
-        values = np.stack([joined.numbers(column)[first:] for column in parts.values()], axis=1).astype(np.float32)
-        # A value with gaps, such as a field, keeps the last one: the format has no gaps.
-        values = _held(values)
+    for name, (parts, values) in frames.vectors.items():
         features[name] = {"dtype": "float32", "shape": [len(parts)], "names": list(parts)}
         columns[name] = pyarrow.FixedSizeListArray.from_arrays(pyarrow.array(values.ravel()), len(parts))
         stats[name] = _statistics(values.astype(np.float64))
-    for view, found in seen.items():
-        if found:
-            shown, (width, height) = _of_one_size(_newest(found, times_s))
-            key = f"observation.images.{view}"
-            features[key] = {"dtype": "image", "shape": [height, width, 3], "names": ["height", "width", "channels"]}
-            columns[key] = pyarrow.array(
-                [{"bytes": picture.jpeg, "path": f"frame-{row:06d}.jpg"} for row, picture in enumerate(shown)],
-                type=pyarrow.struct([("bytes", pyarrow.binary()), ("path", pyarrow.string())]),
-            )
-            stats[key] = _picture_statistics(shown)
+    for view, pictures in frames.shown.items():
+        shown, (width, height) = _of_one_size(pictures)
+        key = f"observation.images.{view}"
+        features[key] = {"dtype": "image", "shape": [height, width, 3], "names": ["height", "width", "channels"]}
+        columns[key] = pyarrow.array(
+            [{"bytes": picture.jpeg, "path": f"frame-{row:06d}.jpg"} for row, picture in enumerate(shown)],
+            type=pyarrow.struct([("bytes", pyarrow.binary()), ("path", pyarrow.string())]),
+        )
+        stats[key] = _picture_statistics(shown)
     counters: dict[str, Any] = {
-        "timestamp": (np.arange(count) / FRAMES_HZ).astype(np.float32),
+        "timestamp": (np.arange(count) / frames.rate_hz).astype(np.float32),
         "frame_index": np.arange(count, dtype=np.int64),
         "episode_index": np.zeros(count, dtype=np.int64),
         "index": np.arange(count, dtype=np.int64),
@@ -96,16 +64,9 @@ def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
     parquet.write_table(table, _made(folder / "data" / _first_file()), compression="snappy")
     parquet.write_table(_tasks(pyarrow), _made(folder / "meta" / "tasks.parquet"))
     parquet.write_table(pyarrow.table(_episode(count, stats)), _made(folder / "meta" / "episodes" / _first_file()))
-    (folder / "meta" / "info.json").write_text(json.dumps(_info(recording, features, count), indent=4) + "\n")
+    info = _info(recording, features, count, frames.rate_hz)
+    (folder / "meta" / "info.json").write_text(json.dumps(info, indent=4) + "\n")
     (folder / "meta" / "stats.json").write_text(json.dumps(stats, indent=4) + "\n")
-    return count
-
-
-def pictures(recording: Recording, view: str) -> list[Picture]:
-    """Return a camera's pictures, in order."""
-    first_ns = recording.began_ns()
-    messages = recording.messages([f"/camera/{view}"])
-    return [Picture(1e-9 * (message.log_ns - first_ns), read_image(message.content).jpeg) for message in messages]
 
 
 def _of_one_size(shown: list[Picture]) -> tuple[list[Picture], tuple[int, int]]:
@@ -123,60 +84,6 @@ def _of_one_size(shown: list[Picture]) -> tuple[list[Picture], tuple[int, int]]:
         one.resize(largest).save(enlarged, "JPEG", quality=_ENLARGED_QUALITY)
         alike.append(picture._replace(jpeg=enlarged.getvalue()))
     return alike, largest
-
-
-def _vectors(joined: Table) -> dict[str, dict[str, str]]:
-    """Return each feature's parts by name, with their columns."""
-    joints = [column for column in joined.columns() if column.startswith("arm.position_rad.")]
-    if not joints or "command.r2" not in joined.columns():
-        raise ConfigurationError("--format lerobot: no arm or no commands in it; valid: a recording of the demo")
-    state = {f"joint_{index}_rad": column for index, column in enumerate(joints)}
-    velocity = {f"joint_{index}_rad_s": f"arm.velocity_rad_s.{index}" for index in range(len(joints))}
-    vectors = {
-        "observation.state": state | {"gripper_opening_m": "arm.gripper_opening_m"},
-        "observation.velocity": velocity,
-        "action": _ACTION,
-    }
-    if "stiffness.r2.stiffness" in joined.columns():
-        vectors["observation.stiffness"] = {f"{side}_stiffness": f"stiffness.{side}.stiffness" for side in ("l2", "r2")}
-        vectors["observation.onset_distances"] = {
-            f"{side}_{kind}_{strength + 1}_m": f"stiffness.{side}.{kind}_m.{strength}"
-            for side in ("l2", "r2")
-            for kind in ("fast", "slow")
-            for strength in range(_STRENGTHS)
-        }
-    if "felt.r2.0" in joined.columns():
-        vectors["observation.felt"] = {
-            f"{side}_zone_{zone}": f"felt.{side}.{zone}" for side in ("l2", "r2") for zone in range(_ZONES)
-        }
-    return vectors
-
-
-def _first_whole_row(vectors: Mapping[str, Mapping[str, str]], seen: Mapping[str, list[Picture]], joined: Table) -> int:
-    """Return the first row that has every required column."""
-    needed = [*vectors["observation.state"].values(), *vectors["action"].values()]
-    if "observation.stiffness" in vectors:
-        needed += vectors["observation.stiffness"].values()
-    begins = [int(np.argmax(np.isfinite(joined.numbers(column)))) for column in needed]
-    begins += [int(np.searchsorted(np.array(joined.times_s), found[0].time_s)) for found in seen.values()]
-    first = max(begins)
-    if first >= len(joined.times_s):
-        raise ConfigurationError("--format lerobot: at no moment was there something of everything")
-    return first
-
-
-def _held(values: Any) -> Any:
-    """Fill each gap with the last value before it, or 0 for none."""
-    filled = values.copy()
-    rows = np.where(np.isfinite(filled), np.arange(len(filled))[:, None], -1)
-    newest = np.maximum.accumulate(rows, axis=0)
-    filled = np.take_along_axis(filled, np.maximum(newest, 0), axis=0)
-    return np.where(newest >= 0, filled, 0.0).astype(np.float32)
-
-
-def _newest(found: list[Picture], times_s: FloatArray) -> list[Picture]:
-    rows = np.searchsorted([picture.time_s for picture in found], times_s + 1e-9, side="right") - 1
-    return [found[max(0, row)] for row in rows]
 
 
 def _statistics(values: FloatArray) -> dict[str, Any]:
@@ -230,7 +137,7 @@ def _episode(count: int, stats: Mapping[str, Any]) -> dict[str, list[Any]]:
     return {name: [value] for name, value in row.items()}
 
 
-def _info(recording: Recording, features: Mapping[str, Any], count: int) -> dict[str, Any]:
+def _info(recording: Recording, features: Mapping[str, Any], count: int, rate_hz: int) -> dict[str, Any]:
     settings = recording.headers.get("robot", {}).get("settings", {})
     return {
         "codebase_version": _VERSION,
@@ -241,7 +148,7 @@ def _info(recording: Recording, features: Mapping[str, Any], count: int) -> dict
         "chunks_size": 1000,
         "data_files_size_in_mb": 100,
         "video_files_size_in_mb": 500,
-        "fps": FRAMES_HZ,
+        "fps": rate_hz,
         "splits": {"train": "0:1"},
         "data_path": f"data/{_FILE}.parquet",
         "video_path": None,

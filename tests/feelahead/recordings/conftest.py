@@ -90,7 +90,7 @@ def jpeg(value: int) -> bytes:
 
 @pytest.fixture
 def with_pictures(run: Recording, tmp_path: Path) -> tuple[Recording, list[bytes]]:
-    """Return the same run with a camera: its messages again, and pictures at 10 Hz."""
+    """Return the same run with a camera: its messages again, and pictures at 10 Hz, captured 20 ms before."""
     path = tmp_path / "pictures.mcap"
     file = RecordingFile(path, 0.0)
     content = Content(file)
@@ -102,7 +102,7 @@ def with_pictures(run: Recording, tmp_path: Path) -> tuple[Recording, list[bytes
         now_s = 1e-9 * (message.log_ns - began_ns)
         if now_s >= next_s:
             header = Header(epoch=1, sequence=len(payloads) + 1, sent_s=now_s)
-            frame = VideoFrame(header, "overview", now_s, 32, 24, jpeg(10 * len(payloads) % 256))
+            frame = VideoFrame(header, "overview", now_s - 0.02, 32, 24, jpeg(10 * len(payloads) % 256))
             payloads.append(encode(frame))
             content.take(0, VIEW + stamped(now_s) + payloads[-1])
             next_s += 0.1
