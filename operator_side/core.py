@@ -17,7 +17,15 @@ from msgspec import UNSET
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import decode, encode
 from common.protocol.link_end import Arrival, LinkEnd
-from common.protocol.messages import Compensation, Hello, LeaseNotice, LinkReport, StiffnessUpdate, Telemetry
+from common.protocol.messages import (
+    Compensation,
+    EpisodeMark,
+    Hello,
+    LeaseNotice,
+    LinkReport,
+    StiffnessUpdate,
+    Telemetry,
+)
 from common.status.codes import LinkState
 from common.status.statuses import OperatorStatus
 from operator_side.controller.feel import Feel
@@ -31,6 +39,7 @@ from operator_side.hands.newest import Hands
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.robot_link.commanding import HEARTBEAT_PERIOD_S, STOPPING, Commands, ToRobot
 from operator_side.robot_link.lease_state import LeaseState
+from operator_side.robot_link.marker import Marker
 from operator_side.robot_link.newest import STIFFNESS_EXPIRES_S, NewestStiffness, overtakes
 from operator_side.robot_link.tuner import Tuner
 
@@ -80,6 +89,7 @@ class OperatorSide:
         """Rendering of stiffness, and memory of the last write"""
         self.commands = Commands(self.link, settings.compensation, full_rate=settings.full_rate)
         self.tuner = Tuner()
+        self.marker = Marker()
         self.rejected = 0
         self._listeners = tuple(listeners)
         self._blindness = Blindness()
@@ -122,6 +132,7 @@ class OperatorSide:
         arrival = self.link.arrived(message, now_s)
         if self.link.peer_epoch != known_epoch:
             self._standing.forget()
+            self.marker.forget()
         if isinstance(message, StiffnessUpdate):
             self._feel(message, arrival, now_s)
         elif isinstance(message, LeaseNotice) and arrival.fresh:
@@ -143,6 +154,8 @@ class OperatorSide:
         if not self._standing.owns:
             self._blindness.end()
             self.commands.stop_button.forget()
+        if self.marker.answered(notice):
+            self._hear("episode", "reset", now_s)
 
     def receive_view(self, payload: bytes, now_s: float) -> None:
         """Take one view payload; keep it if it is the newest telemetry of the robot side's present epoch."""
@@ -160,12 +173,24 @@ class OperatorSide:
     def read_state(self, state: ControllerState, now_s: float) -> None:
         """Take one state of the controller."""
         self._hear("state", state, now_s)
-        self._blindness.see_hands(released=self.hands.read(state, now_s).triggers_released)
+        intent = self.hands.read(state, now_s)
+        self._blindness.see_hands(released=intent.triggers_released)
+        if (mark := self.marker.pressed(intent.mark)) is not None:
+            self._mark(mark, now_s)
 
     def tune(self, probability: float | None, link: str | None, now_s: float) -> None:
         """Take a tuning request for another P, another emulated link, or both; None leaves a value unchanged."""
         self._hear("tuned", {"probability": probability, "link": link}, now_s)
         self.tuner.ask(probability, link, self._standing, now_s)
+
+    def mark(self, kind: EpisodeMark, now_s: float) -> None:
+        """Take a mark of an episode that was made elsewhere than on the controller."""
+        self._hear("marked", kind, now_s)
+        self._mark(kind, now_s)
+
+    def _mark(self, kind: EpisodeMark, now_s: float) -> None:
+        if self.marker.ask(kind, self._standing, now_s):
+            self._hear("episode", kind, now_s)
 
     def calibrate(self, calibration: TravelCalibration) -> None:
         """Use `calibration` for the newly found controller from now on."""
@@ -211,6 +236,8 @@ class OperatorSide:
             messages += self.commands.hello(now_s)
         if (tune := self.tuner.due(self.lease, self.link, now_s)) is not None:
             messages.append(ToRobot(encode(tune)))
+        if (mark := self.marker.due(self._standing, self.link, now_s)) is not None:
+            messages.append(ToRobot(encode(mark)))
         for one in self._listeners:
             one.on_motion(messages, now_s)
         return messages
@@ -285,6 +312,7 @@ class OperatorSide:
             "lease_states": self._standing.history,
             "stops_pressed_elsewhere": self.commands.stop_button.presses,
             "tuning": self.tuner.summary(),
+            "episodes": self.marker.summary(),
             "zones": self.haptics.rendering.zones(),
             "rendering": self.haptics.summary() | {"blind": self._blindness.times},
             "delay_ms": {

@@ -16,10 +16,11 @@ from common.protocol.view_messages import AnyViewMessage
 
 Kind = TypeVar("Kind")
 
-PROTOCOL_VERSION = 9
+PROTOCOL_VERSION = 10
 """2: the lease, with its token in every command. 3: predicted contact in each stiffness. 4: a field for each
 trigger in place of stiffness and contact, and the compensating side in each command. 6: Watch. 7: stiffness and
-telemetry packed. 8: distances around, and whether the held object is supported. 9: the joints' times to change."""
+telemetry packed. 8: distances around, and whether the held object is supported. 9: the joints' times to change.
+10: marks of episodes."""
 MAXIMUM_BYTES = 4096
 """Longest payload that is decoded, in bytes: eight times the largest message."""
 VIEW_MAXIMUM_BYTES: Final = 4 * 1024 * 1024

@@ -1,6 +1,6 @@
 """Messages of the link, frozen; validated when made and when decoded.
 
-    operator ── Hello, MotionCommand, Watch, Tune ──▶ robot     control, ROUTER/DEALER
+    operator ── Hello, MotionCommand, Watch, Tune, Mark ──▶ robot   control, ROUTER/DEALER
     robot ── Hello, LeaseNotice, LinkReport, StiffnessUpdate ──▶ operator   control
     robot ── Telemetry ──▶ viewers                          view, PUB/SUB; view_messages.py has the others
 
@@ -25,6 +25,8 @@ MotionState = Literal["disarmed", "armed", "stopped"]
 OnsetDistances = tuple[float, float, float, float, float, float, float, float]
 Compensation = Literal["operator", "robot"]
 """Side that compensates the delay: the operator side by its commands under way, or the robot side by eq. 8."""
+EpisodeMark = Literal["start", "success", "failure", "discard", "reset"]
+"""Start of an episode; its end, by result, or because it is not to be kept; or the scene was put back to its start."""
 
 _LARGEST = 2**63 - 1
 _FARTHEST_M = 100.0
@@ -174,6 +176,14 @@ class Tune(Message, frozen=True, tag="tune"):
     """Emulated link of both directions in netem's words; empty for no emulation, None for no change."""
 
 
+class Mark(Message, frozen=True, tag="mark"):
+    """Mark of an episode by the owner; `reset` asks for the scene to be put back. Repeated until a notice answers."""
+
+    number: Annotated[int, Meta(ge=1, le=_LARGEST)]
+    """Grows with each mark."""
+    kind: EpisodeMark
+
+
 class LeaseNotice(Message, frozen=True, tag="lease"):
     """Session state of the receiver at the robot side; repeated, so that a lost one does no harm."""
 
@@ -192,6 +202,10 @@ class LeaseNotice(Message, frozen=True, tag="lease"):
     """Present P."""
     tuned: _Number = 0
     """Number of the receiver's newest Tune that arrived, granted or not."""
+    marked: _Number = 0
+    """Number of the receiver's newest Mark that arrived, accepted or not."""
+    mark_refused: _Words = ""
+    """Reason why that mark was refused, for people; empty if it was accepted."""
 
 
 class LinkReport(Message, frozen=True, tag="report"):
@@ -297,4 +311,4 @@ class Telemetry(Message, frozen=True, tag="telemetry", array_like=False):
     r2: Share
 
 
-AnyMessage = Hello | MotionCommand | Watch | Tune | LeaseNotice | LinkReport | StiffnessUpdate | Telemetry
+AnyMessage = Hello | MotionCommand | Watch | Tune | Mark | LeaseNotice | LinkReport | StiffnessUpdate | Telemetry

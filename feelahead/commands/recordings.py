@@ -46,7 +46,7 @@ class ExportSettings(Limited):
     """Turn a recording into files that other programs read.
 
     csv, parquet: a folder with a file for each topic at the original rate, and one with all joined at 100 Hz.
-    lerobot: a LeRobot dataset, v3.0, of one episode at the pictures' own rate, or --fps.
+    lerobot: a LeRobot dataset, v3.0, at the pictures' own rate, or --fps, cut into the marked episodes.
     """
 
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
@@ -150,7 +150,7 @@ def _export(settings: ExportSettings, recording: Recording, folder: Path) -> str
     if settings.format == "lerobot":
         frames = read_demonstrations(recording, tables, settings.fps)
         export_lerobot(recording, frames, folder)
-        return f"1 episode, {frames.words()}"
+        return frames.words()
     return ", ".join((export_csv if settings.format == "csv" else export_parquet)(tables, folder))
 
 

@@ -50,9 +50,18 @@ class Vector(NamedTuple):
     """(n, k) float32"""
 
 
+class Episode(NamedTuple):
+    """Part of the frames: from row `first` to before row `end`."""
+
+    first: int
+    end: int
+    success: bool | None
+    """None: nobody said"""
+
+
 @dataclass(frozen=True)
 class Demonstrations:
-    """Frames of a recording, at an even rate."""
+    """Frames of a recording's kept episodes, at an even rate."""
 
     rate_hz: int
     times_s: FloatArray
@@ -60,10 +69,18 @@ class Demonstrations:
     vectors: Mapping[str, Vector]
     shown: Mapping[str, list[Picture]]
     """Newest picture in each frame, by camera"""
+    episodes: list[Episode]
+    """In order, and of all frames"""
+    left_out: int = 0
+    """Number of episodes that were discarded, or have no frame"""
 
     def words(self) -> str:
-        """Return the number of frames, and of distinct pictures with their rate and greatest age, for a person."""
-        words = f"{len(self.times_s)} frames at {self.rate_hz} Hz"
+        """Return the numbers of episodes and frames, and of distinct pictures with their rate and greatest age."""
+        said = [one.success for one in self.episodes]
+        counts = (said.count(True), "success"), (said.count(False), "failure"), (self.left_out, "left out")
+        judged = ", ".join(f"{count} {word}" for count, word in counts if count)
+        words = f"{len(said)} episode{'s' * (len(said) != 1)}{f' ({judged})' * bool(judged)}"
+        words += f", {len(self.times_s)} frames at {self.rate_hz} Hz"
         for column, (view, shown) in enumerate(self.shown.items()):
             distinct = len(set(shown))
             oldest_s = self.vectors["observation.picture_age_s"].values[:, column].max()
@@ -81,18 +98,46 @@ def read_demonstrations(recording: Recording, tables: Tables, rate_hz: int | Non
     rate_hz = rate_hz or _median_rate_hz(seen)
     joined = tables.joined(rate_hz)
     parts = _vectors(joined)
-    first = _first_whole_row(parts, seen, joined)
-    times_s = np.array(joined.times_s[first:])
+    episodes, left_out = _cut(tables.table("episode"), joined.times_s, _first_whole_row(parts, seen, joined))
+    rows = np.concatenate([np.arange(one.first, one.end) for one in episodes])
+    times_s = np.array(joined.times_s)[rows]
     vectors = {}
     for name, columns in parts.items():
-        values = np.stack([joined.numbers(column)[first:] for column in columns.values()], axis=1).astype(np.float32)
+        values = np.stack([joined.numbers(column) for column in columns.values()], axis=1).astype(np.float32)
         # A value with gaps, such as a field, keeps the last one: the format has no gaps.
-        vectors[name] = Vector(tuple(columns), _held(values))
+        vectors[name] = Vector(tuple(columns), _held(values)[rows])
     shown = {view: _newest(found, times_s) for view, found in seen.items()}
     if shown:
         ages_s = [times_s - [picture.captured_s for picture in pictures] for pictures in shown.values()]
         vectors["observation.picture_age_s"] = Vector(tuple(shown), np.stack(ages_s, axis=1).astype(np.float32))
-    return Demonstrations(rate_hz, times_s, vectors, shown)
+    ends = np.cumsum([one.end - one.first for one in episodes]).tolist()
+    begins = [0, *ends[:-1]]
+    kept = [Episode(*part, one.success) for part, one in zip(zip(begins, ends, strict=True), episodes, strict=True)]
+    return Demonstrations(rate_hz, times_s, vectors, shown, kept, left_out)
+
+
+def _cut(marks: Table, times_s: list[float], first: int) -> tuple[list[Episode], int]:
+    """Return the episodes by their marks, and the number of those left out; one of all rows if none was started.
+
+    An episode ends with its result, or else with the next start, reset, or the recording. first: first row that counts.
+    """
+    marked = [row["mark"] for row in marks.rows]
+    if "start" not in marked:
+        return [Episode(first, len(times_s), None)], 0
+    found: list[tuple[float, float, bool | None]] = []
+    began_s, count = None, 0
+    for time_s, mark in (*zip(marks.times_s, marked, strict=True), (math.inf, "reset")):
+        if began_s is not None and mark != "discard":
+            found.append((began_s, time_s, mark == "success" if mark in ("success", "failure") else None))
+        count += mark == "start"
+        began_s = time_s if mark == "start" else None
+    places = [(max(first, int(at)), int(end)) for at, end in (np.searchsorted(times_s, span[:2]) for span in found)]
+    kept = [Episode(*place, span[2]) for place, span in zip(places, found, strict=True) if place[0] < place[1]]
+    if not kept:
+        raise ConfigurationError(
+            "--format lerobot: no episode was kept; valid: a recording with one of a frame or more"
+        )
+    return kept, count - len(kept)
 
 
 def read_pictures(recording: Recording) -> dict[str, list[Picture]]:

@@ -1,4 +1,4 @@
-"""Export of a recording as one episode of a LeRobot dataset, v3.0, for learning from demonstrations.
+"""Export of a recording's episodes as a LeRobot dataset, v3.0, for learning from demonstrations.
 
 data/chunk-000/file-000.parquet            one row a frame, pictures as encoded bytes
 meta/info.json, stats.json, tasks.parquet
@@ -15,7 +15,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.recording.reading import Recording
-from feelahead.recordings.demonstrations import Demonstrations, Picture
+from feelahead.recordings.demonstrations import Demonstrations, Episode, Picture
 
 _VERSION: Final = "v3.0"
 _FILE: Final = "chunk-{chunk_index:03d}/file-{file_index:03d}"
@@ -30,43 +30,61 @@ def export_lerobot(recording: Recording, frames: Demonstrations, folder: Path) -
     import pyarrow  # noqa: PLC0415
     from pyarrow import parquet  # noqa: PLC0415
 
-    count = len(frames.times_s)
+    values: dict[str, Any] = {name: vector.values for name, vector in frames.vectors.items()}
+    values |= _counters(frames)
     features: dict[str, Any] = {}
     columns: dict[str, Any] = {}
-    stats: dict[str, Any] = {}
-    for name, (parts, values) in frames.vectors.items():
-        features[name] = {"dtype": "float32", "shape": [len(parts)], "names": list(parts)}
-        columns[name] = pyarrow.FixedSizeListArray.from_arrays(pyarrow.array(values.ravel()), len(parts))
-        stats[name] = _statistics(values.astype(np.float64))
+    for name, column in values.items():
+        parts = frames.vectors[name].names if name in frames.vectors else None
+        features[name] = {"dtype": str(column.dtype), "shape": [1], "names": None}
+        columns[name] = pyarrow.array(column.ravel())
+        if parts is not None:
+            features[name] |= {"shape": [len(parts)], "names": list(parts)}
+            columns[name] = pyarrow.FixedSizeListArray.from_arrays(columns[name], len(parts))
+    seen: dict[str, list[Picture]] = {}
     for view, pictures in frames.shown.items():
-        shown, (width, height) = _of_one_size(pictures)
         key = f"observation.images.{view}"
+        seen[key], (width, height) = _of_one_size(pictures)
         features[key] = {"dtype": "image", "shape": [height, width, 3], "names": ["height", "width", "channels"]}
         columns[key] = pyarrow.array(
-            [{"bytes": picture.jpeg, "path": f"frame-{row:06d}.jpg"} for row, picture in enumerate(shown)],
+            [{"bytes": picture.jpeg, "path": f"frame-{row:06d}.jpg"} for row, picture in enumerate(seen[key])],
             type=pyarrow.struct([("bytes", pyarrow.binary()), ("path", pyarrow.string())]),
         )
-        stats[key] = _picture_statistics(shown)
-    counters: dict[str, Any] = {
-        "timestamp": (np.arange(count) / frames.rate_hz).astype(np.float32),
-        "frame_index": np.arange(count, dtype=np.int64),
-        "episode_index": np.zeros(count, dtype=np.int64),
-        "index": np.arange(count, dtype=np.int64),
-        "task_index": np.zeros(count, dtype=np.int64),
-    }
-    for name, values in counters.items():
-        features[name] = {"dtype": str(values.dtype), "shape": [1], "names": None}
-        columns[name] = pyarrow.array(values)
-        stats[name] = _statistics(values[:, None].astype(np.float64))
+
+    def stats(first: int, end: int) -> dict[str, Any]:
+        numbers = {name: _statistics(column[first:end].astype(np.float64)) for name, column in values.items()}
+        return numbers | {key: _picture_statistics(shown[first:end]) for key, shown in seen.items()}
+
     table = pyarrow.table(columns)
     hints = {"info": {"features": {name: _hint(feature) for name, feature in features.items()}}}
     table = table.replace_schema_metadata({"huggingface": json.dumps(hints)})
     parquet.write_table(table, _made(folder / "data" / _first_file()), compression="snappy")
     parquet.write_table(_tasks(pyarrow), _made(folder / "meta" / "tasks.parquet"))
-    parquet.write_table(pyarrow.table(_episode(count, stats)), _made(folder / "meta" / "episodes" / _first_file()))
-    info = _info(recording, features, count, frames.rate_hz)
+    rows = [_episode(number, one, stats(one.first, one.end)) for number, one in enumerate(frames.episodes)]
+    parquet.write_table(pyarrow.Table.from_pylist(rows), _made(folder / "meta" / "episodes" / _first_file()))
+    info = _info(recording, features, frames)
     (folder / "meta" / "info.json").write_text(json.dumps(info, indent=4) + "\n")
-    (folder / "meta" / "stats.json").write_text(json.dumps(stats, indent=4) + "\n")
+    (folder / "meta" / "stats.json").write_text(json.dumps(stats(0, len(frames.times_s)), indent=4) + "\n")
+
+
+def _counters(frames: Demonstrations) -> dict[str, Any]:
+    """Return the columns (n, 1) that number the frames, and say where episodes end and succeed if anybody said."""
+    count = len(frames.times_s)
+    lengths = [one.end - one.first for one in frames.episodes]
+    within = np.concatenate([np.arange(length) for length in lengths])
+    counters = {
+        "timestamp": (within / frames.rate_hz).astype(np.float32),
+        "frame_index": within,
+        "episode_index": np.repeat(np.arange(len(lengths)), lengths),
+        "index": np.arange(count),
+        "task_index": np.zeros(count, dtype=np.int64),
+    }
+    if any(one.success is not None for one in frames.episodes):
+        done, success = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+        done[[one.end - 1 for one in frames.episodes]] = True
+        success[[one.end - 1 for one in frames.episodes if one.success]] = True
+        counters |= {"next.done": done, "next.success": success}
+    return {name: values[:, None] for name, values in counters.items()}
 
 
 def _of_one_size(shown: list[Picture]) -> tuple[list[Picture], tuple[int, int]]:
@@ -129,27 +147,27 @@ def _tasks(pyarrow: Any) -> Any:
     return table.replace_schema_metadata({"pandas": json.dumps(frame)})
 
 
-def _episode(count: int, stats: Mapping[str, Any]) -> dict[str, list[Any]]:
-    row: dict[str, Any] = {"episode_index": 0, "tasks": [_TASK], "length": count}
-    row |= {"data/chunk_index": 0, "data/file_index": 0, "dataset_from_index": 0, "dataset_to_index": count}
+def _episode(number: int, episode: Episode, stats: Mapping[str, Any]) -> dict[str, Any]:
+    row: dict[str, Any] = {"episode_index": number, "tasks": [_TASK], "length": episode.end - episode.first}
+    row |= {"data/chunk_index": 0, "data/file_index": 0}
+    row |= {"dataset_from_index": episode.first, "dataset_to_index": episode.end, "success": episode.success}
     row |= {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
-    row |= {f"stats/{name}/{figure}": value for name, found in stats.items() for figure, value in found.items()}
-    return {name: [value] for name, value in row.items()}
+    return row | {f"stats/{name}/{figure}": value for name, found in stats.items() for figure, value in found.items()}
 
 
-def _info(recording: Recording, features: Mapping[str, Any], count: int, rate_hz: int) -> dict[str, Any]:
+def _info(recording: Recording, features: Mapping[str, Any], frames: Demonstrations) -> dict[str, Any]:
     settings = recording.headers.get("robot", {}).get("settings", {})
     return {
         "codebase_version": _VERSION,
         "robot_type": Path(settings["model"]).stem if settings.get("model") else "feelahead",
-        "total_episodes": 1,
-        "total_frames": count,
+        "total_episodes": len(frames.episodes),
+        "total_frames": len(frames.times_s),
         "total_tasks": 1,
         "chunks_size": 1000,
         "data_files_size_in_mb": 100,
         "video_files_size_in_mb": 500,
-        "fps": rate_hz,
-        "splits": {"train": "0:1"},
+        "fps": frames.rate_hz,
+        "splits": {"train": f"0:{len(frames.episodes)}"},
         "data_path": f"data/{_FILE}.parquet",
         "video_path": None,
         "features": features,

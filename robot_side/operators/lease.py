@@ -32,6 +32,10 @@ class Participant:
         """Content of the last lease notice sent to it."""
         self.tuned = 0
         """Number of the newest request to tune."""
+        self.marked = 0
+        """Number of the newest mark of an episode."""
+        self.mark_refused = ""
+        """Reason why that mark was refused; empty if it was accepted."""
 
     @property
     def state(self) -> SessionState:

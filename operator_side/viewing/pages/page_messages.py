@@ -6,6 +6,7 @@ import msgspec
 from msgspec import Meta
 
 from common.limits import Share
+from common.protocol.messages import EpisodeMark
 
 Deflection = tuple[Annotated[float, Meta(ge=-1.0, le=1.0)], Annotated[float, Meta(ge=-1.0, le=1.0)]]
 _LARGEST = 2**53 - 1
@@ -61,7 +62,8 @@ class TuneWish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PageMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Message of a page: inputs, a tuning request, or both."""
+    """Message of a page: inputs, a tuning request, a mark of an episode, or several of them."""
 
     hands: PageHands | None = None
     tune: TuneWish | None = None
+    mark: EpisodeMark | None = None

@@ -1,7 +1,7 @@
 """One recorded run of both sides in virtual time, for everything that uses recordings."""
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from common.protocol.codec import encode
-from common.protocol.messages import Header
+from common.protocol.messages import EpisodeMark, Header
 from common.protocol.view_messages import VideoFrame
 from common.recording.content import Content
 from common.recording.entries import pack_block
@@ -30,8 +30,14 @@ _FLUSH_BLOCKS = 15
 WALL_OFFSET_S = 1.7e9
 
 
-def record_loopback(path: Path, duration_s: float, **settings: Any) -> None:
-    """Record the scripted person's run; `settings` are both sides'."""
+def record_loopback(
+    path: Path,
+    duration_s: float,
+    doing: Mapping[float, Callable[[Loopback, float], None]] | None = None,
+    **settings: Any,
+) -> None:
+    """Record the scripted person's run; `settings` are both sides'. doing: done from that time on, in seconds."""
+    left = dict(doing or {})
     robot, operator = RobotSettings(**settings), OperatorSettings(**settings)
     notes: dict[str, list[Any]] = {"robot": [], "operator": []}
     run = Loopback(
@@ -54,6 +60,8 @@ def record_loopback(path: Path, duration_s: float, **settings: Any) -> None:
         content.take(source, HEADER + as_json({"side": side, **headers[side]}))
     for number in range(round(duration_s / _BLOCK_S)):
         now_s = (number + 1) * _BLOCK_S
+        for due_s in [due_s for due_s in left if due_s < now_s]:
+            left.pop(due_s)(run, now_s - _BLOCK_S)
         run.run_until(now_s)
         for source, side in enumerate(notes):
             views: list[bytes] = []
@@ -91,7 +99,13 @@ def jpeg(value: int) -> bytes:
 @pytest.fixture
 def with_pictures(run: Recording, tmp_path: Path) -> tuple[Recording, list[bytes]]:
     """Return the same run with a camera: its messages again, and pictures at 10 Hz, captured 20 ms before."""
-    path = tmp_path / "pictures.mcap"
+    return record_pictures(run, tmp_path / "pictures.mcap")
+
+
+def record_pictures(
+    run: Recording, path: Path, marks: Sequence[tuple[float, EpisodeMark]] = ()
+) -> tuple[Recording, list[bytes]]:
+    """Record the run's messages again into `path`, with pictures, and with marks of episodes at these times."""
     file = RecordingFile(path, 0.0)
     content = Content(file)
     content.take(0, HEADER + as_json({"side": "robot", **run.headers["robot"]}))
@@ -107,6 +121,8 @@ def with_pictures(run: Recording, tmp_path: Path) -> tuple[Recording, list[bytes
             content.take(0, VIEW + stamped(now_s) + payloads[-1])
             next_s += 0.1
         file.write(message.topic, now_s, message.content)
+    for time_s, mark in marks:
+        file.write("/episode", time_s, as_json({"time_s": time_s, "side": "robot", "mark": mark}))
     content.take(0, FACTS + stamped(now_s) + b'{"now_s":1.0}')
     file.close()
     return open_recording(path), payloads

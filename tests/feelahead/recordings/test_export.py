@@ -14,17 +14,18 @@ from PIL import Image
 
 from common.errors import ConfigurationError
 from common.protocol.codec import decode_view, encode
-from common.protocol.messages import Header
+from common.protocol.messages import EpisodeMark, Header
 from common.protocol.view_messages import VideoFrame
 from common.recording.content import Content
 from common.recording.mcap_file import RecordingFile
 from common.recording.reading import Recording, open_recording
 from common.recording.wire import HEADER, STATUS, VIEW, as_json, stamped
 from feelahead.commands.recordings import export, plot
-from feelahead.recordings.demonstrations import Picture, read_pictures
+from feelahead.recordings.demonstrations import Picture, read_demonstrations, read_pictures
 from feelahead.recordings.lerobot import _of_one_size
 from feelahead.recordings.playback import Seen, seen
 from feelahead.recordings.tables import read_tables
+from tests.feelahead.recordings.conftest import record_pictures
 
 pyarrow = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -164,6 +165,42 @@ def test_an_operator_side_alone_knows_by_its_clock_offset_how_old_a_picture_is(t
 
     # While the offset is unknown, only the time until it was sent counts.
     assert [one.time_s - one.captured_s for one in found] == pytest.approx([0.02, 0.07], abs=1e-6)
+
+
+def test_lerobot_has_an_episode_for_each_that_was_marked_and_kept(
+    run: Recording,
+    with_pictures: tuple[Recording, list[bytes]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    whole = read_demonstrations(with_pictures[0], read_tables(with_pictures[0]))
+    assert [*whole.episodes] == [(0, len(whole.times_s), None)]
+    # Seconds after its first frame.
+    marks: list[tuple[float, EpisodeMark]] = [(0.5, "start"), (1.5, "success"), (1.6, "failure"), (2.0, "start")]
+    marks += [(2.4, "discard"), (2.5, "start"), (3.0, "failure"), (3.1, "reset"), (3.2, "start"), (3.6, "reset")]
+    path = tmp_path / "marked.mcap"
+    record_pictures(run, path, [(whole.times_s[0] + after_s, mark) for after_s, mark in (*marks, (3.8, "start"))])
+
+    assert export([str(path), "--format", "lerobot", "--out", str(tmp_path / "out")]) == 0
+
+    assert ": 4 episodes (1 success, 1 failure, 1 left out), " in capsys.readouterr().out
+    episodes = parquet.read_table(tmp_path / "out/meta/episodes/chunk-000/file-000.parquet").to_pylist()
+    assert [one["success"] for one in episodes] == [True, False, None, None]
+    assert [one["length"] for one in episodes[:3]] == pytest.approx([10, 5, 4], abs=1)
+    data = parquet.read_table(tmp_path / "out/data/chunk-000/file-000.parquet")
+    info = json.loads((tmp_path / "out/meta/info.json").read_text())
+    assert (info["total_episodes"], info["splits"]) == (4, {"train": "0:4"})
+    assert info["total_frames"] == data.num_rows == episodes[-1]["dataset_to_index"] < len(whole.times_s)
+    states = np.array(data.column("observation.state").to_pylist())
+    for number, one in enumerate(episodes):
+        rows = slice(one["dataset_from_index"], one["dataset_to_index"])
+        part = data.slice(rows.start, one["length"])
+        assert set(part.column("episode_index").to_pylist()) == {number}
+        assert part.column("frame_index").to_pylist() == list(range(one["length"]))
+        assert part.column("timestamp")[0].as_py() == 0.0
+        assert part.column("next.done").to_pylist() == [False] * (one["length"] - 1) + [True]
+        assert part.column("next.success")[-1].as_py() is (one["success"] is True)
+        np.testing.assert_allclose(one["stats/observation.state/mean"], states[rows].mean(axis=0), rtol=1e-5, atol=1e-7)
 
 
 def test_fps_is_for_lerobot_alone(run: Recording) -> None:
