@@ -17,15 +17,7 @@ from msgspec import UNSET
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import decode, encode
 from common.protocol.link_end import Arrival, LinkEnd
-from common.protocol.messages import (
-    Compensation,
-    EpisodeMark,
-    Hello,
-    LeaseNotice,
-    LinkReport,
-    StiffnessUpdate,
-    Telemetry,
-)
+from common.protocol.messages import Compensation, Hello, LeaseNotice, LinkReport, StiffnessUpdate, Telemetry
 from common.status.codes import LinkState
 from common.status.statuses import OperatorStatus
 from operator_side.controller.feel import Feel
@@ -89,11 +81,11 @@ class OperatorSide:
         """Rendering of stiffness, and memory of the last write"""
         self.commands = Commands(self.link, settings.compensation, full_rate=settings.full_rate)
         self.tuner = Tuner()
-        self.marker = Marker()
         self.rejected = 0
         self._listeners = tuple(listeners)
         self._blindness = Blindness()
         self._standing = LeaseState()
+        self.marker = Marker(self._standing, self._hear)
 
     @property
     def lease(self) -> LeaseNotice | None:
@@ -154,8 +146,7 @@ class OperatorSide:
         if not self._standing.owns:
             self._blindness.end()
             self.commands.stop_button.forget()
-        if self.marker.answered(notice):
-            self._hear("episode", "reset", now_s)
+        self.marker.follow(notice, now_s)
 
     def receive_view(self, payload: bytes, now_s: float) -> None:
         """Take one view payload; keep it if it is the newest telemetry of the robot side's present epoch."""
@@ -175,22 +166,12 @@ class OperatorSide:
         self._hear("state", state, now_s)
         intent = self.hands.read(state, now_s)
         self._blindness.see_hands(released=intent.triggers_released)
-        if (mark := self.marker.pressed(intent.mark)) is not None:
-            self._mark(mark, now_s)
+        self.marker.press(intent.mark, now_s)
 
     def tune(self, probability: float | None, link: str | None, now_s: float) -> None:
         """Take a tuning request for another P, another emulated link, or both; None leaves a value unchanged."""
         self._hear("tuned", {"probability": probability, "link": link}, now_s)
         self.tuner.ask(probability, link, self._standing, now_s)
-
-    def mark(self, kind: EpisodeMark, now_s: float) -> None:
-        """Take a mark of an episode that was made elsewhere than on the controller."""
-        self._hear("marked", kind, now_s)
-        self._mark(kind, now_s)
-
-    def _mark(self, kind: EpisodeMark, now_s: float) -> None:
-        if self.marker.ask(kind, self._standing, now_s):
-            self._hear("episode", kind, now_s)
 
     def calibrate(self, calibration: TravelCalibration) -> None:
         """Use `calibration` for the newly found controller from now on."""
@@ -236,7 +217,7 @@ class OperatorSide:
             messages += self.commands.hello(now_s)
         if (tune := self.tuner.due(self.lease, self.link, now_s)) is not None:
             messages.append(ToRobot(encode(tune)))
-        if (mark := self.marker.due(self._standing, self.link, now_s)) is not None:
+        if (mark := self.marker.due(self.link, now_s)) is not None:
             messages.append(ToRobot(encode(mark)))
         for one in self._listeners:
             one.on_motion(messages, now_s)

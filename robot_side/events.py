@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Final, Literal, NamedTuple, get_args
 
 from common.arrays import FloatArray
-from common.protocol.messages import EpisodeMark
+from common.episode import EpisodeMark
 from robot_side.arm.port import ArmState
 from robot_side.laws.law import Situation
 from robot_side.laws.sensed import Sensed

@@ -31,6 +31,7 @@ from robot_side.enlargement.prediction_errors import BUILT_IN, PredictionErrors,
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.laws.explanation import Explains
 from robot_side.laws.named import LAWS
+from robot_side.operators.episodes import Episodes
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.operators.tuning import Tuning
@@ -116,6 +117,7 @@ def build_parts(
     arm, ends_rad = _arm(scene, encoder, limits, beside)
     searching = None if announce is None else cache(lambda: announce(_SEARCHING))
     kinematics = MujocoKinematics(scene, settings.cover_m, searching)
+    camera = _camera(settings, scene, int(camera_noise))
     seen_elsewhere = None if beside is None else beside.objects(settings.roles, settings.camera.sd_m)
     # Before the first tick, as a search for spheres takes far longer than one.
     first = _as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
@@ -133,7 +135,7 @@ def build_parts(
     return SceneParts(
         arm=arm,
         kinematics=kinematics,
-        camera=seen_elsewhere or _camera(settings, scene, int(camera_noise)),
+        camera=seen_elsewhere or camera,
         law=law,
         explains=law,
         surroundings=surroundings,
@@ -142,6 +144,7 @@ def build_parts(
             Safety(settings.safety),
             settings.seed,
             Tuning(settings.probability, law.expect if settings.permit_tuning else None),
+            _episodes(settings, arm, camera),
         ),
         loop_age=LoopAge(settings.assumed_delay_s),
         limits=joint_limits,
@@ -159,6 +162,19 @@ def build_parts(
             *_cover_notes(kinematics.cover, settings.cover_m, held_covers),
         ),
     )
+
+
+def _episodes(settings: RobotSettings, arm: MujocoArm | RemoteArm, camera: MujocoCamera) -> Episodes:
+    """Return the judge of marks: a driver's arm does not go home by itself, nor do objects that are seen elsewhere."""
+    beside = [f"--{what}" for what in ("arm", "objects") if getattr(settings, what) is not None]
+    if beside or not isinstance(arm, MujocoArm):
+        return Episodes(refuses=f"{' and '.join(beside)}: a driver's things stay; valid: all simulated")
+
+    def put_back() -> None:
+        arm.put_back()
+        camera.put_back()
+
+    return Episodes(put_back)
 
 
 def _arm(

@@ -14,6 +14,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from common.episode import EpisodeMark
 from common.limits import Finite, Share, check_limits
 from common.protocol.around import Around
 from common.protocol.session import SessionState
@@ -25,8 +26,6 @@ MotionState = Literal["disarmed", "armed", "stopped"]
 OnsetDistances = tuple[float, float, float, float, float, float, float, float]
 Compensation = Literal["operator", "robot"]
 """Side that compensates the delay: the operator side by its commands under way, or the robot side by eq. 8."""
-EpisodeMark = Literal["start", "success", "failure", "discard", "reset"]
-"""Start of an episode; its end, by result, or because it is not to be kept; or the scene was put back to its start."""
 
 _LARGEST = 2**63 - 1
 _FARTHEST_M = 100.0
@@ -177,10 +176,9 @@ class Tune(Message, frozen=True, tag="tune"):
 
 
 class Mark(Message, frozen=True, tag="mark"):
-    """Mark of an episode by the owner; `reset` asks for the scene to be put back. Repeated until a notice answers."""
+    """Numbered mark of an episode; `reset` asks for the scene to be put back. Repeated until a notice answers it."""
 
     number: Annotated[int, Meta(ge=1, le=_LARGEST)]
-    """Grows with each mark."""
     kind: EpisodeMark
 
 
@@ -202,10 +200,8 @@ class LeaseNotice(Message, frozen=True, tag="lease"):
     """Present P."""
     tuned: _Number = 0
     """Number of the receiver's newest Tune that arrived, granted or not."""
-    marked: _Number = 0
-    """Number of the receiver's newest Mark that arrived, accepted or not."""
-    mark_refused: _Words = ""
-    """Reason why that mark was refused, for people; empty if it was accepted."""
+    marked: tuple[_Number, _Words] = (0, "")
+    """Number of the receiver's newest Mark that arrived, and why it was refused; empty if it was accepted."""
 
 
 class LinkReport(Message, frozen=True, tag="report"):

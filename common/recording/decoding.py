@@ -7,9 +7,10 @@ from typing import Any, Final, NamedTuple
 
 import msgspec
 
+from common.episode import EpisodeMark
 from common.errors import RemoteProtocolError
 from common.protocol.codec import decode, decode_view
-from common.protocol.messages import EpisodeMark, MotionCommand, StiffnessUpdate, Telemetry
+from common.protocol.messages import MotionCommand, StiffnessUpdate, Telemetry
 from common.protocol.view_messages import AnyViewMessage, SceneState
 from common.recording.entries import Block, Entry, Kind, split_text
 from common.recording.wire import as_json

@@ -60,7 +60,7 @@ class Kind(IntEnum):
     TOLD = 18
     """The feel sent to the controller (operator_side/controller/feel.py), in MessagePack."""
     EPISODE = 19
-    """A mark of an episode counts (EpisodeMark of common/protocol/messages.py), as JSON; follows from other inputs."""
+    """A mark of an episode counts (EpisodeMark of common/episode.py), as JSON; follows from other inputs."""
     MARKED = 20
     """A mark was made away from the controller, as JSON."""
 

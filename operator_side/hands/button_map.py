@@ -5,7 +5,7 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Final
 
-from common.protocol.messages import EpisodeMark
+from common.episode import EpisodeMark
 from operator_side.controller.state import Button
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
-from common.protocol.messages import EpisodeMark
+from common.episode import EpisodeMark
 from operator_side.controller.state import ControllerState, Stick
 from operator_side.hands.button_map import MARKS, Action, button_of
 from operator_side.hands.travel_calibration import TravelCalibration

@@ -38,7 +38,7 @@ class Announcements:
         self._answers: list[Answer] = []
         self._answered_stranger_s = -math.inf
         self._noticed_s = -math.inf
-        self._noticed: list[tuple[int, SessionState, int, int]] = []
+        self._noticed: list[tuple[int, SessionState, int, tuple[int, str]]] = []
         self._noticed_token = 0
 
     def stamp(self, now_s: float, link: LinkEnd | None = None) -> Header:
@@ -96,7 +96,6 @@ class Announcements:
             probability=self._tuning.probability,
             tuned=participant.tuned,
             marked=participant.marked,
-            mark_refused=participant.mark_refused,
         )
         _, *said = msgspec.structs.astuple(notice)
         self._answers.append(Answer(participant.peer, encode(notice), everywhere=said != participant.noticed))

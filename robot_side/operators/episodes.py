@@ -4,7 +4,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from typing import Final
 
-from common.protocol.messages import EpisodeMark
+from common.episode import EpisodeMark
 
 _MOST: Final = 16
 """Most marks that wait to be taken."""

@@ -32,10 +32,8 @@ class Participant:
         """Content of the last lease notice sent to it."""
         self.tuned = 0
         """Number of the newest request to tune."""
-        self.marked = 0
-        """Number of the newest mark of an episode."""
-        self.mark_refused = ""
-        """Reason why that mark was refused; empty if it was accepted."""
+        self.marked = 0, ""
+        """Number of the newest mark of an episode, and why it was refused; empty if it was accepted."""
 
     @property
     def state(self) -> SessionState:

@@ -134,10 +134,9 @@ class OperatorSession:
         elif isinstance(message, Hello):
             self._announcements.answer(participant, now_s)
         elif isinstance(message, Mark):
-            if message.number > participant.marked:
-                participant.marked = message.number
+            if message.number > participant.marked[0]:
                 owns, armed = participant is self.lease.owner, self.safety.state == "armed"
-                participant.mark_refused = self.episodes.take(message.kind, owns=owns, armed=armed)
+                participant.marked = message.number, self.episodes.take(message.kind, owns=owns, armed=armed)
         elif message.number > participant.tuned:
             participant.tuned = message.number
             granted = self.tuning.take(message, now_s, owns=participant is self.lease.owner)

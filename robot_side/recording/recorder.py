@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import msgspec
 
-from common.protocol.messages import EpisodeMark
+from common.episode import EpisodeMark
 from common.recording.entries import Kind, entry, text
 from common.recording.provenance import provenance
 from robot_side.arm.port import ArmState

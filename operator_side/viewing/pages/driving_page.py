@@ -14,7 +14,7 @@ from typing import Final
 
 import msgspec
 
-from common.protocol.messages import EpisodeMark
+from common.episode import EpisodeMark
 from common.status.codes import Doing
 from operator_side.core import OperatorSide
 from operator_side.viewing.facts import HandsFacts
@@ -116,7 +116,7 @@ class DrivingPage:
             wish = self.wishes.popleft()
             core.tune(wish.probability, wish.link, now_s)
         while self._marks:
-            core.mark(self._marks.popleft(), now_s)
+            core.marker.mark(self._marks.popleft(), now_s)
 
     def facts(self, core: OperatorSide, now_s: float, *, person: bool) -> HandsFacts:
         """Return the facts for the pages. person: whether they may hand the controls back to a scripted person."""

@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from common.episode import EpisodeMark
 from common.limits import Share
-from common.protocol.messages import EpisodeMark
 
 Deflection = tuple[Annotated[float, Meta(ge=-1.0, le=1.0)], Annotated[float, Meta(ge=-1.0, le=1.0)]]
 _LARGEST = 2**53 - 1

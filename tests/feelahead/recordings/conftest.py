@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 from PIL import Image
 
+from common.episode import EpisodeMark
 from common.protocol.codec import encode
-from common.protocol.messages import EpisodeMark, Header
+from common.protocol.messages import Header
 from common.protocol.view_messages import VideoFrame
 from common.recording.content import Content
 from common.recording.entries import pack_block

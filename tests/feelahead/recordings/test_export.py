@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from common.episode import EpisodeMark
 from common.errors import ConfigurationError
 from common.protocol.codec import decode_view, encode
-from common.protocol.messages import EpisodeMark, Header
+from common.protocol.messages import Header
 from common.protocol.view_messages import VideoFrame
 from common.recording.content import Content
 from common.recording.mcap_file import RecordingFile

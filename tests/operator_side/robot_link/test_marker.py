@@ -3,8 +3,9 @@
 import msgspec
 import pytest
 
+from common.episode import EpisodeMark
 from common.protocol.codec import decode, encode
-from common.protocol.messages import EpisodeMark, LeaseNotice, Mark
+from common.protocol.messages import LeaseNotice, Mark
 from common.protocol.session import SessionState
 from operator_side.controller.state import Button
 from operator_side.core import CoreSettings, OperatorSide
