@@ -1,13 +1,13 @@
 """Exceptions of feelahead.
 
     FeelaheadError
-    ├── ConfigurationError   a person's wish cannot be met (also a ValueError); a command prints the error as one
-    │                        line and ends with exit code 2
+    ├── ConfigurationError   a setting, flag or file cannot be used (also a ValueError); a command prints the error
+    │                        as one line and ends with exit code 2
     ├── RemoteProtocolError  the peer sent an invalid message, which is counted and dropped whole
-    │   └── OtherVersionError    the peer speaks another version of the protocol
-    └── DeviceError          the controller is unreadable or gone; the text names a remedy
-        ├── NoDeviceError        none is connected; one may be plugged in at any time
-        └── NoDriverError        the library for controllers is missing (also a ConfigurationError): do not wait
+    │   └── OtherVersionError    the peer has another version of the protocol
+    └── DeviceError          the controller cannot be read or written; the text names a remedy
+        ├── NoDeviceError        no controller is connected, but one may be connected at any time
+        └── NoDriverError        the library for controllers is missing (also a ConfigurationError); waiting is useless
 
 Public functions raise a plain ValueError, which names the argument, for arguments out of range.
 """
@@ -18,15 +18,15 @@ class FeelaheadError(Exception):
 
 
 class ConfigurationError(FeelaheadError, ValueError):
-    """Impossible setting, flag or file; the text names the value and what is valid."""
+    """Setting, flag or file that cannot be used; the text names the value and what is valid."""
 
 
 class RemoteProtocolError(FeelaheadError):
-    """Bytes from the peer that are no valid message of this protocol version."""
+    """The peer sent bytes that are no valid message of this protocol version."""
 
 
 class OtherVersionError(RemoteProtocolError):
-    """Message of another protocol version: the two sides are of different releases."""
+    """The peer sent a message of another protocol version: the two sides are of different releases."""
 
 
 class DeviceError(FeelaheadError):
@@ -38,4 +38,4 @@ class NoDeviceError(DeviceError):
 
 
 class NoDriverError(DeviceError, ConfigurationError):
-    """hidapi is missing, broken or shadowed by another package."""
+    """The library hidapi is missing, broken or shadowed by another package."""

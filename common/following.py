@@ -1,4 +1,4 @@
-"""Model of an arm that both sides use: it approaches a commanded speed at a bounded acceleration."""
+"""Model, for both sides, of an arm that follows commands: its speed changes at a bounded acceleration."""
 
 import math
 
@@ -10,7 +10,10 @@ from common.arrays import FloatArray
 def follow(
     displacement_m: float, speed: float, target: float, acceleration: float, duration_s: float
 ) -> tuple[float, float]:
-    """Return position and speed after `duration_s` towards the speed `target`, at most at `acceleration`."""
+    """Return displacement and speed after the speed has approached `target` for `duration_s`, at `acceleration`.
+
+    `displacement_m` and `speed` are the values before, in m and m/s.
+    """
     changing_s = abs(target - speed) / acceleration
     if changing_s > duration_s:
         after = speed + math.copysign(acceleration * duration_s, target - speed)
@@ -21,9 +24,10 @@ def follow(
 def follow_together(
     followed: FloatArray, target: FloatArray, changes_s: FloatArray, duration_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Integrate and return trigger and sticks (5,) as the arm follows them from `followed` towards `target`, both (5,).
+    """Model the arm as it follows trigger and sticks (5,) from `followed` towards `target` for `duration_s`.
 
-    changes_s: K (n, 5). A change Δ takes the time max |K Δ|, linearly: the slowest joint limits all.
+    Return the followed trigger and sticks (5,) integrated over that time, and their values at its end (5,). changes_s:
+    K (n, 5), for n joints. A change Δ takes the time max |K Δ| and is linear: the slowest joint limits all.
     """
     change = target - followed
     takes_s = float(np.abs(changes_s @ change).max())

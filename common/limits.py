@@ -1,11 +1,11 @@
-"""Check that a record's fields lie within the ranges that their type hints declare.
+"""Check that the fields of a dataclass or struct are within the ranges that their type hints declare.
 
     @dataclass(frozen=True)
     class SafetySettings(Limited):
         gap_s: Annotated[float, Meta(gt=0.0, lt=60.0)] = 0.1
 
-msgspec uses the same `Meta` to decode a message or a TOML file, so that a range is declared once. NaN lies in no
-range. `Finite` is any number but NaN and the infinities.
+msgspec uses the same `Meta` to decode a message or a TOML file, so that a range is declared once. NaN is in no range.
+`Finite` is any number but NaN and the infinities.
 """
 
 import functools
@@ -18,20 +18,20 @@ from msgspec import Meta
 
 Finite = Annotated[float, Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
-"""Probability or part of a whole, both ends included."""
+"""Probability, or share of a whole: 0 to 1, both included."""
 
 _Check = Callable[[str, Any], None]
 
 
 def check_limits(record: Any) -> None:
-    """Raise ValueError if a field is out of range; the text names the first such field, its value and what is valid."""
+    """Raise ValueError if a field of `record` is out of range; it names the field, its value and what is valid."""
     kind: Any = type(record)
     for name, check in _checks(kind):
         check(name, getattr(record, name))
 
 
 class Limited:
-    """Base of dataclasses whose ranges are checked when they are made."""
+    """Base of dataclasses whose fields' ranges are checked when an instance is made."""
 
     __slots__ = ()
 
@@ -65,7 +65,7 @@ def _checks(kind: Any) -> tuple[tuple[str, _Check], ...]:
 
 
 def _check_of(hint: Any) -> _Check | None:
-    """Make the check of one type hint; None if it declares no range."""
+    """Return a function that checks a value against one type hint; None if the hint declares no range."""
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is Annotated:
         metas = [meta for meta in arguments[1:] if isinstance(meta, Meta)]

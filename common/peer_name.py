@@ -1,4 +1,4 @@
-"""Name of a peer: the authenticated key, then the process among that key's."""
+"""Name of a peer: a digest of its authenticated key, followed by a part that identifies the process."""
 
 import hashlib
 from typing import Final
@@ -7,11 +7,11 @@ _KEY_BYTES: Final = 16
 
 
 def peer_name(key: str, group: bytes) -> bytes:
-    """Put a digest of `key` (zeros without keys) before `group`, which identifies a process of the key."""
+    """Return a peer's name: a digest of `key` (zeros if `key` is empty), then `group`, which identifies the process."""
     digest = hashlib.sha256(key.encode()).digest()[:_KEY_BYTES] if key else bytes(_KEY_BYTES)
     return digest + group
 
 
 def key_part(name: bytes) -> bytes:
-    """Return the part of a peer's name that depends only on the key: equal for all connections of the key."""
+    """Return the part of a peer's name that depends only on the key, and so is equal for all peers with the key."""
     return name[:_KEY_BYTES]

@@ -1,12 +1,12 @@
-"""Reaction: time from a trigger's effect to the changed command, the same for all who use it."""
+"""Reaction h: assumed time from a trigger's effect to the changed command; all code takes it from here."""
 
 from typing import Final
 
 REACTION_S: Final = 0.25
-"""Time from feeling to release, of a person (assumed; 0.25 to 0.3 s for touch)."""
+"""Time from a person's feeling the effect to releasing the trigger, in seconds (assumed; 0.25 to 0.3 s for touch)."""
 FINGER_S: Final = 0.04
-"""Time of the finger's motion (assumed)."""
+"""Duration of the finger's motion, in seconds (assumed)."""
 WRITE_S: Final = 0.01
-"""Period of writes to a controller: at most a hundred a second."""
+"""Period of writes to a controller, in seconds, as there are at most a hundred a second."""
 HORIZON_S: Final = REACTION_S + FINGER_S + WRITE_S
-"""h: time for which a speed continues before anything felt can change it; braking comes on top."""
+"""h: time in seconds for which a commanded speed continues before an effect can change it; braking follows after it."""

@@ -1,11 +1,11 @@
-"""Role of an object in the task."""
+"""Roles that objects may have in the task."""
 
 from enum import Enum
 from typing import Final
 
 
 class Role(Enum):
-    """Role of an object in the task; on the wire a role is the index in ROLES."""
+    """Role of an object in the task. Messages contain its index in ROLES."""
 
     OBSTACLE = "obstacle"
     TARGET = "target"

@@ -1,21 +1,22 @@
-"""Longest silences between messages, and their part in the loop age: the same for both sides."""
+"""Longest times between messages, and the part of them that counts as loop age; both sides use these values."""
 
 from typing import Final
 
 MOTION_PERIOD_S: Final = 1.0 / 250.0
-"""Period at which the operator side checks whether a command must leave."""
+"""Period in seconds at which the operator side checks whether a command must be sent."""
 KEEP_ALIVE_S: Final = 0.02
-"""Longest time between stiffnesses; commands are more frequent. In between the receiver extrapolates."""
+"""Longest time between two stiffness messages, in seconds; commands are more frequent. In between the receiver
+extrapolates."""
 LONGEST_HELD_S: Final = 4.0 * MOTION_PERIOD_S
-"""Longest time between commands. Even if lost packets hold up five in a row, less than 0.1 s, the robot side's limit,
-lies between two arrivals. At 20 ms four of them stopped the arm."""
+"""Longest time between two commands, in seconds. So even if lost packets hold up five successive commands, less than
+0.1 s passes between two arrivals, which is the robot side's limit. At 20 ms four such commands stopped the arm."""
 
 
 def counted_s(silent_s: float) -> float:
     """Return the part of a silence that adds to the loop age, in seconds.
 
-    A message that is not sent means that the receiver's extrapolation holds, which is then no older. One period of
-    commands at full rate counts. The rest of a silence that the dead bands allow does not. Beyond it every millisecond
-    counts: a silent link ages.
+    A message is left out only if the receiver's extrapolation is still right, so that what the receiver knows is no
+    older. Of a silence the first MOTION_PERIOD_S counts; the time from there to KEEP_ALIVE_S does not. All time beyond
+    KEEP_ALIVE_S counts, so that the loop age of a silent link grows.
     """
     return silent_s - min(max(silent_s - MOTION_PERIOD_S, 0.0), KEEP_ALIVE_S - MOTION_PERIOD_S)

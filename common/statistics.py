@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 RESERVOIR_SIZE = 100_000
-"""Number of samples kept for quantiles: 100 s at 1 kHz are exact; of a longer run a uniform random sample is kept."""
+"""Number of samples kept for quantiles, so that 100 s at 1 kHz are exact; of more, a uniform random choice is kept."""
 BLOCK = 512
 """Number of samples that are processed together."""
 
@@ -17,9 +17,9 @@ BLOCK = 512
 class RunningStatistics:
     """Mean, standard deviation, extremes and quantiles of all samples added; None without samples.
 
-    All but the quantiles are exact. Quantiles come from all samples up to `RESERVOIR_SIZE`, and beyond that from a
-    uniform random choice of as many. Samples are processed in blocks, or when a figure is read: a tick that adds one
-    should not compute.
+    Quantiles are exact up to `RESERVOIR_SIZE` samples; beyond that they are from a uniform random choice of so many
+    samples. The other figures are always exact. Samples are processed in blocks, or when a figure is read, so that
+    adding one in a tick takes little time.
     """
 
     def __init__(self, seed: int = 0) -> None:
@@ -51,7 +51,7 @@ class RunningStatistics:
             self._take_in()
 
     def _take_in(self) -> None:
-        """Process the waiting samples. Combining moments: Chan, Golub and LeVeque 1979."""
+        """Process the waiting samples; moments are combined after Chan, Golub and LeVeque 1979."""
         waiting, self._waiting = self._waiting, []
         if not waiting:
             return
@@ -72,9 +72,9 @@ class RunningStatistics:
             self._choose_next_kept()
 
     def _choose_next_kept(self) -> None:
-        """Skip to the next sample that enters the reservoir (Li 1994, algorithm L).
+        """Choose the next sample that enters the reservoir (Li 1994, algorithm L).
 
-        That draws random numbers for each kept sample, not for each added one.
+        The algorithm draws random numbers for each kept sample, not for each added one.
         """
         first, second = 1.0 - self._generator.random(2)
         self._log_threshold += math.log(first) / RESERVOIR_SIZE
@@ -93,7 +93,7 @@ class RunningStatistics:
 
     @property
     def sd(self) -> float | None:
-        """Standard deviation of a sample (n − 1); None below two samples."""
+        """Standard deviation, with the divisor n − 1; None for fewer than two samples."""
         self._take_in()
         return math.sqrt(self._squares / (self._count - 1)) if self._count > 1 else None
 
@@ -117,7 +117,7 @@ class RunningStatistics:
         return float(np.quantile(np.array(self._reservoir), probability)) if self._count else None
 
     def summary_ms(self) -> dict[str, float | None]:
-        """Return `mean`, `sd`, `p50`, `p95` and `p99` in milliseconds, of samples in seconds."""
+        """Return `mean`, `sd`, `p50`, `p95` and `p99` in milliseconds, if the samples are in seconds."""
         values_s = {
             "mean": self.mean,
             "sd": self.sd,
@@ -138,8 +138,8 @@ def _mean(values: list[float]) -> float:
 class SlidingQuantile:
     """Quantile of the newest `window` samples, updated with each.
 
-    Nearest rank: the least sample that at least that fraction of the window does not exceed; a few samples give their
-    maximum.
+    It is the quantile by nearest rank: the least sample that at least the fraction `probability` of the samples does
+    not exceed. So of a few samples it is the maximum.
     """
 
     def __init__(self, window: int = 500, probability: float = 0.95) -> None:
@@ -150,11 +150,11 @@ class SlidingQuantile:
         self._window = window
         self._probability = probability
         self._rank = math.ceil(probability * window) - 1
-        """Index of the quantile in a full window, sorted"""
+        """Index of the quantile in the sorted samples of a full window"""
         self._arrivals: deque[float] = deque()
         self._sorted: list[float] = []
         self.value: float | None = None
-        """Quantile of the window; None while it is empty."""
+        """Present quantile; None while there are no samples."""
 
     def update(self, value: float) -> float:
         """Add the newest sample, forget the oldest of a full window, and return the quantile.
@@ -181,9 +181,9 @@ class SlidingQuantile:
 
 
 class SlidingMinimum:
-    """Least value at the newest `span` positions, in memory bounded by `span`.
+    """Least value at the newest `span` positions, kept in a monotonic queue of at most `span` values.
 
-    A monotonic queue: a value is forgotten as soon as a later one is not above it.
+    A value is forgotten as soon as a later value is not above it.
     """
 
     def __init__(self, span: int) -> None:
@@ -191,7 +191,7 @@ class SlidingMinimum:
         self._candidates: deque[tuple[int, float]] = deque()
 
     def update(self, position: int, value: float) -> float:
-        """Add `value` at `position`, which never decreases; return the minimum."""
+        """Add `value` at `position`, an integer that never decreases; return the minimum."""
         candidates = self._candidates
         while candidates and candidates[-1][1] >= value:
             candidates.pop()

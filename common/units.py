@@ -1,4 +1,4 @@
-"""Parsers of human units (`50ms`, `10mbit`, `1%`); values are SI inside."""
+"""Parsers of values with units (`50ms`, `10mbit`, `1%`), which return seconds, bits per second and shares."""
 
 import math
 import re
@@ -7,7 +7,8 @@ from common.errors import ConfigurationError
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _PER_SECOND = {"us": 1e6, "ms": 1e3, "s": 1.0, "usec": 1e6, "msec": 1e3, "sec": 1.0}
-"""Divisors: 800 / 1e6 is rounded once, like 0.0008, but 800 × 1e-6 twice."""
+"""Divisors that convert a unit to seconds. 800 / 1e6 is rounded once, like 0.0008; 800 × 1e-6 would be rounded
+twice."""
 _BITS_PER_SECOND = {
     f"{prefix}{unit}": factor * bits
     for prefix, factor in {
@@ -23,13 +24,13 @@ _BITS_PER_SECOND = {
     }.items()
     for unit, bits in {"bit": 1.0, "bps": 8.0}.items()
 }
-"""Factors of tc's units: `bit` counts bits, `bps` bytes; k is 1000, ki 1024."""
+"""Factors that convert tc's units to bits per second: `bit` counts bits, `bps` bytes; k is 1000, ki 1024."""
 
 
 def parse_duration(text: str, field: str) -> float:
-    """Read a duration such as `50ms`, `0.2s` or `150us`; return seconds.
+    """Parse a duration such as `50ms`, `0.2s` or `150us`; return seconds.
 
-    A bare number is refused, because netem reads it as microseconds and people as milliseconds. Raises
+    A number without a unit is refused, because netem takes it for microseconds and people for milliseconds. Raises
     ConfigurationError, which names `field` and `text`.
     """
     match = re.fullmatch(rf"({_NUMBER})([a-z]+)", text.strip())
@@ -42,9 +43,9 @@ def parse_duration(text: str, field: str) -> float:
 
 
 def parse_rate(text: str, field: str) -> float:
-    """Read a rate such as `10mbit`, `500kbit` or `2mbps` (bytes, as in tc); return bits per second.
+    """Parse a rate such as `10mbit`, `500kbit` or `2mbps` (bytes, as in tc); return bits per second.
 
-    Raises ConfigurationError, which names `field` and `text`, also for a bare number.
+    Raises ConfigurationError, which names `field` and `text`, also for a number without a unit.
     """
     match = re.fullmatch(rf"({_NUMBER})([a-zA-Z]+)", text.strip())
     if match is None or match[2].lower() not in _BITS_PER_SECOND:
@@ -59,7 +60,7 @@ def parse_rate(text: str, field: str) -> float:
 
 
 def parse_share(text: str, field: str) -> float:
-    """Read a percentage from `0%` to `100%`; return a share. Raises ConfigurationError, which names `field`, `text`."""
+    """Parse a percentage from `0%` to `100%`; return a share. ConfigurationError names `field` and `text`."""
     match = re.fullmatch(rf"({_NUMBER})%", text.strip())
     share = float(match[1]) / 100.0 if match is not None else math.nan
     if not 0.0 <= share <= 1.0:

@@ -1,4 +1,4 @@
-"""Command `feelahead`: all that needs both sides."""
+"""Command `feelahead`: its subcommands, and the text of its help."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -8,6 +8,7 @@ from feelahead.commands.bench_and_try import bench, try_out
 from feelahead.commands.calibrate import calibrate
 from feelahead.commands.demo.command import demo
 from feelahead.commands.doctor.command import doctor
+from feelahead.commands.feel.command import feel
 from feelahead.commands.keys import keys
 from feelahead.commands.recordings import export, plot, replay
 from feelahead.commands.virtual_dualsense import virtual_dualsense
@@ -16,18 +17,19 @@ _COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
     "demo": (demo, "both sides on this machine, with a simulated controller and person"),
     "doctor": (doctor, "find what is missing on this machine, or wrong on the path to a robot side, with the remedy"),
     "calibrate": (calibrate, "measure where a controller's triggers and sticks begin and end"),
+    "feel": (feel, "feel the triggers' zones with a controller alone, or measure their forces with a kitchen scale"),
     "keys": (keys, "who may operate the robot side: make key pairs, allow, list and revoke"),
     "virtual-dualsense": (virtual_dualsense, "a controller that every program on this machine sees, with no hardware"),
     "replay": (replay, "show a recording, or compute it again and compare"),
-    "export": (export, "turn a recording into CSV, Parquet, a LeRobot dataset, or a whole file"),
+    "export": (export, "turn a recording into CSV, Parquet or a LeRobot dataset"),
     "plot": (plot, "draw a recording on one page"),
     "bench": (bench, "measure speed and accuracy, compared with alternatives"),
-    "try": (try_out, "test people and robots under delay, faults and attacks"),
+    "try": (try_out, "run an experiment in simulation: approaches, the demo, haptics on and off, latency"),
 }
 
 
 def command(arguments: Sequence[str]) -> int:
-    """Run the command that the first argument names."""
+    """Run the subcommand that the first argument names; without one, print the help."""
     if not arguments or arguments[0] in ("-h", "--help"):
         lines = [f"  {name:<19}{text}" for name, (_, text) in _COMMANDS.items()]
         sys.stdout.write(

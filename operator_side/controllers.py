@@ -42,12 +42,16 @@ class Opening(NamedTuple):
 
 
 def _hid(given: OpeningParts) -> Opening:
-    find = Finder(load_backend() if given.backend is None else given.backend)
     # Without haptics nothing needs to be released, so there is no watchdog.
     return Opening(
-        BackgroundSearch(functools.partial(_with_background_writes, find)),
-        ReleaseGuard() if given.settings.haptics else None,
+        dualsense_search(given.backend, given.settings.controller), ReleaseGuard() if given.settings.haptics else None
     )
+
+
+def dualsense_search(backend: HidBackend | None = None, only: str | None = None) -> BackgroundSearch:
+    """Return a search for a real DualSense. backend: instead of hidapi. only: address of the one to take."""
+    find = Finder(load_backend() if backend is None else backend, only)
+    return BackgroundSearch(functools.partial(_with_background_writes, find))
 
 
 def _with_background_writes(find: Finder, preferred: str | None) -> OpenController:

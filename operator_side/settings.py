@@ -11,6 +11,7 @@ from common.command.run_options import SideOptions
 from common.limits import check_limits
 from common.protocol.messages import Compensation
 from common.sockets.turns import CONNECTIONS, MOST_CONNECTIONS_EACH
+from operator_side.controller.port import check_choice
 from operator_side.feel.rendering import RenderingSettings
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.settings import PersonSettings
@@ -47,6 +48,8 @@ class OperatorSettings(SideOptions):
     """Controller. hid: a DualSense; if absent, it is waited for. evdev (Linux): any gamepad that rumbles. simulated: a
     simulated DualSense with a scripted person, which a page of the console may take over. browser: only a page of the
     console."""
+    controller: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
+    """Take only the DualSense with this address, as `feelahead doctor` prints it."""
     haptics: bool = True
     """Whether the triggers resist and the motors rumble."""
     compensation: Compensation = "operator"
@@ -80,6 +83,7 @@ class OperatorSettings(SideOptions):
             raise ValueError(f"--tui with --status {self.status}; valid: one of them")
         if self.device == "browser" and not self.console:
             raise ValueError("--device browser without --console: no page could drive; valid: both")
+        check_choice(self.device, self.controller)
         if self.robot_key is not None and self.keys is None:
             raise ValueError("--robot-key without --keys; valid: both (feelahead keys make operator makes ours)")
         if self.swap_sides and self.person.pull_n is not None:

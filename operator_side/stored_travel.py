@@ -1,8 +1,9 @@
-"""Use of the travel calibration that is stored for a controller, as soon as the controller is found."""
+"""Use of what is stored for a controller, as soon as the controller is found: travel calibration, measured forces."""
 
 from collections.abc import Callable
 
 from common.errors import ConfigurationError
+from operator_side.calibration.forces import forces_in_words, load_forces
 from operator_side.calibration.store import calibration_path, load_calibration
 from operator_side.controller.connection import Connection
 from operator_side.core import OperatorSide
@@ -41,7 +42,19 @@ class StoredTravel:
         if controller.address in self._reported:
             return
         self._reported.add(controller.address)
+        for text in _forces(controller.address):
+            self._note(text)
         if stored is None:
             self._note("its travel has not been calibrated: feelahead calibrate does that")
         else:
             self._note(f"its travel calibration: {calibration_path(controller.address)}")
+
+
+def _forces(address: str) -> list[str]:
+    """Return a note for each trigger whose forces were measured; nothing depends on them, so a fault is a note, too."""
+    try:
+        forces = load_forces(address)
+    except ConfigurationError as error:
+        return [str(error)]
+    measured = (("L2", forces.l2), ("R2", forces.r2))
+    return [f"measured: {forces_in_words(name, one)}" for name, one in measured if one is not None]

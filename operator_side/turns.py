@@ -13,6 +13,7 @@ from common.status.statuses import OperatorStatus
 from operator_side.controller.connection import Connection
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.release_guard import ReleaseGuard
+from operator_side.dualsense.hid.second_writer import SecondWriters
 from operator_side.robot_link.commanding import ToRobot
 from operator_side.robot_link.sending import Sending
 from operator_side.settings import OperatorSettings
@@ -77,7 +78,7 @@ class OperatorTurns:
         self._take, self._feel = timed("messages", self._take_in), timed("feeling", self._tell_controller)
         self.turn = timed("hands", self._move)
         self.wait, self.next_due, self.note = sockets.wait, self._sending.line.next_due, self._viewing.note
-        self._guard_s = 0.0
+        self._guard_s, self._second_writers = 0.0, SecondWriters()
         self._person_waits_s = settings.person_waits if console is not None else 0.0
         self._person_since_s: float | None = None
         """Time of the robot side's first telemetry; None before it"""
@@ -114,6 +115,9 @@ class OperatorTurns:
             self._guard_s = now_s + _GUARD_PERIOD_S
             for text in self._guard.take_notes():
                 self.note(text)
+        controller = self._connection.controller
+        for text in self._second_writers.look(None if controller is None else controller.path, now_s):
+            self.note(text)
         shows, tells = self._viewing.facts_due(now_s), status.due(now_s)
         if shows or tells:
             said = self._status(now_s)

@@ -1,10 +1,10 @@
-"""The console script `feelahead-robot`, also `python -m robot_side`."""
+"""Console script `feelahead-robot`, the same as `python -m robot_side`."""
 
 from common.command.launch import Command, launch, single_threaded_algebra
 
 
 def main() -> None:
-    """Run the process."""
+    """Run the robot side's process."""
     single_threaded_algebra()
     launch("feelahead-robot", _load, extra="robot", has_summary=True)
 

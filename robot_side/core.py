@@ -1,4 +1,5 @@
-"""Robot side without I/O: payloads in, payloads out, and `now` with every call.
+"""Robot side without I/O: payloads come in and go out, and every call has the time `now`.
+
 
 payloads ─▶ receive ─▶ newest command ─▶ safety ─▶ tool motion ─▶ arm
 arm ─▶ kinematics ─▶ law: contact ahead ─▶ stiffness fields, telemetry ─▶ payloads
@@ -36,7 +37,10 @@ from robot_side.surroundings.surroundings import Sight, Surroundings
 
 @dataclass(frozen=True, kw_only=True)
 class RobotParts:
-    """Parts of a core; `replace` one to use another arm, camera or law. Each set of parts serves one core only."""
+    """Parts of a core.
+
+    To use another arm, camera or law, `replace` that part. Each set of parts serves only one core.
+    """
 
     arm: Arm
     kinematics: GripperKinematics
@@ -48,12 +52,12 @@ class RobotParts:
     limits: JointLimits
     motion: ToolMotionSettings
     truth: Observer | None = None
-    """Observer of true contacts and distances, for the figures; None where they are unknown"""
+    """Observer of true contacts and distances, for the figures; None if these are unknown"""
     held_covers: HeldCovers | None = None
     assists: bool = False
-    """Cap the speed along the triggers (see `speed_assist`)"""
+    """Whether to limit the speed along the triggers (see `speed_assist`)"""
     full_rate: bool = False
-    """Send a stiffness in every tick"""
+    """Whether to send a stiffness message in every tick"""
     seed: int = 0
     notes: tuple[str, ...] = ()
     """Notes about the scene for a person, shown before the run"""
@@ -63,7 +67,7 @@ class RobotSide:
     """Pipeline of one robot, with one operator at a time and others that observe."""
 
     def __init__(self, parts: RobotParts, listeners: Sequence[Listener] = ()) -> None:
-        """listeners: notified of each turn, as are the run's figures."""
+        """listeners: receive the events of each turn, like the run's figures."""
         self.parts, self.session = parts, parts.session
         self.sight = Sight(parts.camera, parts.surroundings)
         self.grip = Grip(parts.surroundings, parts.held_covers)
@@ -71,7 +75,7 @@ class RobotSide:
         self.reports = Reports(parts.session, parts.law, full_rate=parts.full_rate)
         self.figures = RunFigures(parts.seed, parts.truth)
         self.newest: tuple[Sensed, Situation] | None = None
-        """Result of the law in the last tick, and the situation that it was computed for"""
+        """Result of the law in the last tick, and the situation for which it was computed"""
         self._joints = JointEstimate()
         self._measured: ArmState | None = None
         self._found: Found | None = None
@@ -79,7 +83,7 @@ class RobotSide:
 
     @property
     def held(self) -> str | None:
-        """Name of the object that the gripper holds; None for none."""
+        """Name of the object that the gripper holds; None if it holds nothing."""
         return None if self.grip.held is None else self.grip.held.name
 
     def loop_age_s(self, now_s: float) -> float:
@@ -87,7 +91,7 @@ class RobotSide:
         return self.parts.loop_age.value(now_s)
 
     def receive(self, peer: bytes, payload: bytes, now_s: float) -> None:
-        """Take one control payload from `peer`; drop it if it is invalid, late or not the operator's."""
+        """Take one control payload from `peer`; drop a payload that is invalid, late, or not the operator's."""
         self._heard.on_received(peer, payload, now_s)
         self.session.receive(peer, payload, now_s)
         for mark in self.session.episodes.take_accepted():
@@ -97,7 +101,7 @@ class RobotSide:
             self._heard.on_episode(mark, now_s)
 
     def tick(self, now_s: float) -> list[Outgoing]:
-        """Run the pipeline once at `now_s`; return the messages to send. Listeners hear of a failed tick, too."""
+        """Run the pipeline once at `now_s`; return the messages to send. Listeners receive a failed tick, too."""
         outgoing: list[Outgoing] = []
         self._found = None
         try:
@@ -152,9 +156,9 @@ class RobotSide:
         return outgoing
 
     def _follow_operator(self, now_s: float, late_s: float) -> float:
-        """Update the arm's owner and the loop age; return t_d of eq. 8.
+        """Update the lease's owner and the loop age; return the loop age t_d of eq. 8.
 
-        late_s: lateness of the arm's states, in seconds. Commands take about as long to reach the arm.
+        late_s: lateness of the arm's states, in seconds. Commands take about as long to reach the arm, so it is added.
         """
         session, loop_age = self.session, self.parts.loop_age
         session.update(now_s)
@@ -168,14 +172,14 @@ class RobotSide:
         return loop_age.update(age_s + late_s, now_s)
 
     def observe(self, now_s: float) -> None:
-        """Take in a frame, and let listeners work; called after the messages of the tick at `now_s` have left."""
+        """Read the camera's newest frame, and let listeners work; call it after the tick's messages have left."""
         self._heard.on_step("frame")
         self.sight.see(now_s)
         self._heard.on_step("end")
         self._heard.on_sent(now_s)
 
     def status(self, now_s: float) -> RobotStatus:
-        """Return the status that a person sees, without the process's part."""
+        """Return the status that a person sees, except for the figures of the process."""
         lease, safety, command = self.session.lease, self.session.safety, self.session.safety.command
         delay_s = self.session.link.delay.mean
         status = RobotStatus(
@@ -210,7 +214,7 @@ class RobotSide:
         )
 
     def summary(self) -> dict[str, Any]:
-        """Return this side's part of the run's summary."""
+        """Return the part of the run's summary that comes from the core."""
         stops = [
             {"time_s": self.figures.since_start_s(when_s), "reason": reason}
             for when_s, reason in self.session.safety.stops

@@ -1,6 +1,6 @@
 """Events of each turn, for listeners: recording, timing, figures, experiments.
 
-A listener changes nothing: it gets the core's own values, not copies.
+A listener must change nothing, because it gets the core's own values, not copies.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -17,42 +17,42 @@ from robot_side.surroundings.perceived import PerceivedObjects
 
 Step = Literal["arm", "pose", "grip", "motion", "law", "messages", "listeners", "frame", "end"]
 """Steps of a turn, in their order. A simulated arm advances its physics in `arm`. `frame` comes after the messages have
-left. `end`: no step until the next one."""
+left. `end` means that no step runs until the next one begins."""
 
 
 class Found(NamedTuple):
-    """Results of a tick."""
+    """Results of a tick that did not fail."""
 
     permission: Permission
     commanded_rad_s: FloatArray | None
-    """(n,) joint velocities; None: stand still"""
+    """(n,) commanded joint velocities; None: the arm is to stand still"""
     state: ArmState
-    """The measured state, with estimated joint positions"""
+    """Measured state, with estimated joint positions"""
     situation: Situation
     sensed: Sensed
     holds_target: bool
     target_m: FloatArray | None
-    """(3,) the target's centre as perceived"""
+    """(3,) centre of the target as perceived"""
 
 
 class Tick(NamedTuple):
-    """Input, results and messages of a tick."""
+    """Inputs, results and messages of one tick."""
 
     now_s: float
     measured: ArmState | None
     frame: PerceivedObjects | None
     command_sent_s: float
-    """Time at which the newest accepted command was sent, on its sender's clock; NaN without one"""
+    """Time at which the newest accepted command was sent, on its sender's clock; NaN without a command"""
     outgoing: Sequence[Outgoing]
     found: Found | None
-    """Results; None for a failed tick"""
+    """Results of the tick; None if it failed"""
 
 
 class Listener:
-    """Receiver of a core's events; a method that is not overridden costs nothing."""
+    """Base class of receivers of a core's events; a method that a derived class does not override costs nothing."""
 
     steps: Collection[Step] = ()
-    """Steps that `on_step` receives"""
+    """Steps for which `on_step` is called"""
 
     def on_received(self, peer: bytes, payload: bytes, now_s: float) -> None:
         """Take a control payload, before it is validated."""
@@ -61,17 +61,17 @@ class Listener:
         """Take an accepted mark of an episode; after `reset` the scene is as at its start."""
 
     def on_step(self, step: Step) -> None:
-        """Take the step of the turn that begins: one of `steps`."""
+        """Take the step of the turn that begins now, one of `steps`."""
 
     def on_tick(self, tick: Tick) -> None:
-        """Take the data of a tick, before its messages leave."""
+        """Take the data of a tick, before the tick's messages leave."""
 
     def on_sent(self, now_s: float) -> None:
-        """Note that the messages of the tick at `now_s` have left."""
+        """Receive the event that the messages of the tick at `now_s` have left."""
 
 
 class Listeners(Listener):
-    """Dispatcher: calls each listener only for the methods that it overrides."""
+    """Dispatcher of events to several listeners: calls each listener only for the methods that it overrides."""
 
     def __init__(self, listeners: Sequence[Listener]) -> None:
         own: Final = {
@@ -85,7 +85,7 @@ class Listeners(Listener):
                 self._steps[name].append(one.on_step)
 
     def on_received(self, peer: bytes, payload: bytes, now_s: float) -> None:
-        """Pass it on."""
+        """Pass the event on to the listeners."""
         for hear in self._received:
             hear(peer, payload, now_s)
 
@@ -95,16 +95,16 @@ class Listeners(Listener):
             hear(mark, now_s)
 
     def on_step(self, step: Step) -> None:
-        """Pass it on."""
+        """Pass the event on to the listeners."""
         for hear in self._steps[step]:
             hear(step)
 
     def on_tick(self, tick: Tick) -> None:
-        """Pass it on."""
+        """Pass the event on to the listeners."""
         for hear in self._ticks:
             hear(tick)
 
     def on_sent(self, now_s: float) -> None:
-        """Pass it on."""
+        """Pass the event on to the listeners."""
         for hear in self._sent:
             hear(now_s)

@@ -1,4 +1,4 @@
-"""The process `feelahead-robot`: settings, parts, and `run`."""
+"""Process `feelahead-robot`: settings, parts, and `run`."""
 
 import secrets
 from collections.abc import Callable, Sequence
@@ -38,7 +38,7 @@ _OPEN_TO_ALL: Final = "WITHOUT KEYS: anyone who reaches the port can move the ar
 
 
 Adapted = tuple[RobotParts, Sequence[Listener]]
-"""Parts as an experiment changed them, and its listeners."""
+"""Parts as an experiment changed them, and the experiment's listeners"""
 
 
 def main() -> None:
@@ -47,14 +47,14 @@ def main() -> None:
 
 
 def as_built(parts: RobotParts) -> Adapted:
-    """Return the parts unchanged."""
+    """Return the parts unchanged, without further listeners."""
     return parts, ()
 
 
 def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = as_built) -> int:
-    """Run the robot side until --duration, Ctrl-C or SIGTERM; the arm stands still on every exit.
+    """Run the robot side until --duration, Ctrl-C or SIGTERM; the arm stands still however the program ends.
 
-    adapt: returns an experiment's parts and listeners.
+    adapt: takes the parts that were built; returns an experiment's parts and listeners.
     """
     settings = parse_settings(RobotSettings, "feelahead-robot", arguments)
     keys = None if settings.keys is None else RobotKeys.load(settings.keys)

@@ -1,4 +1,4 @@
-"""Pass the operator's motion on to the arm."""
+"""Motion of the arm by the operator's commands."""
 
 import numpy as np
 
@@ -14,21 +14,21 @@ from robot_side.operators.safety import Permission
 
 
 class Motion:
-    """Commands the arm, and keeps the last command."""
+    """Commander of the arm, which keeps the last command."""
 
     def __init__(self, arm: Arm, limits: JointLimits, settings: ToolMotionSettings, *, assists: bool = False) -> None:
-        """assists: cap the speed along the triggers (see `speed_assist`)."""
+        """assists: limit the speed along the triggers (see `speed_assist`)."""
         self.commanded_rad_s: FloatArray | None = None
-        """(n,) joint velocities; None: stand still"""
+        """(n,) commanded joint velocities; None: the arm is to stand still"""
         self.told_m_s = self.rises_m_s = 0.0
-        """Commanded speeds of the tool: along the direction in which R2 advances; upwards while an object is held"""
+        """Commanded speeds of the tool: in the direction in which R2 advances; and upwards (0 if nothing is held)"""
         self._arm, self._limits, self._settings, self._assists = arm, limits, settings, assists
         self._still: FloatArray = np.zeros(arm.joint_count)
 
     def follow(
         self, permission: Permission, pose: GripperPose, state: ArmState, grip: Grip, felt: Sensed | None, now_s: float
     ) -> None:
-        """Command the arm; stop it without permission. felt: the law's result of the tick before."""
+        """Command the arm; stop it if there is no permission. felt: the law's result in the tick before."""
         command = permission.command
         if command is None or grip.touchdown.gives_way:
             self.commanded_rad_s, self.told_m_s, self.rises_m_s = None, 0.0, 0.0

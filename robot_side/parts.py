@@ -1,4 +1,4 @@
-"""Make the parts of a robot side from its settings. Arm and camera are simulated or connected drivers."""
+"""Making of the parts of a robot side from its settings. Arm and objects are simulated or come from drivers."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -42,16 +42,16 @@ from robot_side.surroundings.surroundings import Surroundings
 
 _SEARCHING = "searching for spheres that cover gripper and objects, seconds for each shape; the next start is quick"
 _NAMED_OBJECTS = 8
-"""Most objects that a note names."""
+"""Maximum number of objects that a note names"""
 _LIBRARY = (
     *("robot_side.overlap.kernels.", "robot_side.overlap.lanes.", "robot_side.overlap.precise."),
     "robot_side.arm.resolved_rate.",
 )
-"""Kernels of library functions that no tick runs: batches, precise forms, joint velocities alone."""
+"""Prefixes of the kernels of library functions that no tick runs: batches, precise forms, joint velocities alone"""
 
 
 class SimulationObserver:
-    """Observer of the simulation's ground truth, which the pipeline itself never sees."""
+    """Observer of the simulation's ground truth, which the pipeline itself never uses."""
 
     def __init__(self, scene: Scene) -> None:
         self._truth = GroundTruth(scene)
@@ -63,27 +63,27 @@ class SimulationObserver:
         figures.truth(self._truth.observe(), self._roles, now_s)
 
     def watch(self, figures: RunFigures, now_s: float) -> None:
-        """Report the first contact to `figures`; before it nothing can be held."""
+        """Report the gripper's first contact to `figures`; before it nothing can be held."""
         if not figures.touched and (onset := self._contact.update(None)) is not None:
             figures.first_contact(onset.thing, onset.closing_speed_m_s, now_s)
 
 
 @dataclass(frozen=True, kw_only=True)
 class SceneParts(RobotParts):
-    """Parts with their scene, which is simulated, or follows the drivers of arm or objects."""
+    """Parts with their scene, which is simulated or follows the drivers of arm or objects."""
 
     kinematics: MujocoKinematics
     scene: Scene
     any_objects: bool
     """Whether objects of any kind may appear during the run"""
     explains: Explains
-    """Law of the settings, even where an experiment replaces `law`"""
+    """Law named in the settings, even if an experiment replaces `law`"""
 
     @property
     def kernels(self) -> list[Compiled]:
-        """Kernels that ticks may run; the overlap kernel of a kind that the scene lacks is left out.
+        """Kernels that ticks may run; the overlap kernel of a kind of primitive that the scene lacks is left out.
 
-        A scene's primitives stay the same during a run. Those of ignored objects count, too.
+        A scene's primitives stay the same during a run. The primitives of ignored objects count, too.
         """
         seen = _as_loaded(self.scene, dict.fromkeys(self.scene.roles, Role.OBSTACLE))
         unneeded = {kind.kernel for kind in KINDS if not (self.any_objects or len(getattr(seen, kind.owner)))}
@@ -102,8 +102,8 @@ def build_parts(
 ) -> SceneParts:
     """Make the parts; ConfigurationError for a model that cannot be used.
 
-    scene: used instead of the one that the settings name. announce: called once, with one line, before a long search.
-    beside: the connected drivers, whose arm and objects replace simulated ones.
+    scene: used instead of the scene that the settings name. announce: called once, with one line, before a long search.
+    beside: the connected drivers, whose arm and objects replace the simulated ones.
     """
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
@@ -180,7 +180,7 @@ def _episodes(settings: RobotSettings, arm: MujocoArm | RemoteArm, camera: Mujoc
 def _arm(
     scene: Scene, encoder: Encoder, limits: MotionLimits, beside: ConnectedDrivers | None
 ) -> tuple[MujocoArm | RemoteArm, tuple[FloatArray, FloatArray]]:
-    """Return the arm, simulated or a driver's, and its joints' lower and upper ends, (n,) each."""
+    """Return the arm, simulated or a driver's, and the lower and upper ends of its joints' ranges, (n,) each."""
     if beside is None or not beside.has_arm:
         simulated = MujocoArm(scene, encoder, limits)
         return simulated, simulated.ends_rad
@@ -192,7 +192,7 @@ def _arm(
 
 
 def _joint_names(scene: Scene) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of the arm's joints and of the fingers', in the model's order."""
+    """Return the names of the arm's joints and of the fingers' joints, in the model's order."""
     model, robot = scene.model, scene.robot
     names = {int(model.jnt_qposadr[joint]): model.joint(joint).name or f"joint{joint}" for joint in range(model.njnt)}
     arm, fingers = (
@@ -207,7 +207,7 @@ def _camera(settings: RobotSettings, scene: Scene, seed: int) -> MujocoCamera:
 
 
 def _notes(scene: Scene, settings: RobotSettings) -> tuple[str, ...]:
-    """Return the notes before the run: start pose, objects and roles, and inexact shapes."""
+    """Return the notes shown before the run: start pose, objects and their roles, and shapes that are not exact."""
     notes = [f"starts at {scene.start_pose}"]
     if settings.arm is not None:
         joints, fingers = (", ".join(names) or "none" for names in _joint_names(scene))
@@ -240,28 +240,28 @@ def _notes(scene: Scene, settings: RobotSettings) -> tuple[str, ...]:
 
 
 def _as_loaded(scene: Scene, roles: Mapping[str, Role]) -> PerceivedObjects:
-    """Return the objects as the scene starts, without the primitives of ignored ones."""
+    """Return the objects as the scene starts, without the primitives of ignored objects."""
     nowhere = np.zeros((len(scene.objects), 3))
     return scene.primitives.place(0.0, roles, nowhere, scene.data.geom_xpos, scene.data.geom_xmat)
 
 
 def _cover_notes(cover: GripperCover, asked_m: float, held: HeldCovers) -> list[str]:
-    """Return the notes about spheres that stand out farther than asked."""
+    """Return the notes about spheres that protrude farther than `asked_m`."""
     notes = []
     if cover.stand_out_m > asked_m * (1.0 + 1e-9):
         notes.append(
-            f"the gripper's {len(cover.radii_m)} spheres stand out of it by up to {1e3 * cover.stand_out_m:.1f} mm"
+            f"the gripper's {len(cover.radii_m)} spheres protrude from it by up to {1e3 * cover.stand_out_m:.1f} mm"
             f" instead of {1e3 * asked_m:.1f}: its links are large"
         )
     if held.coarse:
         shown = [f"{name} by {1e3 * stand_out:.0f} mm" for name, stand_out in held.coarse[:_NAMED_OBJECTS]]
         more = [f"and {len(held.coarse) - len(shown)} more"] if len(held.coarse) > len(shown) else []
-        notes.append(f"felt early while held, as spheres stand out: {', '.join([*shown, *more])}")
+        notes.append(f"felt early while held, because their spheres protrude: {', '.join([*shown, *more])}")
     return notes
 
 
 def _roles(roles: Mapping[str, Role]) -> str:
-    """Return the names of the objects by role, the target first."""
+    """Return the names of the objects grouped by role, the target first."""
     shown = []
     for role in (Role.TARGET, Role.OBSTACLE, Role.SUPPORT, Role.IGNORED):
         names = [name for name, has in roles.items() if has is role]
@@ -272,7 +272,7 @@ def _roles(roles: Mapping[str, Role]) -> str:
 
 
 def _prediction_errors(settings: RobotSettings, scene: Scene) -> tuple[PredictionErrors, tuple[str, ...]]:
-    """Return the table for this arm, and a note where it has not been measured."""
+    """Return the prediction errors of this arm, and a note if they have not been measured."""
     if settings.prediction_errors is not None:
         return load_prediction_errors(settings.prediction_errors), ()
     built_in = load_prediction_errors(BUILT_IN)

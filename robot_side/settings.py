@@ -28,12 +28,12 @@ _Spread = Annotated[float, Meta(ge=0.0, le=1.0)]
 
 @dataclass(frozen=True)
 class EncoderSettings:
-    """Error of the joint encoders (eq. 3): assumed values of a usual class, not one arm's specification."""
+    """Error of the joint encoders (eq. 3); the defaults are assumed for a usual class of encoders, not one arm."""
 
     sigma_rad: _Spread = 2e-4
     """Standard deviation of a reading's noise."""
     resolution_rad: _Spread = 2.0 * math.pi / 2**15
-    """Quantisation step: 15 bits a revolution."""
+    """Quantisation step of a reading; the default is 15 bits a revolution."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -41,14 +41,14 @@ class EncoderSettings:
 
 @dataclass(frozen=True)
 class CameraSettings:
-    """Error of the camera's perceived positions, per axis (eq. 1-2); the enlargement uses these values."""
+    """Error of the camera's perceived positions along each axis (eq. 1-2); the enlargement uses these values."""
 
     mean_m: float | Vector3 = 0.0
-    """μ_c, true minus perceived: one value for all axes of the world, or one for each."""
+    """Mean error μ_c, true minus perceived position: one value for all axes of the world, or three."""
     sd_m: _Spread = 0.003
-    """Standard deviation, drawn once for each object: 3 mm is a depth camera at half a metre (assumed)."""
+    """Standard deviation of an error drawn once for each object; 3 mm is assumed for a depth camera at half a metre."""
     frame_sd_m: _Spread = 0.0
-    """Standard deviation of an additional error, drawn in each frame."""
+    """Standard deviation of an additional error, drawn anew in each frame."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -66,27 +66,27 @@ class RobotSettings(SideOptions):
     """Robot side: a simulated arm that warns of contact ahead and allows for its own measurement errors.
 
     It listens for an operator side, moves while commands keep coming, and answers with the stiffness of the two
-    triggers. Any MJCF arm: --model FILE.xml --site NAME, the site between the fingertips with its z axis along the
-    approach. A model of the arm alone gets the built-in table.
+    triggers. For any MJCF arm give --model FILE.xml --site NAME. The site is between the fingertips, and its z axis is
+    along the approach. A model of the arm alone gets the built-in table.
     """
 
     bind: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT")] = "tcp://127.0.0.1:5555"
-    """Address to listen at for the operator side; port 0 takes any free one."""
+    """Address at which to listen for the operator side; port 0 takes any free port."""
     view_bind: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """Address to publish the views at; the port after the control port unless given."""
+    """Address at which to publish the views; by default the port after the control port."""
     keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """Admit only operators whose keys FOLDER allows, and encrypt everything; needed beyond this machine. Made by:
-    feelahead keys make robot; then, for each operator: feelahead keys allow NAME KEY."""
+    """Admit only operators whose keys FOLDER allows, and encrypt everything; needed for connections beyond this
+    machine. To make FOLDER: feelahead keys make robot; then, for each operator: feelahead keys allow NAME KEY."""
     insecure: bool = False
-    """Listen beyond this machine without keys: anyone who reaches the port can move the arm."""
+    """Listen for other machines without keys: anyone who reaches the port can move the arm."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
-    """Any MJCF arm with actuators instead of the built-in one. It starts at the keyframe named home, else at the first
-    keyframe, else in the middle of the joints' ranges."""
+    """MJCF file of any arm with actuators, instead of the built-in arm. It starts at the keyframe named home, else at
+    the first keyframe, else in the middle of the joints' ranges."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """The model's site between the fingertips."""
+    """Name of the model's site between the fingertips."""
     arm: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Address at which the driver of your arm connects; that arm moves instead of a simulated one (docs/drivers.md).
-    --model describes the arm. With --keys a driver needs an allowed key, as an operator does."""
+    --model describes the arm. With --keys the driver needs an allowed key, as an operator does."""
     objects: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Address at which your perception process connects, instead of a simulated camera (docs/drivers.md)."""
     scene: SceneName | None = None
@@ -94,27 +94,29 @@ class RobotSettings(SideOptions):
     slot: two posts on the way, with 15 to 40 mm of clearance on each side. shelf: a shelf with a raised front edge to
     reach over. The last three are drawn from the seed."""
     law: LawName = "swept"
-    """Law of stiffness. swept: along each trigger, early enough to release it in time. paper: the paper's plain law,
-    for comparison."""
+    """Law from which stiffness follows. swept: stiffness along each trigger, early enough to release it in time. paper:
+    the paper's plain law, for comparison."""
     assist: Assist = "none"
-    """Help besides stiffness, which is only advice. speed: the robot side caps the speed along the triggers, so that
-    the arm stops where full strength is due, however hard the finger pulls."""
+    """Help besides stiffness, which a strong finger can overcome. speed: the robot side limits the speed along the
+    triggers, so that the arm stops where full strength is due, however hard the finger pulls."""
     cover_m: Annotated[float, Meta(ge=0.0005, le=0.05)] = 0.003
-    """Largest distance by which the spheres that cover the gripper may stand out; a larger one needs fewer spheres."""
+    """Largest distance by which spheres that cover the gripper may protrude; a larger distance needs fewer spheres."""
     prediction_errors: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """Prediction errors of the commands under way on this arm, from: feelahead bench error --table FILE.toml. Known for
-    the built-in arm; without it a fifth of the distance at full speed in the loop age is added."""
+    """Errors of the predicted motion by commands under way on this arm, as written by: feelahead bench error --table
+    FILE.toml. They are known for the built-in arm. For another arm without this file, a fifth of the distance at full
+    speed in the loop age is added."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
-    """Share of approaches in which the warning must come before the contact, between 0 and 1 (eq. 10). With a camera of
-    3 mm, 0.9 enlarges the gripper by 4 mm and 0.99 by 7 mm. An edge nearer to the path makes a trigger stiff."""
+    """Share of approaches in which the warning must come before the contact, between 0 and 1 (eq. 10). With a camera
+    error of 3 mm, 0.9 enlarges the gripper by 4 mm and 0.99 by 7 mm. An edge that is nearer than this to the gripper's
+    path makes a trigger stiff."""
     permit_tuning: bool = False
-    """Let the owner of the lease change the probability and this side's emulated link during the run."""
+    """Let the owner of the lease change the probability and the emulated link of this side during the run."""
     assumed_delay_s: Annotated[float, Meta(ge=0.001, le=60.0)] = 1.0
-    """Loop age used until one has been measured."""
+    """Loop age assumed until one has been measured."""
     kinematic_mean_m: Vector3 = (0.0, 0.0, 0.0)
-    """μ_ee, mean error of the forward kinematics in the world frame, true minus estimated."""
+    """Mean error μ_ee of the forward kinematics in the world frame, true minus estimated position."""
     roles: Annotated[dict[str, Role], tyro.conf.Suppress] = field(default_factory=dict)
-    """TOML only: [roles] name = "obstacle", "target", "support" or "ignored"; by default from the names."""
+    """Only in a TOML file: [roles] NAME = "obstacle", "target", "support" or "ignored"; by default by the names."""
     encoder: EncoderSettings = field(default_factory=EncoderSettings)
     camera: CameraSettings = field(default_factory=CameraSettings)
     cameras: CamerasSettings = field(default_factory=CamerasSettings)
@@ -131,7 +133,7 @@ class RobotSettings(SideOptions):
         self.uncertainty(PredictionErrors())
 
     def uncertainty(self, prediction: PredictionErrors) -> Uncertainty:
-        """Return the inputs of eq. 10; ConfigurationError for a probability outside (0, 1)."""
+        """Return the inputs of eq. 9-10; ConfigurationError for a probability outside (0, 1)."""
         return Uncertainty(
             probability=self.probability,
             camera_mean_m=self.camera.mean_vector_m,

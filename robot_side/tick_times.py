@@ -1,4 +1,4 @@
-"""Durations of ticks, and the arm's share of real time."""
+"""Durations of ticks, and the arm's simulated time as a share of real time."""
 
 from collections import deque
 from collections.abc import Callable
@@ -14,10 +14,10 @@ _LATEST: Final = 1000
 
 
 class TickTimes:
-    """Measures each tick; `paced` reports the ticks since its last call."""
+    """Measures the duration of each tick; `paced` returns the figures of the ticks since its last call."""
 
     def __init__(self, loop: Loop, arm: Arm, note: Callable[[str], None], seed: int) -> None:
-        """note: called once if the arm does not keep up."""
+        """note: called once if the simulation does not keep up with real time."""
         self._loop, self._arm, self._note = loop, arm, note
         self._wall, self._processor = RunningStatistics(seed), RunningStatistics(seed)
         self._latest_s: deque[float] = deque(maxlen=_LATEST)
@@ -36,7 +36,7 @@ class TickTimes:
         return took_s
 
     def paced(self) -> dict[str, float | int]:
-        """Return the status's figures for the ticks since the last call."""
+        """Return figures for the status, of the ticks since the last call."""
         share = self._arm.take_share_of_real_time()
         if max(share, self._arm.share_of_real_time) < SLOW and not self._told_slow:
             self._told_slow = True
@@ -55,7 +55,7 @@ class TickTimes:
         }
 
     def summary(self) -> dict[str, Any]:
-        """Return the figures of the run."""
+        """Return the figures of all ticks of the run."""
         return {
             "tick_us": microseconds(self._wall),
             "tick_cpu_us": microseconds(self._processor),

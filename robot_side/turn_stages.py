@@ -1,4 +1,4 @@
-"""Attribution of a turn's steps to its timed stages."""
+"""Assignment of a turn's steps to the stages that are timed."""
 
 from typing import Final
 
@@ -6,8 +6,8 @@ from common.realtime.stages import Stages
 from robot_side.events import Listener, Step
 
 STAGES: Final = ("sockets", "messages", "physics", "sensing")
-"""Stages of a turn: sending and receiving; decoding and judging messages; the arm's state, which advances a
-simulation; the law. Everything else in a tick is the rest."""
+"""Stages of a turn. sockets: sending and receiving. messages: decoding and judging messages. physics: reading the arm's
+state, which advances a simulation. sensing: the law. Everything else in a tick is the rest."""
 REMEDIES: Final = {
     "sockets": "fewer views and observers",
     "messages": "fewer observers",
@@ -15,12 +15,12 @@ REMEDIES: Final = {
     "sensing": "fewer or simpler objects, or a coarser cover (cover_m)",
     "": "fewer views, or a faster machine",
 }
-"""Advice that shortens each stage; the empty name is the rest."""
+"""Advice by which each stage becomes shorter; the empty name stands for the rest."""
 _OF_STEPS: Final[dict[Step, str]] = {"arm": "physics", "law": "sensing"}
 
 
 class StageTiming(Listener):
-    """Listener that begins the stage of each step in `stages`."""
+    """Listener that begins in `stages` the stage of each step."""
 
     def __init__(self, stages: Stages) -> None:
         self._stages = stages
@@ -28,6 +28,6 @@ class StageTiming(Listener):
     steps = ("arm", "pose", "law", "messages")
 
     def on_step(self, step: Step) -> None:
-        """Begin the step's stage, or end the one before."""
+        """Begin the stage of this step; a step without a stage ends the stage before."""
         if self._stages.looks:
             self._stages.begin(_OF_STEPS.get(step))

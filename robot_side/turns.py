@@ -22,11 +22,11 @@ from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.view_scheduler import ViewScheduler
 
 KEYS_PERIOD_S: Final = 0.2
-"""Period of reading the allow-list: a revoked operator is out within a second."""
+"""Period of reading the list of allowed keys, in seconds: a revoked operator is disconnected within a second."""
 
 
 class RobotTurns:
-    """Ticks, messages and views."""
+    """Turns of the robot side: ticks, messages and views."""
 
     def __init__(
         self,
@@ -38,7 +38,7 @@ class RobotTurns:
         process: Process,
         beside: ConnectedDrivers,
     ) -> None:
-        """cameras: None without pictures."""
+        """cameras: None if no pictures are made."""
         self._process, self._core, self._sockets, self._beside = process, core, sockets, beside
         core.parts.arm.give_way(process.loop.clock)
         self._times = TickTimes(process.loop, core.parts.arm, process.note, settings.seed)
@@ -60,7 +60,7 @@ class RobotTurns:
         return self._core.session.safety.state != "armed"
 
     def take(self, received: Sequence[tuple[bytes, bytes]], now_s: float) -> None:
-        """Give the admitted payloads to the core."""
+        """Give the payloads that are admitted to the core."""
         for peer, payload in self._admission.admitted(received, self._core.session.owner_peer):
             self._hear(peer, payload, now_s)
 
@@ -81,7 +81,7 @@ class RobotTurns:
         )
 
     def rest(self, now_s: float, turned_s: float) -> None:
-        """Make views, record, report, refresh keys, pass on tuning; then let the core observe."""
+        """Do what may wait: views, recording, reports, keys, tuning; then let the core observe its frame."""
         process = self._process
         seen = self._looking.idle(now_s, turned_s)
         self._sending.push(seen, now_s)
@@ -109,11 +109,11 @@ class RobotTurns:
         return replace(self._core.status(now_s), **self._reporter.status())
 
     def close(self) -> None:
-        """End the rendering companion process."""
+        """End the companion process that renders pictures."""
         self._looking.close()
 
     def summary(self) -> dict[str, Any]:
-        """Return the figures of the core and the process."""
+        """Return the figures of the core and of the process."""
         sockets, stages = self._sockets, self._process.loop.stages.summary()
         figures = {
             "physics_us": stages["physics"]["wall_us"],

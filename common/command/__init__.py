@@ -1,1 +1,1 @@
-"""Parts of every command line: settings, status, stop signals, orderly ends."""
+"""Parts that all commands share: settings, status, stop signals, orderly ends."""

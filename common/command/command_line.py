@@ -1,4 +1,4 @@
-"""Settings from three layers (flags over a TOML file over defaults), and errors in one line."""
+"""Settings from flags, a TOML file and defaults (in this order of precedence), and errors in one line."""
 
 import contextlib
 import dataclasses
@@ -24,18 +24,18 @@ Settings = TypeVar("Settings")
 
 _LONGEST_COMPLAINT = 400
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-"""The system's errors if standard output is a file that cannot grow."""
+"""Errors of the system when standard output is a file that cannot grow."""
 _LARGEST_CONFIG_BYTES = 1_000_000
 
 
 def parse_settings(
     settings_type: type[Settings], program: str, arguments: Sequence[str], elsewhere: str = ""
 ) -> Settings:
-    """Build the dataclass `settings_type` from its defaults, then `--config FILE.toml`, then the flags.
+    """Make the dataclass `settings_type` from its defaults, then `--config FILE.toml`, then the flags.
 
     Every field of the (nested) dataclass is a key of the file and a flag: `[camera] mean_m = 0.001` and
     `--camera.mean-m 0.001`. `elsewhere` is appended to the error about an unknown key of the file. Raises
-    ConfigurationError for unknown, malformed or out-of-range values, SystemExit after `--help`.
+    ConfigurationError for unknown, malformed or out-of-range values; SystemExit after `--help`.
     """
     path = _config_path(arguments)
     try:
@@ -62,7 +62,7 @@ def parse_settings(
 
 
 def given_fields(arguments: Sequence[str], settings_type: type) -> frozenset[str]:
-    """Return the top-level fields that a person set, by a flag or in the `--config` file."""
+    """Return the top-level fields that were set by a flag or in the `--config` file."""
     hints = get_type_hints(settings_type)
     flags = {argument.partition("=")[0] for argument in arguments if argument.startswith("--")}
     said = {flag.removeprefix("--").partition(".")[0].replace("-", "_") for flag in flags}
@@ -89,7 +89,7 @@ def load_toml(path: Path, settings_type: type[Settings], elsewhere: str = "") ->
 
 
 def run_command(program: str, command: Callable[[Sequence[str]], int]) -> None:
-    """Run `command(arguments)` and exit: a FeelaheadError becomes one line, with exit code 2 for bad input, else 1."""
+    """Run `command(arguments)` and exit. Print a FeelaheadError as one line; exit code 2 for bad input, otherwise 1."""
     try:
         try:
             code = command(sys.argv[1:])
@@ -129,7 +129,7 @@ def _from_toml(kind: type, value: object) -> object:
 
 
 def _config_path(arguments: Sequence[str]) -> str | None:
-    """Return the value of --config, read before the flags because the file provides their defaults."""
+    """Return the value of --config; None without it. It is read before other flags, as the file has their defaults."""
     if (path := value_of("--config", arguments)) == "":
         raise ConfigurationError("--config: no file given; valid: the path of a TOML file")
     return path
@@ -180,5 +180,5 @@ def _one_line(box: str, program: str, settings_type: type) -> str:
 
 
 def _shortened(text: str) -> str:
-    """Cut a value of a thousand digits, which would hide the fault."""
+    """Cut a long text, such as a value of a thousand digits, in which the fault could not be seen."""
     return text if len(text) <= _LONGEST_COMPLAINT else f"{text[:_LONGEST_COMPLAINT]}..."

@@ -1,10 +1,10 @@
-"""Value of a flag, read before a parser is imported."""
+"""Value of one flag, found without a command-line parser, which takes long to import."""
 
 from collections.abc import Sequence
 
 
 def value_of(flag: str, arguments: Sequence[str]) -> str | None:
-    """Return the last value of a flag; None without the flag, and "" if the arguments end after it."""
+    """Return the last value of `flag`; None if it is absent, "" if the arguments end after it."""
     value = None
     for argument, following in zip(arguments, [*arguments, ""][1:], strict=True):
         if argument == flag:

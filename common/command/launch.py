@@ -1,6 +1,6 @@
 """Start of a command, before large imports: signals, output, and missing packages.
 
-Only the standard library and small modules are imported here, so that a Ctrl-C right after the start meets a handler.
+Only the standard library and small modules are imported here, so that a Ctrl-C right after the start is handled.
 """
 
 import importlib.metadata
@@ -22,9 +22,10 @@ _BAD_INPUT = 2
 def launch(program: str, load: Callable[[], Command], extra: str | None = None, *, has_summary: bool = False) -> None:
     """Import the command with `load`, run it with this process's arguments, and exit.
 
-    A stop signal ends the process with code 0 and without a traceback, even during imports. With `has_summary` it
-    writes the summary for --summary, until the command opens a `StopSignal`. A missing module becomes one line that
-    names `extra`, the optional dependencies to install. `--version` needs no import.
+    A stop signal ends the process with code 0 and without a traceback, even during imports. `has_summary`: the command
+    has the flag --summary; until it opens a `StopSignal`, a stop signal writes the summary of a run that never began. A
+    missing package becomes one line that names `extra`, the optional dependencies to install. `--version` needs no
+    import.
     """
     LeavingAtOnce(_summary_path(sys.argv[1:]) if has_summary else None)
     _write_in_any_locale()
@@ -43,9 +44,7 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
         if missing in _OURS:
             raise
         wanted = "." if extra is None else f".[{extra}]"
-        sys.stderr.write(
-            f"{program}: {missing} is not installed on this machine; valid: pip install '{wanted}' in the clone\n"
-        )
+        sys.stderr.write(f"{program}: {missing} is not installed; install it in the clone: pip install '{wanted}'\n")
         sys.exit(_BAD_INPUT)
     try:
         for number in () if has_summary else STOP_SIGNALS:
@@ -57,22 +56,22 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
 
 
 def _summary_path(arguments: Sequence[str]) -> str | None:
-    """Return the last value of --summary; parsers of it, or of a --config, are not imported yet."""
+    """Return the path after --summary; None without one. A --config file is not read, as no parser is imported yet."""
     path = value_of("--summary", arguments)
     return None if path is None or path in ("", "None") or path.startswith("--") else path
 
 
 def single_threaded_algebra() -> None:
-    """Default NumPy's linear algebra to one thread; call before NumPy is imported.
+    """Make NumPy's linear algebra use one thread, unless the environment says otherwise; call before importing NumPy.
 
-    A tick's matrices are tiny: further threads would only wait for work and take processors from others.
+    A tick's matrices are tiny: further threads would only wait for work and occupy processors.
     """
     for library in ("OPENBLAS", "MKL", "OMP"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 
 def _write_in_any_locale() -> None:
-    """Replace characters that the terminal's encoding lacks by question marks, instead of a traceback."""
+    """Make both output streams write question marks for characters that their encoding lacks, instead of failing."""
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")

@@ -1,4 +1,4 @@
-"""Live line of a run, for a terminal of any width: whole facts only, the important ones first."""
+"""Live line of a run, for a terminal of any width: if the line is too long, less important facts are left out."""
 
 from rich.cells import cell_len
 
@@ -9,7 +9,7 @@ _BETWEEN = "  "
 UNKNOWN = "–"
 _QUEUE_MS = 5.0
 _LOST_PERCENT = 0.05
-"""Least queueing delay and least loss that are shown."""
+"""Least loss that is shown, in per cent; _QUEUE_MS is the least queueing delay that is shown, in milliseconds."""
 _LONGEST_NAME = 12
 """Longest name of an object that is shown, in columns."""
 
@@ -18,7 +18,7 @@ _Fact = tuple[int, str]
 
 
 def live_line(view: LiveView, width: int) -> str:
-    """Write `view` in at most `width` columns: all facts, with less space if needed, or the important ones."""
+    """Return `view` as a line of at most `width` columns: all facts, spaced closer if needed, or the most important."""
     facts = _facts(view)
     for between in (_BETWEEN, " "):
         line = _BETWEEN.join((facts[0][1], between.join(text for _, text in facts[1:])))
@@ -34,7 +34,7 @@ def live_line(view: LiveView, width: int) -> str:
 
 
 def millimetres(value_mm: float | None, space: str = " ") -> str:
-    """Write a distance, in metres from one metre on; negative ones as 0."""
+    """Return a distance as text: in millimetres, from 1000 mm in metres; 0 if negative."""
     if (known_mm := number(value_mm)) is None:
         return f"{UNKNOWN}{space}mm"
     known_mm = max(0.0, known_mm)
@@ -42,7 +42,7 @@ def millimetres(value_mm: float | None, space: str = " ") -> str:
 
 
 def percent(share: float | None, digits: int = 0) -> str:
-    """Write a share as per cent, without the sign."""
+    """Return a share in per cent as text of at least `digits` columns, without the sign %."""
     return f"{UNKNOWN:>{digits}}" if share is None else f"{100.0 * share:{digits}.0f}"
 
 

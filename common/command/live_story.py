@@ -1,4 +1,4 @@
-"""Story of a run for a file: one line for each change that matters to a person."""
+"""Story of a run, for output to a file: one line of text for each change that matters to a person."""
 
 import math
 from collections.abc import Mapping
@@ -11,13 +11,13 @@ from common.command.words import printable
 from common.status.codes import LinkState
 
 SHORTEST_GAP_S = 0.4
-"""Least time between two lines, in seconds: rapid changes to and fro give no lines; an alarm does not wait."""
+"""Least time between two lines, in seconds, so that rapid changes to and fro give no lines; alarms are not delayed."""
 _APART_AGAIN_MM = 8.0
-"""Distance at which a touch ends, in millimetres: hysteresis for millimetres of perception error."""
+"""Distance above which a touch counts as ended, in millimetres: hysteresis, as perception errs by millimetres."""
 
 
 class Resistance(IntEnum):
-    """Resistance of a trigger in three levels."""
+    """Resistance of a trigger, in three levels."""
 
     NONE = 0
     SOME = 1
@@ -25,14 +25,17 @@ class Resistance(IntEnum):
 
 
 def next_resistance(before: Resistance, stiffness: float) -> Resistance:
-    """Return the level of a stiffness, 0 to 1, with hysteresis: none below 0.01, some from 0.05, full 0.95 to 0.85."""
+    """Return the level for a stiffness of 0 to 1, with hysteresis after the level `before`.
+
+    FULL begins at 0.95 and ends below 0.85; SOME begins at 0.05 and ends below 0.01.
+    """
     if stiffness >= (0.85 if before is Resistance.FULL else 0.95):
         return Resistance.FULL
     return Resistance.SOME if stiffness >= (0.05 if before is Resistance.NONE else 0.01) else Resistance.NONE
 
 
 class _State(NamedTuple):
-    """State whose changes are reported."""
+    """State of a run as far as the story reports its changes."""
 
     phase: str = ""
     reason: str | None = None
@@ -46,17 +49,17 @@ class _State(NamedTuple):
 
 
 class Story:
-    """Story of a run; remembers the reported state."""
+    """Writer of a run's story; it remembers the state that was last reported."""
 
     def __init__(self) -> None:
         self._state = self._reported = _State()
         self._start_s: float | None = None
         self._reported_s = -math.inf
         self._peaks = {"L2": 0.0, "R2": 0.0}
-        """Largest stiffness of each trigger since it last yielded."""
+        """Largest stiffness of each trigger since a line last reported that it yields freely."""
 
     def tell(self, now_s: float, view: LiveView) -> str | None:
-        """Return a line with the news at `now_s` and the time since the first call; None without news."""
+        """Return a line with the changes up to `now_s` and the time since the first call; None without changes."""
         if self._start_s is None:
             self._start_s = now_s
         for trigger in view.triggers:
@@ -106,7 +109,7 @@ def _news(reported: _State, state: _State, view: LiveView, peaks: Mapping[str, f
 
 
 def _resistance(trigger: TriggerView, before: Resistance, after: Resistance, peak: float, haptics: bool) -> str:
-    """Describe the change that a finger on the trigger feels; without haptics, would feel."""
+    """Describe the change that a finger on the trigger feels; without haptics the change that it would feel."""
     would, s = ("", "s") if haptics else ("would ", "")
     if after is Resistance.NONE:
         return f"{trigger.name} {would}yield{s} freely, after up to {percent(peak)} %"

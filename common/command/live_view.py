@@ -1,4 +1,4 @@
-"""View of a run for people: the statuses of one side or both, and the state in words.
+"""State of a run as people read it: the statuses of one side or both, and the phase in words.
 
 `live_line` writes it for a terminal, `live_story` for a file. Distances are perceived, never the simulation's truth.
 """
@@ -11,11 +11,11 @@ from common.status.statuses import OperatorStatus, RobotStatus
 
 _LARGEST = 1e300
 SLOW = 0.9
-"""Share of real time below which a simulation is called slow."""
+"""Speed of the simulation, as a share of real time, below which the live line shows it."""
 
 
 class TriggerView(NamedTuple):
-    """Trigger of the controller; None is unknown."""
+    """State of one trigger of the controller; None is unknown."""
 
     name: str
     pulled: float | None
@@ -25,7 +25,7 @@ class TriggerView(NamedTuple):
 
 
 class LiveView:
-    """View of one moment; the fields of a missing status are unknown."""
+    """State of a run at one time, for people; if a side's status is missing, its fields are unknown."""
 
     def __init__(self, robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> None:
         facts, first = phase_of(robot, operator), operator or robot
@@ -33,7 +33,8 @@ class LiveView:
         self.phase, self.reason = phase_words(facts, first)
         self.robot, self.operator = robot or RobotStatus(), operator or OperatorStatus()
         self.side, self.scene = first or self.operator, robot or self.operator
-        """Better source: `side` for controller and link, `scene` for the objects ahead and in the hand."""
+        """`side`: for controller and link; the operator side's status, or the robot side's if there is no other.
+        `scene`: for objects; the robot side's status, or the operator side's if there is no other."""
         side, free = self.side, self.side.state not in (None, "armed")
         self.armed = side.state == "armed"
         self.triggers = (
@@ -42,10 +43,10 @@ class LiveView:
         )
         held = self.scene.holding
         self.holding = printable(held) if isinstance(held, str) else "something" if held else None
-        """Object between the fingers."""
+        """Name of the object between the fingers, "something" if the name is unknown, None for no object."""
         self.stands = ", it stands" if self.scene.stands else ""
 
 
 def number(value: float | None) -> float | None:
-    """Return a finite number unchanged; None for all else."""
+    """Return `value` if it is a finite number, else None."""
     return value if value is not None and -_LARGEST < value < _LARGEST else None

@@ -1,4 +1,4 @@
-"""Output stream that never blocks while its context is open: a stalled reader loses texts that do not fit."""
+"""Output stream that never blocks while its context is open: if the reader stalls, texts are dropped."""
 
 import contextlib
 import io
@@ -10,22 +10,22 @@ from collections.abc import Callable
 from typing import Final, TextIO
 
 _WAITING: Final = 64
-"""Number of texts that may wait; the oldest is dropped for another."""
+"""Maximum number of waiting texts; beyond it the oldest is dropped."""
 _END_S: Final = 0.5
-"""Longest wait of the context's end for the last text, in seconds."""
+"""Longest time, in seconds, for which the end of the context waits for the thread to write the last texts."""
 
 
 class PatientOutput(io.TextIOBase):
-    """Stream that is written by a thread while the context is open, and directly after it.
+    """Stream to which a thread writes while the context is open, and which is written directly afterwards.
 
-    Results are written after it: behind all waiting texts, at the reader's speed. The end of the reader raises an
-    error only within the context, at a later write: there it ends a run.
+    Results are written after the context: behind all waiting texts, as fast as the reader takes them. If the reader has
+    ended (a broken pipe), a later write raises the error, but only within the context, where it ends a run.
 
-    The stream's buffer is not used: a flush at the end would wait for the thread.
+    The stream's buffer is not used, because a flush at the end would wait for the thread.
     """
 
     def __init__(self, stream: TextIO | None) -> None:
-        """`stream` None drops everything."""
+        """`stream` None: drop all texts."""
         self._stream = stream
         self._sink = _sink(stream)
         self._failure: Exception | None = None
@@ -48,15 +48,15 @@ class PatientOutput(io.TextIOBase):
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
-        """Encoding of the stream."""
+        """Encoding of the underlying stream."""
         return getattr(self._stream, "encoding", None) or "utf-8"
 
     def isatty(self) -> bool:
-        """Return whether the stream is a terminal."""
+        """Return whether the underlying stream is a terminal."""
         return self._stream is not None and self._stream.isatty()
 
     def write(self, text: str) -> int:
-        """Queue a text to be written whole or dropped. Raises an earlier write's error once; then all is dropped."""
+        """Queue a text, which is written whole or dropped. After an error, raise it once; drop all further texts."""
         if self._open:
             if self._waiting.qsize() >= _WAITING:
                 with contextlib.suppress(queue.Empty):
@@ -86,7 +86,7 @@ class PatientOutput(io.TextIOBase):
 
 
 def _sink(stream: TextIO | None) -> Callable[[str], object]:
-    """Return a function that writes a text to `stream` at once."""
+    """Return a function that writes a text to `stream` without buffering; None: one that drops it."""
     if stream is None:
         return len
     try:

@@ -1,4 +1,4 @@
-"""Flags of every running side."""
+"""Flags of every command that runs a side."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,30 +21,33 @@ class RunOptions:
     """Options of a run: emulated link, duration, recording and output."""
 
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """Settings from a file, which flags override; every flag's name is a key."""
+    """TOML file with settings, which flags override; every flag's name is a key of the file."""
     link: Annotated[str, tyro.conf.arg(metavar="SPEC")] = ""
-    """Emulated link for this side's messages, in netem's words: "delay 50ms 10ms distribution normal loss 1%", with
-    duplicate, corrupt, reorder, rate and limit, and "trace FILE.csv" or "outage 2s at 10s every 30s" (after the first
-    message); or per direction and stream: "to_robot: delay 20ms; to_operator: delay 50ms 10ms; video: rate
-    2mbit; to_operator.telemetry: loss 5%". Or by name: lan, wifi, lte, low-orbit, intercontinental, satellite."""
+    """Emulated link for this side's messages, in netem's words, such as "delay 50ms 10ms distribution normal loss 1%".
+    Further words are duplicate, corrupt, reorder, rate and limit, and also "trace FILE.csv" and "outage 2s at 10s every
+    30s" (counted from the first message). Each direction and stream may have its own link: "to_robot: delay 20ms;
+    to_operator: delay 50ms 10ms; video: rate 2mbit; to_operator.telemetry: loss 5%". A name is valid, too: lan, wifi,
+    lte, low-orbit, intercontinental, satellite."""
     link_model: LinkModel = "datagram"
-    """datagram loses and reorders messages like UDP; stream keeps their order like TCP, so that loss becomes delay."""
+    """How the emulated link treats messages. datagram: they are lost and reordered as with UDP. stream: they keep their
+    order as with TCP, so that a loss becomes a delay."""
     asymmetry: Annotated[str, tyro.conf.arg(metavar="TIME")] = "0ms"
-    """Least delay to the robot minus that to the operator (12ms, or -12ms), if known from elsewhere: messages between
-    two clocks cannot show it. Half of it would be an error of the clock offset."""
+    """Least delay to the robot side minus least delay to the operator side (12ms or -12ms), if known from elsewhere.
+    The sides' messages cannot show it, and half of it would enter the estimated clock offset as an error."""
     full_rate: bool = False
-    """Send a stiffness each millisecond and 250 commands a second, for comparison: otherwise only those that change
-    what is felt, and 50 a second."""
+    """For comparison, send a stiffness every millisecond and 250 commands a second. Otherwise messages are sent only
+    if they change what is felt or commanded, and at least 50 a second."""
     duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
-    """End after this time; by default at Ctrl-C."""
+    """End after so many seconds; by default the run ends at Ctrl-C."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Seed of all random numbers: the same seed gives the same noise and delays."""
     summary: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
     """Write the run's figures to this file at the end."""
     record: Annotated[Path | None, tyro.conf.arg(metavar="FILE.mcap")] = None
-    """Record the run into a new file, to view, export and replay it bit for bit."""
+    """Record the run into this new file, which can be viewed, exported, and replayed bit for bit."""
     status: StatusMode = "line"
-    """A live line for people, JSON lines for programs, JSON lines with all that the console shows, or nothing."""
+    """Status output. line: a live line for people. json: JSON lines for programs. facts: JSON lines with all that the
+    console shows. none: no output."""
 
     def __post_init__(self) -> None:
         self.link_spec()
@@ -60,18 +63,20 @@ class RunOptions:
         require_recordable(self.record)
 
     def link_spec(self) -> LinkSpec:
-        """Return the emulated link, with this run's seed; raises ConfigurationError if it is invalid."""
+        """Return the emulated link with this run's seed; raises ConfigurationError if `link` is invalid."""
         return LinkSpec.parse(self.link, max(0, self.seed), self.link_model)
 
     def asymmetry_s(self) -> float:
-        """Return `asymmetry` in seconds, with its sign; raises ConfigurationError if it is no time."""
+        """Return `asymmetry` in seconds, positive or negative; raises ConfigurationError if it is no time."""
         text = self.asymmetry.strip()
         return -parse_duration(text[1:], "--asymmetry") if text.startswith("-") else parse_duration(text, "--asymmetry")
 
 
 @dataclass(frozen=True)
 class SideOptions(RunOptions):
-    """Options of a side in a separate process."""
+    """Options of a side that runs in its own process."""
 
     realtime: bool = False
-    """Real-time scheduling and locked memory; if not permitted, a note names the command that permits them."""
+    """Use real-time scheduling and locked memory; if they are not permitted, a note names the command that permits
+    them.
+    """

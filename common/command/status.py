@@ -1,4 +1,4 @@
-"""Status output: a live line for people, a story in a file, or JSON lines for programs."""
+"""Status output: a live line in a terminal, a story in a file, or JSON lines for programs."""
 
 import json
 import sys
@@ -25,15 +25,15 @@ _LINES_OF_JSON = ("json", "facts")
 
 class _Console(Console):
     def on_broken_pipe(self) -> None:
-        """Raise the error for the command to handle: Rich would end the process with code 1."""
+        """Raise the error, so that the command handles it; Rich would end the process with code 1."""
         raise  # noqa: PLE0704  # called where the BrokenPipeError is handled
 
 
 class Status:
-    """Output of a status a few times a second; errors always go to standard error.
+    """Output of a run's status on standard output, a few times a second. Errors go to standard error.
 
-    Nothing waits for the reader: texts that a stalled reader has no room for are dropped. A note after the context is
-    a result, which waits for its reader.
+    While the context is open, no call waits for the reader of the output: if the reader stalls, texts are dropped. A
+    note after the context is a result, and waits for the reader.
     """
 
     def __init__(self, mode: StatusMode, program: str) -> None:
@@ -45,7 +45,7 @@ class Status:
         self._story = Story()
         self._next_s = -1.0
         self.also: Callable[[str], None] | None = None
-        """Second receiver of each note"""
+        """Function that also gets each note, besides the output; None for none"""
 
     def __enter__(self) -> "Status":
         self._output.__enter__()
@@ -69,15 +69,18 @@ class Status:
 
     @property
     def wants_facts(self) -> bool:
-        """Whether `show_facts` shows anything: facts take longer to make than a status."""
+        """Whether `show_facts` shows anything. If not, the caller need not make the facts, which takes time."""
         return self._mode == "facts"
 
     def due(self, now_s: float) -> bool:
-        """Return whether `show` would show anything; the values cost time in a tick."""
+        """Return whether `show` would show anything now. If not, the caller need not make a status, which is slow."""
         return self._mode != "none" and now_s >= self._next_s
 
     def show(self, now_s: float, *, robot: RobotStatus | None = None, operator: OperatorStatus | None = None) -> None:
-        """Show a status, at most five times a second, ten with facts; raises BrokenPipeError once if the pipe broke."""
+        """Show the status, at most five times a second, or ten in the mode "facts".
+
+        Raises BrokenPipeError, once, if the reader of the output has ended.
+        """
         if not self.due(now_s):
             return
         self._next_s = now_s + (_FACTS_PERIOD_S if self.wants_facts else _PERIOD_S)
@@ -94,7 +97,7 @@ class Status:
             self._output.write(f"{reported}\n")
 
     def show_facts(self, facts: Any) -> None:
-        """Write the facts of one moment, a struct, at once."""
+        """Write `facts`, a struct of all that the console shows, at once; only in the mode "facts"."""
         if self._mode == "facts":
             self._write({"event": "facts", "facts": facts})
 
@@ -103,13 +106,13 @@ class Status:
         self._output.write(msgspec.json.encode(event).decode() + "\n")
 
     def event(self, kind: str, **values: str | int) -> bool:
-        """Write one line of JSON at once; outside the modes for programs do nothing and return False."""
+        """Write an event as one line of JSON at once. In modes without JSON, do nothing and return False."""
         if self._mode in _LINES_OF_JSON:
             self._output.write(json.dumps({"event": kind, **values}) + "\n")
         return self._mode in _LINES_OF_JSON
 
     def note(self, text: str) -> None:
-        """Write a line that stays, for people; in the modes for programs a separate event."""
+        """Write a line for people that the live line does not overwrite; in modes with JSON, an event "note"."""
         if self.also is not None:
             self.also(text)
         if self._mode in _LINES_OF_JSON:

@@ -1,4 +1,4 @@
-"""Stop signals as a flag that the main loop reads, so that every exit is clean."""
+"""Stop signals, turned into a flag that the main loop reads, so that a run ends in an orderly way."""
 
 import os
 import select
@@ -12,12 +12,12 @@ from common.errors import ConfigurationError
 from common.files.output_file import write_json
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals that end a run, also a closed terminal: a controller must not keep stiff triggers."""
+"""Signals that end a run in an orderly way, SIGHUP (a closed terminal) too: the triggers must not stay stiff."""
 _NEVER_BEGAN: Final = {"duration_s": 0.0, "ticks": 0, "stops": [], "errors": []}
 
 
 class StopSignal:
-    """Flag that STOP_SIGNALS set while the context is open; the old handlers are restored after it."""
+    """Flag that any of STOP_SIGNALS sets while the context is open; afterwards the old handlers are restored."""
 
     def __init__(self) -> None:
         self.is_set = False
@@ -36,27 +36,27 @@ class StopSignal:
 
 
 def ignore_broken_output() -> None:
-    """Prevent an error of the interpreter's last flush, after the reader of standard output has ended."""
+    """Drop standard output after its reader has ended, so that the interpreter's last flush raises no error."""
     sys.stdout = None
 
 
 def say_output_failed(program: str, error: OSError) -> int:
     """Report in one line that standard output cannot be written, as on a full disk; return the exit code."""
     ignore_broken_output()
-    sys.stderr.write(f"{program}: the output cannot be written: {error.strerror}; valid: a place with room for it\n")
+    sys.stderr.write(f"{program}: the output cannot be written: {error.strerror}; valid: an output with enough room\n")
     return 1
 
 
 class LeavingAtOnce:
-    """Handler that ends the process at once on a stop signal, with code 0, until a `StopSignal` opens.
+    """Handler of stop signals that ends the process at once, with code 0, until a `StopSignal` is opened.
 
-    An exception could be caught by a half-imported module, or lost in a compiler's callback, and the process would
-    continue.
+    A handler that raises an exception would not do: a module that is being imported could catch it, or a compiler's
+    callback could lose it, and the process would continue.
     """
 
     def __init__(self, summary: str | Path | None = None) -> None:
         self.summary = summary
-        """File for the summary of a run that never began; None after its begin"""
+        """File to which to write the summary of a run that never began; None if there is none, or the run has begun"""
         for number in STOP_SIGNALS:
             signal.signal(number, self._leave)
 

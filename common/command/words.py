@@ -1,4 +1,4 @@
-"""Words for codes, for a terminal and a log: the only place that puts a status in sentences."""
+"""Words for the codes of a status, as shown in a terminal and a log."""
 
 from enum import StrEnum
 from typing import Final
@@ -11,12 +11,12 @@ _LOST: Final = "nothing heard from the {}"
 
 
 def words(code: StrEnum | str | None) -> str:
-    """Return a code in words; empty for none."""
+    """Return a code in words; empty for None."""
     return "" if code is None else str(code).replace("_", " ")
 
 
 def phase_words(facts: PhaseFacts, side: RobotStatus | OperatorStatus | None) -> tuple[str, str | None]:
-    """Return the phase, in capitals for an alarm, and the reason or None. side: owner of the link."""
+    """Return the phase in words, in capitals for an alarm, and the reason or None. side: the status of the link."""
     said, reason = words(facts.doing or facts.phase), facts.reason
     if facts.phase in (Phase.WAITING, Phase.OBSERVING):
         said = link_words(side)

@@ -1,1 +1,1 @@
-"""Processes besides a side's, for which it never waits: cameras, a console, a recorder."""
+"""Companion processes, which a side starts and never waits for: cameras, a console, a recorder."""

@@ -1,6 +1,6 @@
-"""Channel of messages between two processes of one machine, over a stream socket: neither waits for the other.
+"""Channel of messages between two processes on one machine, over a stream socket; neither process waits for the other.
 
-A message is a length and its bytes. A message that does not fit into the bounded queue is refused whole.
+A message is sent as its length and its bytes. A message that does not fit into the bounded send queue is dropped.
 """
 
 import contextlib
@@ -12,24 +12,24 @@ from typing import Final
 _LENGTH: Final = struct.Struct("<I")
 _AT_ONCE: Final = 1 << 18
 MESSAGE_LIMIT_BYTES: Final = 1 << 26
-"""Longest message, in bytes; a longer one means that the sender is not ours."""
+"""Longest message, in bytes; a longer one means that the sender is no process of ours."""
 
 
 class Channel:
-    """One end of the channel. To wait for it, select `fileno` for reading and, while `waiting`, for writing."""
+    """One end of a channel. To wait for it, select `fileno` for reading, and for writing while `waiting` is above 0."""
 
     def __init__(self, part: socket.socket, room_bytes: int = 1 << 23) -> None:
-        """`room_bytes`: capacity of the send queue, besides the system's buffer."""
+        """`part`: a connected stream socket. `room_bytes`: capacity of the send queue, besides the system's buffer."""
         part.setblocking(False)
         for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
             part.setsockopt(socket.SOL_SOCKET, option, _AT_ONCE)
         self.ended = False
-        """Whether the other end is gone: no more messages are sent or arrive."""
+        """Whether either end is closed, so that no more messages can be sent or arrive."""
         self._part = part
         self._room_bytes = room_bytes
         self._waiting: deque[memoryview] = deque()
         self.waiting = 0
-        """Number of bytes that have not left yet."""
+        """Number of bytes in the send queue."""
         self._begun = bytearray()
 
     def fileno(self) -> int:
@@ -37,7 +37,7 @@ class Channel:
         return self._part.fileno()
 
     def send(self, *parts: bytes) -> bool:
-        """Send `parts` as one message, now or in a later call; return False if there is no room."""
+        """Send `parts` as one message, now or in a later call. Return False, and drop it, if there is no room."""
         self.flush()
         length = sum(map(len, parts))
         if length > MESSAGE_LIMIT_BYTES:
@@ -52,7 +52,7 @@ class Channel:
         return True
 
     def flush(self) -> None:
-        """Send as much as the socket takes now."""
+        """Send as much of the queue as the socket takes now."""
         waiting = self._waiting
         while waiting and not self.ended:
             try:
@@ -71,7 +71,10 @@ class Channel:
                 sent -= len(first)
 
     def receive(self) -> list[bytes]:
-        """Return the complete messages, oldest first. Reads the system's buffer once: a fast sender cannot block us."""
+        """Return the messages that have arrived completely, oldest first.
+
+        Reads the system's buffer once, so that a fast sender cannot block the caller.
+        """
         self.flush()
         try:
             arrived = self._part.recv(_AT_ONCE)
@@ -103,7 +106,7 @@ class Channel:
         self.waiting = 0
 
     def close(self) -> None:
-        """Close this end; the other end notices."""
+        """Close this end; at the other end `ended` becomes true."""
         self._end()
         with contextlib.suppress(OSError):
             self._part.close()

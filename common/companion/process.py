@@ -1,4 +1,4 @@
-"""Start and end of a companion, on both ends."""
+"""Start and end of a companion process, in the process that starts it and in the companion."""
 
 import signal
 import socket
@@ -13,7 +13,7 @@ _END_LIMIT_S: Final = 2.0
 
 
 class Companion:
-    """Python process at the other end of `channel`: it ends with the channel, however we end."""
+    """Python process at the other end of `channel`. It ends when the channel ends, even if this process is killed."""
 
     def __init__(
         self,
@@ -24,7 +24,7 @@ class Companion:
     ) -> None:
         """Run `module`, whose main function calls `companion_channel`; both processes share standard error.
 
-        `output`: a descriptor of ours that becomes its standard output.
+        `room_bytes`: as in Channel. `output`: a descriptor of ours that becomes the standard output of the companion.
         """
         ours, theirs = socket.socketpair()
         with theirs:
@@ -41,12 +41,12 @@ class Companion:
 
     @property
     def process_id(self) -> int:
-        """Process id."""
+        """Process id of the companion."""
         return self._process.pid
 
     @property
     def running(self) -> bool:
-        """Whether the process has not ended yet."""
+        """Whether the companion has not ended yet."""
         return self._process.poll() is None
 
     def __enter__(self) -> Self:
@@ -56,9 +56,10 @@ class Companion:
         self.close()
 
     def close(self, limit_s: float = _END_LIMIT_S) -> bool:
-        """Close the channel, wait `limit_s` for the process, then kill it; return whether it ended by itself.
+        """Close the channel and wait at most `limit_s` for the companion to end, then kill it.
 
-        Waiting bytes are lost; to send them first, call `channel.flush` until nothing waits.
+        Return whether it ended by itself. Bytes in the send queue are lost; to send them first, call `channel.flush`
+        until `channel.waiting` is 0.
         """
         self.channel.close()
         try:
@@ -71,7 +72,7 @@ class Companion:
 
 
 def companion_channel(arguments: Sequence[str], room_bytes: int = 1 << 23) -> tuple[Channel, list[str]]:
-    """Return the companion's end of the channel and the other arguments; from now on stop signals are ignored."""
+    """In a companion: return its end of the channel and its other arguments; from now on it ignores stop signals."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     return Channel(socket.socket(fileno=int(arguments[0])), room_bytes), list(arguments[1:])

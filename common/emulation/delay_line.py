@@ -1,4 +1,4 @@
-"""Delay line: applies a profile to messages."""
+"""Delay line, which applies an emulated link's profile to messages."""
 
 import heapq
 import math
@@ -24,27 +24,27 @@ _MOST_OUTAGES_ON_END = 1000
 
 
 class DelayLine(Generic[Item]):
-    """Delay line: returns messages when they are due, with losses, copies, corruption and reordering.
+    """Delay line, which returns messages when they are due, with losses, copies, corruption and reordering.
 
-    The order of events is netem's: duplicate, lose, corrupt, drop beyond the limit, delay. A copy goes first, through
-    all events by itself. The line has no thread: ask `next_due` when to call `pop`. The same profile, pushes and
-    times give the same deliveries.
+    The order of events is netem's: duplicate, lose, corrupt, drop beyond the limit, delay. A copy precedes its
+    original, and has events of its own. The line has no thread: `next_due` returns when to call `pop`. The same
+    profile, pushes and times give the same deliveries.
     """
 
     def __init__(
         self, profile: LinkProfile, start_s: float | None = None, corrupt: Corrupt[Item] | None = None
     ) -> None:
-        """Outages count from `start_s`, by default from the first push.
+        """Outages count from `start_s`; None: from the first push.
 
-        `corrupt` flips one bit of an item by the function that it receives; needed if the profile corrupts items that
-        are not bytes.
+        `corrupt(item, flip)` returns the item with a part replaced by `flip(part)`, which flips one bit of bytes. It is
+        needed if the profile corrupts items that are not bytes.
         """
         self.figures = LinkFigures(profile.seed)
-        """Counts and statistics up to now."""
+        """Counts and statistics of the messages so far."""
         self._start_s = start_s
         self._corrupt = corrupt
         self._queue: list[tuple[float, int, Item, float, int, int, bool]] = []
-        """Heap of messages by due time and order of arrival."""
+        """Heap of waiting messages, ordered by due time, then by order of arrival."""
         self._entered = 0
         self._last_due_s = -math.inf
         self._follow(profile)
@@ -87,10 +87,10 @@ class DelayLine(Generic[Item]):
         self._lost_again = decisions(generator(7), profile.retransmitted_share())
 
     def push(self, now_s: float, item: Item, size_bytes: int | None = None) -> None:
-        """Add `item` at `now_s`; `size_bytes`, which `rate` needs, defaults to the length of bytes.
+        """Add the message `item` at `now_s`. `size_bytes`, which a rate needs, is by default the length of bytes.
 
-        Raises ValueError for a time that is not finite, a negative size, a missing size with a rate, and an item that
-        is to be corrupted but is not bytes.
+        Raises ValueError for a time that is not finite, a negative size, or a missing size with a rate. Also if the
+        profile corrupts messages, `item` is not bytes, and the line has no `corrupt`.
         """
         if not math.isfinite(now_s):
             raise ValueError(f"now_s = {now_s}; valid: finite seconds")
@@ -115,7 +115,7 @@ class DelayLine(Generic[Item]):
             self._push_datagram(now_s, item, number, size_bytes)
 
     def pop(self, now_s: float) -> list[Item]:
-        """Return the items due by `now_s`, in order of due time, and of `push` at the same due time.
+        """Return the messages due by `now_s`, in order of due time; those of the same due time in order of `push`.
 
         Raises ValueError for a time that is not finite.
         """
@@ -130,22 +130,22 @@ class DelayLine(Generic[Item]):
         return due
 
     def next_due(self) -> float | None:
-        """Return when the next message is due, in seconds on the clock of `push`; None while nothing waits."""
+        """Return the time at which the next message is due, on the clock of `push`; None if none waits."""
         return self._queue[0][0] if self._queue else None
 
     def backlog_s(self, now_s: float) -> float:
-        """Return the queueing delay, in seconds, that a message pushed now would get from the rate."""
+        """Return the queueing delay, in seconds, that the rate would cause for a message pushed now."""
         if self._rate is None:
             return 0.0
         return max(0.0, self._last_due_s - now_s - self._mean_delay_s)
 
     @property
     def waiting(self) -> int:
-        """Number of messages that are not due yet."""
+        """Number of messages that have not been returned yet."""
         return len(self._queue)
 
     def summary(self) -> dict[str, Any]:
-        """Return the profile `asked`, in the grammar's words, with model and seed, and the figures `achieved`."""
+        """Return the requested profile (`asked`, in the grammar's words), model, seed, and the figures `achieved`."""
         return {
             "asked": self.profile.words,
             "model": self.profile.model,
@@ -241,7 +241,7 @@ class DelayLine(Generic[Item]):
         )
 
     def _outage_end_s(self, now_s: float) -> float | None:
-        """Return the end of the outages that contain `now_s`; None outside of any."""
+        """Return the latest end of the outages that contain `now_s`; None outside of all outages."""
         start_s = self._start_s
         if not self._outages or start_s is None:
             return None
@@ -266,7 +266,10 @@ def _endless_delays(profile: LinkProfile, generator: np.random.Generator) -> Ite
 
 
 def link_summary(direction: Direction, lines: Mapping[Stream, DelayLine[Any]]) -> dict[str, Any]:
-    """Return the `link` of a summary: asked and achieved, by direction for haptics, else such as `to_robot.video`."""
+    """Return the part `link` of a run's summary: the summary of each stream's line.
+
+    The keys are the direction for haptics, else direction and stream, such as `to_robot.video`.
+    """
     return {
         direction if stream == "haptics" else f"{direction}.{stream}": line.summary() for stream, line in lines.items()
     }

@@ -1,7 +1,7 @@
-"""Distributions of netem's random delays: mean + jitter × a quantile of a standard shape, by table or closed form.
+"""Distributions of netem's random delays: mean + jitter × quantile of a standard shape, from a table or closed form.
 
-netem's tables hold quantiles in steps of 1/8192 jitter, as 16-bit integers, so that no delay lies more than
-4 jitters from the mean. Ours are computed from the distributions' definitions.
+netem's tables have quantiles as 16-bit integers, in steps of 1/8192 jitter, so that no delay is more than 4 jitters
+from the mean. Our tables are computed from the distributions' definitions.
 """
 
 import functools
@@ -15,7 +15,7 @@ Distribution = Literal["uniform", "normal", "pareto", "paretonormal", "exponenti
 
 STEPS_PER_JITTER = 8192
 TABLE_SIZE = 4096
-"""Number of entries of a table, one for each 1/4096 of probability."""
+"""Number of entries in a table of quantiles, one for each 1/4096 of probability."""
 _LOWEST_ENTRY, _HIGHEST_ENTRY = -(2**15), 2**15 - 1
 _PARETO_SHAPE = 3.0
 _PARETO_MEAN = _PARETO_SHAPE / (_PARETO_SHAPE - 1.0)
@@ -23,7 +23,7 @@ _PARETO_MEAN = _PARETO_SHAPE / (_PARETO_SHAPE - 1.0)
 
 @functools.cache
 def table(shape: Distribution) -> FloatArray | None:
-    """Return the quantiles of `shape` in jitters, (n,) ascending and read-only; None for shapes in closed form."""
+    """Return the quantiles of `shape` (n,) in units of the jitter, ascending, read-only; None for closed forms."""
     if shape == "normal":
         steps = _normal_steps()
     elif shape == "pareto":
@@ -40,7 +40,10 @@ def table(shape: Distribution) -> FloatArray | None:
 
 
 def _normal_steps(lowest: float = _LOWEST_ENTRY) -> FloatArray:
-    """Return the normal table, −4.0 to +3.52: entry k is the quantile of (4 k + 1/2) / 16384, in whole steps."""
+    """Return the normal distribution's table in whole steps of 1/8192 jitter, from −4.0 to +3.52 jitters.
+
+    Entry k is the quantile at the probability (4 k + 1/2) / 16384.
+    """
     probabilities = (4.0 * np.arange(TABLE_SIZE) + 0.5) / (4.0 * TABLE_SIZE)
     from scipy.special import ndtri  # noqa: PLC0415  # slow to load, and most runs emulate no such delay
 
@@ -49,10 +52,11 @@ def _normal_steps(lowest: float = _LOWEST_ENTRY) -> FloatArray:
 
 
 def _pareto_steps() -> FloatArray:
-    """Return the Pareto table of shape 3 and least value 1, minus the mean 3/2, divided by the variance 3/4.
+    """Return the Pareto distribution's table in whole steps of 1/8192 jitter.
 
-    netem divides by the variance, not the standard deviation. The range −0.67 to +4, the limit, leaves a mean of
-    −0.033 and a standard deviation of 0.820 jitters.
+    Shape 3, least value 1, minus the mean 3/2, divided by the variance 3/4: netem does not divide by the standard
+    deviation. The entries reach from −0.67 to the limit of +4 jitters. Their mean is −0.033, their standard deviation
+    0.820 jitters.
     """
     survival = 1.0 - np.arange(TABLE_SIZE) / TABLE_SIZE
     variance = _PARETO_SHAPE / ((_PARETO_SHAPE - 1.0) ** 2 * (_PARETO_SHAPE - 2.0))
@@ -63,9 +67,9 @@ def _pareto_steps() -> FloatArray:
 def delays_at(probabilities: FloatArray, mean_s: float, jitter_s: float, shape: Distribution) -> FloatArray:
     """Return the delays in seconds at `probabilities` (n,) in [0, 1).
 
-    `uniform`: mean ± jitter, netem's default shape. `normal` and netem's other tables: mean plus jitter × table
-    entry. `exponential`, which netem lacks: `mean_s` as least delay, plus an exponential of mean `jitter_s`, so that
-    the mean is `mean_s + jitter_s`. Negative values become 0: such a packet leaves at once.
+    `uniform`: mean ± jitter, netem's default shape. `normal`, `pareto`, `paretonormal`: mean plus jitter × table
+    entry. `exponential`, which netem lacks: least delay `mean_s` plus an exponential random time of mean `jitter_s`;
+    so the mean is `mean_s + jitter_s`. Negative delays become 0.
     """
     quantiles = table(shape)
     if quantiles is not None:
@@ -78,9 +82,10 @@ def delays_at(probabilities: FloatArray, mean_s: float, jitter_s: float, shape: 
 
 
 def moments(mean_s: float, jitter_s: float, shape: Distribution) -> tuple[float, float, float]:
-    """Return mean, standard deviation and greatest value of the delays, in seconds; exact for tables.
+    """Return mean, standard deviation and greatest value of the delays, in seconds.
 
-    Closed forms are evaluated as tables with very fine steps; the exponential's greatest value is infinity.
+    They are exact for shapes with a table. Closed forms are evaluated at 200 000 probabilities. The greatest value of
+    `exponential` is infinity.
     """
     quantiles = table(shape)
     if quantiles is None:

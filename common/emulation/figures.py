@@ -1,4 +1,4 @@
-"""Measured figures of an emulated link, to compare with the profile that was asked for."""
+"""Measured figures of an emulated link, to compare with the requested profile."""
 
 from typing import Any, Final
 
@@ -8,29 +8,30 @@ _COUNTED: Final = ("sent", "delivered", "lost", "outage", "held", "dropped", "du
 
 
 class LinkFigures:
-    """Counts and statistics of one line, message by message."""
+    """Counts and statistics of the messages in one delay line."""
 
     def __init__(self, seed: int = 0) -> None:
         self.sent = 0
-        """Messages pushed."""
+        """Number of messages pushed."""
         self.delivered = 0
-        """Messages delivered, copies included."""
+        """Number of messages delivered, copies included."""
         self.lost = 0
-        """Messages lost by the loss model or the trace."""
+        """Number of messages lost by the loss model or the trace."""
         self.outage = 0
-        """Messages lost in an outage."""
+        """Number of messages lost in an outage."""
         self.held = 0
-        """Messages of a stream that an outage held back until it ended."""
+        """Number of messages that an outage held back until its end (model `stream`)."""
         self.dropped = 0
-        """Messages dropped because the queue was full."""
+        """Number of messages dropped because the queue was full."""
         self.duplicated = 0
-        """Copies made."""
+        """Number of copies made of messages."""
         self.corrupted = 0
-        """Messages with a flipped bit; in a stream, found corrupt and sent again."""
+        """Number of messages in which a bit was flipped; in the model `stream` these are found corrupt and sent
+        again."""
         self.retransmitted = 0
-        """Retransmissions in a stream."""
+        """Number of retransmissions (model `stream`)."""
         self.late = 0
-        """Messages overtaken by a later one (RFC 4737, type-P-reordered)."""
+        """Number of messages that a later one overtook (RFC 4737, type-P-reordered)."""
         self._delay = RunningStatistics(seed)
         self._release_error = RunningStatistics(seed)
         self._delivered_bytes = 0
@@ -43,7 +44,7 @@ class LinkFigures:
     def add_delivered(
         self, now_s: float, sent_s: float, due_s: float, number: int, size_bytes: int, *, copy: bool
     ) -> None:
-        """Count the message `number`, pushed at `sent_s`, due at `due_s` and delivered at `now_s`."""
+        """Count the message `number`, which was pushed at `sent_s`, due at `due_s` and delivered at `now_s`."""
         self._delay.add(now_s - sent_s)
         self._release_error.add(now_s - due_s)
         if not self.delivered:
@@ -61,10 +62,10 @@ class LinkFigures:
             self._newest = number
 
     def achieved(self) -> dict[str, Any]:
-        """Return the figures by name, in the units of their names; None without data.
+        """Return the figures, keyed by names that include the units; None without data.
 
-        `delay_ms` and the rate describe delivered messages at the receiver's end, and so include how late the process
-        released them: `release_error_us`. `loss_share` refers to all messages sent and copied, the other shares to
+        `delay_ms` and `rate_bit_s` are measured when messages are released, and so include how late the process did
+        that (`release_error_us`). `loss_share` is a share of all messages sent and copied; the other shares are of
         those delivered.
         """
         span_s = self._last_delivered_s - self._first_delivered_s
@@ -86,7 +87,7 @@ class LinkFigures:
 
 
 def report_lines(link: dict[str, Any]) -> list[str]:
-    """Return a line of text for each entry of a summary's `link`: asked and achieved."""
+    """Return a line of text for each entry of a summary's `link`: the requested profile and the achieved figures."""
     return [
         f"link {name}: asked {one['asked'] or 'no delay'}; {_achieved(one['achieved'])}" for name, one in link.items()
     ]

@@ -1,4 +1,4 @@
-"""Grammar of a link profile: netem's, with additional clauses for traces, outages and retransmission."""
+"""Grammar of a link profile: that of netem, with further clauses for traces, outages and retransmission."""
 
 import shlex
 from collections.abc import Callable
@@ -24,13 +24,13 @@ GRAMMAR = {
     "outage": "outage DURATION at TIME [every TIME]",
     "retransmit": "retransmit TIME",
 }
-"""Form of each clause; in any order, each at most once, except outage."""
+"""Form of each clause of a profile. Clauses may be in any order; each may occur at most once, except `outage`."""
 
 _Value = TypeVar("_Value")
 
 
 class _Words:
-    """Reader of a specification's words."""
+    """Reader of the words of a profile, one after the other."""
 
     def __init__(self, profile: str, spec: str) -> None:
         self.spec = spec
@@ -56,13 +56,13 @@ class _Words:
         return bool(word) and (word or "")[0] in "0123456789+-." and (word or "").endswith("%") is percent
 
     def value(self, read: Callable[[str, str], _Value], clause: str, name: str) -> _Value:
-        """Read the next word by `read`."""
+        """Return the next word, parsed by `read`; raises ConfigurationError if there is none."""
         if (word := self.take()) is None:
             raise self.error(f"{clause!r} without {name}", clause)
         return read(word, f"link {self.spec!r}: {name}")
 
     def shares(self, clause: str, names: list[str]) -> list[float]:
-        """Read the first percentage, and as many of the others as follow."""
+        """Return the percentages that follow as shares: at least one, at most one for each of `names`."""
         shares = [self.value(parse_share, clause, names[0])]
         for name in names[1:]:
             if not self.number_follows(percent=True):
@@ -76,7 +76,7 @@ class _Words:
 
 
 def read_fields(profile: str, spec: str, model: LinkModel) -> dict[str, Any]:
-    """Read the fields of `LinkProfile` from `profile`, which is `spec` or a clause of it.
+    """Parse the words of `profile` into fields of `LinkProfile`. `spec`: the specification that contains `profile`.
 
     Raises ConfigurationError, in one line that quotes `spec`, for an invalid profile.
     """

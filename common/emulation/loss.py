@@ -1,7 +1,7 @@
-"""netem's loss models, independent or correlated and Gilbert-Elliott, and its correlated random numbers.
+"""netem's loss models (random with correlation, and Gilbert-Elliott), and its correlated random numbers.
 
-netem mixes each uniform number with the previous one, x = (1 − r) U + r last. That narrows the distribution around
-the middle, so that rare events nearly vanish: `loss 10% 50%` loses 0.1 %.
+For the correlation r netem mixes a uniform random number U with the previous result: x = (1 − r) U + r last. That
+narrows the distribution around its middle, so that rare events nearly vanish: `loss 10% 50%` loses 0.1 %.
 """
 
 import itertools
@@ -18,7 +18,7 @@ _WORDS = 2**32
 
 
 def uniform_blocks(generator: np.random.Generator, correlation: float = 0.0) -> Iterator[FloatArray]:
-    """Yield endless blocks of numbers in [0, 1), each correlated with the previous one by `correlation`."""
+    """Yield, without end, blocks of random numbers in [0, 1); `correlation` is between successive numbers."""
     while correlation == 0.0:
         yield generator.random(_DRAWN_AT_ONCE)
     # As in the kernel: weights of 32 bits, and the sum cut to 32 bits.
@@ -42,7 +42,7 @@ def decisions(generator: np.random.Generator, share: float, correlation: float =
 
 @dataclass(frozen=True)
 class RandomLoss(Limited):
-    """`loss random`: each message with the same probability."""
+    """`loss random`: each message is lost with the same probability."""
 
     probability: Share
     correlation: Share = 0.0
@@ -52,25 +52,25 @@ class RandomLoss(Limited):
         return decisions(generator, self.probability, self.correlation)
 
     def share(self) -> float:
-        """Return the probability asked for; with netem's correlation the loss is less."""
+        """Return the requested probability of loss; with netem's correlation fewer messages are lost."""
         return self.probability
 
 
 @dataclass(frozen=True)
 class GilbertElliott(Limited):
-    """`loss gemodel p r 1-h 1-k`: a good and a bad state, with a loss probability in each.
+    """`loss gemodel p r 1-h 1-k`: a good and a bad state, with a probability of loss in each.
 
-    The state before a message's own transition decides its loss.
+    Each message may change the state; the state before that decides whether the message is lost.
     """
 
     p: Share
-    """Probability from good to bad."""
+    """Probability that a message changes the state from good to bad."""
     r: Share
-    """Probability from bad to good: without loss in the good state, bursts of 1 / r messages on average."""
+    """Probability that a message changes the state from bad to good. A bad state lasts 1 / r messages on average."""
     loss_bad: Share = 1.0
-    """1-h."""
+    """Probability of loss in the bad state (1-h)."""
     loss_good: Share = 0.0
-    """1-k."""
+    """Probability of loss in the good state (1-k)."""
 
     def losses(self, generator: np.random.Generator) -> Iterator[bool]:
         """Yield for each message whether it is lost, whatever the time between messages."""
@@ -86,7 +86,7 @@ class GilbertElliott(Limited):
                     yield loss < self.loss_good
 
     def share(self) -> float:
-        """Return the long-run share of losses: p / (p + r) of the time is bad."""
+        """Return the long-run share of lost messages, as the bad state's share of the time is p / (p + r)."""
         bad = self.p / (self.p + self.r) if self.p else 0.0
         return (1.0 - bad) * self.loss_good + bad * self.loss_bad
 

@@ -1,8 +1,8 @@
-"""Links by name, in words that the kernel's netem accepts, too; docs/link.md has published figures and sources.
+"""Emulated links that have names, in words that the kernel's netem also accepts; docs/link.md has figures and sources.
 
-Single, infrequent packets see the published delays. Each link with jitter has a rate, because only then netem keeps
-packets in order, as a radio's queue does; TCP would take disorder for loss. A message waits for the slowest one
-before it: frequent messages see more delay than rare ones.
+Single, infrequent packets have the published delays. Each link with jitter has a rate, because only then netem keeps
+packets in order, as a radio's queue does; TCP would mistake disorder for loss. As a message waits for all before it,
+frequent messages are delayed more than rare ones.
 """
 
 from collections.abc import Mapping
@@ -21,9 +21,9 @@ NAMED_LINKS: Final[Mapping[str, str]] = MappingProxyType(
         "to_operator: delay 300ms 2ms distribution normal rate 10mbit",
     }
 )
-"""Links in order of delay."""
+"""Words of each named link, keyed by name, in ascending order of delay."""
 
 
 def with_names_spelled_out(spec: str) -> str:
-    """Replace each clause that is a link's name by the link's words; keep the rest."""
+    """Replace each clause of `spec` that is the name of a link by the words of that link; keep the other clauses."""
     return ";".join(NAMED_LINKS.get(clause.strip(), clause) for clause in spec.split(";"))

@@ -1,4 +1,4 @@
-"""Frozen, validated profile of one direction of one stream."""
+"""Profile of an emulated link for one stream of messages in one direction, frozen and validated."""
 
 import math
 from dataclasses import dataclass, field
@@ -27,16 +27,16 @@ _Count = Annotated[int, Meta(ge=1)]
 
 @dataclass(frozen=True)
 class LinkProfile:
-    """Effects of one direction of one stream on messages, after netem.
+    """Effects of an emulated link on the messages of one stream in one direction, after netem.
 
-    The model `datagram` loses, duplicates and reorders messages, as UDP sees it. `stream` delivers every message that
-    its queue accepts, once and in order, as TCP does. No message is due before an earlier one. A lost or corrupted
-    message is sent again every `recovery_s` until it arrives; duplicates and reordering do not show.
+    The model `datagram` loses, duplicates and reorders messages, as a link does with UDP. The model `stream` delivers
+    every message that its queue accepts once and in order, as TCP does: no message is due before an earlier one. A lost
+    or corrupted message is sent again every `recovery_s` until it arrives. Duplicates and reordering have no effect.
     """
 
     delay_s: _Delay = 0.0
     jitter_s: _Delay = 0.0
-    """Half range (uniform), standard deviation (normal), or scale of another shape."""
+    """Half the range of a uniform distribution, standard deviation of a normal one, scale of another shape."""
     distribution: Distribution = "uniform"
     seed: int = 0
     model: LinkModel = "datagram"
@@ -44,21 +44,21 @@ class LinkProfile:
     duplicate: Chance | None = None
     corrupt: Chance | None = None
     reorder: Chance | None = None
-    """Share of messages sent at once, ahead of delayed ones."""
+    """Probability with which a message is sent at once, and so overtakes delayed ones."""
     gap: _Count = 1
     """Least number of messages from one reordered message to the next."""
     rate: Rate | None = None
     limit: _Count = QUEUE_LIMIT
-    """Messages that may wait; surplus ones are dropped."""
+    """Maximum number of waiting messages; further ones are dropped."""
     outages: tuple[Outage, ...] = ()
     trace: Trace | None = None
-    """Recorded delays instead of delay, jitter and loss."""
+    """Recorded delays and losses, used instead of delay, jitter and loss."""
     retransmit_s: _Recovery | None = None
-    """Time until a stream sends a lost message again; None: see `recovery_s`."""
+    """Time after which a lost message is sent again in the model `stream`; None: as `recovery_s` computes it."""
     round_trip_s: _Recovery | None = field(default=None, compare=False)
-    """Sum of both directions' mean delays; None if the other is unknown: twice this one."""
+    """Sum of both directions' mean delays. None: the other direction is unknown, and counts as equal to this one."""
     words: str = field(default="", compare=False)
-    """Profile in the grammar's words, as given."""
+    """Words from which the profile was parsed."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -70,7 +70,7 @@ class LinkProfile:
 
     @classmethod
     def parse(cls, spec: str, seed: int = 0, model: LinkModel = "datagram") -> "LinkProfile":
-        """Read one bare profile such as `delay 50ms 10ms distribution normal loss 1%`; empty means no delay.
+        """Parse one profile such as `delay 50ms 10ms distribution normal loss 1%`; empty means no emulation.
 
         Raises ConfigurationError, in one line, for unknown, malformed, contradictory or out-of-range words.
         """
@@ -78,7 +78,7 @@ class LinkProfile:
 
     @classmethod
     def parse_within(cls, profile: str, spec: str, seed: int, model: LinkModel) -> "LinkProfile":
-        """Read `profile`, which is `spec` or a clause of it; raises ConfigurationError, which quotes `spec`."""
+        """Parse `profile`, which is `spec` or a clause of it; raises ConfigurationError, which quotes `spec`."""
         check_seed_and_model(seed, model)
         fields = read_fields(profile, spec, model)
         try:
@@ -87,20 +87,20 @@ class LinkProfile:
             raise ConfigurationError(f"link {spec!r}: {error}") from error
 
     def mean_delay_s(self) -> float:
-        """Return the mean delay asked for, without rate and retransmission."""
+        """Return the mean delay of the profile in seconds, without the effects of rate and retransmission."""
         if self.trace is not None:
             known_s = [delay_s for delay_s in self.trace.delays_s if delay_s is not None]
             return math.fsum(known_s) / len(known_s)
         return moments(self.delay_s, self.jitter_s, self.distribution)[0]
 
     def recovery_s(self) -> float:
-        """Return the time until a stream sends a lost message again, in seconds.
+        """Return the time after which a lost message is sent again in the model `stream`, in seconds.
 
-        `retransmit_s`; by default 5/4 of the round trip, at least 1 ms. That is RACK's recovery (RFC 8985): the
-        acknowledgement of a later message shows that one is missing, a quarter of the least round trip is granted for
-        reordering, and lost retransmissions are found likewise. It assumes a steady flow: the last message before a
-        silence would wait for a time-out, on Linux 200 ms or more. Congestion control is left out: bursts of loss
-        shrink TCP's window and add more delay than this.
+        It is `retransmit_s` or, if that is None, 5/4 of the round trip, but at least 1 ms. That is the recovery of
+        TCP's RACK (RFC 8985): the acknowledgement of a later message shows that a message is missing, and a quarter of
+        the least round trip is allowed for reordering. Lost retransmissions are found likewise. The time holds for a
+        steady flow: the last message before a silence would wait for a time-out, on Linux 200 ms or more. Congestion
+        control is not emulated: bursts of loss shrink TCP's window and add more delay than this.
         """
         if self.retransmit_s is not None:
             return self.retransmit_s
@@ -108,7 +108,7 @@ class LinkProfile:
         return max(_RECOVERY_ROUND_TRIPS * round_trip_s, _SHORTEST_RECOVERY_S)
 
     def retransmitted_share(self) -> float:
-        """Return the share of a stream's transmissions that are repeated because of loss or corruption."""
+        """Return the share of transmissions that are lost or corrupted, and so repeated in the model `stream`."""
         arrives = 1.0
         if self.loss is not None:
             arrives -= self.loss.share()
@@ -128,5 +128,5 @@ def check_seed_and_model(seed: int, model: LinkModel) -> None:
 
 
 def choices(literal: object) -> str:
-    """Join the values of a Literal, for messages."""
+    """Return the values of the Literal type `literal`, joined by commas, for messages."""
     return ", ".join(get_args(literal))

@@ -1,4 +1,4 @@
-"""Profiles for each direction and stream, from one specification."""
+"""Profiles of the emulated link for each direction and stream, parsed from one specification."""
 
 import dataclasses
 from collections.abc import Iterable, Mapping
@@ -19,20 +19,20 @@ Stream = Literal["haptics", "telemetry", "video", "scene"]
 
 @dataclass(frozen=True)
 class LinkSpec:
-    """Profiles by direction and stream.
+    """Profiles of the emulated link for each direction and stream.
 
-    The clause of a stream in a direction (`to_operator.video`) overrides the stream's, that the direction's, and that
-    the bare one.
+    For a stream in a direction the first of these clauses applies: that of both (`to_operator.video`), of the stream
+    (`video`), of the direction (`to_operator`), without a name.
     """
 
     clauses: Mapping[str, LinkProfile] = field(default_factory=dict)
-    """Profiles by name, the bare one under the empty name. Their seeds are not used."""
+    """Profiles, keyed by the clause's name, which is empty for the clause without one. Their seeds are not used."""
     seed: int = 0
     model: LinkModel = "datagram"
 
     @classmethod
     def parse(cls, spec: str, seed: int = 0, model: LinkModel = "datagram") -> "LinkSpec":
-        """Read `[PROFILE;] [NAME: PROFILE;] ...`; NAME is a direction, a stream or `DIRECTION.STREAM`.
+        """Parse `[PROFILE;] [NAME: PROFILE;] ...`; NAME is a direction, a stream or `DIRECTION.STREAM`.
 
         A link's name, such as `wifi`, is replaced by the link's words. Raises ConfigurationError, in one line, for an
         unknown or repeated name and for a bad profile.
@@ -61,7 +61,7 @@ class LinkSpec:
         return cls(clauses, seed, model)
 
     def profile(self, direction: Direction, stream: Stream = "haptics") -> LinkProfile:
-        """Return the profile of `stream` in `direction`, with a separate seed, so that no two are correlated."""
+        """Return the profile of `stream` in `direction`. Each has its own seed, so that no two are correlated."""
         directions, streams = get_args(Direction), get_args(Stream)
         if direction not in directions:
             raise ValueError(f"direction = {direction!r}; valid: {choices(Direction)}")
@@ -75,7 +75,7 @@ class LinkSpec:
         return dataclasses.replace(there, seed=seed, round_trip_s=round_trip_s)
 
     def unused(self, carried: Iterable[tuple[Direction, Stream]]) -> list[str]:
-        """Return the names of clauses that apply to no stream in `carried`."""
+        """Return the names of clauses that apply to none of `carried`, the (direction, stream) pairs that are sent."""
         used = {self._clause_name(direction, stream) for direction, stream in carried}
         return [name for name in self.clauses if name not in used]
 
@@ -92,7 +92,7 @@ class LinkSpec:
 
 
 def unused_clauses(link: LinkSpec, carried: Iterable[tuple[Direction, Stream]]) -> list[str]:
-    """Return a line for a person for each clause of `link` that applies to no stream in `carried`."""
+    """Return a line to show for each clause of `link` that applies to none of `carried`, the pairs that are sent."""
     return [
         f"link: {f'the clause {name!r}' if name else 'the profile without a name'} applies to nothing that is sent here"
         for name in link.unused(carried)

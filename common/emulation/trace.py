@@ -1,4 +1,4 @@
-"""Recorded delays, replayed message by message."""
+"""Recorded delays of a real link, applied again message by message."""
 
 import csv
 import gzip
@@ -19,10 +19,10 @@ _COLUMNS = "delay_ns, or sent_ns and received_ns, with a heading, and seq where 
 
 @dataclass(frozen=True)
 class Trace:
-    """Delays in order of sending: the n-th message gets the n-th; after the last the first follows."""
+    """Recorded delays: the n-th message gets the n-th delay; after the last one they begin again."""
 
     delays_s: tuple[float | None, ...]
-    """Delay of each message; None for a lost one."""
+    """Delay of each recorded message, in order of sending; None for a lost message."""
 
     def __post_init__(self) -> None:
         if all(delay_s is None for delay_s in self.delays_s):
@@ -30,11 +30,12 @@ class Trace:
 
     @classmethod
     def read(cls, path: Path, field: str) -> "Trace":
-        """Read a CSV with the column delay_ns, or sent_ns and received_ns; empty: the message was lost.
+        """Read a CSV file with the column delay_ns, or with sent_ns and received_ns.
 
-        A row is a message, in order of seq if there is such a column, else of sent_ns, else of the file. A missing seq
-        is a lost message. A file whose name ends in .gz is unpacked. Raises ConfigurationError, in one line that begins
-        with `field`, for any other content.
+        A row is a message; an empty delay or time of reception means that it was lost. Rows are sorted by seq if there
+        is such a column, else by sent_ns if there is that, else left as they are. A missing seq is a lost message. A
+        file whose name ends in .gz is unpacked. Raises ConfigurationError, in one line that begins with `field`, for
+        any other content.
         """
         rows = read_samples(path, field)
         try:
@@ -45,16 +46,16 @@ class Trace:
 
 @dataclass(frozen=True)
 class Sample:
-    """Message of a recording."""
+    """One recorded message of a trace."""
 
     sent_s: float | None
-    """Time of sending on the recording's clock, if known."""
+    """Time of sending on the recording's clock; None if unknown."""
     delay_s: float | None
-    """Delay; None for a lost message."""
+    """Delay from sending to reception; None for a lost message."""
 
 
 def read_samples(path: Path, field: str) -> list[Sample]:
-    """Read the messages of a recording, in order of sending, as `Trace.read` does, with their send times."""
+    """Read the messages of a trace in order of sending, with send times. File and errors are those of `Trace.read`."""
     try:
         text = read_regular_file(path, _LARGEST_BYTES)
         if path.suffix == ".gz":
@@ -125,7 +126,10 @@ def _sample(values: dict[str, float | None], names: set[str], where: str) -> Sam
 
 
 def _with_gaps(rows: Iterable[tuple[float, Sample]], path: Path, field: str) -> list[Sample]:
-    """Insert lost messages for missing sequence numbers, with send times evenly between their neighbours."""
+    """Return the samples of `rows` (sequence number, sample), with a lost message for each missing sequence number.
+
+    Send times of lost messages are evenly between those of their neighbours.
+    """
     samples: list[Sample] = []
     last: tuple[float, Sample] | None = None
     for sequence, sample in rows:

@@ -1,7 +1,7 @@
-"""Limits of what the operator may change in an emulated link during a run: delay, jitter and loss.
+"""Limits on what the operator may change in an emulated link during a run: only delay, jitter and loss, within bounds.
 
-A file's name in netem's words would let the other side open files here. After a delay of days no further change
-could arrive. Neither can be tuned.
+Traces are refused, because their file's name would let the other side open files here. Long delays are refused,
+because no further change could arrive.
 """
 
 import dataclasses
@@ -23,9 +23,9 @@ _VALID: Final = (
 
 
 def tuned_link(link: LinkSpec, words: str) -> LinkSpec:
-    """Return `link` with `words` for both directions; raises ConfigurationError, in one line, beyond the limits.
+    """Return `link` with the profile `words` for both directions. ConfigurationError, in one line, beyond the limits.
 
-    Clauses of `link` for telemetry and video stay: video with a separate rate keeps it.
+    Clauses of `link` for telemetry and video are kept, such as a rate of video alone.
     """
     profile = tunable_profile(words)
     profile = dataclasses.replace(profile, model=link.model)
@@ -34,7 +34,7 @@ def tuned_link(link: LinkSpec, words: str) -> LinkSpec:
 
 
 def tunable_profile(words: str) -> LinkProfile:
-    """Return the profile that `words` ask for; errors as in `tuned_link`."""
+    """Return the profile that `words` specify, if it is within the limits; errors as in `tuned_link`."""
     for word in words.split():
         if word not in _WORDS and not word[0].isdigit():
             raise ConfigurationError(f"link {words!r}: {word!r} cannot be tuned; valid: {_VALID}")

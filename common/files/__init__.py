@@ -1,1 +1,1 @@
-"""Files that people name: their places, and careful reading and writing."""
+"""Files and folders of users: where they are, and how they are read and written safely."""

@@ -1,4 +1,4 @@
-"""Files that a person wants written: checked at the start, and written whole or not at all."""
+"""Output files that a user named: checked at the start, and written completely or not at all."""
 
 import json
 import os
@@ -14,7 +14,10 @@ from common.errors import ConfigurationError
 
 
 def require_output_file(flag: str, path: Path | None, endings: Sequence[str] = ()) -> None:
-    """Raise ValueError unless `path` is None, or a writable file in an existing folder, with an allowed ending."""
+    """Raise ValueError if `path` cannot be written or its folder does not exist; None is valid.
+
+    `endings`: valid endings of the file's name in lower case; empty: all are valid.
+    """
     if path is None:
         return
     if path.is_dir() or not path.absolute().parent.is_dir():
@@ -29,10 +32,11 @@ def require_output_file(flag: str, path: Path | None, endings: Sequence[str] = (
 
 @contextmanager
 def output_file(flag: str, path: Path) -> Iterator[TextIO]:
-    """Open `path` for text, with line ends unchanged; the old content stays until all of the new is written.
+    """Open `path` to write text, with line ends unchanged. The old content stays until the new text is complete.
 
-    If a new file would differ for others (a pipe, a second name, another user's file), the old one is written in place.
-    Raises ConfigurationError, in one line that names `flag`, if the system refuses, as on a full disk.
+    For that a new file replaces the old one. But a pipe, a file with a second name, or another user's file is written
+    in place, because others would notice the replacement. Raises ConfigurationError, in one line that names `flag`, if
+    the system refuses, as on a full disk.
     """
     end = Path(os.path.realpath(path))  # a link stays a link
     new = end.with_name(f".feelahead-{secrets.token_hex(8)}")
@@ -57,7 +61,7 @@ def output_file(flag: str, path: Path) -> Iterator[TextIO]:
 
 
 def _state(path: Path) -> os.stat_result | None:
-    """Return the state of an existing file; None for none."""
+    """Return the `stat` of the file; None if there is no file."""
     try:
         return path.stat()
     except FileNotFoundError:
@@ -65,7 +69,10 @@ def _state(path: Path) -> os.stat_result | None:
 
 
 def _own_output(old: os.stat_result | None) -> int | None:
-    """Return our standard output or error if `old` is that file: writing continues at the stream's position."""
+    """Return the descriptor of our standard output or error if it is the file `old`, else None.
+
+    Writing to that descriptor continues at the stream's position.
+    """
     for descriptor, stream in ((1, sys.stdout), (2, sys.stderr)):
         if old is not None and stream is not None and os.path.samestat(old, os.fstat(descriptor)):
             stream.flush()
@@ -74,7 +81,7 @@ def _own_output(old: os.stat_result | None) -> int | None:
 
 
 def _replaceable(path: Path, end: Path, old: os.stat_result | None) -> bool:
-    """Return whether nobody sees a difference to a new file: no pipe, no file of others, no second name."""
+    """Return whether a new file may replace the old one unnoticed: no pipe, no other owner, no second name."""
     if old is None:
         return os.access(end.parent, os.W_OK)
     plain = stat.S_ISREG(old.st_mode) and path.absolute().parts[1] not in ("dev", "proc")

@@ -1,4 +1,4 @@
-"""Reading of files that people name: whole and without waiting, as a pipe or a device might never end."""
+"""Reading of regular files that a user named. Pipes and devices are refused, because they might never end."""
 
 import errno
 import os
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def read_regular_file(path: Path, largest_bytes: int) -> bytes:
-    """Return the content of the regular file `path`, or of the one that a link leads to.
+    """Return the content of the regular file `path`; links are followed.
 
     Raises OSError if the system refuses, also for a folder; ValueError, in one line without the path, if the file is
     not regular or has more than `largest_bytes`.

@@ -1,4 +1,4 @@
-"""Fault of a value in a TOML file, in one line: the key, the value, and what is valid."""
+"""Description of an invalid value in a TOML file, in one line: the key, the value, and what is valid."""
 
 import dataclasses
 import json
@@ -17,7 +17,7 @@ _LONGEST_VALUE = 100
 
 
 def explain(complaint: str, content: Mapping[str, Any], settings_type: type) -> str:
-    """Return one line for msgspec's `complaint` about converting `content` to `settings_type`."""
+    """Return one line that explains msgspec's `complaint`, its error in converting `content` to `settings_type`."""
     said, _, path = complaint.partition(" - at `$.")
     keys = re.findall(r"\w+", path.partition("[")[0].rstrip("`"))
     if not keys:

@@ -1,4 +1,4 @@
-"""Reading of TOML files: whole, without waiting, and with faults in one line."""
+"""Reading of TOML files, with each fault described in one line."""
 
 import tomllib
 from pathlib import Path
@@ -7,9 +7,9 @@ from typing import Any, Final
 from common.files.regular_file import read_regular_file
 
 _LARGEST_INTEGER: Final = 2**63
-"""Limit of TOML's integers; later readers cannot use larger ones."""
+"""Bound of TOML's integers, which have 64 bits; larger ones are refused, as later code cannot use them."""
 _DEEPEST: Final = 50
-"""Largest number of nested levels: a handful suffices, and later code may recurse into them."""
+"""Maximum number of nested levels: settings need a few, and later code may recurse into them."""
 _LONGEST_COMPLAINT: Final = 400
 _TOO_DEEP: Final = f"is nested too deeply; valid: {_DEEPEST} levels"
 _TOO_LARGE: Final = "has a whole number of more than 64 bits, which is no valid TOML"

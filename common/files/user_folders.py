@@ -1,4 +1,4 @@
-"""Folders of a person's settings and of caches, by each system's convention."""
+"""Folders of a user's settings and caches, by the convention of each operating system."""
 
 import os
 import sys
@@ -11,9 +11,10 @@ def configuration_folder(
 ) -> Path:
     """Return the folder of feelahead's configuration; it need not exist.
 
-    Linux and others: $XDG_CONFIG_HOME/feelahead, else ~/.config/feelahead. macOS: the same if XDG_CONFIG_HOME is set,
-    else ~/Library/Application Support/feelahead. Windows: %APPDATA%\\feelahead, else that under AppData\\Roaming.
-    A relative path in a variable is ignored, as the XDG specification requires.
+    Linux and others: $XDG_CONFIG_HOME/feelahead if that variable is set, else ~/.config/feelahead. macOS:
+    $XDG_CONFIG_HOME/feelahead if set, else ~/Library/Application Support/feelahead. Windows: %APPDATA%\\feelahead if
+    set, else ~\\AppData\\Roaming\\feelahead. A relative path in a variable is ignored, as the XDG specification
+    requires.
     """
     home = Path.home() if home is None else home
     if platform == "win32":
@@ -27,6 +28,6 @@ def configuration_folder(
 
 
 def cache_folder(environment: Mapping[str, str] = os.environ, home: Path | None = None) -> Path:
-    """Return the folder of recomputable files: $XDG_CACHE_HOME/feelahead, else ~/.cache/feelahead."""
+    """Return the folder of files that can be made again: $XDG_CACHE_HOME/feelahead if set, else ~/.cache/feelahead."""
     given = Path(environment.get("XDG_CACHE_HOME", ""))
     return (given if given.is_absolute() else (Path.home() if home is None else home) / ".cache") / "feelahead"

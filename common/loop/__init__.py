@@ -1,1 +1,1 @@
-"""Loop and process of both sides: each main is settings, parts, and `run`."""
+"""Loop and process that both sides use: a side's main only reads settings, makes the parts and calls `run`."""

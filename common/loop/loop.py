@@ -1,4 +1,4 @@
-"""Loop of a side: turns at absolute deadlines, messages as they come, all else after the sends."""
+"""Loop of a side: turns at absolute deadlines, messages when they arrive, other work after sending."""
 
 from collections.abc import Mapping
 from typing import Any, Final, Protocol, TypeVar
@@ -16,14 +16,14 @@ SOCKETS: Final = "sockets"
 
 
 class Side(Protocol[Received]):
-    """Work of one side; no call waits but `wait`."""
+    """Work of one side, in the calls that Loop makes; only `wait` may block."""
 
     @property
     def resting(self) -> bool:
-        """Whether nothing moves: there is time to collect garbage."""
+        """Whether nothing moves, so that there is time for garbage collection."""
 
     def note(self, text: str) -> None:
-        """Show one line to all people who watch this side."""
+        """Show one line wherever this side's status is shown."""
 
     def receive(self) -> Received:
         """Return the messages that have arrived."""
@@ -38,20 +38,20 @@ class Side(Protocol[Received]):
         """Send the messages that are due."""
 
     def rest(self, now_s: float, turned_s: float) -> None:
-        """Do the work that may follow the sends, after the turn at `turned_s`."""
+        """Do the less urgent work of the turn that began at `turned_s`, after its messages have been sent."""
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for a message; return whether there is one."""
+        """Wait at most `timeout_s` for a message; return whether there is one."""
 
     def next_due(self) -> float | None:
-        """Return when the next message must leave; None while none waits."""
+        """Return the time at which the next waiting message must leave; None if none waits."""
 
 
 class Loop:
     """Loop that runs a side, and measures whether it keeps the period."""
 
     def __init__(self, period_s: float, remedies: Mapping[str, str], seed: int, clock: Clock | None = None) -> None:
-        """remedies: remedy for each stage of a turn, by name; "" for the time outside of stages."""
+        """remedies: for each stage of a turn, a remedy if it takes too long; "" is the time outside of all stages."""
         self.clock = MonotonicClock() if clock is None else clock
         self.computed = ThreadClock()
         """Processor time of the loop's thread"""
@@ -62,7 +62,7 @@ class Loop:
         self._collection = IdleCollection(self.clock)
 
     def run(self, side: Side[Received], stop: StopSignal, duration_s: float | None) -> None:
-        """Run until `stop`, or for `duration_s`; note once, in words, if the period cannot be kept."""
+        """Run until `stop` is set or `duration_s` has passed; show a note, once, if the period cannot be kept."""
         receive, send = self.stages.timed(SOCKETS, side.receive), self.stages.timed(SOCKETS, side.send)
         pacer, clock = self.pacer, self.clock
         with self._collection:
@@ -90,7 +90,7 @@ class Loop:
                 wait_for_turn(pacer, clock, side.wait, side.next_due())
 
     def summary(self, side: str) -> dict[str, Any]:
-        """Return duration, pacing of the turns, and times of the stages."""
+        """Return the loop's part of a run's summary: duration, pacing of the turns, and times of the stages."""
         return {
             "duration_s": self.clock.now() - self.start_s,
             "stages": {side: self.stages.summary()},

@@ -1,7 +1,7 @@
 """Process of a side, from settings to exit code.
 
-Order of a start: settings, files and keys are checked; everything is built and compiled; then ports are bound, and the
-loop runs. Until then a stop signal ends the process at once, with code 0 and the summary of a run that never began.
+At the start settings, files and keys are checked. Then everything is made and compiled; then ports are bound, and the
+loop runs. Before `run` a stop signal ends the process at once, with code 0 and the summary of a run that never began.
 A failed run has a summary, too; a refused start has none.
 """
 
@@ -21,17 +21,17 @@ Received = TypeVar("Received")
 
 
 class Summarized(Side[Received], Protocol[Received]):
-    """Side with figures of the run."""
+    """Side that returns figures of the run for the summary."""
 
     def close(self) -> None:
-        """End companions and release devices; safe to call again."""
+        """End companion processes and release devices; a second call does no harm."""
 
     def summary(self) -> Mapping[str, Any]:
-        """Return the figures of the run, once it is closed."""
+        """Return the figures of the run; call it after `close`."""
 
 
 class Process:
-    """Surroundings of a side's loop: status, recording, and a stack of contexts to close at the end."""
+    """Parts around a side's loop: status, recording, and a stack of contexts that are closed at the end."""
 
     def __init__(
         self, settings: SideOptions, side: Literal["robot", "operator"], status: Status, encoder: Encoder, loop: Loop
@@ -39,7 +39,7 @@ class Process:
         self._leaving = LeavingAtOnce(settings.summary)
         self._settings, self._side, self._encoder = settings, side, encoder
         self.status, self.loop, self.stack = status, loop, ExitStack()
-        """stack: closed at the end, last in first out"""
+        """stack: contexts that are closed at the end, the last one first"""
         self.recording: SideRecording | None = None
         """Recording of the run; None without one"""
 
@@ -54,11 +54,11 @@ class Process:
         return self.stack.__exit__(*ended)
 
     def note(self, text: str) -> None:
-        """Show a person one line, which stays."""
+        """Show one line that the status output does not overwrite."""
         self.status.note(text)
 
     def run(self, open_side: Callable[[], Summarized[Received]]) -> int:
-        """Make the side, run it, and write the summary; return the exit code. Raises what ended the run."""
+        """Make the side, run it, and write the summary; return the exit code. Raises the error that ended the run."""
         stop = self.stack.enter_context(StopSignal())
         self._leaving.summary = None
         if self.recording is not None:

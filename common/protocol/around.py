@@ -1,4 +1,4 @@
-"""Onset distances around the gripper, part of a StiffnessUpdate: an operator side traces where its sticks lead."""
+"""Map of onset distances around the gripper, part of a StiffnessUpdate; the operator side traces its sticks in it."""
 
 from typing import Final
 
@@ -8,39 +8,42 @@ import numpy as np
 from common.arrays import FloatArray
 
 DIRECTIONS: Final = 4
-"""Right, up, left and down of the tool"""
+"""Number of directions in which a stick moves or turns the tool: right, up, left and down"""
 ACROSS: Final = 3
 TURNED: Final = 2
 PROBES: Final = 1 + DIRECTIONS * (ACROSS + TURNED)
-"""Number of places for which distances are sent"""
+"""Number of poses (probes) for which distances are sent"""
 LISTS: Final = 4
 STEP_M: Final = 2.0**-9
 AXES: Final = 1 + DIRECTIONS
-"""The trigger, and sticks: across, right and up, and turning, right and up"""
+"""Number of columns of `changes`: R2, left stick right and up (across), right stick right and up (turning)"""
 MOST_JOINTS: Final = 32
 CHANGE_STEP_S: Final = 2.0**-12
 PERIOD_S: Final = 0.25
-"""Period of looks from each probe while something moves, in seconds; the mean age of a look is half of it."""
+"""Period, in seconds, of computing each probe's distances while something moves; their mean age is half a period."""
 _OF_A_JOINT: Final = 2 * AXES
 _FREE: Final = 255
-"""Code for a distance beyond the horizon."""
+"""Code in `steps` for a distance beyond the horizon."""
 LONGEST_S: Final = 4.0
-"""Longest T, in seconds: after 2 s of silence the robot side is disarmed, so that no longer T occurs."""
+"""Largest valid `full_s` (T), in seconds; none is longer, as the robot side is disarmed after 2 s of silence."""
 
 
 class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """Onset distances of full strength at probes: poses to which sticks may move the gripper before the arm stops.
 
-    The first probe is the gripper's pose. Each direction adds five. Three are displaced by a fully deflected stick for
-    a third, two thirds and all of `full_s`; two are turned by the other stick for half and all of it.
+    The first probe is the gripper's pose. Each direction adds five probes. Three are displaced by the left stick,
+    fully deflected for a third, two thirds and all of `full_s`. Two are turned by the right stick, fully deflected for
+    half and all of `full_s`.
     """
 
     full_s: float
     """T: longest time until the arm stops, in seconds."""
     steps: bytes
-    """(LISTS, PROBES) distances in steps of 2 mm, rounded towards the gripper: R2's, fast and slow, and L2's."""
+    """(LISTS, PROBES) distances, a byte each, in steps of 2 mm, rounded towards the gripper. The lists are R2 fast,
+    R2 slow, L2 fast and L2 slow."""
     changes: bytes
-    """(n, AXES) in 16 bits, steps of 0.25 ms: times that joints take to full travel of R2 and full stick deflection"""
+    """(n, AXES) times that each of the n joints takes from rest to full travel of R2 or to a full stick deflection, in
+    signed 16-bit steps of 0.25 ms"""
 
     def __post_init__(self) -> None:
         if not (0.0 < self.full_s <= LONGEST_S):
@@ -54,9 +57,10 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
 
     @classmethod
     def of(cls, full_s: float, onsets_m: FloatArray, changes_s: FloatArray) -> "Around":
-        """Pack distances (LISTS, PROBES), infinite beyond the horizon and clipped at 0.5 m.
+        """Pack onset distances and change times.
 
-        changes_s (n, AXES): see `changes`; clipped at 8 s.
+        onsets_m (LISTS, PROBES): infinite beyond the horizon; finite distances are clipped at 0.5 m. changes_s
+        (n, AXES): `changes` in seconds, clipped at ± 8 s.
         """
         steps = np.minimum(np.maximum(onsets_m / STEP_M, 0.0), _FREE - 1)
         steps[onsets_m == np.inf] = _FREE
@@ -64,7 +68,7 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
         return cls(full_s, steps.astype(np.uint8).tobytes(), changes.astype("<i2").tobytes())
 
     def onsets_m(self, horizon_m: float) -> FloatArray:
-        """Return the distances (LISTS, PROBES) in metres, at most the horizon."""
+        """Return the onset distances (LISTS, PROBES) in metres, at most `horizon_m`."""
         steps = np.frombuffer(self.steps, dtype=np.uint8).reshape(LISTS, PROBES)
         onsets_m: FloatArray = np.where(steps == _FREE, horizon_m, np.minimum(steps * STEP_M, horizon_m))
         return onsets_m
@@ -75,6 +79,6 @@ class Around(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
         return changes
 
     def differs(self, other: "Around") -> bool:
-        """Return whether T differs, or a distance by more than a step."""
+        """Return whether `full_s` differs at all, or any distance by more than one step."""
         both = np.frombuffer(self.steps + other.steps, dtype=np.uint8).reshape(2, -1)
         return self.full_s != other.full_s or int((both.max(axis=0) - both.min(axis=0)).max()) > 1

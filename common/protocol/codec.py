@@ -1,7 +1,7 @@
-"""Messages to bytes and back: MessagePack, from and into the frozen types of common.protocol.messages.
+"""Codec of messages: the frozen types of common.protocol.messages to MessagePack bytes, and back.
 
-A payload is `[version, message]`. The version is read first: a peer of another version differs from garbage.
-Stiffness and telemetry travel packed (common/protocol/compact.py).
+A payload is `[version, message]`. The version is decoded first, so that a peer of another version is not taken for
+garbage. Stiffness and telemetry are sent in packed form (common/protocol/compact.py).
 """
 
 import struct
@@ -17,14 +17,14 @@ from common.protocol.view_messages import AnyViewMessage
 Kind = TypeVar("Kind")
 
 PROTOCOL_VERSION = 10
-"""2: the lease, with its token in every command. 3: predicted contact in each stiffness. 4: a field for each
-trigger in place of stiffness and contact, and the compensating side in each command. 6: Watch. 7: stiffness and
-telemetry packed. 8: distances around, and whether the held object is supported. 9: the joints' times to change.
-10: marks of episodes."""
+"""What each version added. 2: the lease, with its token in every command. 3: predicted contact in each stiffness.
+4: a field for each trigger in place of stiffness and contact, and the compensating side in each command. 6: Watch.
+7: packed form of stiffness and telemetry. 8: onset distances around the gripper, and whether the held object is
+supported. 9: `Around.changes`. 10: `Mark`."""
 MAXIMUM_BYTES = 4096
-"""Longest payload that is decoded, in bytes: eight times the largest message."""
+"""Longest control payload that is decoded, in bytes: eight times the largest message."""
 VIEW_MAXIMUM_BYTES: Final = 4 * 1024 * 1024
-"""Longest view payload, in bytes; common/sockets refuses a longer one, too."""
+"""Longest view payload that is decoded, in bytes; common/sockets refuses longer ones, too."""
 
 
 _ENCODER: Final = msgspec.msgpack.Encoder()
@@ -40,21 +40,21 @@ def encode(message: Message) -> bytes:
 
 
 class Prepared:
-    """Message that is packed once and sent under many headers."""
+    """Message that is encoded once and sent with many headers."""
 
     def __init__(self, message: Message) -> None:
         # No bytes before the header can equal it.
         self._before, _, self._after = encode(message).partition(_ENCODER.encode(message.header))
 
     def under(self, header: Header) -> bytes:
-        """Return the payload with this header."""
+        """Return the payload of the message with this header."""
         return b"".join((self._before, _ENCODER.encode(header), self._after))
 
 
 def decode(payload: bytes) -> AnyMessage:
-    """Unpack and validate one message whole. Raises RemoteProtocolError, which names the fault.
+    """Decode and validate one control message. Raises RemoteProtocolError, which names the fault.
 
-    Its subclass OtherVersionError means a peer of another version, whatever else the bytes hold.
+    The subclass OtherVersionError means that the peer has another protocol version; the rest is not examined.
     """
     message = _decode(payload, _MESSAGE, MAXIMUM_BYTES)
     try:
@@ -69,7 +69,7 @@ def decode_view(payload: bytes) -> AnyViewMessage:
 
 
 def claims_to_be(tag: str, payload: bytes) -> bool:
-    """Return whether the first bytes of `payload` hold this tag; the rest is not unpacked and may be invalid."""
+    """Return whether `payload` begins like a message of this tag; the rest is not decoded and may be invalid."""
     # The tag follows a list's first byte, the version, and the first bytes of another list and of the tag.
     return tag.encode() in payload[: 8 + len(tag)]
 

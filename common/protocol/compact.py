@@ -1,11 +1,11 @@
-"""Stiffness and telemetry packed: all but the header and a name is in one binary field.
+"""Packed form of stiffness and telemetry: all but the header and the target's name is in one binary field.
 
     stiffness    [tag, header, field]            110 bytes of field, some 260 with distances around
     telemetry    [tag, header, name, field]      57 bytes
 
 Onset distances are whole steps of 2^-14 m, a sixteenth of a millimetre, in 16 bits. They are rounded towards the
-gripper, never up. The step is a power of two, so that packing again loses nothing more. Speeds, accelerations and
-shares are single precision; rumble is eighths, rounded up. All is little-endian.
+gripper, never up. The step is a power of two, so that packing unpacked values again loses nothing. Speeds,
+accelerations and stiffnesses are single-precision numbers. Rumble is in eighths, rounded up. All is little-endian.
 """
 
 import math
@@ -41,7 +41,7 @@ _BEYOND: Final = 2**15 - 1
 _ALL_BEYOND: Final = [_BEYOND] * 8
 _NOTHING_NEAR: Final = tuple(_ALL_BEYOND)
 _FARTHEST: Final = _BEYOND - 1
-"""Largest distance in steps, 2 m: longer ones below the horizon are clipped to it."""
+"""Largest distance in steps (2 m), to which longer distances below the horizon are clipped."""
 _PAST: Final = -(2**15)
 """Code for a negative distance that 16 bits cannot hold."""
 _PAST_M: Final = -100.0
@@ -50,14 +50,14 @@ _STANDS = 4
 _LARGEST_SINGLE: Final = (2.0 - 2.0**-23) * 2.0**127
 
 _STIFFNESS: Final = struct.Struct("<32h10fiBB")
-"""Onset distances of L2, fast and slow, and of R2; v_max, a, δ, s of each; v; commanded speed, NaN for none;
-horizon; rumble; state, and a bit for `stands`."""
+"""Fields in order: onset distances (L2 fast, L2 slow, R2 fast, R2 slow); v_max, a, δ and s of L2, then of R2; v;
+commanded speed, NaN for None; horizon; rumble; one byte with the state and a bit for `stands`."""
 _AROUND: Final = struct.Struct(f"<f{LISTS * PROBES}s")
-"""Optional part behind it: T, `steps`, and then `changes` of an Around."""
+"""Optional part after _STIFFNESS: `full_s` and `steps` of an Around; its `changes` follow, to the end of the field."""
 
 
 def _numbers(kind: inspect.Type) -> int:
-    """Count the numbers that a field of that type holds."""
+    """Return how many floats a message's field of that type holds; 0 if it holds something else."""
     match kind:
         case inspect.UnionType(types=types):
             return max(map(_numbers, types))
@@ -71,9 +71,9 @@ _NUMBERS: Final = {name: count for name, kind in _VIEW.items() if (count := _num
 _TRUE: Final = [name for name, kind in _VIEW.items() if isinstance(kind, inspect.BoolType)]
 _KNOWN: Final = [name for name in _NUMBERS if isinstance(_VIEW[name], inspect.UnionType)]
 _BITS: Final = {name: 4 << place for place, name in enumerate((*_TRUE, *_KNOWN))}
-"""Bits above the state's two: one for each boolean, and one for each optional field that is present."""
+"""Bits above the two of the state: one for each boolean's value, and one for each optional field's presence."""
 _TELEMETRY: Final = struct.Struct(f"<{sum(_NUMBERS.values())}fB")
-"""All numbers in the order of Telemetry's fields, zeros for None; then state and bits."""
+"""All numbers in the order of Telemetry's fields, zeros for None; then one byte with the state and _BITS."""
 
 
 class StiffnessOnWire(Message, frozen=True, tag="stiffness"):
@@ -104,7 +104,7 @@ def packed(message: Message) -> Message:
 def unpacked(
     message: AnyOnWire,
 ) -> Hello | MotionCommand | Watch | Tune | Mark | LeaseNotice | LinkReport | StiffnessUpdate | Telemetry:
-    """Unpack a received message; raises ValueError or struct.error for an invalid field."""
+    """Return the unpacked form of a received message; raises ValueError or struct.error for an invalid binary field."""
     if isinstance(message, StiffnessOnWire):
         return _unpack_stiffness(message)
     return _unpack_telemetry(message) if isinstance(message, TelemetryOnWire) else message

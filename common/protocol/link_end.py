@@ -14,35 +14,36 @@ from common.timing.clock_offset import ClockOffset
 
 _GAP_S = 0.1
 _REMEMBERED_EPOCHS = 64
-"""Number of ended epochs that are refused for good; the oldest are forgotten, so that memory stays bounded."""
+"""Number of the peer's ended epochs that are remembered, and so refused; older ones are forgotten to bound memory."""
 _MOST_RECENT = 4096
-"""Number of arrivals in `recent`; enough for the last second."""
+"""Maximum number of arrivals in `recent`; enough for the last second."""
 _MOST_UNMEASURED = 4096
-"""Number of arrivals that wait for the offset to settle: it takes a second, in which about a thousand arrive."""
+"""Maximum number of arrivals kept until the clock offset settles: that takes a second, in which about 1000 arrive."""
 
 
 @dataclass(frozen=True)
 class Arrival:
-    """Delays of one message by its stamps, at its arrival."""
+    """Order and delays of one received message, computed from its stamps."""
 
     fresh: bool
-    """Newer than all messages of the kind in the peer's present epoch: it may be applied."""
+    """Whether the message is newer than all others of its kind in the peer's present epoch; only then it is applied."""
     queueing_age_s: float
-    """Queueing delay: one-way delay above the sliding minimum, whatever the distance."""
+    """Queueing delay in seconds: one-way delay above its sliding minimum."""
     one_way_s: float | None
     """One-way delay from the peer, as uncertain as the clock offset; None while the offset is unknown."""
     loop_age_s: float | None
-    """Round trip of the echoed stamp, plus the counted part of the holding time (common/silence.py). None before the
-    first echo."""
+    """Loop age in seconds: round trip of the echoed stamp, plus the counted part of the time for which the peer held
+    that stamp (common/silence.py). None if the message echoes no valid stamp."""
     copy: bool = False
-    """Duplicate of the newest message of the kind, by another connection."""
+    """Whether the message is a duplicate of the newest of its kind, received over another connection."""
 
 
 class LinkEnd:
     """Epoch, sequence numbers, echoes and delay statistics towards one peer.
 
-    Latest wins: of each kind of message only a higher sequence number of the present epoch is fresh. An epoch begins
-    with the peer's Hello. An ended one is refused for good.
+    Latest wins: a message is fresh only if its sequence number in the present epoch exceeds all earlier ones of its
+    kind. An epoch begins with the peer's Hello, and ends with a Hello of another epoch. Later messages of an ended
+    epoch are refused.
     """
 
     def __init__(
@@ -53,9 +54,9 @@ class LinkEnd:
         seed: int = 0,
         asymmetry_s: float = 0.0,
     ) -> None:
-        """`asymmetry_s`: least delay to the robot minus that to the operator, if known from elsewhere."""
+        """`asymmetry_s`: least delay to the robot minus least delay to the operator, if known from elsewhere."""
         self.delay = RunningStatistics(seed)
-        """One-way delays from the peer in seconds, of all arrivals before ordering; empty until the offset settles."""
+        """One-way delays from the peer in seconds, of all arrivals, fresh or not; empty until the offset settles."""
         self.round_trip = RunningStatistics(seed)
         """Round trips without the peer's holding time, in seconds, of all arrivals that echo a stamp."""
         self.recent: deque[tuple[float, float | None, float | None]] = deque(maxlen=_MOST_RECENT)
@@ -63,9 +64,9 @@ class LinkEnd:
         self.outgoing = OutgoingQueue(seed)
         """Estimate of the queue in front of our messages to the peer."""
         self.stale = 0
-        """Number of messages that came too late to be applied, or of no known epoch."""
+        """Number of messages that were older than the newest of their kind, or not of the peer's present epoch."""
         self.gaps = 0
-        """Number of silences of more than 100 ms that a newer message ended."""
+        """Number of silences of more than 100 ms between two messages, each newer than all before."""
         self._side = side
         self._epoch = epoch
         self._clock_domain = clock_domain
@@ -77,7 +78,7 @@ class LinkEnd:
     def _forget_peer(self, epoch: int | None, *, shared_clock: bool) -> None:
         self.peer_epoch = epoch
         self.clock_offset = ClockOffset(shared_clock=shared_clock, asymmetry_s=self._to_peer_asymmetry_s)
-        """Clock offset to the peer; a new one for each of the peer's epochs."""
+        """Estimate of the peer's clock offset; begun anew with each epoch of the peer."""
         self._jumps = 0
         self.outgoing.reset()
         self._unmeasured: deque[tuple[float, float]] = deque(maxlen=_MOST_UNMEASURED)
@@ -88,7 +89,7 @@ class LinkEnd:
         self._last_sent_s = self._last_received_s = 0.0
 
     def begin_epoch(self) -> None:
-        """Begin our next epoch after the peer ended this one; the number is a hash, which strangers cannot guess."""
+        """Begin our next epoch after the peer ended the present one; strangers cannot guess its number, a hash."""
         self._epoch = int.from_bytes(hashlib.sha256(self._epoch.to_bytes(8)).digest()[:8]) >> 11
 
     def hello(self, now_s: float, sequence: int | None = None) -> Hello:
@@ -96,9 +97,10 @@ class LinkEnd:
         return Hello(self.stamp(now_s, sequence), side=self._side, clock_domain=self._clock_domain)
 
     def stamp(self, now_s: float, sequence: int | None = None) -> Header:
-        """Return the header of the next message, to be made when the message enters its delay line.
+        """Return the header of the next message; call it when the message enters its delay line.
 
-        `sequence`: its number, if the caller counts over several ends of one epoch; None for our next.
+        `sequence`: the message's number, if the caller counts the messages of several LinkEnds of one epoch together.
+        None: the next number of this LinkEnd.
         """
         if sequence is None:
             self._sequence = sequence = self._sequence + 1
@@ -119,12 +121,12 @@ class LinkEnd:
         )
 
     def expect_other_delay(self) -> None:
-        """Forget the least delays, after the peer's link was changed on purpose: new arrivals give new ones."""
+        """Forget the least delays after the emulated link was changed on purpose; new arrivals give new ones."""
         self._queueing.reset()
         self.outgoing.reset()
 
     def arrived(self, message: AnyMessage, now_s: float) -> Arrival:
-        """Measure and order one message from the peer."""
+        """Note one received message: compute its delays, and whether it is fresh."""
         header = message.header
         if isinstance(message, Hello) and header.epoch != self.peer_epoch:
             self._begin_epoch(message)
@@ -156,7 +158,7 @@ class LinkEnd:
         self._forget_peer(epoch, shared_clock=shared)
 
     def _measure_loop(self, header: Header, now_s: float) -> float | None:
-        """Use the stamps of a message; return its loop age."""
+        """Update the estimates from a message's stamps; return its loop age, None without a valid echo."""
         sent_s, held_s = header.echo_sent_s, header.echo_held_s
         if sent_s is None or held_s is None:
             self.clock_offset.arrived(header.sent_s, now_s)
@@ -191,8 +193,9 @@ class LinkEnd:
         return one_way_s
 
     def offset_summary_ms(self) -> dict[str, Any]:
-        """Return the clock offset's `value` and `bound` in ms, its `skew_ppm` and `estimator`, and the numbers of
-        `rejected` stamps and of clock `jumps`; None where unknown.
+        """Return the clock offset's `value` and `bound` in ms, `skew_ppm` and `estimator`; None where unknown.
+
+        Also return the number of `rejected` stamps and of clock `jumps`.
         """
         offset = self.clock_offset
         value_s, bound_s, skew = offset.offset_s, offset.bound_s, offset.skew

@@ -25,7 +25,7 @@ Vector3 = tuple[float, float, float]
 MotionState = Literal["disarmed", "armed", "stopped"]
 OnsetDistances = tuple[float, float, float, float, float, float, float, float]
 Compensation = Literal["operator", "robot"]
-"""Side that compensates the delay: the operator side by its commands under way, or the robot side by eq. 8."""
+"""Side that compensates the delay: "operator" by its commands under way, "robot" by v t_d (eq. 8)."""
 
 _LARGEST = 2**63 - 1
 _FARTHEST_M = 100.0
@@ -75,23 +75,23 @@ def _both_or_neither(name: str, sent_s: float | None, held_s: float | None) -> N
 
 
 class Header(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """Epoch, sequence number and stamps of a message; the echoes give four-timestamp delay estimation."""
+    """Epoch, sequence number and stamps of a message; the echoed stamps allow delay estimation from four timestamps."""
 
     epoch: int
-    """Random number of one run of the sending process."""
+    """Random number that identifies one run (epoch) of the sending side."""
     sequence: int
-    """Number of the message in its epoch, of all kinds together."""
+    """Number of the message in its epoch, counted over all kinds of messages together."""
     sent_s: float
     """Time at which the message entered its delay line, on the sender's monotonic clock."""
     echo_sent_s: float | None = None
-    """Newest `sent_s` that the sender has received from us, on our clock."""
+    """The `sent_s`, on the receiver's clock, of the newest message that the sender has received from the receiver."""
     echo_held_s: float | None = None
-    """Time for which the sender held that stamp, on its clock."""
+    """Time from that message's arrival at the sender to `sent_s`, on the sender's clock."""
     last_sent_s: float | None = None
-    """The `sent_s` of ours that arrived last at the sender, if a newer one had overtaken it. The newest stamps alone
-    would bias delays low."""
+    """The `sent_s` of the receiver's message that arrived last at the sender, if a newer message had overtaken it; else
+    None. The newest messages' stamps alone would bias the delays low."""
     last_held_s: float | None = None
-    """Time for which the sender held that one, on its clock."""
+    """Time from the arrival of the message of `last_sent_s` to `sent_s`, on the sender's clock."""
 
     def __post_init__(self) -> None:
         _in_range("epoch", 0, _LARGEST, self.epoch)
@@ -103,7 +103,7 @@ class Header(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
 
 
 class Message(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=True):
-    """Base of all messages; frequent ones and those with more conditions replace the check of ranges."""
+    """Base of all messages; frequent messages, and those with more conditions, replace this check of ranges."""
 
     header: Header
 
@@ -112,15 +112,16 @@ class Message(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_field
 
 
 class Hello(Message, frozen=True, tag="hello"):
-    """Opening of an epoch, in either direction; repeated until the peer's has arrived."""
+    """First message of an epoch, in either direction; repeated until the peer's Hello has arrived."""
 
     side: Literal["operator", "robot"]
     clock_domain: _Words
-    """Name of the monotonic clock (common.clock.clock_domain): equal and not empty means a shared clock."""
+    """Name of the sender's monotonic clock (common.clock.clock_domain). If both sides' names are equal and not empty,
+    the sides read the same clock."""
 
 
 class MotionCommand(Message, frozen=True, tag="motion"):
-    """State of the operator's hands. Travel, not velocity: the robot side owns the mapping."""
+    """The operator's inputs: triggers, sticks and buttons. The robot side maps them to velocities."""
 
     l2: float
     """Calibrated travel of the left trigger, 0 to 1."""
@@ -130,19 +131,19 @@ class MotionCommand(Message, frozen=True, tag="motion"):
     turning: Vector2 = (0.0, 0.0)
     """Right stick, right and up positive, -1 to 1 each."""
     gripper: float = 0.0
-    """-1 opens, +1 closes, 0 holds."""
+    """Motion of the gripper's fingers: -1 opens, +1 closes, 0 holds."""
     run: bool = False
-    """The hold-to-run button is down."""
+    """Whether the hold-to-run button is down."""
     arm: bool = False
-    """The arming button is down."""
+    """Whether the arming button is down."""
     emergency_stop: bool = False
     next_target: bool = False
     hand_over: bool = False
-    """The hand-over button is down: the lease passes to the observer who has waited longest."""
+    """Whether the hand-over button is down: the lease then passes to the observer who has waited longest."""
     token: int = 0
     """Fencing token of the lease under which the command was sent; 0 for none."""
     compensation: Compensation = "operator"
-    """The side that compensates the delay; eq. 10 uses its prediction errors."""
+    """Side that compensates the delay; eq. 10 uses the prediction errors of that side's compensation."""
 
     def __post_init__(self) -> None:
         _in_range("l2", 0.0, 1.0, self.l2)
@@ -154,25 +155,26 @@ class MotionCommand(Message, frozen=True, tag="motion"):
 
 
 class Watch(Message, frozen=True, tag="watch"):
-    """Views that the sender shows, repeated a few times a second: nothing unwatched is rendered."""
+    """Views that the sender shows at present, repeated a few times a second; the robot side renders no others."""
 
     overview: bool = False
     first_person: bool = False
     scene: bool = False
-    """SceneShapes and SceneState"""
+    """Whether the sender wants SceneShapes and SceneState"""
     lacks: tuple[_Number, _Number] | None = None
-    """Newest VideoStep of each view that could not be shown, 0 for none; None: the sender can show only JPEG."""
+    """For each view, `number` of the newest VideoStep that could not be shown, 0 for none. None: the sender can show
+    only JPEG."""
 
 
 class Tune(Message, frozen=True, tag="tune"):
-    """Changes that the owner wants during the run; repeated until a notice confirms them."""
+    """Changes of settings requested by the lease's owner during the run; repeated until a LeaseNotice confirms them."""
 
     number: Annotated[int, Meta(ge=1, le=_LARGEST)]
-    """Grows with each wish."""
+    """Number of the request; each new request has a higher one."""
     probability: Annotated[float, Meta(ge=1e-6, le=1.0 - 1e-6)] | None = None
-    """P of eq. 10, within (0, 1); None for no change."""
+    """Probability P of eq. 10, within (0, 1); None for no change."""
     link: _Words | None = None
-    """Emulated link of both directions in netem's words; empty for no emulation, None for no change."""
+    """Emulation of the link in both directions, in netem's words; empty for no emulation, None for no change."""
 
 
 class Mark(Message, frozen=True, tag="mark"):
@@ -183,21 +185,22 @@ class Mark(Message, frozen=True, tag="mark"):
 
 
 class LeaseNotice(Message, frozen=True, tag="lease"):
-    """Session state of the receiver at the robot side; repeated, so that a lost one does no harm."""
+    """Session state, at the robot side, of the operator who receives the notice; repeated in case a notice is lost."""
 
     session: SessionState
     why: _Words
     """Reason of that state, for people."""
     token: _Number
-    """Fencing token of the present lease; it only grows. 0 before the first."""
+    """Fencing token of the present lease, which grows with each lease; 0 before the first lease."""
     waiting: _Few
     """Number of observers."""
     place: _Few = 0
-    """The receiver's place among the observers, or the one that an unknown peer would get: 1 is next, 0 owns."""
+    """Position in the queue of observers: 1 gets the lease next, 0 is not queued. For an unknown peer, the position
+    that it would get; 0 if it would get the lease."""
     may_tune: bool = False
-    """The run lets its owner tune."""
+    """Whether the robot side's settings let the lease's owner use Tune."""
     probability: Share | None = None
-    """Present P."""
+    """Present probability P of eq. 10."""
     tuned: _Number = 0
     """Number of the receiver's newest Tune that arrived, granted or not."""
     marked: tuple[_Number, _Words] = (0, "")
@@ -205,46 +208,42 @@ class LeaseNotice(Message, frozen=True, tag="lease"):
 
 
 class LinkReport(Message, frozen=True, tag="report"):
-    """The robot side's view of the link to the owner, twice a second."""
+    """State of the link to the lease's owner as the robot side measures it, sent twice a second."""
 
     rate_kbit_s: Annotated[float, Meta(ge=0.0, le=1e9)]
-    """Rate that the rate control allows for all messages of the robot side."""
+    """Rate that the rate control allows for all messages of the robot side together."""
     queue_ms: Annotated[float, Meta(ge=0.0, le=1e9)]
     """Queueing delay of the robot side's messages."""
     lost: Share | None
-    """Share of packets to the owner that the kernel sent again since the last report; None if none was sent."""
+    """Share of the packets to the owner since the last report that the kernel sent again; None if there were none."""
     pictures: _Words
     """Rate and quality of the pictures."""
     held_back: _Words
-    """Streams held back since the last report, and why; empty for none."""
+    """Streams of which messages were held back since the last report, and why; empty for none."""
 
     def values(self) -> dict[str, float | str | None]:
         """Return the report as fields of a status (common/status)."""
-        return {
-            "rate_kbit_s": self.rate_kbit_s,
-            "queue_ms": self.queue_ms,
-            "lost_percent": None if self.lost is None else 100.0 * self.lost,
-            "pictures": self.pictures,
-            "held_back": self.held_back,
-        }
+        shown = {name: getattr(self, name) for name in ("rate_kbit_s", "queue_ms", "pictures", "held_back")}
+        return shown | {"lost_percent": None if self.lost is None else 100.0 * self.lost}
 
 
 class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """Onset distances of the eight strengths along one trigger (§4.2)."""
 
     fast_m: OnsetDistances
-    """Distances, never falling, at which strengths 1 to 8 begin; `horizon_m` for those beyond it. Below 0: the gripper
-    is past the onset."""
+    """Advances from here at which strengths 1 to 8 begin, in ascending order, for fast zones; `horizon_m` for those
+    beyond the horizon. Below 0: the gripper is past the onset."""
     slow_m: OnsetDistances
-    """Distances for slow zones, in which touching the target is allowed."""
+    """As `fast_m`, for slow zones, whose commanded speed is so low that touching the target is allowed."""
     full_speed_m_s: float
     """v_max: speed that a full pull commands in this pose."""
     acceleration_m_s2: float
-    """a: least acceleration that the joints give along the trigger's direction in this pose."""
+    """a: acceleration along the trigger's direction that the joints are sure to reach in this pose."""
     displacement_m: float
-    """δ by the robot side, along the trigger: v t_d (eq. 8); v_max t_d while the commands under way are unknown."""
+    """δ along the trigger, as the robot side computes it: v t_d (eq. 8); v_max t_d while the commands under way are
+    unknown."""
     stiffness: float
-    """s(δ) of the fast list, 0 to 1."""
+    """Stiffness s(δ) by `fast_m`, 0 to 1."""
 
     def __post_init__(self) -> None:
         _rising("fast_m", self.fast_m)
@@ -256,24 +255,24 @@ class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
 
 
 class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
-    """Trigger fields (§4.2), which the operator side renders over the travel."""
+    """Trigger fields (§4.2), which the operator side renders as strengths over each trigger's travel."""
 
     l2: TriggerField
     r2: TriggerField
     speed_m_s: float
-    """v of the gripper along R2's direction."""
+    """v: speed of the gripper along R2's direction."""
     horizon_m: float
     """Horizon of both fields."""
     rumble: float
-    """Strength in the direction of the stick, in eighths, 0 to 1; 0 while the stick rests."""
+    """Rumble, 0 to 1 in eighths: strength in the direction of the stick; 0 while the stick rests."""
     state: MotionState
     told_m_s: float | None = None
-    """Speed along R2's direction that the newest command gets after joint limits, discarded and stopped commands.
-    None if unknown: the command then counts as followed."""
+    """Commanded speed along R2's direction: what remains of the newest command after joint limits; 0 if the command was
+    discarded or stopped. None if unknown: the arm then counts as following the command."""
     stands: bool = False
-    """The held object is supported: it cannot move farther down."""
+    """Whether the held object is supported, so that it cannot move farther down."""
     around: Around | None = None
-    """Onset distances around; in a few messages only, and the newest holds."""
+    """Onset distances around the gripper. Only a few messages have them; they hold until the next."""
 
     def __post_init__(self) -> None:
         _in_range("speed_m_s", -_FARTHEST_M, _FARTHEST_M, self.speed_m_s)
@@ -286,18 +285,19 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
 class Telemetry(Message, frozen=True, tag="telemetry", array_like=False):
     """Values for the operator's screen; the robot side never controls by them.
 
-    compact.py packs the fields by type. A new field enters recordings, exports and OperatorFacts.screen by itself.
+    compact.py packs the fields by type. A field added here appears in recordings, exports and OperatorFacts.screen
+    without further code.
     """
 
     state: MotionState
     tool_position_m: _Place
-    """Estimated position, in the world frame."""
+    """Estimated position of the tool, in the world frame."""
     target: str | None
     """Name of the present target; None for none."""
     target_in_tool_m: _Place | None
     """Centre of the perceived target in the tool frame; +z is the approach axis."""
     up_in_tool: tuple[_Component, _Component, _Component]
-    """Upward unit vector of the world in the tool frame: an artificial horizon."""
+    """Unit vector that points up in the world, expressed in the tool frame; for an artificial horizon."""
     tool_speed_m_s: _Far
     gripper_opening_m: Annotated[float, Meta(ge=0.0, le=10.0)]
     holding: bool

@@ -1,6 +1,6 @@
-"""State machine of one operator at the robot side, as a table that the code executes.
+"""State machine of one operator's session at the robot side, as a table that the code executes.
 
-docs/session.md shows the table and its diagram. A pair of state and event outside the table changes nothing.
+docs/session.md shows the table and its diagram. A pair of state and event that the table lacks changes nothing.
 """
 
 from collections.abc import Iterable, Mapping
@@ -11,30 +11,30 @@ from typing import Final
 
 
 class SessionState(StrEnum):
-    """State of one operator (one epoch); the values travel in LeaseNotice."""
+    """State of one operator's session (one epoch); LeaseNotice sends the values."""
 
     UNKNOWN = "unknown"
     """No Hello yet, or a refused one."""
     OBSERVING = "observing"
-    """Waiting; another operator owns the lease."""
+    """Waiting for the lease, which another operator owns."""
     DISARMED = "disarmed"
     """Owner of the lease; the arm is still."""
     READY = "ready"
-    """Disarmed, after a healthy second with released triggers: the arming button arms."""
+    """Disarmed, but the arming button arms: for a second commands have come in time, with released triggers."""
     ARMED = "armed"
     """Owner of the lease, whose commands reach the arm."""
     STOPPED = "stopped"
     """Owner of the lease under an emergency stop."""
     STOPPED_READY = "stopped_ready"
-    """Stopped, after a healthy second with released triggers."""
+    """Stopped, but the arming button arms: for a second commands have come in time, with released triggers."""
     AWAY = "away"
-    """Silent, without lease; remembered, so that it can return."""
+    """Silent and without the lease; the session is remembered, so that the operator can return."""
     ENDED = "ended"
-    """Final state: an ended epoch is refused for good."""
+    """Final state: messages of an ended epoch are always refused."""
 
 
 class SessionEvent(Enum):
-    """Event of one operator; the values are the words of the diagram."""
+    """Event in one operator's session; the values label the arrows of the diagram in docs/session.md."""
 
     ASKED_WHILE_FREE = "Hello (or any message when away), lease free"
     ASKED_WHILE_HELD = "Hello (or any message when away), lease held"
@@ -63,12 +63,12 @@ OWNING: Final = frozenset(
         SessionState.STOPPED_READY,
     }
 )
-"""States of the lease's owner."""
+"""States in which the operator owns the lease."""
 
 
 @dataclass(frozen=True)
 class Transition:
-    """Row of the table."""
+    """Row of the session's table: `event` in state `before` leads to `after`, for the reason `why`."""
 
     before: SessionState
     event: SessionEvent
@@ -79,7 +79,7 @@ class Transition:
 def _rows(
     before: Iterable[SessionState], event: SessionEvent, after: SessionState | None, why: str
 ) -> tuple[Transition, ...]:
-    """Return one row for each state, in the order of their definition; `after` None keeps the state."""
+    """Return one row for each state in `before`, in the order of SessionState. `after` None: the state remains."""
     return tuple(Transition(state, event, after or state, why) for state in SessionState if state in set(before))
 
 
@@ -124,12 +124,12 @@ TABLE: Final[Mapping[tuple[SessionState, SessionEvent], Transition]] = MappingPr
 
 
 class Session:
-    """Present state of one operator."""
+    """Present state of one operator's session."""
 
     def __init__(self) -> None:
         self.state = SessionState.UNKNOWN
         self.why = "no Hello yet"
-        """Reason of the last row that applied."""
+        """Reason of the last transition."""
 
     @property
     def owns(self) -> bool:
@@ -137,7 +137,7 @@ class Session:
         return self.state in OWNING
 
     def handle(self, event: SessionEvent) -> Transition | None:
-        """Apply the event; return its row, or None if the table has no such pair and nothing changes."""
+        """Apply the event; return the table's row for it. Return None, and change nothing, if there is none."""
         row = TABLE.get((self.state, event))
         if row is not None:
             self.state, self.why = row.after, row.why

@@ -1,4 +1,4 @@
-"""Trigger field of one strength in every zone, at every distance and speed."""
+"""Trigger field with the same strength in every zone, at every distance and speed."""
 
 from typing import Final
 
@@ -6,11 +6,11 @@ from common.protocol.messages import OnsetDistances, TriggerField
 
 STRENGTHS: Final = 8
 FAR_M: Final = 10.0
-"""Horizon of a field without distances, in metres: out of reach within a reaction."""
+"""Horizon of a uniform field, in metres: farther than the gripper moves within a reaction time."""
 
 
 def uniform_field(strength: int, full_speed_m_s: float = 0.25, acceleration_m_s2: float = 3.0) -> TriggerField:
-    """Return a field of `strength`, 0 to 8, at every speed; raises ValueError for any other."""
+    """Return a trigger field that has `strength` (0 to 8) at every speed; raises ValueError outside that range."""
     if not 0 <= strength <= STRENGTHS:
         raise ValueError(f"strength = {strength}; valid: 0 to {STRENGTHS}")
     near, far = (-FAR_M,) * strength, (FAR_M,) * (STRENGTHS - strength)

@@ -1,10 +1,10 @@
 """View messages besides Telemetry: camera pictures, and the scene as the robot side perceives it.
 
-    operator ── Watch ──▶ robot                                 control: the views that it shows, renewed
+    operator ── Watch ──▶ robot                                 control: the views that the operator side shows
     robot ── VideoFrame, VideoStep ──▶ viewers                  view, PUB/SUB, topic `video`
     robot ── SceneShapes, SceneState ──▶ viewers                view, PUB/SUB, topic `scene`
 
-Arrays travel as bytes, little-endian, row by row; their docstrings give the shapes.
+Arrays are sent as bytes, little-endian, row by row; the docstrings of the fields give their shapes.
 """
 
 from typing import Annotated, Final, Literal
@@ -27,7 +27,7 @@ _SPHERE_BYTES: Final = 4 * 4
 
 
 class VideoFrame(Message, frozen=True, tag="video"):
-    """One picture of one camera."""
+    """One picture of one camera, as JPEG."""
 
     view: ViewName
     captured_s: Finite
@@ -38,7 +38,7 @@ class VideoFrame(Message, frozen=True, tag="video"):
 
 
 class VideoStep(Message, frozen=True, tag="step"):
-    """One picture of one camera in H.264: whole, or its changes since the previous picture."""
+    """One picture of one camera, in H.264: either a whole picture, or the changes since the previous one."""
 
     view: ViewName
     captured_s: Finite
@@ -46,15 +46,15 @@ class VideoStep(Message, frozen=True, tag="step"):
     width: _Pixels
     height: _Pixels
     number: Annotated[int, Meta(ge=1, le=2**63 - 1)]
-    """Number of the picture in its view, counted up by one"""
+    """Number of the picture among those of its view, which count up by one"""
     whole: bool
-    """The picture can be shown without any other"""
+    """Whether the picture can be decoded without an earlier one"""
     h264: bytes
-    """Access unit in Annex B's form"""
+    """H.264 access unit in the byte stream format of Annex B"""
 
 
 class Shape(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """One solid of a link or an object, in the owner's frame."""
+    """One solid of a link or an object (the owner), in the owner's frame."""
 
     owner: int
     """Index into SceneShapes.links or .objects"""
@@ -64,16 +64,16 @@ class Shape(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=
     """box: half sizes; sphere: radius, 0, 0; cylinder, capsule: radius, half length, 0; ellipsoid: half axes; plane:
     half sizes, 0 for infinite; mesh: 1, 1, 1"""
     pose: tuple[float, float, float, float, float, float, float]
-    """x, y, z and the quaternion w, x, y, z, in the owner's frame"""
+    """Position x, y, z in metres and quaternion w, x, y, z, in the owner's frame"""
     color: tuple[float, float, float, float] = (0.6, 0.6, 0.6, 1.0)
     vertices_m: bytes = b""
-    """(v, 3) float32, meshes only"""
+    """(v, 3) float32: vertices of a mesh; empty for other kinds"""
     triangles: bytes = b""
-    """(t, 3) uint32, meshes only"""
+    """(t, 3) uint32: vertex indices of a mesh's triangles; empty for other kinds"""
 
 
 class SceneShapes(Message, frozen=True, tag="shapes"):
-    """Shapes of links and objects: sent when somebody begins to watch, and every few seconds."""
+    """Shapes of the robot's links and of the objects; sent when an operator begins to watch, and every few seconds."""
 
     version: int
     """Version of the lists below, to which SceneState's indices refer"""
@@ -81,10 +81,10 @@ class SceneShapes(Message, frozen=True, tag="shapes"):
     objects: tuple[str, ...]
     shapes: tuple[Shape, ...]
     left_out: int = 0
-    """Number of objects without room in the message; they are felt all the same"""
+    """Number of objects left out because the message has no room; the law includes them all the same"""
     object_poses: bytes = b""
-    """(objects, 7) float32, rows as in SceneState: poses of the objects that SceneState leaves out; empty if it has
-    all"""
+    """(objects, 7) float32, rows as in SceneState: poses of all objects, for those that SceneState leaves out. Empty if
+    SceneState has all of them"""
 
     def __post_init__(self) -> None:
         if len(self.object_poses) not in (0, _POSE_BYTES * len(self.objects)):
@@ -92,14 +92,14 @@ class SceneShapes(Message, frozen=True, tag="shapes"):
 
 
 class EnlargementTerms(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """Terms of eq. 8-10 along one trigger, for the sphere with the largest D_σ."""
+    """Terms of eq. 8-10 along one trigger's direction, for the sphere of the gripper with the largest D_σ."""
 
     sigma_m: float
     """D_σ (eq. 9-10)"""
     mean_m: float
-    """û·(μ_ee - μ_c) + μ_δ"""
+    """Mean û·(μ_ee - μ_c) + μ_δ"""
     kinematic_sd_m: float
-    """√(ûᵀΣû), eq. 5-7"""
+    """√(ûᵀΣû), from eq. 5-7"""
     camera_sd_m: float
     prediction_sd_m: float
     """σ_δ"""
@@ -108,29 +108,31 @@ class EnlargementTerms(msgspec.Struct, frozen=True, array_like=True, forbid_unkn
     loop_age_s: float
     """t_d of eq. 8"""
     displacement_m: float
-    """δ by the robot side (eq. 8)"""
+    """δ as the robot side computes it (eq. 8)"""
 
 
 class SceneState(Message, frozen=True, tag="scene"):
-    """Perceived poses and the law's result, published at 30 Hz while somebody watches."""
+    """Perceived poses and the law's result, published at 30 Hz while an operator watches the scene."""
 
     version: int
     taken_s: float
-    """Time of the state, on the robot side's monotonic clock"""
+    """Time at which this state held, on the robot side's monotonic clock"""
     link_poses: bytes
     """(n, 7) float32: x, y, z, and the quaternion w, x, y, z of each link"""
     object_index: bytes
-    """(k,) uint32: objects whose poses follow: those that may move, or have moved since SceneShapes was made"""
+    """(k,) uint32: indices into SceneShapes.objects of the objects in `object_poses`: those that may move, or have
+    moved since SceneShapes was made"""
     object_poses: bytes
-    """(k, 7) float32"""
+    """(k, 7) float32: x, y, z, and the quaternion w, x, y, z of each object in `object_index`"""
     roles: bytes
-    """(objects,) uint8: indices of roles in common/roles.py"""
+    """(objects,) uint8: role of each object, as an index into the roles of common/roles.py"""
     tool_pose: tuple[float, float, float, float, float, float, float]
     """Pose of the tool, whose z axis is the approach axis"""
     spheres: bytes
     """(m, 4) float32: centre and radius of the spheres of the gripper and of the held object"""
     overlaps: tuple[tuple[int, float, float], ...]
-    """(object, by L2, by R2): overlap in m³ of the gripper inflated by D_σ and moved by the robot side's δ, if any"""
+    """(object index, volume for L2, for R2): overlap of each object, in m³, with the gripper inflated by D_σ and moved
+    by the robot side's δ, if any"""
     l2: EnlargementTerms
     r2: EnlargementTerms
     tick_p50_us: float

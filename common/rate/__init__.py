@@ -1,1 +1,1 @@
-"""Amount and order of a side's messages, so that they cause no queue in the link."""
+"""Control of how much a side sends, and in which order, so that its messages cause no queue in the link."""

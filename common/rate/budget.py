@@ -1,4 +1,4 @@
-"""Budget of all that a side sends: urgent messages are counted, others get the rest, in pieces."""
+"""Budget of all messages that a side sends: urgent ones always leave, others share the remaining rate, in pieces."""
 
 import math
 from collections import deque
@@ -11,26 +11,27 @@ from common.rate.pieces import LEAST_BYTES, piece_of
 from common.silence import KEEP_ALIVE_S
 
 _HEADERS_BYTES: Final = 90
-"""Headers of a packet and its acknowledgement: Ethernet, IP, TCP, ZeroMQ."""
+"""Header bytes of one packet and its acknowledgement together: Ethernet, IP, TCP, ZeroMQ."""
 _PACKET_BYTES: Final = 1400
 SLICE_S: Final = 0.006
-"""Transmission time of the largest piece, in seconds: it delays a stiffness no longer."""
+"""Transmission time of the largest piece, in seconds, and so the longest delay that a piece causes to a stiffness."""
 _LEAST_PIECE_BYTES: Final = 2 * LEAST_BYTES
 _DEBT_S: Final = 0.05
-"""Longest time for which a burst of urgent messages holds back all else, in seconds."""
+"""Longest time for which a burst of urgent messages holds back all other messages, in seconds."""
 _WAITING: Final = 2
-"""Number of a stream's waiting wholes that have not begun; the oldest gives way to a newer one."""
+"""Maximum number of a stream's messages that wait and of which no piece has left; beyond it the oldest is dropped."""
 _SHARE: Final = 0.6
-"""Share of the rate above which haptics slow down."""
+"""Largest share of the allowed rate that haptics take; to stay below it they are sent less often."""
 _TYPICAL_BYTES: Final = 200.0
 _SMOOTHING_S: Final = 0.5
 _URGENCY: Final = {"haptics": Urgency.MUST, "telemetry": Urgency.SOON}
 _SELDOM_S: Final = 0.2
-"""Longest time between telemetry, in seconds, even without room: a frozen screen looks like a fault."""
+"""Longest time between two telemetry messages, in seconds, even if the budget is used up: a frozen screen would look
+like a fault."""
 
 
 def on_the_wire(size_bytes: int) -> int:
-    """Return the bytes of a payload on the link, with headers and acknowledgements."""
+    """Return how many bytes a payload of `size_bytes` takes on the link, with headers and acknowledgements."""
     return size_bytes + _HEADERS_BYTES * max(1, math.ceil(size_bytes / _PACKET_BYTES))
 
 
@@ -38,7 +39,7 @@ Name = TypeVar("Name", bound=str)
 
 
 class Leaving(NamedTuple, Generic[Name]):
-    """Payload that leaves now: a whole one of `stream`, or a piece."""
+    """Payload to send now: a whole message of `stream`, or a piece of one."""
 
     stream: Name
     payload: bytes
@@ -46,7 +47,7 @@ class Leaving(NamedTuple, Generic[Name]):
 
 
 class _Stream:
-    """Waiting wholes of one stream; the first may have begun to leave."""
+    """Messages of one stream that have not left completely; pieces of the first (`begun`) may have left."""
 
     def __init__(self) -> None:
         self.begun: bytes | None = None
@@ -56,39 +57,39 @@ class _Stream:
 
     @property
     def left_bytes(self) -> int:
-        """Number of bytes that have not left yet."""
+        """Number of bytes of the stream that have not left yet."""
         begun = 0 if self.begun is None else len(self.begun) - self.offset
         return begun + sum(map(len, self.waiting))
 
 
 class Budget(Generic[Name]):
-    """Token bucket (its rate is the controller's) with strict priority: haptics, telemetry, then the `paced` streams.
+    """Token bucket with strict priority: haptics, telemetry, `paced` streams. A RateController sets the bucket's rate.
 
-    Haptics always leave and may put the bucket into debt. Paced streams leave if there is room. A whole that has
-    begun is finished; one that has not gives way to a newer one.
+    Haptics always leave, even if the bucket's level falls below 0. Messages of paced streams leave while the level
+    allows it. A message of which a piece has left is sent to its end; before that it may be dropped for newer ones.
     """
 
     def __init__(self, paced: Sequence[Name] = (), first_number: int = 0) -> None:
-        """paced: streams that leave in pieces, most urgent first. first_number: number before the first whole's."""
+        """paced: streams sent in pieces, most urgent first. first_number: one less than the first message's number."""
         self.controller = RateController()
         self._streams: dict[Name, _Stream] = {name: _Stream() for name in paced}
         self._number: dict[Name, int] = dict.fromkeys(paced, first_number)
         self._dropped = {"telemetry": {"rate": 0, "queue": 0}}
         self.level_bytes = 0.0
-        """Level of the bucket: bytes that may leave at once; below 0 a debt."""
+        """Level of the bucket: bytes that may leave at once; below 0 after urgent messages exceeded the rate."""
         self._now_s: float | None = None
         self._telemetry_s = -math.inf
         self._flows_s = math.inf
-        """Last time at which nothing waited for the rate"""
+        """Last time at which no message was waiting because of the rate"""
         self._haptic_bytes = _TYPICAL_BYTES
         self._must_bit_s = 0.0
-        """Smoothed rate of haptics and telemetry."""
+        """Smoothed rate at which haptics and telemetry are sent, in bit/s."""
         self._heard_from: OutgoingQueue | None = None
         self._measured: OutgoingQueue | None = None
-        """Queue of the peer that was measured last."""
+        """OutgoingQueue of the newest peer, kept for the summary when no peer is present."""
 
     def hear(self, queue: OutgoingQueue | None, now_s: float) -> None:
-        """Process the present peer's new echoes; None: no peer echoes."""
+        """Process the new echoes in the present peer's `queue`; None: there is no peer."""
         if queue is not self._heard_from:
             self._heard_from, self._measured = queue, queue or self._measured
             self.controller = RateController()
@@ -96,7 +97,7 @@ class Budget(Generic[Name]):
             self.controller.heard(echo, now_s)
 
     def spend(self, stream: Name | Literal["haptics", "telemetry"], size_bytes: int, now_s: float) -> None:
-        """Count a payload that leaves now, regardless of the budget."""
+        """Count a payload that leaves now, even if it exceeds the budget."""
         self._fill(now_s)
         taken = on_the_wire(size_bytes)
         self.controller.sent(taken, now_s, _URGENCY.get(stream, Urgency.PACED))
@@ -107,7 +108,7 @@ class Budget(Generic[Name]):
             self._haptic_bytes += (taken - self._haptic_bytes) / 64.0
 
     def may_send_telemetry(self, size_bytes: int, now_s: float) -> bool:
-        """Return whether telemetry of that size may leave now, and count it if so; if not, the next one is newer."""
+        """Return whether telemetry of that size may leave now, and count it if so. If not, it is to be dropped."""
         self._fill(now_s)
         flows = self.controller.may_send(now_s)
         if (flows and self.level_bytes > 0.0) or now_s - self._telemetry_s >= _SELDOM_S:
@@ -118,7 +119,7 @@ class Budget(Generic[Name]):
         return False
 
     def offer(self, stream: Name, payload: bytes, now_s: float) -> None:
-        """Queue a payload of a paced stream."""
+        """Queue a message of a paced stream."""
         one = self._streams[stream]
         one.waiting.append(payload)
         if len(one.waiting) > _WAITING:
@@ -126,7 +127,7 @@ class Budget(Generic[Name]):
             one.held_back["rate" if self.controller.may_send(now_s) else "queue"] += 1
 
     def take(self, now_s: float) -> list[Leaving[Name]]:
-        """Return the paced payloads that leave at `now_s`. Call it about every millisecond."""
+        """Return the payloads of paced streams to send at `now_s`. Call it about every millisecond."""
         self._fill(now_s)
         leaving: list[Leaving[Name]] = []
         for name, stream in self._streams.items():
@@ -144,7 +145,7 @@ class Budget(Generic[Name]):
         return leaving
 
     def _next_bytes(self, stream: _Stream) -> int:
-        """Return the bytes of the next piece, 0 for none; a short last piece is joined to the one before it."""
+        """Return the size of the next piece, 0 for none; a short last piece is joined to the one before it."""
         if stream.begun is None:
             if not stream.waiting:
                 return 0
@@ -178,10 +179,10 @@ class Budget(Generic[Name]):
         self._must_bit_s *= math.exp(-elapsed_s / _SMOOTHING_S)
 
     def waiting_s(self, stream: Name) -> float:
-        """Return the queueing delay of a payload offered now; infinite if a whole of `stream` has not begun to leave.
+        """Return the time until a message offered now begins to leave; infinite if one of `stream` still has not begun.
 
-        A sender that waits for a finite delay loses no whole: of pictures that hold only the changes since the previous
-        one, all must arrive.
+        A sender that offers only at a finite time has no message dropped. Pictures that hold only the changes since
+        the previous picture need that.
         """
         if self._streams[stream].waiting:
             return math.inf
@@ -194,13 +195,13 @@ class Budget(Generic[Name]):
 
     @property
     def left_bit_s(self) -> float:
-        """Rate left by haptics and telemetry, at least a twentieth of the whole."""
+        """Rate left for the paced streams by haptics and telemetry: at least a twentieth of the allowed rate."""
         rate_bit_s = self.controller.rate_bit_s
         return max(rate_bit_s - self._must_bit_s, 0.05 * rate_bit_s)
 
     @property
     def haptic_interval_s(self) -> float:
-        """Least time between two haptic messages to a peer: 0 until the link shows a limit, 20 ms in a queue."""
+        """Least time between haptic messages to a peer: 0 until the link shows a limit, 20 ms while a queue drains."""
         if self.controller.drains:
             return KEEP_ALIVE_S
         if self.controller.begins:
@@ -208,16 +209,16 @@ class Budget(Generic[Name]):
         return min(8.0 * self._haptic_bytes / (_SHARE * self.controller.rate_bit_s), KEEP_ALIVE_S)
 
     def held_back(self) -> dict[str, dict[str, int]]:
-        """Count each stream's messages that gave way to the `rate`, or while a `queue` drained."""
+        """Return each stream's number of dropped messages, by the cause: `rate` used up, or `queue` in the link."""
         paced: dict[str, dict[str, int]] = {name: dict(stream.held_back) for name, stream in self._streams.items()}
         return self._dropped | paced
 
     def status(self) -> dict[str, float]:
-        """Return the present `queue_ms` and `rate_kbit_s`."""
+        """Return the present queueing delay `queue_ms` and the allowed rate `rate_kbit_s`."""
         return {"queue_ms": 1e3 * self.controller.queue_s, "rate_kbit_s": 1e-3 * self.controller.rate_bit_s}
 
     def summary(self) -> dict[str, Any]:
-        """Return `allowed_kbit_s`, `queue_ms` with p50 and p95, and `held_back`."""
+        """Return the figures `allowed_kbit_s`, `queue_ms` (p50 and p95) and `held_back` for a run's summary."""
         queue = {"p50": None, "p95": None} if self._measured is None else self._measured.summary_ms()
         return {
             "allowed_kbit_s": 1e-3 * self.controller.rate_bit_s,

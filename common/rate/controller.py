@@ -1,8 +1,9 @@
-"""Rate that one direction of a link carries without a queue, found by the delay of our messages.
+"""Rate that one direction of a link carries without a queue, found from the delays of our messages.
 
-Delay-based congestion control as in GCC (Carlucci et al. 2017). The rate falls to 0.85 of the delivered rate.
-It grows by 5 % a second near the last known capacity. The target is SCReAM's (RFC 8298), much shortened. The threshold
-rises with the jitter of RFC 3550. Silence is noticed by the timeout of RFC 6298.
+This is delay-based congestion control as in GCC (Carlucci et al. 2017). In a queue the rate falls to 0.85 of the
+delivered rate. Near the last known capacity it grows by 5 % a second. The target of the queueing delay is that of
+SCReAM (RFC 8298), much shortened; it rises with the jitter, estimated as in RFC 3550. Late echoes are detected as by
+the timeout of RFC 6298.
 """
 
 import math
@@ -16,59 +17,66 @@ LEAST_BIT_S: Final = 100e3
 MOST_BIT_S: Final = 1e9
 START_BIT_S: Final = 1e6
 TARGET_S: Final = 0.010
-"""Standing queue of our messages, in seconds, above which the link is overused."""
+"""Standing queueing delay of our messages, in seconds, above which the link counts as overused."""
 _JITTER_S: Final = 0.003
 """Jitter assumed until it is measured, in seconds."""
 _CALM_S: Final = 0.001
 _SLACK: Final = 5.0
-"""Multiple of the jitter above _CALM_S by which the target rises: the least of several delays varies as much."""
+"""Multiple of the jitter above _CALM_S by which the target rises, because the least of several delays varies as
+much."""
 _AFTER: Final = 2
-"""Number of echoes after a burst that measure its rest, not jitter."""
+"""Number of echoes after a burst that still show the burst's queue, and so do not measure jitter."""
 _MOST_APART_S: Final = 0.03
-"""Largest difference that counts as jitter, in seconds: a single loss is no jitter."""
+"""Limit to which a difference of successive delays counts as jitter, in seconds: a lost packet causes larger ones."""
 _WINDOW_S: Final = 0.09
-"""Window of the least queue, in seconds: jitter and a lost packet delay single messages, a standing queue all."""
+"""Window in seconds of which the least queueing delay counts: jitter and a lost packet delay single messages, a
+standing queue delays all."""
 _FEWEST: Final = 5
 _DELIVERY_S: Final = 0.15
 """Span of arrivals over which the delivered rate is measured, in seconds."""
 _DECREASE: Final = 0.85
 _LARGEST_DECREASE: Final = 0.5
-"""Largest decrease by one echo: a process that paused for a moment sent little, and little was delivered."""
+"""Least factor by which one echo reduces the rate: after a pause of the process little was sent, and so little
+delivered.
+"""
 _DOUBLING_S: Final = 0.5
 _FAR_DOUBLING_S: Final = 1.5
 _NEAR_GROWTH: Final = 1.05
 _NEAR: Final = (0.8, 1.1)
-"""Range near the last known capacity, as shares of it."""
+"""Range of rates that count as near the last known capacity, as shares of that capacity."""
 _LIMITED_S: Final = 0.25
 _BURST_S: Final = 0.003
-"""Least transmission time of a burst, in seconds."""
+"""Least transmission time, in seconds, with which paced messages count as a burst."""
 _BURSTS_S: Final = 0.005
-"""Mean queue behind bursts, in seconds, that means that they leave as fast as the link carries them."""
+"""Mean queueing delay right after bursts, in seconds, at which the bursts' rate counts as the link's, and grows no
+more.
+"""
 _EASING: Final = 0.5
-"""Factor per second for a rate whose bursts cause 1.5 times that queue."""
+"""Factor per second by which the rate falls if bursts cause more than 1.5 times the queueing delay _BURSTS_S."""
 _SILENT_S: Final = 1.0
 _MOST_UNDER_WAY: Final = 8192
 
 
 class Urgency(IntEnum):
-    """Urgency of a message."""
+    """Urgency of a message, which decides whether it waits or is dropped."""
 
     MUST = 0
-    """Never waits: haptics, stops, leases."""
+    """The message never waits: haptics, stops, leases."""
     SOON = 1
-    """Telemetry: the next one is newer."""
+    """Telemetry: dropped if the rate does not allow it, because a newer one follows."""
     PACED = 2
-    """Waits for room: pictures, the scene."""
+    """The message waits until the rate allows it: pictures, the scene."""
 
 
 class RateController:
-    """Controller of the allowed rate and of pauses, from sent messages and their echoes.
+    """Controller of the allowed rate and of pauses in sending, from sent messages and their echoes.
 
-    A queue that stays while nothing that can wait is sent is not ours; it is ignored until it shrinks.
+    A queue that does not shrink while we send only urgent messages is caused by other traffic. Its delay is subtracted
+    from the measured one, until it shrinks.
     """
 
     def __init__(self, start_bit_s: float = START_BIT_S) -> None:
-        """Raises ValueError for a start outside of LEAST_BIT_S to MOST_BIT_S."""
+        """Raises ValueError if `start_bit_s` is outside of LEAST_BIT_S to MOST_BIT_S."""
         if not LEAST_BIT_S <= start_bit_s <= MOST_BIT_S:
             raise ValueError(f"start_bit_s = {start_bit_s}; valid: {LEAST_BIT_S:g} to {MOST_BIT_S:g}")
         self.rate_bit_s = start_bit_s
@@ -78,17 +86,17 @@ class RateController:
         self.begin_epoch()
 
     def begin_epoch(self) -> None:
-        """Forget the link, for another peer or none; keep the rate."""
+        """Forget all that was measured of the link, but keep the rate; called when echoes stop."""
         self._capacity_bit_s: float | None = None
-        """Delivered rate at the last queue; None before the first."""
+        """Delivered rate when the last queue was found; None before the first queue."""
         self._under_way: deque[tuple[float, int, Urgency]] = deque(maxlen=_MOST_UNDER_WAY)
         self._arrived_bytes = 0
         self._arrivals: deque[tuple[float, int]] = deque(maxlen=_MOST_UNDER_WAY)
         self._recent: deque[tuple[float, float]] = deque()
         self._behind_s = 0.0
-        """Mean queue of messages right after a burst."""
+        """Mean queueing delay of messages right after a burst, in seconds."""
         self.queue_s = 0.0
-        """Newest measured queueing delay."""
+        """Newest measured queueing delay, in seconds."""
         self._jitter_s = _JITTER_S
         self._calm = 0
         self._calm_queue_s = 0.0
@@ -100,11 +108,11 @@ class RateController:
         self._answer_s = self._answer_deviation_s = 0.0
 
     def sent(self, size_bytes: int, now_s: float, urgency: Urgency) -> None:
-        """Note a sent message, headers included."""
+        """Note a sent message; `size_bytes` includes the headers."""
         self._under_way.append((now_s, size_bytes, urgency))
 
     def heard(self, echo: Echo, now_s: float) -> None:
-        """Process the echo of one of our messages, in ascending order of `sent_s`."""
+        """Process the echo of one of our messages; call it in ascending order of `echo.sent_s`."""
         before, paced_bytes = Urgency.MUST, 0
         while self._under_way and self._under_way[0][0] <= echo.sent_s:
             _, size_bytes, urgency = self._under_way.popleft()
@@ -127,7 +135,7 @@ class RateController:
             self._judge(echo, min(queue_s for _, queue_s in self._recent), now_s)
 
     def _follow_jitter(self, queue_s: float, before: Urgency) -> None:
-        """Separate the link's jitter from the queue of our bursts. before: urgency of the message before."""
+        """Update the jitter, unless a burst of ours caused the delay. before: least urgent class just echoed."""
         if before is Urgency.PACED or self._draining is not None:
             self._calm = 0
         elif before is Urgency.MUST:
@@ -185,7 +193,7 @@ class RateController:
 
     @property
     def delivered_bit_s(self) -> float | None:
-        """Delivered rate of the last arrivals; None while too few echoes are known."""
+        """Rate at which the last echoed messages arrived, in bit/s; None while too few echoes are known."""
         if len(self._arrivals) < _FEWEST:
             return None
         (first_s, first_bytes), (last_s, last_bytes) = self._arrivals[0], self._arrivals[-1]
@@ -211,9 +219,9 @@ class RateController:
         return self._draining is not None
 
     def update(self, now_s: float, *, limited: bool) -> None:
-        """Let the rate grow while it is the limit. Call it every few milliseconds.
+        """Let the rate grow while it limits what we send. Call it every few milliseconds.
 
-        limited: messages wait for the rate. Otherwise the capacity is not tested.
+        limited: messages wait because of the rate. Otherwise too little is sent to test a higher rate.
         """
         elapsed_s = min(max(0.0, now_s - self._updated_s), 0.1)
         self._updated_s = now_s

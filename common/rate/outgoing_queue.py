@@ -1,4 +1,4 @@
-"""Queue in front of our messages, from our stamps that the peer echoes."""
+"""Queueing delay of our messages in the link, measured by our stamps that the peer echoes."""
 
 import math
 from collections import deque
@@ -7,43 +7,44 @@ from typing import Final, NamedTuple
 from common.statistics import RunningStatistics
 
 _DRIFT: Final = 600e-6
-"""Rise of the base delay per time: two clocks drift apart no faster (common/timing/clock_offset.py)."""
+"""Rise of the base delay, in seconds a second: the largest drift of two clocks (common/timing/clock_offset.py)."""
 _LONGEST_S: Final = 1000.0
-"""Longest possible queue, in seconds: more means another clock."""
+"""Longest possible queueing delay, in seconds: a larger value means that the peer's clock jumped."""
 _MOST_ECHOES: Final = 256
-"""Number of echoes that wait to be taken; the oldest are forgotten."""
+"""Maximum number of echoes that wait to be taken; beyond it the oldest are forgotten."""
 
 
 class Echo(NamedTuple):
-    """Message of ours that has arrived at the peer."""
+    """Echo that shows that a message of ours has arrived at the peer."""
 
     sent_s: float
-    """Time of sending, on our clock."""
+    """Time at which our message was sent, on our clock."""
     arrived_s: float
-    """Time of arrival, on the peer's clock."""
+    """Time at which our message arrived, on the peer's clock."""
     queue_s: float
-    """One-way delay above the base delay."""
+    """Queueing delay of our message: its one-way delay above the base delay."""
 
 
 class OutgoingQueue:
-    """One-way delay from us to the peer above the base delay (LEDBAT, RFC 6817), with unknown clock offset.
+    """Queueing delay from us to the peer: one-way delay above a base delay (LEDBAT, RFC 6817). Needs no clock offset.
 
-    The base delay is a minimum that rises by 600 ppm: it follows any drift, and forgets an old route in minutes.
+    The base delay is a minimum that rises by 600 ppm. So it follows any drift of the clocks, and the delay of an old
+    route is forgotten in minutes.
     """
 
     def __init__(self, seed: int = 0) -> None:
         self.delay = RunningStatistics(seed)
-        """Queueing delays of all echoes, in seconds."""
+        """Statistics of the queueing delays of all echoed messages, in seconds."""
         self._echoes: deque[Echo] = deque(maxlen=_MOST_ECHOES)
         self.reset()
 
     def reset(self) -> None:
-        """Forget the base delay: the peer's clock has another origin, or the link was changed on purpose."""
+        """Forget the base delay, because the peer's clock has another origin or the link was changed on purpose."""
         self._base_s = math.inf
         self._newest_s = -math.inf
 
     def echoed(self, sent_s: float, arrived_s: float) -> None:
-        """Add the echo of our message of `sent_s`, received at `arrived_s` on the peer's clock; each counts once."""
+        """Add the echo of our message of `sent_s`, which the peer received at `arrived_s`; ignore repeated echoes."""
         if sent_s <= self._newest_s:
             return
         delay_s = arrived_s - sent_s
@@ -55,12 +56,12 @@ class OutgoingQueue:
         self._echoes.append(Echo(sent_s, arrived_s, delay_s - self._base_s))
 
     def take(self) -> list[Echo]:
-        """Return the echoes since the last call, oldest first."""
+        """Return the echoes that were added since the last call, oldest first."""
         taken = list(self._echoes)
         self._echoes.clear()
         return taken
 
     def summary_ms(self) -> dict[str, float | None]:
-        """Return `p50` and `p95` of the queue in milliseconds; None before the first echo."""
+        """Return `p50` and `p95` of the queueing delay in milliseconds; None before the first echo."""
         quantiles = {f"p{percent}": self.delay.quantile(percent / 100.0) for percent in (50, 95)}
         return {name: None if value_s is None else 1e3 * value_s for name, value_s in quantiles.items()}

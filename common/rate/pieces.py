@@ -1,6 +1,6 @@
-"""Large view messages in pieces: `number, offset, total` (u32 each, little-endian), then bytes.
+"""Large view messages (wholes), split into pieces: `number, offset, total` (u32 each, little-endian), then the bytes.
 
-The topic of a piece is the whole's plus `.piece`, so that a subscription to the whole's receives it, too.
+The topic of a piece is the topic of the whole plus `.piece`. So a subscription to the topic receives the pieces, too.
 """
 
 import struct
@@ -8,17 +8,18 @@ from dataclasses import dataclass, field
 from typing import Final
 
 PIECE: Final = b".piece"
-"""End of a piece's topic."""
+"""Suffix of the topic of a piece."""
 _HEAD: Final = struct.Struct("<III")
 HEAD_BYTES: Final = _HEAD.size
 LEAST_BYTES: Final = 128
-"""Least bytes of a piece, except the last of a whole: a flood of tiny pieces must not fill our memory."""
+"""Least content of a piece in bytes, except for the last of a whole: a flood of tiny pieces must not fill our
+memory."""
 _UNDER_WAY: Final = 2
-"""Number of wholes that are joined at once; the one begun first is forgotten for a third."""
+"""Maximum number of incomplete wholes; when a third begins, the first is forgotten."""
 
 
 def piece_of(whole: bytes, number: int, offset: int, size_bytes: int) -> bytes:
-    """Make the piece of `whole` that begins at `offset`; `number` identifies the whole, modulo 2**32."""
+    """Make the piece of `size_bytes` of `whole` that begins at `offset`; `number` modulo 2**32 identifies `whole`."""
     return _HEAD.pack(number & 0xFFFFFFFF, offset, len(whole)) + whole[offset : offset + size_bytes]
 
 
@@ -30,19 +31,19 @@ class _Whole:
 
 
 class Joining:
-    """Joiner of one topic's pieces, in any order; memory is bounded by twice `limit_bytes`."""
+    """Joiner of the pieces of one topic, which may arrive in any order; memory is bounded by twice `limit_bytes`."""
 
     def __init__(self, limit_bytes: int) -> None:
-        """limit_bytes: largest size of a message."""
+        """limit_bytes: largest valid size of a whole."""
         self.rejected = 0
-        """Number of pieces that belong to no message."""
+        """Number of invalid pieces, and of wholes with overlapping pieces."""
         self.incomplete = 0
-        """Number of messages with a lost piece."""
+        """Number of wholes forgotten before all of their pieces had arrived."""
         self._limit_bytes = limit_bytes
         self._begun: dict[int, _Whole] = {}
 
     def take(self, piece: bytes) -> bytes | None:
-        """Add one piece; return the whole if it is complete now."""
+        """Add one piece; return the whole message if this piece completes it, else None."""
         if len(piece) <= HEAD_BYTES:
             self.rejected += 1
             return None

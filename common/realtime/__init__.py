@@ -1,1 +1,1 @@
-"""Real-time parts of a loop: deadlines, priority, garbage collection."""
+"""Parts that keep a loop on time: deadlines, priority, garbage collection, and monitoring of the period."""

@@ -1,4 +1,4 @@
-"""Garbage collection outside of the ticks: only in idle time."""
+"""Garbage collection in idle time, so that it does not delay a tick."""
 
 import gc
 
@@ -8,11 +8,11 @@ from common.statistics import RunningStatistics
 _RESTING_PERIOD_S = 10.0
 """Time between collections while nothing moves, in seconds."""
 _PRESSING_OBJECTS = 50_000
-"""Number of new live objects that are collected even while the arm moves: it bounds memory."""
+"""Number of new objects beyond which garbage is collected even while the arm moves, to bound memory."""
 
 
 class IdleCollection:
-    """Collection in idle time: freezes existing objects, and disables the automatic collector while open."""
+    """Context that replaces Python's automatic collector by `idle`; later collections skip objects made before it."""
 
     def __init__(self, clock: Clock) -> None:
         self.pauses = RunningStatistics()
@@ -32,7 +32,7 @@ class IdleCollection:
         gc.unfreeze()
 
     def idle(self, now_s: float, *, resting: bool) -> None:
-        """Collect if due: every ten seconds while `resting`, otherwise only after _PRESSING_OBJECTS."""
+        """Collect garbage if it is due: every ten seconds while `resting`, else only beyond _PRESSING_OBJECTS."""
         if (resting and now_s >= self._next_s) or gc.get_count()[0] > _PRESSING_OBJECTS:
             self._next_s = now_s + _RESTING_PERIOD_S
             began_s = self._clock.now()
@@ -40,6 +40,6 @@ class IdleCollection:
             self.pauses.add(self._clock.now() - began_s)
 
     def summary(self) -> dict[str, float | int | None]:
-        """Return the number of `collections`, and the longest pause as `max_ms`."""
+        """Return the number of `collections` in idle time, and the longest as `max_ms`."""
         longest_s = self.pauses.maximum
         return {"collections": self.pauses.count, "max_ms": None if longest_s is None else 1e3 * longest_s}

@@ -1,4 +1,4 @@
-"""Turns at absolute deadlines: missed ones are counted and skipped, never made up for."""
+"""Turns of a loop at absolute deadlines. Missed turns are counted and skipped, never made up for."""
 
 import math
 from collections.abc import Callable
@@ -8,14 +8,14 @@ from common.clock import Clock
 from common.statistics import RunningStatistics
 
 SPIN_S = 200e-6
-"""Time of the busy loop before a deadline, in seconds. A sleep ends 70 us late on average and 300 us late once in
-twenty; a busy loop ends 0.1 us late, for a fifth of a core at 1 kHz."""
+"""Duration of the busy loop before each deadline, in seconds. A sleep ends 70 us late on average, and one in twenty
+300 us late. A busy loop ends 0.1 us late, but takes a fifth of a core at 1 kHz."""
 
 _SHORTEST_SLEEP_S = 1e-6
 
 
 class Pacer:
-    """Deadlines at `start_s + k period_s`, k = 0, 1, 2, ..., independent of earlier turns."""
+    """Deadlines of turns at `start_s + k period_s`, k = 0, 1, 2, ..., whatever the delays of earlier turns."""
 
     def __init__(self, period_s: float, start_s: float, seed: int = 0) -> None:
         if not (math.isfinite(period_s) and period_s > 0.0 and math.isfinite(start_s)):
@@ -26,14 +26,14 @@ class Pacer:
         self.turns = 0
         """Number of turns taken."""
         self.overruns = 0
-        """Number of turns skipped because their time had passed."""
+        """Number of skipped turns: an earlier turn began so late that their deadlines had passed, too."""
         self.wake_error = RunningStatistics(seed)
-        """Delays of the turns' begins after their deadlines, in seconds."""
+        """Statistics of the times from a turn's deadline to its begin, in seconds."""
         self._latest_s = 0.0
         self.restart(start_s)
 
     def restart(self, start_s: float) -> None:
-        """Set the first deadline to `start_s`; keep the counts."""
+        """Begin again with the first deadline at `start_s`; keep the counts."""
         self._start_s = self.deadline_s = start_s
         self._deadline = 0
 
@@ -42,7 +42,7 @@ class Pacer:
         return now_s >= self.deadline_s
 
     def begin(self, now_s: float) -> None:
-        """Begin a turn at `now_s`; the next is due at the first later deadline. Raises ValueError before its time."""
+        """Begin a turn at `now_s`; the next is due at the first later deadline. ValueError if the turn is not due."""
         if not now_s >= self.deadline_s:
             raise ValueError(f"now_s = {now_s} lies before the deadline {self.deadline_s}")
         self.turns += 1
@@ -56,7 +56,7 @@ class Pacer:
         self.deadline_s = self._start_s + following * self.period_s
 
     def take_latest_s(self) -> float:
-        """Return the largest wake error since the last call, in seconds."""
+        """Return the largest time from a turn's deadline to its begin since the last call, in seconds."""
         latest_s, self._latest_s = self._latest_s, 0.0
         return latest_s
 
@@ -76,10 +76,10 @@ class Pacer:
 def wait_for_turn(
     pacer: Pacer, clock: Clock, wait: Callable[[float], bool], other_s: float | None = None, spin_s: float = SPIN_S
 ) -> bool:
-    """Wait for a message, the pacer's deadline, or `other_s` if that is earlier; return whether a message came.
+    """Wait until a message arrives, or until the pacer's deadline or `other_s`, whichever is earlier.
 
-    `wait(timeout_s)` waits for a message and returns whether there is one; it may end early. For the last `spin_s` it
-    is polled without waiting, so that the turn is in time and a message is still noticed at once.
+    Return whether a message arrived. `wait(timeout_s)` waits for a message and returns whether there is one; it may
+    return early. For the last `spin_s` it is called with a timeout of 0 in a busy loop, so that the turn is in time.
     """
     due_s = pacer.deadline_s if other_s is None else min(pacer.deadline_s, other_s)
     while (asleep_s := due_s - spin_s - clock.now()) > _SHORTEST_SLEEP_S:

@@ -1,4 +1,4 @@
-"""Check that a loop keeps its period; if not, cause and remedy in one sentence, once a run."""
+"""Check that a loop keeps its period; if it does not, one sentence per run names the cause and a remedy."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Final
@@ -10,15 +10,15 @@ from common.realtime.stolen_time import StolenTime, read_stolen_time
 
 WINDOW_S: Final = 5.0
 _LEFT_OUT: Final = 0.05
-"""Least share of left-out turns that counts; less is a hiccup, which every machine has."""
+"""Share of left-out turns above which the period counts as not kept; single ones occur on every machine."""
 _FULL: Final = 0.8
-"""Highest mean load, as a share of the period; above it there is no headroom."""
+"""Mean computing time of a turn, as a share of the period, from which on the machine counts as too slow."""
 _UNDISTURBED: Final = 1.25
-"""Ratio of wall time to processor time below which turns were undisturbed."""
+"""Ratio of wall time to processor time below which turns count as undisturbed by other programs."""
 
 
 class PeriodMonitor:
-    """Monitor of one loop, in windows of 5 s; the pacer's overruns count as left out."""
+    """Monitor of one loop, which judges windows of 5 s; the pacer's overruns are the turns left out."""
 
     def __init__(
         self,
@@ -29,23 +29,23 @@ class PeriodMonitor:
         remedies: Mapping[str, str],
         taken: Callable[[], StolenTime] = read_stolen_time,
     ) -> None:
-        """remedies: from a stage's name to its remedy; the name "" is the time outside of all stages."""
+        """remedies: for each stage's name, a remedy if it takes too long; "" is the time outside of all stages."""
         self.said: str | None = None
-        """The sentence, once there is one."""
+        """The sentence about a period that was not kept; None before."""
         self.stages = stages
         self._pacer, self._wall, self._processor, self._remedies, self._taken = pacer, wall, processor, remedies, taken
         self._began_s = self._computed_s = 0.0
         self._worked_s = [0.0, 0.0]
-        """Wall time and processor time in this window, without waiting."""
+        """Wall time and processor time of the loop's work in this window, without waiting."""
         self._first: tuple[float, StolenTime] | None = None
         self._window: tuple[float, StolenTime, int, int, list[float]] | None = None
 
     def begin(self) -> None:
-        """Note that the loop begins to work."""
+        """Note that the loop begins to work, after waiting."""
         self._began_s, self._computed_s = self._wall.now(), self._processor.now()
 
     def end(self, *, turned: bool) -> str | None:
-        """Note that the loop will wait. `turned`: it took the pacer's turn. Return the sentence, at most once a run."""
+        """Note that the loop begins to wait. `turned`: it has taken a turn. Return the sentence, at most once a run."""
         now_s = self._wall.now()
         self._worked_s[0] += now_s - self._began_s
         self._worked_s[1] += self._processor.now() - self._computed_s
@@ -66,7 +66,7 @@ class PeriodMonitor:
         return said
 
     def summary(self) -> dict[str, Any]:
-        """Return `said`, and the shares of the run that other programs (`waited`) and the host (`stolen`) took."""
+        """Return `said`, and the shares of time that other programs (`waited`) and the host (`stolen`) took."""
         waited = stolen = None
         if self._first is not None:
             since_s, taken = self._first
@@ -110,7 +110,10 @@ class PeriodMonitor:
         )
 
     def _longest(self, before_s: list[float], computed_s: float) -> tuple[str, float]:
-        """Return the stage with the most processor time since, and its share; "" if most time is outside of stages."""
+        """Return the stage with the most processor time in the window, and its share of `computed_s`.
+
+        The stage is "" if more time was spent outside of all stages. before_s: `stages.spent_s` at the window's begin.
+        """
         spent_s = [now_s - then_s for now_s, then_s in zip(self.stages.spent_s[1::2], before_s[1::2], strict=True)]
         longest_s = max(spent_s)
         if longest_s < computed_s - sum(spent_s):

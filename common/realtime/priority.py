@@ -1,4 +1,4 @@
-"""Priority of a running side over other work on the machine, as far as the system permits."""
+"""Priority of a side's process over other programs on the machine, as far as the system permits it."""
 
 import contextlib
 import ctypes
@@ -8,18 +8,18 @@ import sys
 from pathlib import Path
 
 _NICENESS = -10
-"""Above ordinary programs, below the system's needs."""
+"""Niceness of a side: a higher priority than ordinary programs, a lower one than system services."""
 _REALTIME_PRIORITY = 20
-"""Above every ordinary program, below the kernel's interrupt threads (50)."""
+"""Real-time priority: above every ordinary program, below the kernel's interrupt threads (50)."""
 _PR_SET_TIMERSLACK = 29
 _CAP_IPC_LOCK = 14
-"""linux/capability.h"""
+"""Number of the capability in linux/capability.h"""
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4
-"""linux/prctl.h and asm-generic/mman.h."""
+"""Flags of mlockall in asm-generic/mman.h"""
 
 
 def raise_priority() -> bool:
-    """Request exact sleeps and a higher priority; return whether the latter was granted, which needs CAP_SYS_NICE."""
+    """Request exact sleeps and a higher priority; return whether the priority was granted, which needs CAP_SYS_NICE."""
     _libc().prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)  # by default sleeps may end 50 us late, to save power
     for thread in _threads():
         with contextlib.suppress(OSError):
@@ -31,9 +31,9 @@ def raise_priority() -> bool:
 
 
 def make_realtime() -> list[str]:
-    """Set first-in-first-out scheduling for the present threads, and lock memory; return a note for each refusal.
+    """Set first-in-first-out scheduling for the present threads, and lock memory.
 
-    Each note is one line that ends with the command that permits it.
+    Return a note, of one line, for each of the two that was refused; it ends with the command that permits it.
     """
     notes = []
     try:
@@ -52,7 +52,7 @@ def schedule_realtime() -> None:
 
 
 def raise_descriptor_limit() -> None:
-    """Raise the limit of descriptors to the system's, so that a crowd of strangers cannot lock others out."""
+    """Raise this process's limit of descriptors to the system's, so that many strangers cannot lock others out."""
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     with contextlib.suppress(OSError, ValueError):
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
@@ -68,7 +68,7 @@ def _lock_memory() -> bool:
 
 
 def _may_lock_without_limit() -> bool:
-    """Return whether this process has CAP_IPC_LOCK, to which the limit does not apply."""
+    """Return whether this process has CAP_IPC_LOCK, which permits locking memory without a limit."""
     for line in Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines():
         if line.startswith("CapEff:"):
             return bool(int(line.split()[1], 16) >> _CAP_IPC_LOCK & 1)

@@ -1,7 +1,7 @@
-"""Times of the stages of a loop's turns, in wall time and in processor time.
+"""Durations of the stages of a loop's turns, in wall time and in processor time.
 
-Reading four clocks takes a microsecond and a half, so that one turn in seven is sampled. The periods of the loop's
-work, such as 4, 10 or 33 turns, are no multiples of seven.
+The four clock readings of a stage take 1.5 us. So only one turn in seven is sampled. Periodic work of the loop, such
+as every 4, 10 or 33 turns, has no period that is a multiple of seven.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,31 +11,31 @@ from common.clock import Clock
 from common.statistics import BLOCK, RunningStatistics
 
 EVERY: Final = 7
-"""Sampling interval, in turns."""
+"""Sampling interval: one turn in so many is measured."""
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 
 
 class Stages:
-    """Sums within a turn, and statistics over the turns; a stage may lie within another's time."""
+    """Durations of stages, added up within a turn, with statistics over the turns. Stages may be nested."""
 
     def __init__(self, names: Sequence[str], wall: Clock, processor: Clock, seed: int = 0, every: int = EVERY) -> None:
-        """`processor`: processor time of the loop's thread."""
+        """names: of the stages. processor: clock of the loop thread's processor time. every: sampling interval."""
         self.names = tuple(names)
         self.spent_s = [0.0] * (2 * len(self.names))
-        """Wall time, then processor time of each stage since the start, scaled up from sampled turns."""
+        """For each stage its wall time, then its processor time, since the start, scaled up from the sampled turns."""
         self._wall, self._processor = wall, processor
         self._every, self._until_next = every, 0
         self.looks = True
-        """This turn is sampled."""
+        """Whether the present turn is sampled."""
         self._turn_s = [0.0] * len(self.spent_s)
         self._begun: tuple[int, float, float] | None = None
-        """Stage that was begun: its index in `spent_s`, and both clocks then"""
+        """Stage that `begin` began: its index in `spent_s`, and wall and processor time at its begin"""
         self._turns_s: list[list[float]] = []
         self._statistics = [RunningStatistics(seed) for _ in self.spent_s]
 
     def timed(self, name: str, function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
-        """Wrap `function` so that its time counts for the stage `name`; raises ValueError for an unknown one."""
+        """Wrap `function` so that its duration counts for the stage `name`; raises ValueError for an unknown name."""
         place = 2 * self.names.index(name)
         wall, processor = self._wall.now, self._processor.now
 
@@ -52,9 +52,9 @@ class Stages:
         return measured
 
     def begin(self, name: str | None) -> None:
-        """Count the time until the next call for the stage `name`; None: for none.
+        """Count the time from now to the next call for the stage `name`; None: for no stage.
 
-        Call it only in a turn that `looks`.
+        Call it only while `looks` is true.
         """
         if name is None and self._begun is None:
             return
@@ -66,7 +66,7 @@ class Stages:
         self._begun = None if name is None else (2 * self.names.index(name), wall_s, processor_s)
 
     def end_turn(self) -> None:
-        """Count the time since the last call as one turn."""
+        """End a turn: what was measured since the last call counts as one turn."""
         if self.looks:
             self._until_next = self._every
             self._turns_s.append(self._turn_s)
@@ -77,7 +77,7 @@ class Stages:
         self.looks = self._until_next == 0
 
     def take_in(self) -> None:
-        """Add the waiting turns to the statistics; a batch costs less per turn."""
+        """Add the sampled turns to the statistics; many at once take less time per turn."""
         if not self._turns_s:
             return
         for place, values_s in enumerate(zip(*self._turns_s, strict=True)):
@@ -86,7 +86,7 @@ class Stages:
         self._turns_s.clear()
 
     def summary(self) -> dict[str, dict[str, dict[str, float | None]]]:
-        """Return `wall_us` and `cpu_us` of each stage in a turn, each with `p50`, `p99` and `max`."""
+        """Return the duration of each stage in a turn: `wall_us` and `cpu_us`, each with `p50`, `p99` and `max`."""
         self.take_in()
         wall, processor = ([microseconds(one) for one in self._statistics[which::2]] for which in (0, 1))
         return {name: {"wall_us": wall[place], "cpu_us": processor[place]} for place, name in enumerate(self.names)}

@@ -1,4 +1,4 @@
-"""Processor time that the machine took from a runnable thread, as counted by Linux."""
+"""Time in which a thread could have run but other programs or the host had the processor, as Linux counts it."""
 
 import contextlib
 from dataclasses import dataclass
@@ -8,22 +8,22 @@ from typing import Final
 _WAITED: Final = Path("/proc/thread-self/schedstat")
 _PROCESSORS: Final = Path("/proc/stat")
 _STOLEN: Final = 7
-"""Index of `steal` among the processors' times; later ones are contained in earlier ones."""
+"""Index of `steal` among the processors' times in /proc/stat; the times after it are included in earlier ones."""
 
 
 @dataclass(frozen=True)
 class StolenTime:
-    """Counters since some start; None if the system gives none."""
+    """Counters of processor time since an arbitrary start; None if the system does not have them."""
 
     waited_s: float | None
-    """Time in which this thread was runnable and other programs had the processor."""
+    """Time in seconds in which the calling thread could have run, but other programs had the processor."""
     stolen: float | None
-    """Time in which the host ran something else, in units of `whole`."""
+    """Time in which the host of this virtual machine ran something else, in the unit of `whole`."""
     whole: float | None
-    """Time of all processors together."""
+    """Total time of all processors, in the kernel's unit."""
 
     def shares_since(self, earlier: "StolenTime", passed_s: float) -> tuple[float | None, float | None]:
-        """Return the waited share of `passed_s`, and the stolen share of the processors' time."""
+        """Return the share of `passed_s` that the thread waited, and the stolen share of all processors' time."""
         whole = None if self.whole is None or earlier.whole is None else self.whole - earlier.whole
         return _share(self.waited_s, earlier.waited_s, passed_s), _share(self.stolen, earlier.stolen, whole)
 

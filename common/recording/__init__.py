@@ -1,1 +1,1 @@
-"""Recording of a run: every input of the cores and all views, in one MCAP file, without waiting."""
+"""Recording of a run into one MCAP file: all inputs of both sides' cores, and all views. A side never waits for it."""

@@ -1,4 +1,4 @@
-"""Sorting of a side's messages: inputs are kept unchanged, and decoded for people and tools."""
+"""Sorting of the messages that a side records into topics: inputs are kept unchanged, and also decoded for people."""
 
 import json
 import math
@@ -18,7 +18,7 @@ _OTHER: Final = {"robot": "operator", "operator": "robot"}
 
 
 class Content:
-    """Sorter of one or both sides' messages into topics."""
+    """Sorter that writes one or both sides' messages into the topics of a file."""
 
     def __init__(self, file: RecordingFile) -> None:
         self._file = file
@@ -30,7 +30,7 @@ class Content:
         self._objects: tuple[str, ...] = ()
 
     def take(self, source: int, message: bytes) -> None:
-        """Write one message of one side; raises ValueError if it is invalid, KeyError if it precedes the header."""
+        """Write a message of the side `source`; ValueError if it is invalid, KeyError if it precedes the header."""
         kind, content = message[:1], message[1:]
         if kind == HEADER:
             self._begin(source, content)

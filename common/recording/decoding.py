@@ -1,4 +1,4 @@
-"""Decoding of a core's entries for people and tools: one JSON message a topic, in the recorder's process."""
+"""Decoding of a core's entries into JSON messages for people and tools, in the recorder's process."""
 
 import math
 import struct
@@ -19,7 +19,7 @@ AGES_PERIOD_S: Final = 0.01
 
 
 class Shown(NamedTuple):
-    """Message for people."""
+    """Decoded message of a topic, as JSON."""
 
     topic: str
     now_s: float
@@ -27,24 +27,24 @@ class Shown(NamedTuple):
 
 
 class Decoder:
-    """Decoder of one side, with the stamps from which ages are measured.
+    """Decoder of one side's entries; it remembers the stamps from which ages are measured.
 
-    If both sides are recorded, fields come from the robot side and commands from the operator side, as sent. A side
-    recorded alone gives both, the other's as they arrived.
+    If both sides are recorded, stiffnesses are taken from the robot side and commands from the operator side, as they
+    were sent. If only one side is recorded, the messages that it received are used, too.
     """
 
     def __init__(self, side: str) -> None:
         self.alone = True
         """Whether only this side is recorded in the file."""
         self.offset_s = math.nan
-        """Clock offset of the other side, by this side's status; NaN while unknown, as all values here."""
+        """Clock of the other side minus this side's, from this side's status; NaN while unknown."""
         self._side = side
         self._ages_s = -math.inf
         self._field_sent_s = self._frame_s = math.nan
         self._field_number = 0
 
     def shown(self, block: Block) -> Iterator[Shown]:
-        """Yield the messages of a block's entries; undecodable ones remain only in the inputs."""
+        """Yield the messages decoded from a block's entries; entries that cannot be decoded are passed over."""
         for entry in block.unpacked():
             try:
                 yield from self._shown(entry)
@@ -92,7 +92,7 @@ class Decoder:
             yield _shown("/command", entry.now_s, stamps, msgspec.structs.asdict(message))
 
     def _since_ms(self, now_s: float, sent_s: float) -> float:
-        """Return the time since the other side's stamp `sent_s`, in milliseconds."""
+        """Return the time from the other side's stamp `sent_s` to `now_s`, in milliseconds."""
         return 1e3 * (now_s - (sent_s - self.offset_s))
 
 
@@ -101,7 +101,7 @@ def _mark(entry: Entry) -> dict[str, Any]:
 
 
 def view_message(payload: bytes) -> AnyViewMessage | Telemetry | None:
-    """Decode a view payload; None for an invalid one."""
+    """Decode a view payload; return None if it is invalid."""
     try:
         return decode_view(payload)
     except RemoteProtocolError:
@@ -114,7 +114,10 @@ def view_message(payload: bytes) -> AnyViewMessage | Telemetry | None:
 
 
 def shown_view(message: AnyViewMessage | Telemetry, now_s: float, objects: tuple[str, ...]) -> Iterator[Shown]:
-    """Yield the terms and overlaps of a state, or a telemetry; `objects`: the names of the newest SceneShapes."""
+    """Yield the messages shown for a view message: enlargement and overlaps of a SceneState, or a Telemetry.
+
+    objects: the objects' names in the newest SceneShapes.
+    """
     stamps = {"time_s": now_s, "sequence": message.header.sequence, "sent_s": message.header.sent_s}
     if isinstance(message, Telemetry):
         yield _shown("/telemetry", now_s, stamps, msgspec.structs.asdict(message))

@@ -1,4 +1,4 @@
-"""Foxglove's messages: pictures, the scene with transforms, and the log."""
+"""Messages of Foxglove's types in a recording: pictures, the scene with its transforms, and the log."""
 
 from typing import Any, Final
 
@@ -23,20 +23,20 @@ class Drawing:
         self._version: int | None = None
 
     def log(self, side: str, now_s: float, text: str, *, warning: bool = False) -> None:
-        """Write a line that a person was shown."""
+        """Write a line that was shown to people, or a warning, to the topic /log."""
         level = messages.LogLevel.Warning if warning else messages.LogLevel.Info
         entry = messages.Log(timestamp=self._stamp(now_s), level=level, message=text, name=side)
         self._file.draw("/log", now_s, entry)
 
     def image(self, frame: VideoFrame, now_s: float) -> None:
-        """Write a camera's picture unchanged."""
+        """Write a camera's picture with its JPEG unchanged."""
         image = messages.CompressedImage(
             timestamp=self._stamp(now_s), frame_id=frame.view, data=frame.jpeg, format="jpeg"
         )
         self._file.draw(f"/camera/{frame.view}", now_s, image)
 
     def shapes(self, scene: SceneShapes, now_s: float) -> None:
-        """Write the shapes if they have changed."""
+        """Write the shapes of the scene if they have changed."""
         self._links, self._objects, self._version = scene.links, scene.objects, scene.version
         if self._drawn == (scene.links, scene.objects, scene.shapes):
             return

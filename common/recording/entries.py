@@ -1,12 +1,13 @@
-"""Entries of a core's inputs and outputs, in blocks of bytes: all that a replay needs.
+"""Recorded inputs and outputs of a core, as entries in blocks of bytes: all that a replay needs.
 
-A block is one message of the file, little-endian throughout:
+A block is one message of the file. All numbers are little-endian:
 
     block   number u32, dropped u32, first f64, last f64, then entries
     entry   kind u8, length u32, now f64, then `length` bytes
 
-`number` counts the blocks of one side from 0. A missing one was dropped because the recorder did not keep up;
-`dropped` counts them. `first` and `last` are seconds on the side's monotonic clock.
+`number` counts the blocks of one side from 0. A missing block was dropped because the recorder did not keep up;
+`dropped` counts such blocks up to this one. `first` and `last` are the times of the first and last entry, in seconds on
+the side's monotonic clock.
 """
 
 import struct
@@ -20,45 +21,48 @@ _ENTRY: Final = struct.Struct("<BId")
 
 
 class Kind(IntEnum):
-    """Kind of an entry. Text before bytes is a length u8 and the text in UTF-8."""
+    """Kind of an entry, with its content. A text is a length (u8) and so many bytes of UTF-8."""
 
     RECEIVED = 1
-    """A control payload was received: peer (text; its bytes), payload."""
+    """A control payload was received: peer (packed like a text), payload."""
     SENT = 2
-    """A payload was sent: stream (text), peer (text; its bytes), payload."""
+    """A payload was sent: stream (text), peer (packed like a text), payload."""
     TICK = 3
-    """A turn of the robot side, after its STATE and FRAME: applied f64, stamp of the command that moves the arm, on the
-    operator side's clock, NaN for none."""
+    """A turn of the robot side, after its STATE and FRAME. Content: f64, stamp, on the operator side's clock, of the
+    command that moves the arm; NaN for none."""
     STATE = 4
-    """The arm's measurement (robot_side/recording/inputs.py), if it differs from the previous tick's."""
+    """The arm's measurement (robot_side/recording/inputs.py), if it differs from that of the previous tick."""
     FRAME = 5
-    """The camera's frame (the same file), if it differs from the previous tick's."""
+    """The camera's frame (robot_side/recording/inputs.py), if it differs from that of the previous tick."""
     SEEN = 6
-    """The operator side got a view payload; no core uses those longer than a control payload, which go elsewhere."""
+    """The operator side received a view payload that a control message could hold, such as Telemetry. Longer ones,
+    which no core uses, are recorded only as messages of kind VIEW (wire.py)."""
     REPORT = 7
-    """Input report of a DualSense, in recordings older than HANDS."""
+    """Input report of a DualSense, in old recordings, which have no HANDS."""
     CALIBRATED = 8
-    """The controller's travel, as JSON."""
+    """Calibration of the travel of the controller's triggers, as JSON."""
     FOUND = 9
     """A controller was found."""
     LOST = 10
     """The controller was lost."""
     MOTION = 11
-    """The operator side was polled for messages; those follow as SENT."""
+    """The operator side's core was asked for messages to send; they follow as SENT."""
     OUTPUT = 12
-    """The operator side was polled for feel; that follows as TOLD, in older recordings as WRITTEN."""
+    """The operator side's core was asked for the controller's effects; they follow as TOLD, in old recordings as
+    WRITTEN.
+    """
     WRITTEN = 13
-    """Output report for a DualSense on USB, in recordings older than TOLD."""
+    """Output report for a DualSense on USB, in old recordings, which have no TOLD."""
     STOPPED = 14
-    """The emergency stop was pressed away from the controller."""
+    """The emergency stop was pressed elsewhere than on the controller, as on a page."""
     TUNED = 15
-    """Wanted settings of the run, as JSON."""
+    """Changes of the run's settings that the operator requests, as JSON."""
     WATCHED = 16
-    """The operator side reported its watched views, under the core's next sequence number."""
+    """The operator side sent a Watch, which took the core's next sequence number."""
     HANDS = 17
     """The controller's state (operator_side/controller/state.py), in MessagePack."""
     TOLD = 18
-    """The feel sent to the controller (operator_side/controller/feel.py), in MessagePack."""
+    """The effects sent to the controller (operator_side/controller/feel.py), in MessagePack."""
     EPISODE = 19
     """A mark of an episode counts (EpisodeMark of common/episode.py), as JSON; follows from other inputs."""
     MARKED = 20
@@ -66,7 +70,7 @@ class Kind(IntEnum):
 
 
 class Entry(NamedTuple):
-    """Event of a core."""
+    """One recorded input or output of a core."""
 
     kind: int
     now_s: float
@@ -76,7 +80,7 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True)
 class Block:
-    """Block of one side's entries, in order."""
+    """Block of one side's successive entries."""
 
     number: int
     dropped: int
@@ -86,7 +90,7 @@ class Block:
     entries: bytes
 
     def unpacked(self) -> Iterator[Entry]:
-        """Yield the entries; raises ValueError if the block is invalid."""
+        """Yield the block's entries; raises ValueError if the block is invalid."""
         position, end = 0, len(self.entries)
         while position < end:
             if end - position < _ENTRY.size:
@@ -100,7 +104,7 @@ class Block:
 
 
 def entry(kind: Kind, now_s: float, *parts: bytes) -> bytes:
-    """Pack one entry."""
+    """Pack one entry, whose content is the concatenation of `parts`."""
     content = b"".join(parts)
     return _ENTRY.pack(kind, len(content), now_s) + content
 
@@ -111,7 +115,7 @@ def pack_block(number: int, dropped: int, first_s: float, last_s: float, entries
 
 
 def unpack_block(content: bytes) -> Block:
-    """Unpack a block of `pack_block`; raises ValueError if it is invalid."""
+    """Unpack what `pack_block` packed; raises ValueError if `content` is invalid."""
     if len(content) < _BLOCK.size:
         raise ValueError(f"a block of {len(content)} bytes; valid: {_BLOCK.size} or more")
     number, dropped, first_s, last_s = _BLOCK.unpack_from(content)
@@ -119,12 +123,12 @@ def unpack_block(content: bytes) -> Block:
 
 
 def text(value: bytes) -> bytes:
-    """Pack a short text, to precede bytes."""
+    """Pack a text of at most 255 bytes with its length, so that other bytes can follow it."""
     return bytes([len(value)]) + value
 
 
 def split_text(content: bytes) -> tuple[bytes, bytes]:
-    """Split off the short text; raises ValueError if it is cut."""
+    """Return a text packed by `text`, and the bytes after it; raises ValueError if the text is cut off."""
     if not content or len(content) < 1 + content[0]:
         raise ValueError("a text that ends within itself")
     return content[1 : 1 + content[0]], content[1 + content[0] :]

@@ -1,4 +1,4 @@
-"""Camera pictures in a file: decoding of a CompressedImage without a schema compiler."""
+"""Camera pictures in a recording: Foxglove's CompressedImage messages, decoded without a protobuf compiler."""
 
 from typing import Final, NamedTuple
 
@@ -8,7 +8,7 @@ _BYTES: Final = 2
 
 
 class Image(NamedTuple):
-    """One picture."""
+    """One camera picture of a view."""
 
     view: str
     jpeg: bytes
@@ -23,7 +23,7 @@ def read_image(content: bytes) -> Image:
 
 
 def _fields(content: bytes) -> dict[int, bytes]:
-    """Return the fields of bytes by number; the message has no others at its top level."""
+    """Return the protobuf fields of `content`, keyed by number. All must be byte fields, as a CompressedImage's are."""
     found: dict[int, bytes] = {}
     position = 0
     while position < len(content):

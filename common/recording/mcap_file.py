@@ -1,4 +1,4 @@
-"""MCAP file, through foxglove-sdk: a chunk a second, each complete on the disk before the next begins."""
+"""MCAP file, written through foxglove-sdk in chunks of about a second, each completed before the next begins."""
 
 import json
 import logging
@@ -20,15 +20,15 @@ logging.getLogger("foxglove").setLevel(logging.CRITICAL)
 
 
 class RecordingFile:
-    """New file. A failure to write is kept in `error`; from then on nothing is written, and nothing raises."""
+    """New MCAP file. If writing fails, the reason is kept in `error`; nothing more is written, and no call raises."""
 
     def __init__(self, path: Path, wall_offset_s: float) -> None:
-        """`wall_offset_s`: wall clock minus stamps, in seconds. Raises FileExistsError if the file exists."""
+        """`wall_offset_s`: wall clock minus the clock of `now_s`, in seconds. FileExistsError if the file exists."""
         self.error: str | None = None
         self.kept_bytes = 0
-        """Length up to the end of the last whole chunk"""
+        """Length of the file up to the end of the last complete chunk"""
         self.kept_s = 0.0
-        """Time from the first message to the last one of that chunk"""
+        """Time from the first message of the file to the last message of that chunk, in seconds"""
         self._first_s: float | None = None
         self._last_s = 0.0
         self._offset_s = wall_offset_s
@@ -49,21 +49,21 @@ class RecordingFile:
         self._closed = False
 
     def describe(self, name: str, values: Mapping[str, str]) -> None:
-        """Write values of the whole file."""
+        """Write named values that describe the whole file, as MCAP metadata."""
         if self.error is None:
             self._attempt(lambda: self._writer.write_metadata(name, dict(values)))
 
     def write(self, topic: str, now_s: float, content: bytes) -> None:
-        """Write a message of one of our topics."""
+        """Write a message in our own encoding: binary for a topic in BINARY, else JSON."""
         self._log(topic, now_s, content, lambda: self._own_channel(topic, content))
 
     def draw(self, topic: str, now_s: float, content: Any) -> None:
-        """Write a message of one of Foxglove's types."""
+        """Write a message `content` of one of Foxglove's types."""
         kind = getattr(channels, f"{type(content).__name__}Channel")
         self._log(topic, now_s, content, lambda: kind(topic, context=self._context))
 
     def _log(self, topic: str, now_s: float, content: Any, make: Callable[[], Any]) -> None:
-        """Write a message; `make` makes the topic's channel for its first one."""
+        """Write a message; for the first of a topic, `make` makes the topic's channel."""
         if self.error is not None:
             return
         if topic not in self._channels:
@@ -73,17 +73,17 @@ class RecordingFile:
         self._attempt(lambda: self._channels[topic].log(content, log_time=self.wall_ns(now_s)))
 
     def wall_ns(self, now_s: float) -> int:
-        """Return the wall clock's nanoseconds at a stamp."""
+        """Return the wall clock's time at the stamp `now_s`, in nanoseconds."""
         return max(0, round((now_s + self._offset_s) * _NANOSECONDS))
 
     def flush(self) -> None:
-        """End the chunk: all that was written survives the process."""
+        """End the chunk, so that all that was written is in the file even if the process ends now."""
         if self.error is None and self._attempt(self._writer.flush):
             self.kept_bytes = self._output.end
             self.kept_s = 0.0 if self._first_s is None else self._last_s - self._first_s
 
     def close(self) -> None:
-        """Finish the file with its index; after a failure, cut it to the last whole chunk."""
+        """Finish the file with its index; after a failure, cut it off after the last complete chunk."""
         if self._closed:
             return
         self._closed = True
@@ -97,7 +97,7 @@ class RecordingFile:
         self._output.finish(None if self.error is None else self.kept_bytes)
 
     def figures(self) -> dict[str, Any]:
-        """Return seconds and bytes that are known to be on the disk, and the error if any."""
+        """Return how many seconds and bytes are in complete chunks, and the error, if any."""
         return {"kept_s": self.kept_s, "bytes": self.kept_bytes, "error": self.error}
 
     def _own_channel(self, topic: str, first: bytes) -> foxglove.Channel:
@@ -121,14 +121,14 @@ class RecordingFile:
 
 
 class _Output:
-    """File for the library to write to; remembers why a write failed."""
+    """File to which the library writes; it remembers why a write failed."""
 
     def __init__(self, path: Path) -> None:
         self.error: str | None = None
         self.end = 0
         self._given_up = False
         self._position = 0
-        """Position that the library expects: it panics at any other"""
+        """Position that the library expects; at any other it panics"""
         self._file = path.open("xb", buffering=0)
 
     def write(self, data: bytes | bytearray) -> int:

@@ -1,4 +1,4 @@
-"""Check for the packages of extras, which a run does not need."""
+"""Check that the packages of an optional dependency group (an extra) are installed."""
 
 from importlib.util import find_spec
 
@@ -6,7 +6,8 @@ from common.errors import ConfigurationError
 
 
 def require_packages(what: str, *modules: str, extra: str = "record") -> None:
-    """Raise ConfigurationError, with the command to install them, if `modules` are missing; imports none."""
+    """Raise ConfigurationError, with the command that installs `extra`, if one of `modules` is missing."""
     missing = [module for module in modules if find_spec(module) is None]
     if missing:
-        raise ConfigurationError(f"{what}: {missing[0]} is not installed; pip install '.[{extra}]' in the clone")
+        remedy = f"install it in the clone: pip install '.[{extra}]'"
+        raise ConfigurationError(f"{what}: {missing[0]} is not installed; {remedy}")

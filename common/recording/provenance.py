@@ -1,4 +1,4 @@
-"""Provenance of a run: settings, versions and the kind of machine, for replay."""
+"""Provenance of a run, needed for replay: settings, versions of packages, and the kind of machine."""
 
 import dataclasses
 import importlib.metadata
@@ -15,11 +15,11 @@ Settings = TypeVar("Settings")
 
 _PACKAGES: Final = ("feelahead", "numpy", "scipy", "msgpack", "msgspec", "mujoco-core", "mujoco", "numba")
 _OF_THIS_RUN: Final = ("summary", "record", "config", "keys")
-"""Settings without effect on a core; their files may be gone later."""
+"""Settings that have no effect on a core and are not recorded, because their files may no longer exist at replay."""
 
 
 def provenance(settings: Any, epoch: int, clock_domain: str) -> dict[str, Any]:
-    """Return all values from which a core was made, as plain ones."""
+    """Return all values from which a core was made, as values that JSON can hold."""
     kept = dataclasses.replace(settings, **{name: None for name in _OF_THIS_RUN if hasattr(settings, name)})
     return {
         "epoch": epoch,
@@ -32,7 +32,10 @@ def provenance(settings: Any, epoch: int, clock_domain: str) -> dict[str, Any]:
 
 
 def settings_from(values: Mapping[str, Any], kind: type[Settings]) -> Settings:
-    """Restore the settings from `provenance`; raises ConfigurationError if this version rejects them."""
+    """Restore settings of type `kind` from the settings that `provenance` returned.
+
+    Raises ConfigurationError if this version of feelahead rejects them.
+    """
     try:
         return msgspec.convert(dict(values), kind, dec_hook=lambda want, value: want(value))
     except (msgspec.ValidationError, ValueError) as error:
@@ -56,7 +59,7 @@ def _versions() -> dict[str, str]:
 
 
 def processor_name() -> str:
-    """Return the processor's name: another one may round differently."""
+    """Return the name of the processor; another processor may round differently."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -1,6 +1,6 @@
-"""Reading of recordings, whole or cut off anywhere: up to the last complete second.
+"""Reading of recordings, even if the file was cut off: up to the last complete chunk (a second).
 
-The file is read record by record: its index is at the end, where a cut file has none.
+The file is read record by record, because its index is at the end, which a file that was cut off lacks.
 """
 
 import json
@@ -17,7 +17,7 @@ _SIDES: Final = {f"{PROFILE}.{side}": side for side in ("robot", "operator")}
 
 
 class Message(NamedTuple):
-    """Message of the file."""
+    """Message of a recording's file."""
 
     topic: str
     log_ns: int
@@ -27,28 +27,28 @@ class Message(NamedTuple):
 
 @dataclass(frozen=True)
 class Recording:
-    """Recording whose records have been scanned."""
+    """Recording, with what a scan of its file found."""
 
     path: Path
     headers: Mapping[str, Mapping[str, Any]]
-    """Settings and versions of each recorded core, by side"""
+    """Settings, versions and other values of each recorded core, keyed by side"""
     whole: bool
-    """Whether the file was finished; else it ends at the last complete second"""
+    """Whether the file was finished; if not, it is read up to the last complete chunk"""
     damaged: bool = False
-    """Whether a chunk is damaged; the rest of the file is not read"""
+    """Whether a chunk is damaged; the file is then read up to that chunk"""
     end_ns: int = 0
-    """Last stamp of the intact chunks, nanoseconds on the wall clock"""
+    """Newest stamp in the intact chunks, in nanoseconds on the wall clock"""
 
     def began_ns(self) -> int:
-        """Return the first message's stamp, nanoseconds on the wall clock; 0 without messages."""
+        """Return the stamp of the first message, in nanoseconds on the wall clock; 0 without messages."""
         return next((message.log_ns for message in self.messages()), 0)
 
     def length_s(self) -> float:
-        """Return the time from the first message to the last one in an intact chunk, in seconds."""
+        """Return the time from the first message to the last one that can be read, in seconds."""
         return 1e-9 * (self.end_ns - self.began_ns()) if self.end_ns else 0.0
 
     def messages(self, topics: Collection[str] = ()) -> Iterator[Message]:
-        """Yield the messages, of `topics` if any are named, in the file's order, which is nearly that of time."""
+        """Yield the messages of `topics`, or all if none is given, in the order of the file, nearly that of time."""
         from mcap.records import Channel  # noqa: PLC0415
         from mcap.records import Message as Logged  # noqa: PLC0415
 
@@ -80,10 +80,10 @@ def open_recording(path: Path) -> Recording:
             end_ns = max(end_ns, record.message_end_time)
         whole |= isinstance(record, DataEnd)
     if not headers and damaged:
-        raise ConfigurationError(f"{path}: its header is damaged; valid: a file as --record made it")
+        raise ConfigurationError(f"{path}: its header is damaged; valid: an undamaged file made by --record")
     if not headers:
         raise ConfigurationError(
-            f"{path}: holds nothing that feelahead recorded; valid: a file that --record made, of a second or more"
+            f"{path}: holds nothing that feelahead recorded; valid: a file made by --record, of a second or more"
         )
     return Recording(path, headers, whole, damaged, end_ns)
 
@@ -102,7 +102,7 @@ def _value(text: str) -> Any:
 
 
 def _records(path: Path) -> Iterator[tuple[Any, list[Any]]]:
-    """Yield each whole record with the contents of a chunk; for a damaged one a last None."""
+    """Yield each complete record, with its records if it is a chunk. At a damaged one, yield None and end."""
     from mcap.exceptions import EndOfFile, InvalidMagic, RecordLengthLimitExceeded  # noqa: PLC0415
     from mcap.records import Chunk, DataEnd  # noqa: PLC0415
     from mcap.stream_reader import StreamReader, breakup_chunk  # noqa: PLC0415

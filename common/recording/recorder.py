@@ -2,8 +2,8 @@
 
     python -m common.recording.recorder FD FILE.mcap [SOCKET]
 
-It runs until its starter's channel and every side's have ended, even by a kill. Every 0.75 s all received events are
-complete on the disk.
+FD is the channel to the process that started it; at SOCKET other sides connect. It runs until all these channels have
+ended, even if the processes were killed. Every 0.75 s all events received so far are written completely to the file.
 """
 
 import os
@@ -23,13 +23,13 @@ from common.recording.mcap_file import RecordingFile
 from common.recording.wire import END, as_json
 
 FLUSH_PERIOD_S: Final = 0.75
-"""Time between flushes, in seconds: with the blocks' 40 ms and a loaded machine, at most a second is lost."""
+"""Time between flushes, in seconds. With the 40 ms of a block, at most a second is lost, even on a loaded machine."""
 _NICENESS: Final = 5
 _SIDES_LIMIT: Final = 8
 
 
 def main() -> None:
-    """Record until all channels have ended."""
+    """Run the recorder until all channels have ended."""
     owner, arguments = companion_channel(sys.argv[1:])
     # A file at its size limit is an error to report, and must not end the process.
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

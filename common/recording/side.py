@@ -1,4 +1,4 @@
-"""A side's end of a recording: a note in a turn costs an append; all else waits for idle time.
+"""Recording at the side that is recorded: noting an event in a turn costs one append; the rest is done in idle time.
 
 core ── notes ──▶ list ── idle ──▶ blocks ── channel ──▶ recorder process ──▶ FILE.mcap
 """
@@ -34,43 +34,40 @@ KILLED: Final = "the recorder was killed"
 
 
 class Encoder(Protocol):
-    """Encoder of a core's notes as entries."""
+    """Encoder of the events that a core notes into entries (entries.py)."""
 
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
-        """Return the note's time and entries; pass view payloads to `views`, with their times."""
+        """Return the time and the entries of a noted event; call `views(now_s, payload)` for view payloads in it."""
 
     def begin_epoch(self) -> None:
-        """Encode the next values whole: earlier ones may be lost."""
+        """Encode the next values completely, not only if they have changed, as a block of earlier ones was dropped."""
 
 
 def require_recordable(path: Path | None) -> None:
     """Raise ValueError if `path` cannot become a recording, ConfigurationError if packages are missing.
 
-    An existing file is never overwritten: its run cannot be recorded again.
+    `path` may be a recorder's socket, or None. An existing file is never overwritten: its run cannot be repeated.
     """
     if path is None or path.is_socket():
         return
     if path.suffix != ".mcap":
         raise ValueError(f"--record {path}: valid: a file's path that ends in .mcap")
     if not path.absolute().parent.is_dir():
-        raise ValueError(f"--record {path}: its folder is not there; valid: a file's path")
+        raise ValueError(f"--record {path}: its folder is not there; valid: a file in an existing folder")
     if path.exists() or path.is_symlink():
         raise ValueError(f"--record {path}: exists already; valid: a new file's path")
     require_packages("--record", "foxglove", "mcap")
 
 
 class SideRecording:
-    """Sender of a side's events to the recorder. Only the start and `close` wait."""
+    """Sender of a side's events to the recorder process. Only the start and `close` may block."""
 
     def __init__(self, path: Path, side: str, encoder: Encoder) -> None:
-        """Record into the new file `path`, or through the recorder that listens at the socket `path`.
-
-        Raises ConfigurationError if that fails.
-        """
+        """Connect to a recorder, as `connect` does. Raises ConfigurationError if that fails."""
         self.noted: list[Any] = []
-        """Notes since the last idle time; a note costs one append."""
+        """Events noted since the last call of `idle`; noting one costs one append."""
         self.dropped = 0
-        """Number of blocks for which the recorder had no room."""
+        """Number of blocks that were dropped because the recorder did not keep up."""
         self._side = side
         self._channel, self._recorder = connect(path)
         self._clock = MonotonicClock()
@@ -84,11 +81,11 @@ class SideRecording:
         self._gone = self._closed = False
 
     def begin(self, header: Mapping[str, Any]) -> None:
-        """Send first the values from which the core was made, for replay."""
+        """Send the values from which the core was made, which a replay needs; call it before anything else is sent."""
         self._channel.send(HEADER, as_json({"side": self._side, **header}))
 
     def idle(self, now_s: float, status: Callable[[], msgspec.Struct] | None = None) -> list[str]:
-        """Send the notes, and ten times a second the `status`. Return lines for a person."""
+        """Send the noted events, and ten times a second the `status`. Return lines to show to a person."""
         noted, self.noted[:] = self.noted[:], []
         for one in noted:
             self._last_s, entries = self._encoder.encode(one, self.view)
@@ -105,15 +102,15 @@ class SideRecording:
         return notes
 
     def view(self, now_s: float, payload: bytes) -> None:
-        """Record a view payload."""
+        """Record a view payload of the time `now_s`."""
         self._channel.send(VIEW, stamped(now_s), payload)
 
     def facts(self, now_s: float, facts: msgspec.Struct) -> None:
-        """Record the facts that the operator side showed at one moment."""
+        """Record the facts that the operator side shows at `now_s`."""
         self._channel.send(FACTS, stamped(now_s), msgspec.json.encode(facts))
 
     def note(self, text: str) -> None:
-        """Record a line that is shown to a person now."""
+        """Record a line that is now shown to people."""
         self._channel.send(NOTE, stamped(self._clock.now()), text.encode())
 
     def _send_block(self) -> None:
@@ -140,9 +137,9 @@ class SideRecording:
         return f"kept: {self._said['kept_s']:.1f} s, {self._said['bytes'] / 1e6:.1f} MB"
 
     def close(self) -> dict[str, Any]:
-        """Send the rest and let the recorder finish; return figures of the file for the summary.
+        """Send what is left and let the recorder finish; return figures of the file for the summary.
 
-        Safe to call again.
+        A second call does no harm.
         """
         if self._closed:
             return {"dropped_blocks": self.dropped} | self._said
@@ -164,7 +161,7 @@ class SideRecording:
 
 @contextmanager
 def recording_to(path: Path | None, side: str, encoder: Encoder) -> Iterator[SideRecording | None]:
-    """Open a recording, unless `path` is None; it ends with the context."""
+    """Open a recording that ends with the context; yield None if `path` is None."""
     recording = None if path is None else SideRecording(path, side, encoder)
     try:
         yield recording
@@ -174,10 +171,10 @@ def recording_to(path: Path | None, side: str, encoder: Encoder) -> Iterator[Sid
 
 
 class Recorder:
-    """Recorder process that writes one file: for one side, or for all that connect to `socket_path`."""
+    """Recorder process that writes one file, for this side or, at `socket_path`, for all sides that connect there."""
 
     def __init__(self, path: Path, socket_path: Path | None = None) -> None:
-        """Start the process and wait for the file; raises ConfigurationError if it cannot be made."""
+        """Start the process and wait until it has made the file `path`; raises ConfigurationError if it cannot."""
         listening = [] if socket_path is None else [str(socket_path)]
         self._companion = Companion(_RECORDER, [str(path), *listening])
         self.channel = self._companion.channel
@@ -189,11 +186,11 @@ class Recorder:
 
     @property
     def process_id(self) -> int:
-        """Process id."""
+        """Process id of the recorder."""
         return self._companion.process_id
 
     def finish(self) -> dict[str, Any]:
-        """Finish the file once every side has ended; return its figures."""
+        """Finish the file, once all sides have ended; return figures of the file."""
         said, ended = dict(_NOTHING), False
         # Read its earlier messages first: a send to an ended process would lose them.
         for message in self.channel.receive():
@@ -208,13 +205,16 @@ class Recorder:
         return said
 
     def close(self) -> None:
-        """Release the process: it ends by itself once all channels are closed."""
+        """Close our channel and wait for the process, which ends once all channels are closed."""
         # On a busy machine it may still have much to write: killing it would lose the end of the run.
         self._companion.close(_FINISH_LIMIT_S)
 
 
 def connect(path: Path) -> tuple[Channel, Recorder | None]:
-    """Connect to the recorder that listens at the socket `path`, or to a new one that writes the file `path`."""
+    """If `path` is a socket, connect to the recorder that listens there; otherwise start one that writes to `path`.
+
+    Return the channel to the recorder, and the recorder if it was started here.
+    """
     if not path.is_socket():
         recorder = Recorder(path)
         return recorder.channel, recorder
@@ -223,12 +223,14 @@ def connect(path: Path) -> tuple[Channel, Recorder | None]:
         part.connect(str(path))
     except OSError as error:
         part.close()
-        raise ConfigurationError(f"--record {path}: nobody listens there; valid: a file's path") from error
+        raise ConfigurationError(
+            f"--record {path}: no recorder listens at this socket; valid: the path of a new file"
+        ) from error
     return Channel(part), None
 
 
 def _wait_until_sent(channel: Channel, limit_s: float) -> None:
-    """Send the waiting messages; give up when none leaves for `limit_s`."""
+    """Send the waiting messages; give up when nothing can be sent for `limit_s`."""
     while channel.waiting and not channel.ended:
         if not select.select([], [channel], [], limit_s)[1]:
             return
@@ -236,7 +238,7 @@ def _wait_until_sent(channel: Channel, limit_s: float) -> None:
 
 
 def _wait_for_answer(channel: Channel, limit_s: float) -> bytes | None:
-    """Return the newest message from the other end; None if it is gone or silent."""
+    """Wait for messages and return the newest; None if the channel has ended or `limit_s` passes without one."""
     while not channel.ended and select.select([channel], [], [], limit_s)[0]:
         if messages := channel.receive():
             return messages[-1]

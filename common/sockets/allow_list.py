@@ -1,4 +1,4 @@
-"""Peers that a running robot side admits, from the folder of keys."""
+"""Peers that a running robot side admits, read from the folder of keys."""
 
 from dataclasses import dataclass, field
 
@@ -8,22 +8,22 @@ from common.sockets.keys import SHORTAGES, KeyFolder
 
 @dataclass
 class AllowList:
-    """Admitted peers: those of the folder, read again when the folder changes."""
+    """Admitted peers: those in `folder`, which is read again when it changes."""
 
     folder: KeyFolder
     names: dict[str, str] = field(default_factory=dict)
-    """Peers' names by key."""
+    """Names of the admitted peers, keyed by their public keys."""
     unreadable: str | None = None
     """Reason why the folder cannot be read at present; None while it can."""
     faults: tuple[str, ...] = ()
-    """Faults of single files, which admit nobody; a line each."""
+    """Faults of single files in the folder, one line each; these files admit nobody."""
     _fingerprint: tuple[tuple[str, int, int], ...] | None = None
 
     def refresh(self) -> set[str]:
-        """Read the folder if it has changed; return the keys that were revoked. Costs a few stat calls.
+        """Read the folder if it has changed; return the keys that were revoked. If unchanged, costs a few stat calls.
 
-        An unreadable folder admits nobody, unless descriptors or memory are short: a peer that exhausts these must not
-        throw others out.
+        An unreadable folder admits nobody. But if it is unreadable for lack of descriptors or memory, the list stays: a
+        peer that exhausts these must not get others excluded.
         """
         before = set(self.names)
         try:

@@ -1,7 +1,7 @@
 """Authentication: CURVE key pairs, and the answers to ZeroMQ's handshake requests.
 
-ZeroMQ asks over a separate socket (ZAP, rfc.zeromq.org/spec/27). The thread that waits for messages serves it, so that
-no other thread can die unnoticed. While nobody serves, nobody gets in.
+ZeroMQ asks over a separate socket whether a key is allowed (ZAP, rfc.zeromq.org/spec/27). The thread that waits for
+messages answers, so that there is no other thread that could die unnoticed. Without answers no peer is admitted.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from common.sockets.readable import readable
 _ZAP_ENDPOINT = "inproc://zeromq.zap.01"
 _ZAP_DOMAIN = b"feelahead"
 _ANSWERS_PER_CALL = 4
-"""Number of answers per call: a storm of handshakes must not block the caller."""
+"""Maximum number of handshakes answered per call, so that a storm of handshakes does not block the caller."""
 _EVENTS_PER_CALL = 16
 _REMEMBERED_REFUSALS = 64
 
@@ -38,14 +38,14 @@ def public_part(secret: str) -> str:
 
 @dataclass(frozen=True)
 class RobotKeys:
-    """Keys of the robot side: its secret one, and those that it admits."""
+    """Keys of the robot side: its secret key, and the list of admitted public keys."""
 
     secret: str
     allowed: AllowList
 
     @classmethod
     def load(cls, folder: Path) -> "RobotKeys":
-        """Load a folder of keys. Raises ConfigurationError, which names the command that mends it."""
+        """Load a folder of keys. Raises ConfigurationError, which names the command that mends the fault."""
         keys = KeyFolder(folder)
         secret = keys.secret("robot")
         allowed = AllowList(keys)
@@ -55,14 +55,14 @@ class RobotKeys:
         return cls(secret, allowed)
 
     def notes(self) -> list[str]:
-        """Name the admitted peers, for a person at the start."""
+        """Return a line with the names of the admitted peers, to be shown at the start."""
         folder, names = self.allowed.folder, ", ".join(sorted(self.allowed.names.values()))
         change = folder.command("allow NAME KEY")
         who = f"lets in {names}" if names else f"nobody is let in yet; to change that: {change}"
         return [f"keys: {who}"]
 
     def secure(self, part: "zmq.Socket[bytes]") -> None:
-        """Admit only allowed keys to `part`; call before it is bound."""
+        """Make the socket `part` admit only allowed keys; call before it is bound."""
         part.setsockopt(zmq.CURVE_SERVER, 1)
         part.setsockopt(zmq.CURVE_SECRETKEY, bytes.fromhex(self.secret))
         part.setsockopt(zmq.ZAP_DOMAIN, _ZAP_DOMAIN)
@@ -71,31 +71,31 @@ class RobotKeys:
 
 @dataclass(frozen=True)
 class OperatorKeys:
-    """Keys of the operator side: its secret one, and the robot side's public one."""
+    """Keys of the operator side: its own secret key, and the robot side's public key."""
 
     secret: str
     robot: str
 
     @classmethod
     def load(cls, folder: Path, robot_key: str | None) -> "OperatorKeys":
-        """Load a folder of keys and the robot side's public key; errors as in RobotKeys.load."""
+        """Load our secret key from `folder`; `robot_key`: the robot side's public key. Errors as in RobotKeys.load."""
         secret = KeyFolder(folder).secret("operator")
         if robot_key is None:
             raise ConfigurationError(
-                f"--keys {folder}: whose robot side it is must be known, too; valid: --robot-key KEY, "
+                f"--keys {folder}: the robot side's public key is needed, too; valid: --robot-key KEY, "
                 "where KEY is what `feelahead keys show robot` prints on the robot's machine"
             )
         return cls(secret, read_public_key(robot_key, "--robot-key"))
 
     def secure(self, part: "zmq.Socket[bytes]") -> None:
-        """Connect `part` only to the owner of the robot side's key; call before it is connected."""
+        """Make the socket `part` connect only to the owner of the robot side's key; call before it is connected."""
         part.setsockopt(zmq.CURVE_SERVERKEY, bytes.fromhex(self.robot))
         part.setsockopt(zmq.CURVE_PUBLICKEY, bytes.fromhex(public_part(self.secret)))
         part.setsockopt(zmq.CURVE_SECRETKEY, bytes.fromhex(self.secret))
 
 
 class Authenticator:
-    """Answers to the handshakes of one context from an allow-list; must exist before any socket is bound."""
+    """Authenticator of the handshakes of one ZeroMQ context, by an allow-list. Make it before any socket is bound."""
 
     def __init__(self, context: "zmq.Context[zmq.Socket[bytes]]", allowed: AllowList) -> None:
         self.refused = 0
@@ -107,7 +107,7 @@ class Authenticator:
         self._questions.bind(_ZAP_ENDPOINT)
 
     def fileno(self) -> int:
-        """Return a descriptor that becomes readable when a handshake waits."""
+        """Return a descriptor that becomes readable when a handshake waits for an answer."""
         return self._questions.fileno()
 
     def serve(self) -> bool:
@@ -120,7 +120,7 @@ class Authenticator:
         return True
 
     def news(self) -> list[str]:
-        """Return a line for each key first refused since the last call: a person may want to allow it."""
+        """Return a line for each unknown key newly refused since the last call, with the command that allows it."""
         new = [key for key, is_new in self._refused_keys.items() if is_new]
         self._refused_keys.update(dict.fromkeys(new, False))
         command = self._allowed.folder.command
@@ -140,16 +140,17 @@ class Authenticator:
 
 
 class HandshakeWatch:
-    """Monitor of a connecting socket's handshakes; explains failures in words."""
+    """Monitor of the handshakes of a connecting socket; it explains failures in words."""
 
     def __init__(self, part: "zmq.Socket[bytes]", keys: OperatorKeys | None, unsent_bytes: int) -> None:
-        """`unsent_bytes` as for hold_little, which is applied to each connection."""
+        """`keys` None: we have no keys. `unsent_bytes`: as in hold_little, which is applied to each connection."""
         self.trouble: str | None = None
-        """Reason why the newest handshake failed, with a remedy; None after a success."""
+        """Reason why the newest handshake failed, with a remedy; None after a successful one."""
         self.failed = False
-        """Whether one has failed since the caller last cleared this; ZeroMQ does not retry."""
+        """Whether the newest handshake failed; the caller connects again, as ZeroMQ does not, and sets this to
+        False."""
         self.key_refused = False
-        """Whether the newest failed because the robot side does not allow our key."""
+        """Whether the newest handshake failed because the robot side does not allow our key."""
         self._keys = keys
         self._unsent_bytes = unsent_bytes
         self._part = part
@@ -162,7 +163,7 @@ class HandshakeWatch:
         )
 
     def look(self) -> None:
-        """Process the events since the last call; never blocks."""
+        """Process ZeroMQ's handshake events since the last call; never blocks."""
         for _ in range(_EVENTS_PER_CALL):
             try:
                 event_fields = parse_monitor_message(self._events.recv_multipart(zmq.NOBLOCK))

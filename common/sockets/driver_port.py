@@ -1,4 +1,4 @@
-"""Port of the robot side for one program of the user: an arm's driver, or perception."""
+"""Socket of the robot side to which a user's program connects: an arm's driver, or a perception of objects."""
 
 from typing import Final, NamedTuple
 
@@ -16,7 +16,7 @@ _HANDSHAKE_S: Final = 5.0
 
 
 class Received(NamedTuple):
-    """Message, and when it was taken from the socket, on our monotonic clock."""
+    """Received message, its sender, and the time at which it was taken from the socket, on our monotonic clock."""
 
     peer: bytes
     payload: bytes
@@ -24,21 +24,24 @@ class Received(NamedTuple):
 
 
 class DriverPort(SocketShell):
-    """Bound socket, so that the program may come and go; keys and refusals as for the control port."""
+    """Bound socket for a user's program, which may connect and disconnect at any time.
+
+    Keys are checked and peers refused as at the control port.
+    """
 
     def __init__(
         self, bind: str, flag: str, limit_bytes: int, *, insecure: bool = False, keys: RobotKeys | None = None
     ) -> None:
-        """Bind to `bind`, the address after `flag`, for messages of at most `limit_bytes`, 1 KiB or more.
+        """Bind to the address `bind`, the value of `flag`. `limit_bytes`: largest valid message, at least 1 KiB.
 
-        ConfigurationError when the address is malformed, in use, not this machine's, or open to the network with
-        neither `keys` nor `insecure`.
+        Raises ConfigurationError if the address is malformed, in use, or not this machine's. Also if it is open to the
+        network with neither `keys` nor `insecure`.
         """
         endpoint = parse_bind(bind, flag)
         if keys is None and not insecure:
             refuse_open(endpoint, bind, flag)
         self.revoked = 0
-        """Number of messages under keys revoked since their handshake"""
+        """Number of messages from peers whose keys were revoked after their handshake"""
         self._keys = keys
         super().__init__(_HEARTBEAT_S, _HANDSHAKE_S)
         try:
@@ -53,7 +56,7 @@ class DriverPort(SocketShell):
             bind_socket(self._part, endpoint, flag)
             self._inbox = Inbox(self._part, frames=2)
             self.endpoint = self._part.getsockopt_string(zmq.LAST_ENDPOINT)
-            """Bound address, with the port that the system chose"""
+            """Bound address; if `bind` left the port open, with the port that the system chose"""
         except BaseException:
             self.close()
             raise
@@ -73,14 +76,17 @@ class DriverPort(SocketShell):
         return received
 
     def send(self, peer: bytes, payload: bytes) -> bool:
-        """Send at once; False, and counted in `dropped`, if the peer is gone or does not keep up."""
+        """Send at once. Return False, and count in `dropped`, if the peer is gone or does not keep up."""
         self._inbox.used()
         taken = self.offer(self._part, peer, payload) is Offered.TAKEN
         self.dropped += not taken
         return taken
 
     def refresh_keys(self) -> list[str]:
-        """Refresh the allow-list, before its other users; return a line for each unknown key that was refused."""
+        """Read the allow-list again; return a line for each unknown key that was newly refused.
+
+        Call it before other sockets with the same allow-list refresh it.
+        """
         if self._keys is None or self._authenticator is None:
             return []
         self._keys.allowed.refresh()

@@ -1,4 +1,4 @@
-"""Addresses of the form tcp://HOST:PORT, checked before a socket sees them."""
+"""Addresses of the form tcp://HOST:PORT, checked before a socket uses them."""
 
 import ipaddress
 import re
@@ -15,14 +15,14 @@ _HIGHEST_PORT = 65535
 
 @dataclass(frozen=True)
 class Endpoint:
-    """Address to bind or to connect to."""
+    """Address to bind to or to connect to."""
 
     host: str
     """Host name, IP address without brackets, or * for every address of this machine."""
     port: int
-    """0 lets the system choose a free one."""
+    """Port number; 0 lets the system choose a free one."""
     ipv6: bool
-    """Whether only IPv6 reaches it."""
+    """Whether the host is reached by IPv6 only."""
 
     @property
     def address(self) -> str:
@@ -31,14 +31,14 @@ class Endpoint:
         return f"tcp://{host}:{'*' if self.port == _EPHEMERAL else self.port}"
 
     def is_loopback(self) -> bool:
-        """Whether only this machine can reach it."""
+        """Return whether only this machine can reach the address."""
         return self.host != "*" and ipaddress.ip_address(self.host.partition("%")[0]).is_loopback
 
 
 def parse_bind(text: str, flag: str) -> Endpoint:
-    """Read an address to bind, a host name replaced by its own numeric address.
+    """Parse an address to bind to; a host name is replaced by its numeric address.
 
-    Port 0 or * lets the system choose. ConfigurationError names `flag`, `text` and what is valid.
+    Port 0 or * lets the system choose. Raises ConfigurationError, which names `flag`, `text` and what is valid.
     """
     host, port_text = _split(text, flag, "tcp://127.0.0.1:5555")
     port = _EPHEMERAL if port_text == "*" else _port(port_text, text, flag, lowest=0)
@@ -49,16 +49,16 @@ def parse_bind(text: str, flag: str) -> Endpoint:
 
 
 def parse_connect(text: str, flag: str) -> Endpoint:
-    """Read an address to connect to, and see that its host name resolves; the name itself is kept.
+    """Parse an address to connect to, and check that its host name resolves; the endpoint keeps the name.
 
-    ConfigurationError names `flag`, `text` and what is valid.
+    Raises ConfigurationError, which names `flag`, `text` and what is valid.
     """
     host, port = split_connect(text, flag)
     return Endpoint(host, port, resolve(host, text, flag)[1])
 
 
 def split_connect(text: str, flag: str) -> tuple[str, int]:
-    """Host and port of an address to connect to, by its spelling alone; ConfigurationError as in parse_connect."""
+    """Return host and port of an address to connect to, without resolving the host. Errors as in parse_connect."""
     host, port_text = _split(text, flag, "tcp://192.168.1.5:5555")
     port = _port(port_text, text, flag, lowest=1)
     if host == "*":
@@ -67,7 +67,7 @@ def split_connect(text: str, flag: str) -> tuple[str, int]:
 
 
 def resolve(host: str, text: str, flag: str) -> tuple[str, bool]:
-    """Return the first numeric address, preferably IPv4, and whether it is IPv6; raises ConfigurationError."""
+    """Return the host's numeric address, IPv4 if there is one, and whether it is IPv6; raises ConfigurationError."""
     try:
         found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError) as error:
@@ -83,7 +83,7 @@ def resolve(host: str, text: str, flag: str) -> tuple[str, bool]:
 
 
 def following(control: Endpoint, text: str, flag: str) -> Endpoint:
-    """Return the view's default endpoint: the port after the control port, or any port if that is any."""
+    """Return the view's default endpoint: the port after the control port; if that is 0 (any port), also 0."""
     if control.port == _HIGHEST_PORT:
         raise ConfigurationError(
             f"{flag}: the control address {text!r} leaves no port after it for the view; "
@@ -94,7 +94,7 @@ def following(control: Endpoint, text: str, flag: str) -> Endpoint:
 
 
 def refuse_open(endpoint: Endpoint, text: str, flag: str) -> None:
-    """Raise ConfigurationError, with remedies, if other machines could reach `endpoint`."""
+    """Raise ConfigurationError, which names remedies, if other machines could reach `endpoint`."""
     if not endpoint.is_loopback():
         raise ConfigurationError(
             f"{flag}: {text!r} would be open to anyone on the network; valid: --keys {default_folder()} "

@@ -1,4 +1,4 @@
-"""Arrivals and ends of a bound socket's connections."""
+"""Monitoring of a bound socket: when connections begin and end."""
 
 import resource
 
@@ -11,7 +11,7 @@ from common.sockets.readable import readable
 
 
 class Gate:
-    """Monitor of one socket's connections, to find the surplus ones; made before the socket is bound."""
+    """Monitor of one socket's connections, to find those beyond the limit. Make it before the socket is bound."""
 
     def __init__(
         self,
@@ -21,9 +21,9 @@ class Gate:
         introduced_s: float,
         unsent_bytes: int,
     ) -> None:
-        """Allow `most` connections, at most a quarter of the descriptors that this process may open.
+        """Allow `most` connections, but no more than a quarter of the descriptors that this process may open.
 
-        `introduced_s` as for PortConnections, `unsent_bytes` as for hold_little.
+        `introduced_s`: as in PortConnections. `unsent_bytes`: as in hold_little.
         """
         self._part = part
         self._unsent_bytes = unsent_bytes
@@ -31,12 +31,12 @@ class Gate:
         address = f"inproc://gate-{id(part)}"
         part.monitor(address, zmq.EVENT_ACCEPTED | zmq.EVENT_DISCONNECTED)
         self.events = context.socket(zmq.PAIR)
-        """Socket of ZeroMQ's events; only the gate reads it, so that its descriptor signals each new one."""
+        """Socket on which ZeroMQ reports events. Only Gate reads it, so that its descriptor signals each new event."""
         self.events.setsockopt(zmq.RCVHWM, 0)  # at a mark ZeroMQ's thread would wait for us
         self.events.connect(address)
 
     def look(self, now_s: float) -> bool:
-        """Process the next arrival or end; return False if there is none. Never blocks."""
+        """Process the next begin or end of a connection; return False if there is none. Never blocks."""
         if not readable(self.events):
             return False
         event = parse_monitor_message(self.events.recv_multipart())

@@ -1,4 +1,4 @@
-"""Receiving side of one socket: polled as seldom as possible, read frame by frame."""
+"""Receiving of messages from one ZeroMQ socket: polled as seldom as possible, read frame by frame."""
 
 import select
 from collections.abc import Iterator
@@ -8,20 +8,21 @@ import zmq
 from common.sockets.readable import readable
 
 MESSAGES_PER_RECEIVE = 64
-"""Messages per `read`, so that a flood cannot block the caller."""
+"""Maximum number of messages per `read`, so that a flood cannot block the caller."""
 _NOBLOCK = int(zmq.NOBLOCK)
 
 
 class Inbox:
-    """Receiving side of one socket.
+    """Receiver of the messages of one ZeroMQ socket.
 
-    Its descriptor signals only changes, and any call of the socket clears the signal: EVENTS is decisive. It takes
-    four times as long as polling the descriptor. After a no, EVENTS is read again only when the descriptor signals or
-    somebody else has used the socket.
+    The socket's descriptor signals only changes, and any call on the socket clears the signal. So only the option
+    EVENTS tells whether a message waits, but reading it takes four times as long as polling the descriptor. Once EVENTS
+    has said that none waits, it is read again only when the descriptor signals or other code has used the socket
+    (`used`).
     """
 
     def __init__(self, part: "zmq.Socket[bytes]", frames: int) -> None:
-        """`part` carries messages of `frames` frames."""
+        """Receive from the socket `part`, whose valid messages have `frames` frames."""
         self.descriptor = part.fileno()
         self._part = part
         self._frames = frames
@@ -30,7 +31,7 @@ class Inbox:
         self._signals.register(self.descriptor, select.POLLIN)
         self._settled = False
         self._waiting = False
-        """Whether EVENTS said yes, and nothing has been read since."""
+        """Whether EVENTS said that a message waits, and none has been read since."""
 
     def has_some(self) -> bool:
         """Return whether a frame can be received at once."""
@@ -41,13 +42,13 @@ class Inbox:
         return self._waiting
 
     def used(self) -> None:
-        """Note that the socket was used: sending may have cleared the signal of an arrival."""
+        """Note that the socket was used otherwise: a call such as sending may have cleared the signal of an arrival."""
         self._settled = False
 
     def read(self) -> Iterator[list[zmq.Frame]]:
-        """Yield the messages that have arrived, oldest first, each cut to one frame more than valid.
+        """Yield the messages that have arrived, oldest first. Of a longer message only one frame too many is kept.
 
-        Reads frame by frame: a message of a million frames must not block the caller either.
+        Reads frame by frame, so that a message of a million frames does not block the caller.
         """
         more = bool(self._begun)
         for _ in range(MESSAGES_PER_RECEIVE * self._frames):

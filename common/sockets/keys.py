@@ -1,11 +1,11 @@
-"""Keys as files that people can read: this side's own pair, and the peers that it lets in.
+"""Keys as text files: this side's own pair, and the public keys of the peers that it admits.
 
     FOLDER/robot.secret        the robot side's secret key (mode 0600)
     FOLDER/robot.public        its public part, to be given to the operators
     FOLDER/allowed/NAME.public the public key of an admitted peer; deleting the file revokes it
 
-A key is 64 hexadecimal digits (32 bytes, Curve25519), so that no shell needs quotes around it. Lines that begin
-with # are for people.
+A key is 64 hexadecimal digits (32 bytes, Curve25519), which need no quotes in a shell. Lines that begin with # are
+comments.
 """
 
 import errno
@@ -23,10 +23,10 @@ from common.files.user_folders import configuration_folder
 Side = Literal["robot", "operator"]
 
 PEER_LIMIT = 256
-"""Number of peers in one folder: far more than operators of one robot, and read in a few milliseconds."""
+"""Maximum number of peers in one folder: far more than one robot has operators, yet read in a few milliseconds."""
 _FILE_LIMIT_BYTES = 4096
 SHORTAGES = (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
-"""Errors without meaning for a file or folder: this process or the machine lacks a resource."""
+"""Errors that are no fault of the file or folder: this process or the machine lacks descriptors or memory."""
 _KEY = re.compile(r"[0-9a-f]{64}")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 
@@ -54,7 +54,7 @@ def checked_name(name: str) -> str:
 
 
 def read_public_key(key_or_file: str, what: str) -> str:
-    """Return a public key, given as digits or as a file's path; raises ConfigurationError, which names `what`."""
+    """Return the public key that `key_or_file` gives by digits or by a file's path. ConfigurationError names `what`."""
     if _KEY.fullmatch(key_or_file.strip().lower()):
         return key_or_file.strip().lower()
     path = Path(key_or_file).expanduser()
@@ -71,17 +71,17 @@ def read_public_key(key_or_file: str, what: str) -> str:
 
 @dataclass(frozen=True)
 class Peers:
-    """Admitted peers, and files that admit nobody."""
+    """Admitted peers, and faults of files that should admit one."""
 
     names: dict[str, str]
-    """Peers' names by key."""
+    """Names of the admitted peers, keyed by their public keys."""
     faults: tuple[str, ...]
-    """Faults of files that hold no key, a line each."""
+    """Faults of files that cannot be used, one line each."""
 
 
 @dataclass(frozen=True)
 class KeyFolder:
-    """Folder of keys; nothing is kept in memory."""
+    """Folder of keys; every call reads or writes the files."""
 
     path: Path = field(default_factory=default_folder)
 
@@ -98,11 +98,11 @@ class KeyFolder:
 
     @property
     def allowed_path(self) -> Path:
-        """Folder of the admitted peers."""
+        """Folder with the public keys of the admitted peers."""
         return self.path / "allowed"
 
     def write_pair(self, side: Side, public: str, secret: str, *, replace: bool = False) -> None:
-        """Write a side's pair; raises ConfigurationError if there is one already, unless `replace`."""
+        """Write the pair of keys of a side; without `replace` raises ConfigurationError if there is a secret key."""
         path = self.secret_path(side)
         if path.exists() and not replace:
             raise ConfigurationError(
@@ -120,7 +120,7 @@ class KeyFolder:
         )
 
     def secret(self, side: Side) -> str:
-        """Return the side's secret key. Raises ConfigurationError, which names the command that mends it."""
+        """Return the side's secret key. Raises ConfigurationError, which names the command that mends the fault."""
         path = self.secret_path(side)
         if not path.is_file():
             raise ConfigurationError(
@@ -152,7 +152,7 @@ class KeyFolder:
         _write(self.peer_path(name), f"# A peer that is let in as {name}; deleting this file revokes it.\n{public}\n")
 
     def revoke(self, name: str) -> None:
-        """Revoke a peer; raises ConfigurationError if there is none of that name, or another has the same key."""
+        """Revoke a peer; raises ConfigurationError if there is none of that name, or another name has the same key."""
         path = self.peer_path(name)
         if not path.is_file():
             names = ", ".join(sorted(self.allowed().values())) or "none is allowed"
@@ -166,14 +166,14 @@ class KeyFolder:
             )
 
     def allowed(self) -> dict[str, str]:
-        """Return the admitted peers' names by key; errors as in `peers`."""
+        """Return the names of the admitted peers, keyed by their public keys; errors as in `peers`."""
         return self.peers().names
 
     def peers(self) -> Peers:
-        """Read the admitted peers: a file that cannot be read, or has vanished, excludes only its key.
+        """Read the admitted peers. A file that cannot be read, or has vanished, excludes only its own key.
 
-        Raises ConfigurationError for a folder that is unreadable or writable for others, OSError during a shortage
-        (SHORTAGES).
+        Raises ConfigurationError if the folder is unreadable or writable for others; OSError if descriptors or memory
+        are short (SHORTAGES).
         """
         names: dict[str, str] = {}
         faults = []
@@ -191,9 +191,9 @@ class KeyFolder:
         return Peers(names, tuple(faults))
 
     def fingerprint(self) -> tuple[tuple[str, int, int], ...]:
-        """Return a value that changes with the peers: each file's name, time of change and inode, unread.
+        """Return a value that changes when the admitted peers change, without reading the files.
 
-        Errors as in `peers`.
+        It has each file's name, time of change and inode. Errors as in `peers`.
         """
         return tuple((path.name, *_stand(path)) for path in self._allowed_files())
 
@@ -268,7 +268,7 @@ def _refuse_writable(path: Path) -> None:
 
 
 def _write(path: Path, content: str, mode: int = 0o600) -> None:
-    """Write the file atomically: a running side must never read half a key."""
+    """Write the file atomically, so that a running side never reads half a key."""
     partial = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         descriptor = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)

@@ -1,4 +1,4 @@
-"""Sockets of the operator side: they connect, and reconnect by themselves."""
+"""Sockets of the operator side, which connect to the robot side and reconnect by themselves."""
 
 import contextlib
 import threading
@@ -30,23 +30,24 @@ from common.sockets.turns import (
 
 _RETRY_S = 0.5
 _ATTEMPT_LIMIT_S = 3.0
-"""Time limit of an attempt to connect, in seconds; then the host's address is resolved again. The system alone retries
-after 1, 2, 4... 64 s: a network that is back after a minute would stay unnoticed for another."""
+"""Time limit of an attempt to connect, in seconds; then the host name is resolved again. Without it the system retries
+after 1, 2, 4... 64 s, and would notice a network that is back after a minute only a minute later."""
 _CLOSE_LIMIT_S = 0.5
 _HANDSHAKE_LIMIT_S = 10.0
-"""Time limit of a handshake: CURVE takes three round trips from here, and the robot side may still be starting."""
+"""Time limit of a handshake, in seconds: CURVE takes the client three round trips, and the robot side may be
+starting."""
 
 
 @dataclass(eq=False)
 class _Connection(TurnConnection):
-    """Control connection."""
+    """Control connection to the robot side, with its own socket."""
 
     part: "zmq.Socket[bytes]"
     inbox: Inbox
 
 
 class OperatorSockets(SocketShell):
-    """Sockets of the operator side: they connect, and reconnect by themselves."""
+    """Sockets of the operator side, which connect to the robot side and reconnect by themselves."""
 
     def __init__(
         self,
@@ -58,11 +59,12 @@ class OperatorSockets(SocketShell):
         heartbeat_timeout_s: float = 3.0,
         connections: int = CONNECTIONS,
     ) -> None:
-        """Connect control to `connect`, `connections` times, and view to `view_connect`, by default the port after.
+        """Connect `connections` control sockets to `connect`, and the view socket to `view_connect`.
 
-        `topics` are prefixes of the topics to receive; the empty one means all. The robot side need not run yet.
-        `heartbeat_timeout_s` as in RobotSockets. Raises ConfigurationError for a malformed address or unknown host,
-        ValueError for fewer than 1 or more than 16 connections.
+        `view_connect` None: the port after that of `connect`. `topics`: prefixes of the view topics to receive; the
+        empty prefix means all. `heartbeat_timeout_s`: as in RobotSockets. The robot side need not run yet. Raises
+        ConfigurationError for a malformed address or unknown host, ValueError for fewer than 1 or more than 16
+        connections.
         """
         if not 1 <= connections <= MOST_CONNECTIONS_EACH:
             raise ValueError(f"connections = {connections}; valid: 1 to {MOST_CONNECTIONS_EACH}")
@@ -109,7 +111,7 @@ class OperatorSockets(SocketShell):
         return any(watch.key_refused for _, _, watch in self._watched)
 
     def receive(self) -> list[bytes]:
-        """Return the control messages that have arrived, the oldest of each connection first."""
+        """Return the control messages that have arrived, connection by connection, each one's oldest first."""
         self._look_after_handshakes()
         return [
             payload.bytes for connection in self._connections for (payload,) in self._whole(connection.inbox.read(), 1)
@@ -121,9 +123,10 @@ class OperatorSockets(SocketShell):
         return [(topic.bytes, payload.bytes) for topic, payload in messages]
 
     def send(self, payload: bytes, *, everywhere: bool = False) -> bool:
-        """Send to the robot side; False, and counted in `dropped`, if it is gone or does not keep up.
+        """Send to the robot side. Return False, and count in `dropped`, if it is gone or does not keep up.
 
-        everywhere: over each connection, not only the next. Raises ValueError for more than CONTROL_LIMIT_BYTES.
+        everywhere: send over each connection, not only over the next. Raises ValueError for more than
+        CONTROL_LIMIT_BYTES.
         """
         check_size(payload, CONTROL_LIMIT_BYTES)
         taken = self._turns.send(payload, self._clock.now(), everywhere=everywhere)
@@ -162,7 +165,7 @@ class OperatorSockets(SocketShell):
         return self.offer(connection.part, payload)
 
     def _whole(self, messages: Iterator[list[zmq.Frame]], frames: int) -> Iterator[list[zmq.Frame]]:
-        """Yield the messages of `frames` frames; others are counted in `rejected`."""
+        """Yield the messages that have `frames` frames; others are counted in `rejected`."""
         for message in messages:
             if len(message) == frames:
                 yield message
@@ -170,7 +173,7 @@ class OperatorSockets(SocketShell):
                 self.rejected += 1
 
     def _look_after_handshakes(self) -> None:
-        """Connect again after a refused handshake: ZeroMQ gives up, but the key may be allowed by now."""
+        """Connect again after a refused handshake: ZeroMQ does not, but the key may have been allowed since."""
         now_s = self._clock.now()
         if now_s < self._next_look_s:
             return

@@ -1,4 +1,4 @@
-"""Peers of the robot side: connections of one key and one group are one peer."""
+"""Peers of the robot side; connections that have the same key and the same group (turns.py) are one peer."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -13,51 +13,51 @@ _REMEMBERED_CONNECTIONS: Final = 1024
 
 @dataclass(eq=False)
 class Connection(TurnConnection):
-    """State of one connection."""
+    """State of one connection, identified by its ZeroMQ routing id."""
 
     name: bytes
     """Routing id."""
     peer: "Peer"
     descriptor: int = -1
-    """Descriptor by which the last message came; -1 if unknown."""
+    """Descriptor of the TCP connection by which the last message came; -1 if unknown."""
     number: int | None = None
-    """Number of that connection at the port; 0 for an ended one, None while unknown."""
+    """Number of that TCP connection (PortConnections.number); 0 if it has ended, None while unknown."""
     hung_up: bool = False
 
     def stands_for(self, descriptor: int, number: int | None) -> None:
-        """Note that messages come by another TCP connection than before."""
+        """Note that messages of this routing id now come by the TCP connection `descriptor`, `number`."""
         self.descriptor, self.number, self.hung_up = descriptor, number, False
 
 
 @dataclass(eq=False)
 class Peer:
-    """One or more connections of the same key and group."""
+    """Peer with one or more connections of the same key and group."""
 
     name: bytes
     key: str
-    """Authenticated key; empty without keys."""
+    """Authenticated public key; empty if the robot side uses no keys."""
     turns: Turns[Connection]
 
 
 class Peers:
-    """Peers and their newest connections; without I/O."""
+    """Peers and their connections; does no I/O."""
 
     def __init__(self, offer: Callable[[Connection, bytes], Offered]) -> None:
-        """`offer` as for Turns; a connection that is gone is forgotten."""
+        """`offer` sends a payload over a connection without waiting; after GONE the connection is forgotten."""
         self.connections: dict[bytes, Connection] = {}
-        """Connections by routing id; beyond the limit the longest silent is forgotten."""
+        """Connections, keyed by routing id; beyond the limit the one that has been silent longest is forgotten."""
         self._offer = offer
         self._peers: dict[bytes, Peer] = {}
         self._received: Counter[bytes | str] = Counter()
 
     def get(self, name: bytes) -> Peer | None:
-        """Return the peer of that name while it has a connection."""
+        """Return the peer of that name; None if it has no connection."""
         return self._peers.get(name)
 
     def connection(self, name: bytes, key: str) -> Connection:
-        """Return the connection of a routing id and `key`, a new one if needed.
+        """Return the connection of the routing id `name` and `key`; make it if there is none.
 
-        A routing id that another key takes over leaves its peer: no two keys share a name.
+        If the routing id belonged to another key, that key's connection is forgotten: no two keys share a routing id.
         """
         known = self.connections.get(name)
         if known is not None and known.peer.key == key:
@@ -74,13 +74,13 @@ class Peers:
         return connection
 
     def count(self, peer: Peer) -> int:
-        """Count a message; return this second's count of the key, or of the peer without keys."""
+        """Count a message of `peer`; return how many its key has sent this second, or without keys the peer."""
         account = peer.key or peer.name
         self._received[account] += 1
         return self._received[account]
 
     def begin_second(self) -> None:
-        """Reset the counts."""
+        """Reset the counts of messages."""
         self._received.clear()
 
     def _peer(self, name: bytes, key: str) -> Peer:
@@ -100,5 +100,5 @@ class Peers:
 
 
 def peer_name_of(name: bytes, key: str) -> bytes:
-    """Name the peer that a routing id belongs to."""
+    """Return the name of the peer to which the routing id `name` belongs."""
     return peer_name(key, group_of(name))

@@ -1,32 +1,33 @@
-"""Bound on the connections of one port: introduced ones stay; of the others the newest."""
+"""Bound on the connections of one port. Introduced connections stay; of the others (newcomers) the oldest are ended."""
 
 from collections.abc import Iterator
 
 
 class PortConnections:
-    """Connections of one port by descriptor; without I/O."""
+    """Connections of one port, keyed by descriptor; does no I/O."""
 
     def __init__(self, limit: int, introduced_s: float) -> None:
-        """Allow `limit` at once. One older than `introduced_s` counts as introduced: ZeroMQ would have ended it."""
+        """Allow `limit` connections at once. One older than `introduced_s` counts as introduced, as its handshake
+        succeeded: otherwise ZeroMQ would have ended it."""
         self.hung_up = 0
-        """Number of connections that were ended as surplus."""
+        """Number of connections that were ended because of the limit."""
         self.limit = limit
         self._introduced_s = introduced_s
         self._newcomers: dict[int, float] = {}
-        """Time of each one's arrival, oldest first."""
+        """Time at which each newcomer was accepted, keyed by descriptor, oldest first."""
         self._known: set[int] = set()
         self._numbers: dict[int, int] = {}
         self._accepted = 0
 
     def accepted(self, descriptor: int, now_s: float) -> None:
-        """Add an accepted connection."""
+        """Add a connection that was just accepted, as a newcomer."""
         self.ended(descriptor)
         self._newcomers[descriptor] = now_s
         self._accepted += 1
         self._numbers[descriptor] = self._accepted
 
     def introduced(self, descriptor: int) -> None:
-        """Count the connection as introduced: it carried a message that only introduced peers can send."""
+        """Count the connection as introduced, because it carried a message after a successful handshake."""
         if self._newcomers.pop(descriptor, None) is not None:
             self._known.add(descriptor)
 
@@ -41,7 +42,10 @@ class PortConnections:
         self._numbers.pop(descriptor, None)
 
     def surplus(self, now_s: float) -> Iterator[int]:
-        """Yield the connections to end: the oldest newcomers, so that a quick handshake succeeds in any crowd."""
+        """Yield the connections beyond the limit, which the caller ends: the oldest newcomers.
+
+        So a quick handshake succeeds however many others connect.
+        """
         while self._newcomers:
             descriptor, came_s = next(iter(self._newcomers.items()))
             if now_s - came_s >= self._introduced_s:

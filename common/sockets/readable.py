@@ -1,4 +1,4 @@
-"""Frequent queries to ZeroMQ: whether a socket has a message, and who sent a frame."""
+"""Fast queries to ZeroMQ: whether a socket has a message, and who sent a frame."""
 
 from typing import Final
 
@@ -10,7 +10,7 @@ _POLLIN: Final = int(zmq.POLLIN)
 
 
 def readable(part: "zmq.Socket[bytes]") -> bool:
-    """Return whether a frame can be received at once. ZeroMQ processes the socket's pending events, too."""
+    """Return whether a frame can be received at once; ZeroMQ also processes the socket's pending events."""
     return int(part.getsockopt(EVENTS)) & _POLLIN != 0
 
 
@@ -18,7 +18,7 @@ _SOURCE: Final = int(zmq.SRCFD)
 
 
 def user_of(frame: zmq.Frame) -> str:
-    """Return the key that the connection authenticated with; empty if ZeroMQ knows none."""
+    """Return the key with which the frame's connection authenticated; empty if ZeroMQ knows none."""
     try:
         return str(frame.get("User-Id"))
     except zmq.ZMQError:
@@ -26,7 +26,7 @@ def user_of(frame: zmq.Frame) -> str:
 
 
 def descriptor_of(frame: zmq.Frame) -> int:
-    """Return the descriptor of the connection; -1 if ZeroMQ knows none."""
+    """Return the descriptor of the frame's connection; -1 if ZeroMQ knows none."""
     try:
         return int(frame.get(_SOURCE))
     except zmq.ZMQError:

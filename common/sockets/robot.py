@@ -1,4 +1,4 @@
-"""Sockets of the robot side: they distinguish peers, and cut off floods and revoked keys."""
+"""Sockets of the robot side, which distinguish peers and cut off those that flood or whose key was revoked."""
 
 import contextlib
 import select
@@ -26,18 +26,19 @@ from common.sockets.tcp_figures import TcpFigures, tcp_figures
 from common.sockets.turns import Offered
 
 PEER_LIMIT_PER_S = 5000
-"""Messages a second at which a key, or without keys a peer, is cut off: 20 times an operator's rate, and twice a
-backlog of ten seconds."""
+"""Maximum number of messages a second from one key, or without keys from one peer; above it that key or peer is cut
+off. It is 20 times an operator's rate, and twice what arrives at once after ten seconds of a blocked link."""
 HANDSHAKE_LIMIT_S = 5.0
-"""Time limit of a handshake, in seconds: CURVE takes two round trips from here, of 2 s at most in a session."""
+"""Time limit of a handshake, in seconds: CURVE takes the server two round trips, of at most 2 s each in a session."""
 MOST_CONNECTIONS = 1024
-"""Connections to each port; at most a quarter of the descriptors that this process may open."""
+"""Maximum number of connections to each port, unless a quarter of the descriptors that this process may open is
+less."""
 _EVENTS_PER_CALL = 256
-"""Events of each port, 5 us each: a storm of connections cannot block the caller."""
+"""Maximum number of events of each port per call, 5 us each, so that a storm of connections cannot block the caller."""
 
 
 class RobotSockets(SocketShell):
-    """Sockets of the robot side: they bind, distinguish peers, and with keys admit only allowed ones."""
+    """Sockets of the robot side, which are bound and distinguish peers. With `keys` they admit only allowed peers."""
 
     def __init__(
         self,
@@ -48,11 +49,11 @@ class RobotSockets(SocketShell):
         keys: RobotKeys | None = None,
         heartbeat_timeout_s: float = 3.0,
     ) -> None:
-        """Bind control to `bind` and view to `view_bind`, by default the port after.
+        """Bind the control socket to `bind` and the view socket to `view_bind`; None: the port after that of `bind`.
 
         A silent connection ends after `heartbeat_timeout_s`, which must exceed the link's real one-way delay. Raises
-        ConfigurationError for an address that is malformed, in use, not this machine's, or open to the network with
-        neither `keys` nor `insecure`.
+        ConfigurationError if an address is malformed, in use, or not this machine's. Also if it is open to the network
+        with neither `keys` nor `insecure`.
         """
         control = parse_bind(bind, "--bind")
         view = following(control, bind, "--view-bind") if view_bind is None else parse_bind(view_bind, "--view-bind")
@@ -62,14 +63,16 @@ class RobotSockets(SocketShell):
         self.flooding = 0
         """Number of messages above PEER_LIMIT_PER_S."""
         self.revoked = 0
-        """Number of messages under keys revoked since their handshake."""
+        """Number of messages from peers whose keys were revoked after their handshake."""
         self._keys = keys
         self.crowded = 0
-        """Number of connections that were ended as surplus."""
+        """Number of connections that were ended because of MOST_CONNECTIONS."""
         self._reported: list[str] = []
         self._peers = Peers(self._offer)
         self._all_seen = False
-        """Whether the gates had processed all events of connections."""
+        """Whether the gates have processed all of ZeroMQ's events, so that descriptors surely belong to their
+        connections.
+        """
         self._second = 0
         self._view_endpoint: Endpoint | None = None
         self._view_outdated = False
@@ -88,9 +91,9 @@ class RobotSockets(SocketShell):
                     keys.secure(part)
                 bind_socket(part, endpoint, flag)
             self.control_endpoint = self._control.getsockopt_string(zmq.LAST_ENDPOINT)
-            """Bound address of control, with the port that the system chose."""
+            """Bound address of the control socket, with the actual port."""
             self.view_endpoint = self._view.getsockopt_string(zmq.LAST_ENDPOINT)
-            """Bound address of view, with the port that the system chose."""
+            """Bound address of the view socket, with the actual port."""
         except BaseException:
             self.close()
             raise
@@ -101,7 +104,7 @@ class RobotSockets(SocketShell):
         return 0 if self._authenticator is None else self._authenticator.refused
 
     def news(self) -> list[str]:
-        """Return news of strangers and keys since the last call, a line each."""
+        """Return lines to show that are new since the last call: refused keys, faults of keys, too many connections."""
         news: list[str] = []
         wrong = []
         if self.crowded:
@@ -118,7 +121,7 @@ class RobotSockets(SocketShell):
         return news + [text for text in wrong if text not in reported]
 
     def refresh_keys(self) -> None:
-        """Refresh the allow-list, and cut off revoked peers; call a few times a second."""
+        """Read the allow-list again if it has changed, and cut off revoked peers; call a few times a second."""
         if self._keys is None:
             return
         revoked = self._keys.allowed.refresh()
@@ -155,9 +158,10 @@ class RobotSockets(SocketShell):
         return received
 
     def send(self, peer: bytes, payload: bytes, *, everywhere: bool = False) -> bool:
-        """Send to `peer`; False, and counted in `dropped`, if it is gone, revoked, or does not keep up.
+        """Send to `peer`. Return False, and count in `dropped`, if it is gone, revoked, or does not keep up.
 
-        everywhere: over each connection, not only the next. Raises ValueError for more than CONTROL_LIMIT_BYTES.
+        everywhere: send over each of its connections, not only over the next. Raises ValueError for more than
+        CONTROL_LIMIT_BYTES.
         """
         check_size(payload, CONTROL_LIMIT_BYTES)
         known = self._peers.get(peer)
@@ -170,14 +174,14 @@ class RobotSockets(SocketShell):
         return taken
 
     def tcp_figures(self, peer: bytes) -> TcpFigures:
-        """Return the sum of the kernel's figures of the connections to `peer`."""
+        """Return the kernel's TCP figures of all connections to `peer`, added up."""
         known = self._peers.get(peer)
         return tcp_figures(
             [] if known is None else [each.descriptor for each in known.turns.connections if each.number]
         )
 
     def publish(self, topic: bytes, payload: bytes) -> None:
-        """Send to the subscribers of `topic`; only a viewer that does not keep up loses the message.
+        """Send to all subscribers of `topic`; a viewer that does not keep up loses the message, others do not.
 
         Raises ValueError for more than VIEW_LIMIT_BYTES.
         """
@@ -193,17 +197,17 @@ class RobotSockets(SocketShell):
         return Gate(self._context, part, MOST_CONNECTIONS, HANDSHAKE_LIMIT_S, unsent_bytes)
 
     def _listen(self) -> None:
-        """Poll the gates and the view from now on; present events are processed anyway."""
+        """Register the sockets of the gates and the view for polling, which shows when connections begin or end."""
         self._comings = select.poll()
         for part in (self._view, *(gate.events for gate in self._gates)):
             self._comings.register(part.fileno(), select.POLLIN)
         self._all_seen = False
 
     def _watch_connections(self) -> None:
-        """Process both ports' arrivals and ends since the last call, and end surplus connections.
+        """Process the begins and ends of connections at both ports since the last call; end those beyond the limit.
 
-        A descriptor may belong to another connection by now, even at the other port. The owners are known only when
-        neither gate has another event. After more events than one call takes, nobody is hung up on.
+        A descriptor may belong to another connection by now, even at the other port. So its owner is certain only when
+        neither gate has further events. If there are more events than one call processes, no connection is ended.
         """
         if self._all_seen and not self._comings.poll(0):
             return
@@ -224,7 +228,7 @@ class RobotSockets(SocketShell):
                 self.crowded += 1
 
     def _replace_view(self, keys: RobotKeys) -> None:
-        """Make another view socket: a PUB socket cannot cut off single viewers, so that all must authenticate again."""
+        """Make a new view socket, so that all viewers must authenticate again: PUB cannot cut off a single viewer."""
         view = self._open_view(zmq.PUB)
         try:
             keys.secure(view)
@@ -239,7 +243,7 @@ class RobotSockets(SocketShell):
         self._view_endpoint = parse_bind(self.view_endpoint, "--view-bind")
 
     def _bind_view_again(self) -> None:
-        """Bind the new view: after a revocation the port is free only when ZeroMQ's thread has closed the old one."""
+        """Try to bind the new view socket: the port is free only after ZeroMQ's thread has closed the old socket."""
         if self._view_endpoint is not None:
             with contextlib.suppress(ConfigurationError):
                 bind_socket(self._view, self._view_endpoint, "--view-bind")
@@ -253,7 +257,11 @@ class RobotSockets(SocketShell):
         return self.offer(self._control, connection.name, payload)
 
     def _admitted(self, name: bytes, frame: zmq.Frame) -> Connection | None:
-        """Return the connection of one message if it may be decoded; each frame names its sender."""
+        """Return the connection of a message; None if its key is not allowed or sends too much.
+
+        In that case end all connections of the peer. frame: a frame of the message, by which ZeroMQ names the key and
+        the descriptor.
+        """
         key = "" if self._keys is None else user_of(frame)
         descriptor = descriptor_of(frame)
         connection, crowd = self._peers.connection(name, key), self._gates[0].connections
@@ -279,14 +287,14 @@ class RobotSockets(SocketShell):
         return None
 
     def _is_there(self, connection: Connection) -> bool:
-        """Return whether the connection is back under an old descriptor, and has not only left messages behind.
+        """Return whether the peer of the connection is still connected, rather than only its last messages unread.
 
-        ZeroMQ refuses even an empty message to a peer that has left.
+        To find out, send an empty message: ZeroMQ refuses it if the peer has left.
         """
         return self.offer(self._control, connection.name, b"") is not Offered.GONE
 
     def _hang_up(self, connection: Connection) -> None:
-        """End a connection, so that it does not fill our memory; ZeroMQ has no call for that."""
+        """End a connection by its descriptor, so that it does not fill our memory; ZeroMQ has no call for that."""
         # A message may be read long after its sender left: the descriptor may belong to another connection by now.
         number, now_number = connection.number, self._gates[0].connections.number(connection.descriptor)
         if self._all_seen and not connection.hung_up and number and number == now_number:

@@ -1,4 +1,4 @@
-"""Base of both processes' sockets: options, waiting, sending, closing."""
+"""Base of both sides' sockets: options, waiting, sending, closing."""
 
 import os
 import select
@@ -16,39 +16,40 @@ from common.sockets.readable import EVENTS
 from common.sockets.turns import Offered
 
 CONTROL_HIGH_WATER_MARK = 2
-"""Send queue of each control connection, in messages: over four, a burst of eight after a hiccup passes whole."""
+"""Length of the send queue of each control connection, in messages. Four connections take a burst of eight messages."""
 VIEW_HIGH_WATER_MARK = 8
-"""View queue on either side, in messages: both cameras' pictures, the scene and telemetry of one tick. ZeroMQ counts
-sent messages in steps of half the mark: 4 lost the telemetry, and 2 the scene, too."""
+"""Length of the view's queue at either side, in messages: enough for both cameras' pictures, the scene and the
+telemetry of one tick. ZeroMQ counts sent messages in steps of half the mark. With 4 the telemetry was lost, with 2 also
+the scene."""
 CONTROL_UNSENT_BYTES = 1024
-"""Bound on unsent bytes in the kernel, of each connection: a few messages."""
+"""Maximum number of unsent bytes of each control connection in the kernel: a few messages."""
 VIEW_UNSENT_BYTES = 16 * 1024
 RECEIVE_HIGH_WATER_MARK = 100_000
-"""Receive queue of control, in messages: never reached by a caller that drains it once per tick.
+"""Length of the control socket's receive queue, in messages: never reached by a caller that empties it once per tick.
 
-A low mark would not keep messages fresh: the kernel's buffers hold thousands more, and a drain would end at the
-mark instead of at the newest. libzmq up to 4.3.5 aborts the process when a socket at its mark finds a
-heartbeat before the end of the connection (libzmq issues 3937, 4364 and 4767).
+A low mark would not keep messages fresh: the kernel's buffers hold thousands more, and a caller that empties the queue
+would not reach the newest. And libzmq up to 4.3.5 aborts the process when a socket at its mark finds a heartbeat
+before the end of the connection (libzmq issues 3937, 4364 and 4767).
 """
 CONTROL_LIMIT_BYTES = 4096
 """Largest control payload, in bytes; the codec decodes no larger one."""
 VIEW_LIMIT_BYTES = 4 * 1024 * 1024
 _CONTROL_THREAD, _VIEW_THREAD = 0b01, 0b10
-"""Masks of ZeroMQ's threads."""
+"""Masks that assign sockets to ZeroMQ's I/O threads (option AFFINITY)."""
 _NOBLOCK, _NOBLOCK_AND_MORE = int(zmq.NOBLOCK), int(zmq.NOBLOCK | zmq.SNDMORE)
 
 
 class SocketShell:
-    """Context of control and view sockets; no call but `wait_for` blocks."""
+    """ZeroMQ context of one side's sockets; no call but `wait_for` blocks."""
 
     def __init__(self, heartbeat_timeout_s: float, handshake_limit_s: float) -> None:
-        """End a connection without a handshake after `handshake_limit_s`."""
+        """A connection ends after `heartbeat_timeout_s` of silence, or `handshake_limit_s` without a handshake."""
         if not 0.03 <= heartbeat_timeout_s <= 60.0:
             raise ValueError(f"heartbeat_timeout_s = {heartbeat_timeout_s}; valid: 0.03 to 60 seconds")
         self.dropped = 0
-        """Number of messages that could not leave at once: the peer is gone, or does not keep up."""
+        """Number of messages dropped because they could not leave at once: the peer is gone, or does not keep up."""
         self.rejected = 0
-        """Number of messages received with a wrong number of frames."""
+        """Number of received messages that had a wrong number of frames."""
         self._clock = MonotonicClock()
         # A thread each: each connection of the view resolves its host's name, and a silent name server blocks the
         # thread that asks.
@@ -103,9 +104,10 @@ class SocketShell:
         self._context.destroy(linger=0)
 
     def wait_for(self, timeout_s: float | None, awaited: Sequence[Inbox], served: Authenticator | None = None) -> bool:
-        """Wait for a message in one of `awaited`; return whether there is one in time. Serves `served` meanwhile.
+        """Wait at most `timeout_s` for a message in one of `awaited`; return whether there is one.
 
-        zmq's poll counts whole milliseconds, hence select on the descriptors.
+        Meanwhile answer the handshakes of `served`. Uses select on the descriptors, because zmq's poll counts whole
+        milliseconds.
         """
         if timeout_s is not None and not timeout_s >= 0.0:
             raise ValueError(f"timeout_s = {timeout_s}; valid: 0 or more seconds, or None for no limit")
@@ -130,7 +132,7 @@ class SocketShell:
                 remaining_s = deadline_s - self._clock.now()
 
     def offer(self, part: "zmq.Socket[bytes]", *frames: bytes) -> Offered:
-        """Send without waiting."""
+        """Send one message of `frames` over the socket `part` without waiting."""
         for _ in range(2):
             try:
                 for frame in frames[:-1]:
@@ -155,7 +157,7 @@ def check_size(payload: bytes, limit_bytes: int) -> None:
 
 
 def bind_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> None:
-    """Bind; raises ConfigurationError, one line that names `flag`, if that fails."""
+    """Bind the socket `part`; if that fails, raises ConfigurationError with one line that names `flag`."""
     part.setsockopt(zmq.IPV6, endpoint.ipv6)
     try:
         part.bind(endpoint.address)
@@ -169,7 +171,7 @@ def bind_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> Non
 
 
 def connect_socket(part: "zmq.Socket[bytes]", endpoint: Endpoint, flag: str) -> None:
-    """Connect, now or when the other side is up; raises ConfigurationError, which names `flag`, if it never can."""
+    """Connect the socket `part`, now or when the other side runs. ConfigurationError names `flag` if it never can."""
     part.setsockopt(zmq.IPV6, endpoint.ipv6)
     try:
         part.connect(endpoint.address)

@@ -1,4 +1,4 @@
-"""The kernel's figures of a TCP connection: packets sent, and sent again."""
+"""The kernel's figures of TCP connections: packets sent, packets sent again, and round trip."""
 
 import contextlib
 import socket
@@ -13,27 +13,27 @@ _ROUND_TRIP, _SENT_AGAIN, _SENT = 68, 100, 156
 
 
 class TcpFigures(NamedTuple):
-    """Number of packets with data that one or more connections sent since they began."""
+    """Numbers of packets with data that one or more connections have sent since they began."""
 
     sent: int = 0
     sent_again: int = 0
-    """Number of retransmissions among them."""
+    """Number of retransmitted packets; `sent` includes them."""
     round_trip_s: float | None = None
-    """The kernel's smoothed estimate, the least of the connections; None for none."""
+    """Least of the connections' round trips, which the kernel smooths; None if there is none."""
 
     def since(self, before: Self) -> "TcpFigures":
-        """Return the figures of the time since `before`."""
+        """Return the packets sent since the earlier figures `before`, with the present round trip."""
         sent, again = self.sent - before.sent, self.sent_again - before.sent_again
         return TcpFigures(max(sent, 0), max(again, 0), self.round_trip_s)
 
     @property
     def lost_share(self) -> float | None:
-        """Packets sent again among all sent, 0 to 1; None before the first."""
+        """Share of packets that were sent again, 0 to 1; None if none was sent."""
         return self.sent_again / self.sent if self.sent else None
 
 
 def tcp_figures(descriptors: Collection[int]) -> TcpFigures:
-    """Add up the figures of the connections with these `descriptors`; ended ones count nothing."""
+    """Add up the figures of the connections with these `descriptors`; ended connections are left out."""
     sent = again = 0
     trips_s = []
     for descriptor in descriptors:
@@ -47,7 +47,7 @@ def tcp_figures(descriptors: Collection[int]) -> TcpFigures:
 
 
 def connected_to(port: int) -> list[int]:
-    """Find the descriptors of this process's TCP connections to a peer's `port`; ZeroMQ does not name them."""
+    """Find the descriptors of this process's TCP connections to `port` at the peer; ZeroMQ does not report them."""
     found = []
     for name in Path("/proc/self/fd").iterdir():
         with contextlib.suppress(OSError):

@@ -1,1 +1,1 @@
-"""Status of each side: codes and figures in one struct a side. Words are made where people read them."""
+"""Status of each side: one struct of codes and figures for each. Only displays translate the codes into words."""

@@ -1,4 +1,4 @@
-"""Codes of a status: short and stable, for programs to compare; `common/command/words.py` has the words."""
+"""Codes of a status, short and stable, for programs to compare; `common/command/words.py` has the words for people."""
 
 from enum import StrEnum
 
@@ -12,9 +12,9 @@ class LinkState(StrEnum):
     OBSERVING = "observing"
     """Another operator owns the robot."""
     REFUSED = "refused"
-    """The other side refuses us, or is of another version."""
+    """The other side refuses us, or has another protocol version."""
     LOST = "lost"
-    """Messages arrived once, and none do now."""
+    """Messages arrived earlier, but no longer."""
 
 
 class ConnectionState(StrEnum):
@@ -24,30 +24,30 @@ class ConnectionState(StrEnum):
     """No controller has been found yet."""
     CONNECTED = "connected"
     LOST = "lost"
-    """A controller was connected, and is gone."""
+    """A controller was connected, but is not at present."""
 
 
 class Sight(StrEnum):
-    """State of the trigger field at the operator side."""
+    """Whether the operator side has a recent trigger field."""
 
     SEEING = "seeing"
     BLIND = "blind"
-    """The field has expired: intent is zero."""
+    """The field is too old: triggers are free, the intent is zero."""
     WAITING = "waiting"
-    """The field is back, but both triggers must be released first."""
+    """A field has arrived again, but both triggers must be released before the intent counts."""
 
 
 class Hands(StrEnum):
-    """Source of the hands that move the arm."""
+    """Source of the inputs that move the arm."""
 
     CONTROLLER = "controller"
     PERSON = "person"
-    """The simulated person."""
+    """The simulated person operates the controller."""
     BROWSER = "browser"
 
 
 class Doing(StrEnum):
-    """Action of the hands at the controller, or at a page that drives."""
+    """Present action of a simulated person, or of a browser page that drives the arm."""
 
     RESTING = "resting"
     ARMING = "arming"
@@ -62,14 +62,14 @@ class Doing(StrEnum):
     PULLING = "pulling"
     DONE = "done"
     NO_TARGET = "no_target"
-    """The hands would advance, but there is no target."""
+    """The person would advance, but there is no target."""
     AT_REST_FIRST = "at_rest_first"
-    """A page's: all keys but hold-to-run must be released before the arm moves."""
+    """Of a page: all keys but hold-to-run must be released before the arm moves."""
     NOBODY_DRIVES = "nobody_drives"
-    """This and the next three are a page's, too."""
+    """Of a page, like the next three: no page drives."""
     ALL_KEYS_UP_FIRST = "all_keys_up_first"
     READY = "ready"
-    """Hold-to-run takes effect."""
+    """All keys have been released: pressing hold-to-run now takes effect."""
     RUNNING = "running"
 
 
@@ -87,13 +87,13 @@ class Phase(StrEnum):
     NO_CONTROLLER = "no_controller"
     ARMED = "armed"
     BUSY = "busy"
-    """The hands act; `Doing` tells how."""
+    """A person or page acts; `Doing` has the action."""
     READY_TO_ARM = "ready_to_arm"
     STARTING = "starting"
 
 
 class Look(StrEnum):
-    """Colour of the page's border: a run's state, seen from afar."""
+    """State of a run that the colour of the console page's border shows, visible from a distance."""
 
     LOST = "lost"
     STOPPED = "stopped"

@@ -1,4 +1,4 @@
-"""Phase of a run from both sides' status: the only place with the order of severity."""
+"""Phase of a run from both sides' status. Only this file has the order of severity of the phases."""
 
 import msgspec
 
@@ -13,20 +13,20 @@ _NOBODY = OperatorStatus()
 
 
 class PhaseFacts(msgspec.Struct, frozen=True):
-    """Phase of a run, with reason and look."""
+    """Phase of a run, with its reason and the state that the page's border shows."""
 
     phase: Phase = Phase.STARTING
     doing: Doing | None = None
-    """Action, if the phase is BUSY"""
+    """Action of the person or page, if the phase is BUSY"""
     reason: str | None = None
     """Reason of the phase, for people, if a side gives one"""
     alarm: bool = False
-    """Whether the phase keeps the arm from moving against somebody's will"""
+    """Whether something unintended keeps the arm from moving"""
     look: Look = Look.STARTING
 
 
 def phase_of(robot: RobotStatus | None, operator: OperatorStatus | None) -> PhaseFacts:
-    """Return the phase by what is known of either side."""
+    """Return the phase from the status of each side; None: that side's status is unknown."""
     side, hands = operator or robot, operator or _NOBODY
     if side is None:
         return PhaseFacts()

@@ -1,4 +1,4 @@
-"""Ages of arrivals without knowledge of the clock offset: loop age (eq. 8) and queueing age."""
+"""Ages of received messages that need no clock offset: loop age (eq. 8) and queueing delay."""
 
 import math
 
@@ -6,11 +6,11 @@ from common.statistics import SlidingMinimum, SlidingQuantile
 
 
 class LoopAge:
-    """t_d of eq. 8: age of the robot's report when the reaction to it arrives, in seconds.
+    """t_d of eq. 8: age of the robot side's report when the operator's command in response arrives, in seconds.
 
-    A quantile of the loop age with peak hold: it rises at once and falls exponentially, so that stopping does not
-    make it chatter. Without samples it is the worst case, from which it falls as from any peak. Update it in every
-    tick, not only on arrivals: then a silent link ages, too.
+    t_d is a quantile of the loop ages with peak hold: it rises at once and falls exponentially, so that it does not
+    fluctuate when the arm stops. Without samples t_d is the worst case, from which it falls as from any peak. Call
+    `update` in every tick, not only on arrivals, so that t_d grows on a silent link.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class LoopAge:
         return self._held_s
 
     def reset(self) -> None:
-        """Forget all samples: the worst case holds until the next one."""
+        """Forget all samples: t_d is the worst case until the next sample."""
         self._quantile.clear()
         self._held_s = self._worst_case_s
 
@@ -52,7 +52,7 @@ class LoopAge:
         return self._quantile.value is not None
 
     def value(self, now_s: float) -> float:
-        """Return t_d at `now_s`, in seconds; without samples the worst case."""
+        """Return t_d at `now_s`, in seconds; the worst case without samples."""
         quantile_s = self._quantile.value
         if quantile_s is None:
             return self._worst_case_s
@@ -64,9 +64,9 @@ class LoopAge:
 class QueueingAge:
     """Queueing delay of a message: its one-way delay above the sliding minimum.
 
-    A constant clock offset cancels, and so does a steady delay of any length. The window counts only time in which
-    messages flow, at a resolution of a hundredth. Otherwise the minimum would expire in a long pause, and the backlog
-    after it would pass for fresh.
+    A constant clock offset cancels, and so does a constant delay. The minimum's window counts only time in which
+    messages arrive, at a resolution of a hundredth of the window. Otherwise the minimum would expire in a long pause,
+    and the delayed messages after the pause would count as fresh.
     """
 
     _RESOLUTION = 100
@@ -78,13 +78,13 @@ class QueueingAge:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the minimum, because the peer's clock has another origin."""
+        """Forget the minimum; for use after a jump of the peer's clock or a change of the link."""
         self._least_delay_s = SlidingMinimum(self._RESOLUTION)
         self._flowing_s = 0.0
         self._last_received_s: float | None = None
 
     def update(self, sent_s: float, received_s: float) -> float:
-        """Return the queueing delay, in seconds, >= 0; `sent_s` is on the peer's clock, `received_s` on ours.
+        """Add a message and return its queueing delay in seconds, >= 0. `sent_s`: peer's clock; `received_s`: ours.
 
         Raises ValueError if the stamps are not finite.
         """

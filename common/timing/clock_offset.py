@@ -1,4 +1,4 @@
-"""Clock offset of the peer, from the stamps of ordinary traffic."""
+"""Clock offset of the peer, estimated from the stamps of ordinary messages."""
 
 import math
 from typing import Literal
@@ -9,28 +9,30 @@ from common.timing.offset_tracking import OffsetTracking
 Estimator = Literal["shared clock", "interval", "lower envelope", "mean"]
 
 MAX_SKEW = 600e-6
-"""Largest skew of two clocks: 500 ppm while a time daemon slews one (adjtime), and 100 ppm between quartz crystals."""
+"""Largest skew of two clocks: 500 ppm while a time daemon slews a clock (adjtime), plus 100 ppm between crystals."""
 _CONTRADICTIONS = 8
-"""Number of contradictions in a row, in one direction, that mean a clock jump."""
+"""Number of successive contradictory stamps, in one direction, that mean a clock jump."""
 _LONGEST_S = 1000.0
-"""Longest possible delay, in seconds; beyond it stamps are invented, and must not enter any sum."""
+"""Longest possible delay, in seconds. Stamps that imply more are invalid, and must not enter any sum."""
 _REMEMBERED_ECHOES = 1024
-"""Number of remembered stamps: a second's at 1 kHz. One echoed again later counts twice, which does little harm."""
+"""Number of remembered stamps that were echoed: one second's at 1 kHz. A stamp echoed again later counts twice."""
 _ROUNDING = 1e-15
 """Relative rounding error of four operations on stamps."""
 
 
 class ClockOffset:
-    """Offset, skew and one-way delays, with a bound on the offset that holds while the clocks run within `max_skew`.
+    """Estimate of clock offset, skew and one-way delays, with a bound on the offset's error.
 
-    The estimate uses the lower envelope of the delays both ways, or the mean if both directions look symmetric: queues
-    leave a minimum unchanged, symmetric jitter has none. Neither sees an asymmetry of the delays, half of which enters
-    the offset. `asymmetry_s` corrects that: the least delay to the peer minus that from it. The bound ignores it.
-    Two processes that read the same clock (`shared_clock`) differ by exactly 0.
+    The estimate uses the lower envelope of the delays both ways, because queues leave a minimum unchanged. If the
+    delays of both directions have a symmetric distribution, it uses their mean, because symmetric jitter has no clear
+    minimum. Neither method detects unequal delays of the two directions; half of the difference enters the offset.
+    `asymmetry_s`, the least delay to the peer minus the least delay from the peer, corrects the estimate, not the
+    bound. The bound holds while the clocks' skew is within `max_skew`. Two processes that read the same clock
+    (`shared_clock`) have the offset 0.
 
-    A clock jump, as after a suspend, restarts the estimate. It is found at once if messages seem to arrive before
-    they were sent. A smaller shift of both directions against each other takes three blocks of time (2.4 s on a link
-    that has been up for a minute). Only until then may the bound be wrong.
+    A clock jump, as after a suspend, restarts the estimate. A jump is found at once if messages seem to arrive before
+    they were sent. To find a smaller one takes three blocks of time (2.4 s on a link that has been up for a minute).
+    Only until then the bound may be wrong.
     """
 
     def __init__(self, *, shared_clock: bool, asymmetry_s: float = 0.0, max_skew: float = MAX_SKEW) -> None:
@@ -39,9 +41,9 @@ class ClockOffset:
         if not 0.0 < max_skew < 0.01:
             raise ValueError(f"max_skew = {max_skew}; valid: above 0 to below 0.01")
         self.round_trip_s: float | None = None
-        """Newest round trip without the peer's holding time, of the stamp that arrived last; None before the first."""
+        """Newest round trip, without the time for which the peer held our stamp; None before the first."""
         self.rejected = 0
-        """Number of stamps that contradict each other or all earlier ones."""
+        """Number of rejected stamps: impossible by themselves, or in contradiction to all earlier ones."""
         self.jumps = 0
         """Number of clock jumps found."""
         self._shared_clock = shared_clock
@@ -70,11 +72,11 @@ class ClockOffset:
         *,
         arrived_last: bool = True,
     ) -> bool:
-        """Add one exchange: our stamp, held by the peer and echoed in a message.
+        """Add one exchange: our stamp, which the peer held for `peer_held_s` and echoed in a message.
 
         `peer_sent_s` is on the peer's clock, `local_sent_s` and `local_received_s` are on ours. `arrived_last` is False
-        if an older stamp of ours arrived after this newest one: then it is early, and no fair sample of the delay.
-        Return False, and count it in `rejected`, if the holding time is negative or longer than the whole exchange.
+        if an older stamp of ours arrived after this one: then this stamp was early, and no fair sample of the delay.
+        Return False, and count in `rejected`, if the holding time is negative or longer than the whole exchange.
         """
         round_trip_s = local_received_s - local_sent_s - peer_held_s
         if not self._is_possible(round_trip_s, peer_sent_s, peer_held_s, local_received_s):
@@ -87,10 +89,11 @@ class ClockOffset:
         return True
 
     def overtaken(self, local_sent_s: float, peer_sent_s: float, peer_held_s: float, local_received_s: float) -> bool:
-        """Add the stamp of ours that arrived last at the peer, if it is not the newest; as for `update`.
+        """Add the exchange of the stamp of ours that arrived last at the peer, if a newer stamp overtook it.
 
-        Call it after `update` with the same message's newest stamp. Otherwise delays to the peer would be biased low on
-        a link that reorders, because overtaken messages would never be echoed.
+        Parameters and result are those of `update`. Call it after `update` with the same message's newest stamp.
+        Without it delays to the peer would be biased low on a link that reorders: overtaken messages would never be
+        echoed.
         """
         round_trip_s = local_received_s - local_sent_s - peer_held_s
         if not self._is_possible(round_trip_s, peer_sent_s, peer_held_s, local_received_s):
@@ -109,7 +112,7 @@ class ClockOffset:
         return False
 
     def arrived(self, peer_sent_s: float, local_received_s: float) -> None:
-        """Add the stamps of a message without an echo; `update` does so by itself."""
+        """Add the stamps of a message without an echo; `update` calls it for messages with one."""
         if self._shared_clock:
             return
         if not (math.isfinite(peer_sent_s) and math.isfinite(local_received_s)):
@@ -166,7 +169,10 @@ class ClockOffset:
         self._start_anew(now_s)
 
     def _relative_offset_s(self, now_s: float) -> float | None:
-        """Return the offset between the origins, `now_s` from ours; None while unknown or in doubt."""
+        """Return the offset of the clocks counted from their origins; None while unknown or in doubt.
+
+        `now_s` is counted from the origin of our clock.
+        """
         if self._contradictions_to or self._contradictions_from:
             return None
         least_s, greatest_s = self._interval.at(now_s)
@@ -180,7 +186,7 @@ class ClockOffset:
         return greatest_s if likeliest_s > greatest_s else likeliest_s
 
     def offset_at(self, now_s: float) -> float | None:
-        """Return the peer's clock minus ours at `now_s` on ours, in seconds; None while unknown or in doubt."""
+        """Return the peer's clock minus ours, in seconds, at `now_s` on our clock; None while unknown or in doubt."""
         if self._shared_clock:
             return 0.0
         if self._origin_s is None:
@@ -189,9 +195,9 @@ class ClockOffset:
         return None if offset_s is None else self._peer_origin_s - self._origin_s + offset_s
 
     def bound_at(self, now_s: float) -> float | None:
-        """Return the largest possible error of `offset_at`, in seconds, for any delays; None while unknown.
+        """Return the largest possible error of `offset_at`, in seconds, whatever the delays are; None while unknown.
 
-        Half the least round trip if the offset lies in the middle of the possible interval, otherwise more.
+        The bound is half the least round trip if the offset lies in the middle of the possible interval, else more.
         """
         if self._shared_clock:
             return 0.0
@@ -208,17 +214,17 @@ class ClockOffset:
 
     @property
     def offset_s(self) -> float | None:
-        """Offset at the newest arrival."""
+        """`offset_at` the time of the newest arrival."""
         return self.offset_at(self._now_s + (self._origin_s or 0.0))
 
     @property
     def bound_s(self) -> float | None:
-        """Bound at the newest arrival."""
+        """`bound_at` the time of the newest arrival."""
         return self.bound_at(self._now_s + (self._origin_s or 0.0))
 
     @property
     def skew(self) -> float | None:
-        """Skew: gain of the peer's clock on ours, in seconds a second; None while unknown."""
+        """Seconds that the peer's clock gains on ours in a second; None while unknown."""
         if self._shared_clock:
             return 0.0
         line = self._tracking.line
@@ -226,7 +232,7 @@ class ClockOffset:
 
     @property
     def estimator(self) -> Estimator | None:
-        """Source of the offset; None while unknown."""
+        """Method by which the offset is estimated; None while the offset is unknown."""
         if self._shared_clock:
             return "shared clock"
         if self.offset_s is None:
@@ -235,13 +241,13 @@ class ClockOffset:
 
     @property
     def settled(self) -> bool:
-        """Whether the offset rests on about a second of messages both ways."""
+        """Whether the offset is estimated from at least about a second of messages both ways."""
         return self._shared_clock or self._tracking.settled
 
     def one_way_from_peer_s(self, peer_sent_s: float, local_received_s: float) -> float | None:
         """Return the one-way delay of a message from the peer, in seconds; None while the offset is unknown.
 
-        The delay is as uncertain as the offset. Never below 0 for stamps that were accepted.
+        The delay is as uncertain as the offset. It is never below 0 for stamps that were accepted.
         """
         if self._shared_clock:
             return local_received_s - peer_sent_s

@@ -1,4 +1,4 @@
-"""Clock differences of one direction of a link, summed over blocks of time in bounded memory.
+"""Clock differences of one direction of a link, summarised over blocks of time in bounded memory.
 
 A clock difference is the receiver's stamp of a message minus the sender's: delay plus clock offset.
 """
@@ -8,21 +8,21 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 MOST_BLOCKS = 64
-"""Number of blocks kept of one direction."""
+"""Maximum number of blocks kept of one direction."""
 _LEAST_COUNT_FOR_SHAPE = 8
 _LEAST_VARIANCE_FOR_SHAPE_S2 = 0.1e-3**2
-"""Least variance for a shape, in s²: jitter below 0.1 ms has the shape of the clocks' drift, not of the link."""
+"""Least variance, in s², with which a skewness is computed: below 0.1 ms the clocks' drift dominates the jitter."""
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Summary of the samples in a block of time; times in seconds from the estimator's origin."""
+    """Summary of the clock differences in a block of time; times are in seconds from the estimator's origin."""
 
     least_s: float
-    """Least difference; the next field is its time."""
+    """Least difference; `least_at_s` is its time."""
     least_at_s: float
     count: int
-    """Number of fair samples of all arrivals, which the moments describe."""
+    """Number of fair samples (see BlockTrack.add), which the mean, squares, cubes and skewness describe."""
     mean_at_s: float
     mean_s: float
     squares_s2: float
@@ -30,10 +30,14 @@ class Block:
     cubes_s3: float
     """Sum of the cubed deviations from the mean."""
     skewness: float | None
-    """Third standardised moment: 0 if symmetric, 2 for an exponential; None for too few or too similar samples."""
+    """Third standardised moment: 0 if symmetric, 2 for an exponential distribution. None for too few or too similar
+    samples."""
 
     def merged(self, later: "Block") -> "Block":
-        """Merge two blocks. Combining central moments: Chan, Golub and LeVeque 1979; Terriberry 2007 for the third."""
+        """Merge with `later` into one block.
+
+        Moments are combined after Chan, Golub and LeVeque 1979, the third after Terriberry 2007.
+        """
         least = self if self.least_s <= later.least_s else later
         if not self.count or not later.count:
             full = self if self.count else later
@@ -71,7 +75,7 @@ def _skewness(count: int, squares_s2: float, cubes_s3: float) -> float | None:
 
 
 class BlockTrack:
-    """Blocks of one direction, oldest first, and the open one that samples enter."""
+    """Closed blocks of one direction, oldest first, and the open block to which samples are added."""
 
     def __init__(self) -> None:
         self.blocks: deque[Block] = deque()
@@ -85,9 +89,9 @@ class BlockTrack:
         self._times_s = self._sum_s = self._squares_s2 = self._cubes_s3 = 0.0
 
     def add(self, at_s: float, difference_s: float, *, fair: bool = True) -> None:
-        """Add one sample at `at_s`.
+        """Add one sample, of time `at_s`, to the open block.
 
-        `fair` is False for a sample that was selected as early: it enters the least difference, not the moments.
+        `fair` is False for a sample that was selected because it was early: it counts only for the least difference.
         """
         if difference_s < self._least_s:
             self._least_s, self._least_at_s = difference_s, at_s
@@ -103,7 +107,7 @@ class BlockTrack:
             self._cubes_s3 += square_s2 * deviation_s
 
     def close(self) -> Block | None:
-        """Close the open block and open another; return the closed one, not kept yet, or None if it was empty."""
+        """Open a new block; return the previous one, or None if it was empty. `keep` adds it to `blocks`."""
         if self._least_s == math.inf:
             return None
         count = self._count
@@ -124,7 +128,7 @@ class BlockTrack:
         return block
 
     def keep(self, block: Block, oldest_s: float) -> None:
-        """Append `block`; forget those whose least sample is before `oldest_s`, and the oldest beyond `MOST_BLOCKS`."""
+        """Append `block`; forget old blocks: those with the least sample before `oldest_s`, or beyond `MOST_BLOCKS`."""
         blocks = self.blocks
         blocks.append(block)
         while len(blocks) > MOST_BLOCKS or blocks[0].least_at_s < oldest_s:
@@ -133,7 +137,7 @@ class BlockTrack:
                 return
 
     def coarsen(self) -> None:
-        """Merge the blocks two by two; of an odd number the last is kept."""
+        """Merge the blocks two by two; the last of an odd number stays as it is."""
         blocks = list(self.blocks)
         merged = [one.merged(other) for one, other in zip(blocks[::2], blocks[1::2], strict=False)]
         self.blocks = deque(merged + blocks[2 * len(merged) :])

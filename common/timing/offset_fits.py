@@ -1,7 +1,8 @@
-"""Straight lines through two directions' clock differences: offset and skew of the peer's clock.
+"""Fits of a straight line to the clock differences of both directions: offset and skew of the peer's clock.
 
-Both directions see the same line, one from above and one from below. Messages to the peer differ by delay + offset,
-those from it by delay − offset. The lower envelope assumes equal least delays, the mean equal average ones.
+The clock difference of a message to the peer is delay + offset; of a message from the peer it is delay − offset. So
+one direction bounds the offset from above, the other from below. The lower envelope assumes that the least delays of
+both directions are equal; the mean assumes that the average delays are equal.
 """
 
 import math
@@ -13,7 +14,7 @@ from statistics import median
 from common.timing.difference_blocks import Block
 
 TYPICAL_SKEW = 50e-6
-"""Prior standard deviation of the skew: quartz crystals are specified to 20 to 100 ppm."""
+"""Prior standard deviation of the skew: quartz crystals have tolerances of 20 to 100 ppm."""
 _LEAST_SCALE_S = 1e-6
 _HALVINGS = 24
 
@@ -23,7 +24,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class OffsetLine:
-    """Offset in seconds that changes by `skew` seconds a second."""
+    """Clock offset that is `offset_s` at the time `at_s` and changes by `skew` seconds a second."""
 
     at_s: float
     offset_s: float
@@ -36,7 +37,7 @@ class OffsetLine:
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """Line under one direction's differences, and the mean height of the blocks' least differences above it."""
+    """Line under one direction's clock differences; `scale_s` is the mean height of the blocks' least ones above it."""
 
     difference_s: float
     """Difference at time 0."""
@@ -58,7 +59,7 @@ class Envelope:
 
 
 class _Hull:
-    """Lower convex hull of points, with the supporting line of a given slope."""
+    """Lower convex hull of points, with its supporting line for a given slope."""
 
     def __init__(self, points: Iterable[Point], slope: float) -> None:
         ordered = sorted(points)
@@ -80,7 +81,7 @@ class _Hull:
 
 
 def _lower_hull(ordered: Sequence[Point]) -> list[Point]:
-    """Return the hull by Andrew's monotone chain over points in ascending order."""
+    """Return the lower convex hull of points in ascending order (Andrew's monotone chain)."""
     hull: list[Point] = []
     for at_s, value_s in ordered:
         if hull and hull[-1][0] == at_s:  # ascending, hence not lower
@@ -95,10 +96,11 @@ def _lower_hull(ordered: Sequence[Point]) -> list[Point]:
 
 
 def fit_envelope(to_peer: Sequence[Block], from_peer: Sequence[Block], max_skew: float, skew: float) -> Envelope:
-    """Fit the likeliest line if the blocks' least delays exceed one floor each way exponentially.
+    """Fit the likeliest offset line, if the least delays exceed a floor in each direction by exponential amounts.
 
-    That is a hull's supporting line (Moon, Skelly and Towsley 1999), here for both directions at once, with a normal
-    prior of `TYPICAL_SKEW` on the skew, within ± `max_skew`. `skew` is a first guess. Neither sequence may be empty.
+    It is a supporting line of the convex hull (Moon, Skelly and Towsley 1999), here for both directions at once. The
+    skew has a normal prior with the standard deviation `TYPICAL_SKEW`, and is within ± `max_skew`; `skew` is a first
+    guess. Neither sequence may be empty.
     """
     upper = _Hull(((block.least_at_s, block.least_s) for block in to_peer), skew)
     lower = _Hull(((block.least_at_s, block.least_s) for block in from_peer), -skew)
@@ -125,7 +127,7 @@ def fit_envelope(to_peer: Sequence[Block], from_peer: Sequence[Block], max_skew:
 
 
 class Average:
-    """Averages of one direction's blocks; at least one block, each with a count above 0."""
+    """Averages over the blocks of one direction. There must be at least one block, and each count must be above 0."""
 
     def __init__(self, blocks: Sequence[Block]) -> None:
         self._blocks = blocks
@@ -139,9 +141,10 @@ class Average:
         self.at_s = times_s / count
         self.mean_s = values_s / count
         self.variance_s2 = max(squares_s2 / count, _LEAST_SCALE_S**2)
-        """Variance of a sample about its block's mean."""
+        """Variance of the samples about the means of their blocks."""
         self.spread_s2 = self.tilt_s2 = 0.0
-        """Sums over the samples: squared time from `at_s`, and time multiplied with the difference."""
+        """Sums over the samples: of the squared time from `at_s`, and of that time times the difference from
+        `mean_s`."""
         for block in blocks:
             weight_s = block.count * (block.mean_at_s - self.at_s)
             self.spread_s2 += weight_s * (block.mean_at_s - self.at_s)
@@ -150,7 +153,7 @@ class Average:
     def wander(self, slope: float) -> float:
         """Return the median deviation of the blocks' means from a line of `slope`, in standard errors.
 
-        Independent delays give 0.67. Much more means a cause slower than a block, such as a queue.
+        Independent delays give 0.67. Much more means that delays vary more slowly than a block lasts, as by a queue.
         """
         strays = [
             abs(block.mean_s - self.mean_s - slope * (block.mean_at_s - self.at_s)) * math.sqrt(block.count)
@@ -160,7 +163,7 @@ class Average:
 
 
 def fit_mean(to_peer: Average, from_peer: Average, max_skew: float) -> OffsetLine:
-    """Fit the least-squares line through the blocks' means, with the same prior on the skew, within ± `max_skew`."""
+    """Fit the least-squares line through the blocks' means. Prior and limits of the skew are as in `fit_envelope`."""
     information = to_peer.spread_s2 / to_peer.variance_s2 + from_peer.spread_s2 / from_peer.variance_s2
     tilt = to_peer.tilt_s2 / to_peer.variance_s2 - from_peer.tilt_s2 / from_peer.variance_s2
     skew = min(max(tilt / (information + TYPICAL_SKEW**-2), -max_skew), max_skew)
@@ -168,6 +171,6 @@ def fit_mean(to_peer: Average, from_peer: Average, max_skew: float) -> OffsetLin
 
 
 def typical_skewness(blocks: Iterable[Block], least_blocks: int) -> float | None:
-    """Return the blocks' median skewness, robust to a few stalls; None for fewer than `least_blocks` values."""
+    """Return the median skewness of the blocks, robust to single delays. None if fewer than `least_blocks` have one."""
     found = [block.skewness for block in blocks if block.skewness is not None]
     return median(found) if len(found) >= least_blocks else None

@@ -8,34 +8,36 @@ from common.timing.offset_fits import Average, Envelope, OffsetLine, fit_envelop
 _FIRST_BLOCK_S = 0.1
 _LAST_BLOCK_S = 0.8
 _HORIZON_S = 60.0
-"""Age at which blocks are forgotten, in seconds: the skew changes with the temperature."""
+"""Age at which blocks are forgotten, in seconds, because the skew changes with the temperature."""
 _SETTLED_BLOCKS = 10
 _SYMMETRIC = (0.5, 0.8)
-"""Skewness below which the mean is used, and above which it is left; an exponential has 2, a normal 0."""
+"""Skewness up to which the mean begins to be used, and above which it is used no longer. An exponential distribution
+has 2, a normal one 0."""
 _STEADY = (2.0, 3.0)
-"""Like limits for the wander of the blocks' means; independent delays have 0.67."""
+"""The same two limits for `Average.wander` of the blocks' means; independent delays have 0.67."""
 _SHIFT_SCALES = 8.0
 _LEAST_SHIFT_S = 1e-3
 _SHIFTED_BLOCKS = 2
 _DOUBTFUL_BLOCKS = 5
-"""Number of doubtful blocks after which a shorter delay is believed."""
+"""Number of successive doubtful blocks after which the delay counts as really shorter."""
 
 
 class OffsetTracking:
-    """Blocks of both directions and the line through them.
+    """Blocks of both directions, and the offset line fitted to them.
 
-    The line is the lower envelope, or the mean if both directions look symmetric: queues leave a minimum unchanged,
-    symmetric jitter has none. Blocks last 0.1 s at first, for an early answer, and 0.8 s in the end. All times and
-    differences are in seconds from origins that the caller chose near them.
+    The line is the lower envelope, because queues leave a minimum unchanged. If the delays of both directions have a
+    symmetric distribution, it is the mean, because symmetric jitter has no clear minimum. Blocks last 0.1 s at first,
+    for an early result, and 0.8 s later. Times and differences are in seconds from an origin that the caller chose
+    on each clock.
     """
 
     def __init__(self) -> None:
         self.to_peer = BlockTrack()
         self.from_peer = BlockTrack()
         self.line: OffsetLine | None = None
-        """Offset line; None until both directions have a block."""
+        """Fitted offset line; None until both directions have a block."""
         self.estimator: Literal["lower envelope", "mean"] = "lower envelope"
-        """Kind of `line`."""
+        """Method by which `line` was fitted."""
         self._envelope: Envelope | None = None
         self._block_s = _FIRST_BLOCK_S
         self._block_ends_s = _FIRST_BLOCK_S
@@ -44,13 +46,14 @@ class OffsetTracking:
 
     @property
     def settled(self) -> bool:
-        """Whether both directions have enough blocks to judge their shape."""
+        """Whether both directions have enough blocks to judge the distribution of their delays."""
         return min(len(self.to_peer.blocks), len(self.from_peer.blocks)) >= _SETTLED_BLOCKS
 
     def advance(self, now_s: float, max_skew: float) -> bool:
-        """Close the block if its time is over; return True on a clock jump, after which the object is useless.
+        """Close the open blocks if their time is over. Return True on a clock jump; then discard this object.
 
-        Sign of a jump: in successive blocks one delay falls by as much as the other rises, which no route causes.
+        A jump shows in successive blocks: the delay of one direction falls by as much as that of the other rises, which
+        no change of route causes.
         """
         if now_s < self._block_ends_s:
             return False
@@ -69,7 +72,7 @@ class OffsetTracking:
         return False
 
     def _is_doubtful(self, to_peer: Block | None, from_peer: Block | None) -> bool:
-        """Return whether the newest blocks lie so far below the envelope that a clock may have jumped."""
+        """Return whether one of the newest blocks lies so far below the envelope that a clock may have jumped."""
         if self._envelope is None or not self.settled or to_peer is None or from_peer is None:
             return False
         to_floor, from_floor = self._envelope.to_peer, self._envelope.from_peer
@@ -95,7 +98,7 @@ class OffsetTracking:
             self.line, self.estimator = mean, "mean"
 
     def _fit_mean(self, max_skew: float) -> OffsetLine | None:
-        """Fit the line through the means; None if the delays seem to have a floor."""
+        """Fit the line through the means; None if delays look asymmetric, or change slowly as those of a queue do."""
         leaving = self.estimator == "mean"  # hysteresis: harder to leave than to enter
         tracks = self.to_peer, self.from_peer
         for track in tracks:

@@ -1,1 +1,1 @@
-"""Decoding of H.264 pictures, each the changes since the previous one, to JPEG, through PyAV."""
+"""Conversion, through PyAV, of H.264 pictures to JPEG; most of them hold only the changes since the previous one."""

@@ -1,4 +1,4 @@
-"""Conversion of a view's H.264 pictures to JPEG, for pages and files."""
+"""Conversion of the views' H.264 pictures (VideoStep) to JPEG (VideoFrame), for pages and files."""
 
 from fractions import Fraction
 from typing import Final
@@ -11,21 +11,22 @@ from common.protocol.view_messages import VIEW_NAMES, VideoFrame, VideoStep, Vie
 
 _MOST_PIXELS: Final = 4096 * 4096
 _JPEG_SCALE: Final = 2
-"""Scale of FFmpeg's MJPEG, 1 to 31: 2 is about JPEG 90. These bytes never cross a link."""
+"""Quantiser scale of FFmpeg's MJPEG, 1 (best) to 31; 2 is about JPEG quality 90. These pictures never cross the
+link."""
 
 
 class Steps:
-    """Decoder of every view's steps, in order of arrival."""
+    """Converter of the VideoSteps of all views, which it takes in order of arrival."""
 
     def __init__(self) -> None:
-        """Raises av.FFmpegError or ValueError if this FFmpeg has no H.264 or no JPEG."""
+        """Raises av.FFmpegError or ValueError if the installed FFmpeg has no H.264 decoder or no JPEG encoder."""
         _decoder()
         _jpeg_encoder(16, 16)
         self._views: dict[ViewName, _View] = {}
 
     @property
     def lacks(self) -> tuple[int, int]:
-        """Newest picture of each view that could not be shown, for `Watch`; 0 for none."""
+        """For each view, number of the newest picture if it could not be shown, else 0; sent as `Watch.lacks`."""
         first, second = (view.lacks if (view := self._views.get(name)) else 0 for name in VIEW_NAMES)
         return first, second
 

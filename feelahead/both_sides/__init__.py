@@ -1,1 +1,1 @@
-"""Robot side and operator side together: in one process and virtual time, or as two processes."""
+"""Run robot side and operator side together: in one process and virtual time, or as two processes in real time."""

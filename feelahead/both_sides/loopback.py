@@ -1,4 +1,4 @@
-"""Both sides in one process in virtual time: the same cores, bytes and delay lines; no sockets, no sleeps.
+"""Both sides in one process in virtual time: the cores, bytes and delay lines of the real sides, without sockets.
 
 Events happen exactly when they are due, in order of time, so that the same settings and seed give the same
 numbers on every machine.
@@ -35,11 +35,11 @@ from robot_side.parts import SceneParts, build_parts
 from robot_side.settings import RobotSettings
 
 _WALL = MonotonicClock()
-"""Clock for the durations of ticks, and nothing else."""
+"""Real clock, only to measure how long ticks take."""
 _PEER = b"loopback"
 VIRTUAL_CLOCK = "virtual"
 _STREAMS: tuple[Stream, ...] = ("haptics", "telemetry")
-"""Streams to the operator; nobody watches views here."""
+"""Streams to the operator side; pictures and scene are left out, as nobody watches views here."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class LoopbackSettings:
 
 
 def robot_parts(settings: RobotSettings, scene: Scene | None = None) -> SceneParts:
-    """Make the robot side's parts for a virtual clock, in `scene` or the one of the settings."""
+    """Make the robot side's parts for a virtual clock, in `scene` or else in the scene that the settings name."""
     return build_parts(settings, 1, VIRTUAL_CLOCK, scene)
 
 
@@ -59,7 +59,7 @@ class Person(Protocol):
     """Person with the controller in their hands."""
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Look at the screen and move the hands; `delay_s` is the round trip to which the person is accustomed."""
+        """Look at the telemetry `screen`, and move the controller. delay_s: mean round trip, which the person knows."""
 
 
 class Loopback:
@@ -77,18 +77,17 @@ class Loopback:
         operator_listeners: Sequence[operator_events.Listener] = (),
         tick_period_s: float = TICK_PERIOD_S,
     ) -> None:
-        """parts: the robot side's, instead of those of the settings (see `robot_parts`).
+        """parts: the robot side's parts, instead of those that the settings give (see `robot_parts`).
 
-        person: replaces the scripted one.
-
-        tick_period_s: period of the robot side; the physics keeps its steps, and fields come at most each 10 ms.
-
-        pages: pages of the console, as the person knows them.
-        listeners, operator_listeners: receive the events of the two cores.
+        device: the simulated controller; a new one if None. person: makes the person who holds it; the scripted person
+        if None. pages: the console's pages, from which an emergency stop or tuning may come.
+        tick_period_s: period of the robot side's ticks. The steps of the physics do not depend on it, and the law
+        evaluates each trigger at most every 10 ms.
+        listeners, operator_listeners: receive the events of the robot side's and the operator side's core.
         """
         self.clock = VirtualClock()
         self.robot = RobotSide(parts or robot_parts(settings.robot), listeners)
-        # After the scene, which decides which kernels exist.
+        # After the scene was loaded, as it decides which kernels are imported.
         warm_up()
         self.operator = build_operator_side(settings.operator, 2, VIRTUAL_CLOCK, operator_listeners)
         self.device = device or SimulatedDualSense()
@@ -116,7 +115,7 @@ class Loopback:
         self._motions = 0
 
     def run_until(self, end_s: float) -> None:
-        """Run until `end_s`, on the virtual clock."""
+        """Advance the virtual clock to `end_s`, and process all events until then."""
         while (due_s := self._next_event()) <= end_s:
             self.clock.advance_to(due_s)
             self._deliver(due_s)
@@ -132,7 +131,7 @@ class Loopback:
         self.clock.advance_to(end_s)
 
     def summary(self) -> dict[str, Any]:
-        """Return the demo's summary; only the tick times are real and differ from run to run."""
+        """Return a summary like the demo's; only its tick times are in real time, and so differ from run to run."""
         merged = merge_summaries(self.robot.summary(), self.operator.summary(), [])
         merged["duration_s"] = self.clock.now()
         merged["tick_us"] = microseconds(self.tick_time)
@@ -144,7 +143,7 @@ class Loopback:
     def _next_event(self) -> float:
         dues = [self._ticks * self._tick_period_s, self._motions * MOTION_PERIOD_S]
         dues += [due for line in (self._to_robot, *self._to_operator.values()) if (due := line.next_due()) is not None]
-        # A message that is due at once, within an instant, must not turn the clock back.
+        # The clock must not go back for a message whose time has just passed.
         return max(min(dues), self.clock.now())
 
     def _deliver(self, now_s: float) -> None:

@@ -1,4 +1,4 @@
-"""Memory and descriptors of a process, as reported by Linux."""
+"""Memory and open file descriptors of a process, as Linux reports them."""
 
 from pathlib import Path
 
@@ -13,9 +13,9 @@ def resident_mb(process_id: int | str = "self") -> float:
                 return int(line.split()[1]) / 1024.0
     except OSError:
         pass
-    raise FeelaheadError(f"process {process_id} tells no VmRSS; valid: a running process on Linux")
+    raise FeelaheadError(f"process {process_id} reports no VmRSS; valid: a running process on Linux")
 
 
 def descriptors(process_id: int | str = "self") -> int:
-    """Return the number of open descriptors."""
+    """Return how many file descriptors the process has open."""
     return sum(1 for _ in Path(f"/proc/{process_id}/fd").iterdir())

@@ -1,4 +1,4 @@
-"""Sides as child processes that report to this one by lines of JSON."""
+"""Sides as child processes, which report events to this process as lines of JSON."""
 
 import json
 import queue
@@ -18,14 +18,14 @@ _STOP_PERIOD_S = 0.05
 
 
 class SideFailedError(FeelaheadError):
-    """A side ended by itself with an error; the text is the side's."""
+    """A side ended with an error (the text is the side's), ended early, or reported nothing in time."""
 
 
 class StartedSide:
-    """Side with `--status json`, started by a command; a thread reads the events, so that the side never blocks."""
+    """Side with `--status json`, started by a command; a thread reads its output, so that the side never blocks."""
 
     def __init__(self, name: str, command: Sequence[str]) -> None:
-        """Start the command."""
+        """Start `command`; `name` is the side's name in messages."""
         self.name = name
         self._errors = tempfile.TemporaryFile(mode="w+", encoding="utf-8", errors="replace")  # noqa: SIM115  # closed by __exit__
         self._process = subprocess.Popen(
@@ -56,7 +56,7 @@ class StartedSide:
 
     @property
     def process_id(self) -> int:
-        """Process id."""
+        """Id of the side's process."""
         return self._process.pid
 
     @property
@@ -72,7 +72,10 @@ class StartedSide:
         return said
 
     def wait_for(self, kind: str, timeout_s: float) -> dict[str, Any]:
-        """Return the next event of this kind; raises SideFailedError if the side ends or is silent too long."""
+        """Return the next event of this kind.
+
+        Raises SideFailedError if the side ends, or if no event of any kind comes for `timeout_s`.
+        """
         event = self.wait_unless(kind, timeout_s, None)
         assert event is not None  # noqa: S101  # no stop signal
         return event
@@ -84,7 +87,10 @@ class StartedSide:
         stop: StopSignal | None,
         meanwhile: Callable[[dict[str, Any]], None] | None = None,
     ) -> dict[str, Any] | None:
-        """Wait like `wait_for`; None once `stop` is set. `meanwhile` or, later, `events` gets the others."""
+        """Wait like `wait_for`, but return None once `stop` is set.
+
+        Events of other kinds are passed to `meanwhile`; without it, the next `events` returns them.
+        """
         remaining_s = timeout_s
         while True:
             try:
@@ -96,7 +102,7 @@ class StartedSide:
                 if remaining_s > 0.0:
                     continue
                 self.check()
-                raise SideFailedError(f"the {self.name} side said nothing for {timeout_s:g} s") from None
+                raise SideFailedError(f"the {self.name} side reported nothing for {timeout_s:g} s") from None
             remaining_s = timeout_s
             if event["event"] == kind:
                 return event
@@ -107,32 +113,35 @@ class StartedSide:
             (meanwhile or self._kept_events.append)(event)
 
     def check(self) -> None:
-        """Raise SideFailedError, with the side's text, if it ended with an error; ConfigurationError for bad input."""
+        """Raise SideFailedError, with the side's last line, if the side ended with an error.
+
+        Raise ConfigurationError instead if the side refused its arguments.
+        """
         code = self._process.poll()
         if self._interrupted and not self._has_spoken:
-            # Our interrupt came before the side had its handlers, which no side can prevent.
+            # Our interrupt came before the side could handle signals: its exit code is no error.
             return
         if code not in (None, 0):
             self._errors.seek(0)
             said = self._errors.read().strip().splitlines()
-            reason = said[-1] if said else "without a word"
+            reason = said[-1] if said else "it gave no reason"
             if code == _BAD_INPUT:
-                # The bad input is ours: our arguments went on to the side.
+                # The user's arguments were passed on to the side, so the fault is in them.
                 raise ConfigurationError(reason.partition(": ")[2] or reason)
             raise SideFailedError(f"the {self.name} side ended with code {code}: {reason}")
 
     def interrupt(self) -> None:
-        """Interrupt the side like Ctrl-C, only once: a second signal could come while it writes the summary."""
+        """Interrupt the side as Ctrl-C does, once only: a second signal could disturb its writing of the summary."""
         if self.running and not self._interrupted:
             self._interrupted = True
             self._process.send_signal(signal.SIGINT)
 
     def wait(self, timeout_s: float) -> int:
-        """Wait for the end and return the exit code; raises subprocess.TimeoutExpired."""
+        """Wait for the side's end; return its exit code. Raises subprocess.TimeoutExpired after `timeout_s`."""
         return self._process.wait(timeout=timeout_s)
 
     def stop(self, timeout_s: float = 10.0) -> int:
-        """Interrupt the side, wait, kill it only after `timeout_s`, and return the exit code."""
+        """Interrupt the side and wait for its end, kill it after `timeout_s`, and return the exit code."""
         self.interrupt()
         try:
             return self._process.wait(timeout=timeout_s)
@@ -155,9 +164,9 @@ class StartedSide:
 
 
 class SideProcess(StartedSide):
-    """Side as a process of this machine, in this Python."""
+    """Side that runs as a process on this machine, with this Python."""
 
     def __init__(self, module: str, name: str, arguments: Sequence[str], before: Sequence[str] = ()) -> None:
-        """Run `module` with `arguments`; `before` is a command that runs it."""
+        """Run `module` with `arguments`. before: words in front of the command, such as a program that runs it."""
         # -P: a folder named `common` in the working directory must not shadow the package.
         super().__init__(name, [*before, sys.executable, "-P", "-m", module, "--status", "json", *arguments])

@@ -1,4 +1,4 @@
-"""Both sides in real time, as processes anywhere: from the start of the link to the end."""
+"""Run both sides in real time, as processes on this machine or in containers."""
 
 import tempfile
 import threading
@@ -14,30 +14,35 @@ from feelahead.both_sides.processes import SideProcess, StartedSide
 from feelahead.both_sides.summary import read_summary
 
 START_S: Final = 600.0
-"""Time limit of a start, in seconds: the first one compiles kernels, which takes minutes on a busy machine."""
+"""Time limit for a side to start, in seconds: the first start compiles kernels, for minutes on a busy machine."""
 LINK_S: Final = 30.0
 """Time limit for the link to come up, in seconds."""
 _PAUSE_S: Final = 0.1
 
 
 class Both(NamedTuple):
-    """Both sides' processes."""
+    """Running processes of both sides, and the robot side's addresses."""
 
     robot: SideProcess
     operator: SideProcess
     control: str
+    """Address of the robot side's control port"""
     view: str
-    """Both are addresses of the robot side."""
+    """Address of the robot side's view port"""
     folder: Path
+    """Folder of both summaries"""
 
     def summaries(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Read the summaries that both have written at the end."""
+        """Read the summaries that both sides have written at their end: the robot side's, and the operator side's."""
         return read_summary(self.folder / "robot.json"), read_summary(self.folder / "operator.json")
 
 
 @contextmanager
 def started(robot: Sequence[str], operator: Sequence[str], program: str = "robot_side") -> Iterator[Both]:
-    """Start both on 127.0.0.1 with these flags and a simulated controller; `program`: the robot side's module."""
+    """Start both sides on 127.0.0.1 with a simulated controller.
+
+    robot, operator: further flags of each side. program: module to run as the robot side.
+    """
     with tempfile.TemporaryDirectory(prefix="feelahead-") as name, ExitStack() as stack:
         folder = Path(name)
         ours = ["--bind=tcp://127.0.0.1:0", f"--summary={folder / 'robot.json'}", *robot]
@@ -50,7 +55,10 @@ def started(robot: Sequence[str], operator: Sequence[str], program: str = "robot
 
 
 def run_for(robot: StartedSide, operator: StartedSide, duration_s: float) -> None:
-    """Run both for `duration_s` once the link is up, then end them; raises SideFailedError if one fails."""
+    """Let both sides run for `duration_s` from when the link is up, then end them.
+
+    Raises SideFailedError if a side fails, FeelaheadError if no link comes up or a side ends early.
+    """
     clock, pause = MonotonicClock(), threading.Event()
     limit_s = clock.now() + LINK_S
     while operator.wait_for("status", LINK_S).get("link") != LinkState.UP:
@@ -69,7 +77,10 @@ def run_for(robot: StartedSide, operator: StartedSide, duration_s: float) -> Non
 
 
 def end(robot: StartedSide, operator: StartedSide) -> None:
-    """End both at once, so that neither takes the other's end for a link fault; raises SideFailedError if one fails."""
+    """End both sides at once, so that neither reports the other's end as a fault of the link.
+
+    Raises SideFailedError if a side ended with an error.
+    """
     for side in (operator, robot):
         side.interrupt()
     for side in (operator, robot):

@@ -1,4 +1,4 @@
-"""Summary of a run from both sides' summaries."""
+"""Merge both sides' summaries into the summary of the run."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -7,9 +7,10 @@ from typing import Any
 
 
 def merge_summaries(robot: Mapping[str, Any], operator: Mapping[str, Any], errors: Sequence[str]) -> dict[str, Any]:
-    """Merge both sides' summaries; the robot side's value wins where both have one.
+    """Merge both sides' summaries; for a key that both have, take the robot side's value.
 
-    Counts that both sides have (`rejected`, `stale`, `dropped_blocks`) are added; nested tables are joined.
+    Three counts (`rejected`, `stale`, `dropped_blocks`) are added instead, and nested tables are merged in the same
+    way. errors: further errors of the run, which are appended to those of the sides.
     """
     merged = _joined(robot, operator)
     merged["errors"] = [*robot.get("errors", []), *operator.get("errors", []), *errors]
@@ -29,7 +30,7 @@ def _joined(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def read_summary(path: Path) -> dict[str, Any]:
-    """Read a side's summary; empty if the side has not written one."""
+    """Read a side's summary; return an empty one if the side has not written a valid file."""
     try:
         content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, json.JSONDecodeError):

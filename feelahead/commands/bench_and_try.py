@@ -1,4 +1,7 @@
-"""`feelahead bench NAME` and `feelahead try NAME`: questions of feelahead/lab, imported only on demand."""
+"""`feelahead bench NAME` and `feelahead try NAME`: run a measurement or an experiment of feelahead/lab/questions.
+
+A question's module is imported only when it is asked.
+"""
 
 import ast
 import sys
@@ -14,14 +17,14 @@ _QUESTIONS = Path(__file__).parents[1] / "lab" / "questions"
 
 @dataclass(frozen=True)
 class Menu:
-    """Command whose first argument names a question."""
+    """Command whose first argument names the question (measurement or experiment) to run."""
 
     name: str
     questions: Mapping[str, str]
-    """Needed extras by question's name."""
+    """Extras of the package that each question needs, by its name."""
 
     def __call__(self, arguments: Sequence[str]) -> int:
-        """Answer the question that the first argument names, by name or by a user's file."""
+        """Run the question that the first argument names: one of `questions`, or a file of the user's own."""
         if not arguments or arguments[0] in ("-h", "--help", "--list"):
             lines = "\n".join(f"  {name:<10}{_sentence(name)}" for name in self.questions)
             sys.stdout.write(
@@ -31,7 +34,7 @@ class Menu:
             return 0
         try:
             return self._answer(*arguments)
-        except KeyboardInterrupt:  # before its first cell, or after its last one
+        except KeyboardInterrupt:  # before the first cell of the sweep, or after the last one
             sys.stderr.write(f"feelahead {self.name} {arguments[0]}: interrupted\n")
             return 130
 
@@ -53,19 +56,24 @@ class Menu:
         except (ImportError, SyntaxError) as error:
             reason = f"{error}; valid: a question's file"
             if name in self.questions and isinstance(error, ModuleNotFoundError):
-                reason = f"{error.name} is not installed; pip install '.[{self.questions[name]}]' in the clone"
+                remedy = f"install it in the clone: pip install '.[{self.questions[name]}]'"
+                reason = f"{error.name} is not installed; {remedy}"
             raise ConfigurationError(f"{self.name} {name}: {reason}") from error
         if name not in self.questions and Path(found.__file__ or "").resolve() != Path(name).resolve():
-            raise ConfigurationError(f"{self.name} {name}: named like a module of Python; valid: another name")
+            raise ConfigurationError(
+                f"{self.name} {name}: Python already has a module of this name; valid: another name"
+            )
         question = getattr(found, "QUESTION", None)
         if not isinstance(question, sweep.Question):
-            raise ConfigurationError(f"{self.name} {name}: it holds no QUESTION; valid: QUESTION = Question(...)")
+            raise ConfigurationError(
+                f"{self.name} {name}: the file defines no QUESTION; valid: QUESTION = Question(...)"
+            )
         code: int = sweep.ask(question, arguments)
         return code
 
 
 def _sentence(name: str) -> str:
-    """Read the sentence that begins a question's file, without imports."""
+    """Return the first sentence of a question's docstring, read without importing the module."""
     text = ast.get_docstring(ast.parse((_QUESTIONS / f"{name}.py").read_text(encoding="utf-8"))) or ""
     return text.partition("\n\n")[0].replace("\n", " ")
 

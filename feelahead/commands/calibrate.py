@@ -22,7 +22,7 @@ from common.files.output_file import require_output_file
 from operator_side.calibration.procedure import CalibrationProcedure, Step
 from operator_side.calibration.store import calibration_path, write_calibration
 from operator_side.controller.feel import RELEASED
-from operator_side.controller.port import Controller, OpenController
+from operator_side.controller.port import Controller, OpenController, check_choice
 from operator_side.controller.state import ControllerState
 from operator_side.dualsense.hid.device import load_backend
 from operator_side.dualsense.hid.finding import find_controller
@@ -37,23 +37,27 @@ _SILENT_S = 5.0
 
 @dataclass(frozen=True)
 class CalibrateSettings:
-    """Measure one controller's triggers and sticks: half a minute with the controller in your hands.
+    """Measure the ranges of one controller's triggers and sticks. This takes half a minute.
 
-    It tells what to do, and shows the controller's reports. The result is stored for this controller, on USB and
-    Bluetooth, in your configuration folder, where feelahead-operator finds it.
+    The command says what to do, and shows what the controller reports. It stores the result in your configuration
+    folder by the controller's address, which is the same on USB and Bluetooth. feelahead-operator finds it there.
     """
 
     device: Literal["hid", "simulated"] = "hid"
-    """A real controller, or a simulated one with simulated hands, stored only with --out."""
+    """hid: a real controller. simulated: a simulated one with simulated hands; its result is stored only with --out."""
+    controller: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
+    """Measure the controller with this address, as `feelahead doctor` prints it."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """Store the result in this file instead: a new one in an existing folder, or one to replace."""
+    """Store the result in this file instead of the configuration folder. The folder must exist; an existing file is
+    replaced."""
 
     def __post_init__(self) -> None:
+        check_choice(self.device, self.controller)
         require_output_file("--out", self.out)
 
 
 def calibrate(arguments: Sequence[str]) -> int:
-    """Run the calibration; exit code 1 if it was given up, and nothing is stored."""
+    """Run the calibration; return 1 if the person gave up, and then store nothing."""
     settings = parse_settings(CalibrateSettings, "feelahead calibrate", arguments)
     clock: Clock
     if settings.device == "simulated":
@@ -63,7 +67,7 @@ def calibrate(arguments: Sequence[str]) -> int:
         kept_at = settings.out
     else:
         clock, hands = MonotonicClock(), None
-        controller = find_controller(load_backend())
+        controller = find_controller(load_backend(), settings.controller, others=False)
         kept_at = settings.out
         if kept_at is None and controller.address is not None:
             kept_at = calibration_path(controller.address)
@@ -73,8 +77,8 @@ def calibrate(arguments: Sequence[str]) -> int:
         try:
             if controller.address is None:
                 raise ConfigurationError(
-                    f"{controller.name} does not tell its address, by which a calibration is kept; valid: a controller"
-                    " that does"
+                    f"{controller.name} does not report its address, by which a calibration is stored; valid: a"
+                    " controller that does"
                 )
             console.print(f"Calibrating {controller.name}", markup=False, highlight=False, soft_wrap=True)
             with _Screen(console) as show:
@@ -107,9 +111,12 @@ def _measure(
     stop: StopSignal,
     show: Show,
 ) -> bool:
-    """Feed the procedure until it is done; False if it was stopped. Raises CalibrationError or DeviceError."""
+    """Feed the controller's states to the procedure until it is done; return False if `stop` came first.
+
+    Raises CalibrationError or DeviceError.
+    """
     start_s = heard_s = clock.now()
-    # An effect that was left on would make travel unreachable.
+    # With an effect still on, a finger could not reach the full travel.
     device.write(RELEASED, start_s)
     while procedure.step is not Step.DONE:
         if stop.is_set:
@@ -123,7 +130,7 @@ def _measure(
             show(procedure, state, now_s)
         elif now_s - heard_s > _SILENT_S:
             raise DeviceError(
-                f"the controller has said nothing for {_SILENT_S:.0f} s: plug it in again and start again"
+                f"the controller has sent nothing for {_SILENT_S:.0f} s: plug it in again and start again"
             )
         if isinstance(clock, VirtualClock):
             clock.advance_to(now_s + _POLL_S)
@@ -133,7 +140,7 @@ def _measure(
 
 
 class _Screen:
-    """Live bars on a terminal; elsewhere a line for each step and complaint."""
+    """Display of the calibration: live bars on a terminal; elsewhere a line for each step and complaint."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -164,11 +171,11 @@ class _Screen:
 
 _BAR = 40
 _STEPS = len(Step) - 1
-"""Number of steps that a person must do."""
+"""Number of steps for the person, without the final `DONE`."""
 
 
 def calibration_screen(procedure: CalibrationProcedure, state: ControllerState) -> RenderableType:
-    """Draw the present step, and live bars of the controller's report."""
+    """Draw the present step, and bars with the controller's present travel and sticks."""
     number = list(Step).index(procedure.step) + 1
     table = Table.grid(padding=(0, 2))
     for name, raw in (("L2", state.l2), ("R2", state.r2)):
@@ -182,7 +189,7 @@ def calibration_screen(procedure: CalibrationProcedure, state: ControllerState) 
 
 
 def calibration_lines(calibration: TravelCalibration) -> list[str]:
-    """Return the result for people, a line each."""
+    """Describe the result in words: a line for each trigger and each stick."""
     return [
         _trigger_line("L2", calibration.l2),
         _trigger_line("R2", calibration.r2),
@@ -203,6 +210,6 @@ def _stick_line(name: str, stick: StickRest) -> str:
 
 
 def _dot(x: float) -> Text:
-    """A stick's sideways deflection, -1 to 1, as a mark on a line."""
+    """Draw a stick's sideways deflection `x`, -1 to 1, as a dot on a line."""
     place = round(0.5 * (x + 1.0) * (_BAR - 1))
     return Text("─" * place + "●" + "─" * (_BAR - 1 - place))

@@ -1,4 +1,4 @@
-"""`feelahead keys`: make a side's key pair, and choose whom the robot side admits."""
+"""`feelahead keys`: make a side's key pair, and choose which operators the robot side admits."""
 
 import argparse
 import sys
@@ -30,7 +30,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def keys(arguments: Sequence[str]) -> int:
-    """Run a subcommand; raises ConfigurationError for bad input."""
+    """Run the subcommand that `arguments` begin with; raises ConfigurationError for bad input."""
     parsed = _parser().parse_args(list(arguments))
     folder = KeyFolder(parsed.folder)
     said: list[str] = []

@@ -1,4 +1,4 @@
-"""Display of the console's address, and of the page if possible."""
+"""Show the console's address, and open its page in the browser if there is a display."""
 
 import os
 import sys
@@ -9,14 +9,14 @@ from common.command.status import Status
 
 
 def show_address(address: str, status: Status) -> None:
-    """Show the address on a line that stays; open the page if there are a display and a terminal."""
+    """Show the address on its own line; on a terminal with a display, also open the page."""
     if not status.event("console", address=address):
         status.note(f"the console: {address}")
     if sys.stdout.isatty() and has_display():
-        # Some launchers wait for the browser to end.
+        # In a thread, as some launchers return only when the browser ends.
         threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
 
 def has_display() -> bool:
-    """Return whether there is a display: without one, a text browser would take over the terminal."""
+    """Return whether a graphical display exists; without a display, a text browser would take over the terminal."""
     return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

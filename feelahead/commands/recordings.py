@@ -1,4 +1,4 @@
-"""`feelahead replay`, `export` and `plot`: commands on recordings."""
+"""`feelahead replay`, `feelahead export` and `feelahead plot`: the commands that read a recording."""
 
 import struct
 import sys
@@ -18,12 +18,12 @@ from common.recording.packages import require_packages
 from common.recording.reading import Recording, open_recording
 from feelahead.recordings.playback import require_protocol, require_statuses
 
-_BOTH_SIDES = "pip install '.[robot,operator,record]' in the clone"
+_BOTH_SIDES = "install it in the clone: pip install '.[robot,operator,record]'"
 
 
 @dataclass(frozen=True)
 class ReplaySettings(Limited):
-    """Show a recording in the console, or recompute it.
+    """Show a recording in the console; with --check, compute its run again and compare.
 
     Try: feelahead demo --record run.mcap, then feelahead replay run.mcap --check.
     """
@@ -31,21 +31,23 @@ class ReplaySettings(Limited):
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
     """The recording."""
     check: bool = False
-    """Recompute every stiffness, command and report to the controller from the recorded inputs, and compare. Exit
-    code 1 if they differ by more than processors do: 1 of 8 in strength, 1e-12 m in distances."""
+    """Compute every stiffness, command and report to the controller again from the recorded inputs, and compare them
+    with the recorded ones. Exit code 1 if they differ by more than 1 of 8 in strength or 1e-12 m in distance, the
+    differences between processors."""
     speed: Annotated[float, Meta(ge=0.01, le=1000.0)] = 1.0
-    """Playing speed; 1 is the recorded one."""
+    """Speed of playing; 1 is the speed of the recorded run."""
     tui: bool = False
-    """Full-screen terminal, instead of the console's page."""
+    """Show the recording on the full terminal, instead of on the console's page."""
     console_port: Annotated[int, Meta(ge=0, le=65535)] = 0
-    """Port of the page on this machine; 0: any free one."""
+    """Port of the page on this machine; 0: any free port."""
 
 
 @dataclass(frozen=True)
 class ExportSettings(Limited):
     """Turn a recording into files that other programs read.
 
-    csv, parquet: a folder with a file for each topic at the original rate, and one with all joined at 100 Hz.
+    csv, parquet: a folder with a file for each topic at its original rate, and a file `joined` with all topics at
+    100 Hz.
     lerobot: a LeRobot dataset, v3.0, at the pictures' own rate, or --fps, cut into the marked episodes.
     """
 
@@ -56,7 +58,7 @@ class ExportSettings(Limited):
     fps: Annotated[int, Meta(ge=1, le=1000)] | None = None
     """Frames a second, for lerobot only; by default the median rate of the pictures, at most 30."""
     out: Path | None = None
-    """A new or empty folder; by default beside the recording, named after it."""
+    """Folder for the files, new or empty; unless given, a folder beside the recording, named after the recording."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ class PlotSettings:
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
     """The recording."""
     out: Path | None = None
-    """A file that ends in .png, .svg or .pdf; by default .png beside the recording."""
+    """File to write, which ends in .png, .svg or .pdf; unless given, a .png beside the recording."""
 
 
 def _open(path: Path | None) -> Recording:
@@ -81,7 +83,7 @@ def _open(path: Path | None) -> Recording:
 
 @contextmanager
 def _recording(path: Path | None) -> Iterator[Recording]:
-    """Open a recording; faults of the content become one line."""
+    """Open a recording; errors that its content causes become a ConfigurationError of one line."""
     recording = _open(path)
     try:
         yield recording
@@ -117,7 +119,7 @@ def _check(recording: Recording) -> int:
     said = [line for one in compared for line in one.lines()]
     within = all(one.within for one in compared)
     if not sum(one.made for one in compared):
-        said.append("nothing was compared: it holds nothing to recompute")
+        said.append("nothing was compared: the recording holds nothing to recompute")
         within = False
     else:
         said.append("the same, within what is promised" if within else "NOT the same")
@@ -141,7 +143,7 @@ def export(arguments: Sequence[str]) -> int:
 
 
 def _export(settings: ExportSettings, recording: Recording, folder: Path) -> str:
-    """Write a folder of tables; return a description."""
+    """Write the files into `folder`; return a description of them in words."""
     from feelahead.recordings.demonstrations import read_demonstrations  # noqa: PLC0415
     from feelahead.recordings.lerobot import export_lerobot  # noqa: PLC0415
     from feelahead.recordings.tables import export_csv, export_parquet, read_tables  # noqa: PLC0415
@@ -166,14 +168,14 @@ def _empty_folder(path: Path) -> Path:
 
 
 def plot(arguments: Sequence[str]) -> int:
-    """Draw a recording on one page."""
+    """Draw a recorded run on one page."""
     settings = parse_settings(PlotSettings, "feelahead plot", arguments)
     with _recording(settings.file) as recording:
         out = recording.path.with_suffix(".png") if settings.out is None else settings.out
         if out.suffix not in (".png", ".svg", ".pdf"):
             raise ConfigurationError(f"--out {out}: valid: a file that ends in .png, .svg or .pdf")
         if not out.absolute().parent.is_dir():
-            raise ConfigurationError(f"--out {out}: its folder is not there; valid: a file's path")
+            raise ConfigurationError(f"--out {out}: its folder does not exist; valid: a file in an existing folder")
         require_packages("plot", "matplotlib", extra="experiments")
         from feelahead.recordings.plot import plot_run  # noqa: PLC0415
         from feelahead.recordings.tables import read_tables  # noqa: PLC0415

@@ -1,4 +1,4 @@
-"""Player of recordings: on the console's page, or on the full terminal."""
+"""Play a recording on the console's page, or on the full terminal."""
 
 import select
 import threading
@@ -22,12 +22,12 @@ from operator_side.viewing.viewing import SceneFigures
 _PROGRAM: Final = "feelahead replay"
 _STEP_S: Final = 0.01
 _LONGEST_S: Final = 0.25
-"""Longest step, in seconds: a suspended machine misses nothing."""
+"""Longest step of the playback, in seconds: after the machine was suspended, nothing is skipped."""
 _STATE_PERIOD_S: Final = 0.1
 
 
 def play_on_page(recording: Recording, speed: float, port: int) -> int:
-    """Play once a page is open, until Ctrl-C; return 1 if the console has ended."""
+    """Play on the console from when a page is open until Ctrl-C; return 1 if the console's process ended, else 0."""
     title = f"{recording.path.name}, replayed"
     with StopSignal() as stop, Status("line", _PROGRAM) as status, Console(title, port=port, live=False) as console:
         facts = msgspec.json.Decoder(OperatorFacts)
@@ -101,7 +101,10 @@ def play_in_terminal(recording: Recording, speed: float) -> int:
 
 
 def _passing(goes_on: Callable[[float], bool]) -> Iterator[float]:
-    """Yield the time passed at each step while `goes_on(seconds)`, which waits as long, is true."""
+    """Yield the seconds that each step took, at most `_LONGEST_S`.
+
+    `goes_on(seconds)` waits for the given time; the steps end when it returns False.
+    """
     clock = MonotonicClock()
     before_s = clock.now()
     while goes_on(_STEP_S):

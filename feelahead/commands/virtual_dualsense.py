@@ -23,9 +23,9 @@ from operator_side.dualsense.uhid.controller import UhidController, UhidIdentity
 from operator_side.dualsense.uhid.file import UhidFile, offer
 
 PULL_PERIOD_S = 4.0
-"""Period, in seconds, in which R2 and then L2 go down and up, and the left stick once round."""
+"""Period of the hands `pulling`, in seconds: R2 goes down and up, then L2, and the left stick goes round once."""
 DRIVER_PATIENCE_S = 5.0
-"""Time, in seconds, within which an installed driver takes the controller."""
+"""Time after which a hint is shown if no driver has taken the controller, in seconds."""
 _STICK_RADIUS = 0.8
 
 Say = Callable[[str], None]
@@ -33,23 +33,26 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class VirtualDualSenseSettings(Limited):
-    """A virtual DualSense through /dev/uhid (Linux): games, drivers and feelahead-operator see it as a real one.
+    """Offer a virtual DualSense through /dev/uhid (Linux): games, drivers and feelahead-operator see a real controller.
 
-    It prints the commands that it gets. Ctrl-C unplugs it.
+    The command prints what programs send to the controller. Ctrl-C unplugs the controller.
     """
 
     transport: Literal["usb", "bluetooth"] = "usb"
-    """Simulated transport."""
+    """Transport by which the controller seems to be connected."""
     edge: bool = False
-    """DualSense Edge instead of a DualSense."""
+    """Offer a DualSense Edge instead of a DualSense."""
     duration: Annotated[Annotated[float, Meta(gt=0.0, lt=1e6)] | None, tyro.conf.arg(metavar="SECONDS")] = None
-    """Unplug it after this time; by default at Ctrl-C."""
+    """Unplug the controller after this time; unless given, at Ctrl-C."""
     hands: Literal["none", "pulling"] = "none"
-    """none: no hands; pulling: R2 and L2 in turn, and the left stick round."""
+    """none: nobody touches the controller. pulling: R2 and L2 are pulled in turn, and the left stick goes round."""
 
 
 def virtual_dualsense(arguments: Sequence[str]) -> int:
-    """Offer a controller until --duration, Ctrl-C or SIGTERM; raises ConfigurationError if /dev/uhid is unusable."""
+    """Offer a controller until --duration is over, or Ctrl-C or SIGTERM comes.
+
+    Raises ConfigurationError if /dev/uhid cannot be used.
+    """
     settings = parse_settings(VirtualDualSenseSettings, "feelahead virtual-dualsense", arguments)
     try:
         with UhidFile() as file, StopSignal() as stop:
@@ -62,7 +65,10 @@ def virtual_dualsense(arguments: Sequence[str]) -> int:
 def live(
     settings: VirtualDualSenseSettings, file: UhidFile, clock: Clock, stopped: Callable[[], bool], say: Say
 ) -> None:
-    """Run one controller from plug to unplug; raises DeviceError if the kernel removes it."""
+    """Plug one controller in, run it until `stopped` or the duration is over, and unplug it.
+
+    Raises DeviceError if the kernel removes the controller.
+    """
     transport = Transport.USB if settings.transport == "usb" else Transport.BLUETOOTH
     controller = _Narrated(transport, Model.EDGE if settings.edge else Model.DUALSENSE, say)
     identity = UhidIdentity(transport, controller.model, controller.address)
@@ -91,7 +97,7 @@ def live(
 
 
 class _Narrated(SimulatedDualSense):
-    """Controller that reports the changes by every output report."""
+    """Simulated controller that prints what each output report changes."""
 
     def __init__(self, transport: Transport, model: Model, say: Say) -> None:
         super().__init__(transport, model)
@@ -100,7 +106,7 @@ class _Narrated(SimulatedDualSense):
         self._last_words = self._state_in_words()
 
     def take_report(self, report: bytes, now_s: float) -> None:
-        """Apply a report, and report the changes."""
+        """Apply an output report, and print the changes."""
         super().take_report(report, now_s)
         l2, r2 = encoded_effects(report)
         self._effects = {"L2": l2 or self._effects["L2"], "R2": r2 or self._effects["R2"]}
@@ -119,7 +125,7 @@ class _Narrated(SimulatedDualSense):
 
 
 def pulling(time_s: float) -> tuple[float, float, tuple[float, float]]:
-    """Return the hands at `time_s`: forces on L2 and R2 in N, and the left stick (x, y)."""
+    """Return the inputs of the hands `pulling` at `time_s`: forces on L2 and R2 in N, and the left stick (x, y)."""
     turns = time_s / PULL_PERIOD_S
     pull_n = NORMAL_FINGER_FORCE_N * (1.0 - math.cos(2.0 * math.tau * turns)) / 2.0
     stick = (_STICK_RADIUS * math.cos(math.tau * turns), _STICK_RADIUS * math.sin(math.tau * turns))
@@ -127,7 +133,7 @@ def pulling(time_s: float) -> tuple[float, float, tuple[float, float]]:
 
 
 def described(encoded: bytes) -> str:
-    """Describe an effect: "Off", "strengths 0 0 0 6 6 6 6 6 6 6", or the bytes of one that feelahead never sends."""
+    """Describe a trigger effect: "Off", "strengths 0 0 0 6 6 6 6 6 6 6", or its bytes if feelahead never sends it."""
     if (strengths := decode_effect(encoded)) is None:
         return f"another effect, {encoded.hex(' ')}"
     return f"strengths {' '.join(map(str, strengths))}" if any(strengths) else "Off"

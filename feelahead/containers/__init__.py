@@ -1,1 +1,1 @@
-"""Robot side, operator side and a router between them in containers, with the programs that docker/ starts."""
+"""Run robot side, operator side and a router between them in containers; docker/ has the images and compose file."""

@@ -1,4 +1,4 @@
-"""Cable between the two networks: the interfaces, and the commands that configure the kernel."""
+"""The router's connection between the two networks (cable): its interfaces, and commands that configure the kernel."""
 
 import ipaddress
 from collections.abc import Iterable, Mapping
@@ -8,30 +8,31 @@ from typing import Any, Final, get_args
 from common.emulation.spec import Direction
 
 PORTS: Final = "5555, 5556"
-"""Ports of control and view."""
+"""TCP ports of control and view, as nft writes a set."""
 _SEGMENTING: Final = "tbf rate 2gbit burst {burst} limit 10mb"
-"""Queue that segments what a sender left to the interface: netem must see packets as on a wire."""
+"""Queue before netem. It splits large packets whose segmentation the sender left to the interface, so that netem
+sees packets as on a wire."""
 _HEADERS_BYTES: Final = 100
-"""Bytes of a frame that the interface's limit does not count."""
+"""Bytes of headers that come on top of the interface's MTU in one frame."""
 HANDLES: Final[Mapping[Direction, str]] = {direction: f"{n}:" for n, direction in enumerate(get_args(Direction), 2)}
-"""Handles of the two directions' netem."""
+"""Handle of the netem queue of each direction."""
 
 
 @dataclass(frozen=True)
 class End:
-    """Interface of the router."""
+    """One network interface of the router."""
 
     name: str
     number: int
-    """The kernel's number; it changes when the interface is removed and added again."""
+    """The interface's number in the kernel; it changes when the interface is removed and added again."""
     address: str
-    """Address with the network's prefix length."""
+    """Address with the prefix length of its network, as 172.18.0.2/16."""
     mtu: int = 1500
 
 
 @dataclass(frozen=True)
 class Cable:
-    """Present connection between the networks."""
+    """The router's present interfaces to both networks, and the robot side's address."""
 
     robot: End
     operator: End
@@ -39,7 +40,7 @@ class Cable:
     """Address of the robot side."""
 
     def rules(self) -> str:
-        """Return rules for nft, which applies all or none: forward only the ports, under our address."""
+        """Return rules for nft, which applies all or none: forward only PORTS, under the router's own address."""
         return f"""
             table ip feelahead
             delete table ip feelahead
@@ -61,14 +62,14 @@ class Cable:
             """
 
     def delays(self, words: Mapping[Direction, str]) -> list[list[str]]:
-        """Return the commands that delay the packets to each side."""
+        """Return the commands that delay the packets to each side. words: netem's arguments for each direction."""
         ends: Mapping[Direction, End] = {"to_robot": self.robot, "to_operator": self.operator}
         mtu = max(self.robot.mtu, self.operator.mtu)
         return [line for direction, end in ends.items() for line in delay(end.name, direction, words[direction], mtu)]
 
 
 def delay(interface: str, direction: Direction, words: str, mtu: int = 1500) -> list[list[str]]:
-    """Return the commands that delay the packets of an interface: segmentation, then netem."""
+    """Return the commands that delay the packets leaving by an interface: first split large ones, then netem."""
     queue = ["tc", "qdisc", "replace", "dev", interface]
     cutter = _SEGMENTING.format(burst=mtu + _HEADERS_BYTES).split()
     netem = ["parent", "1:", "handle", HANDLES[direction], "netem", *words.split()]
@@ -76,7 +77,10 @@ def delay(interface: str, direction: Direction, words: str, mtu: int = 1500) -> 
 
 
 def find_cable(interfaces: Iterable[Mapping[str, Any]], robot_address: str) -> Cable | None:
-    """Find the cable in the output of `ip -json address`; None unless each side has exactly one interface address."""
+    """Find the router's two interfaces in the output of `ip -json address`.
+
+    None unless exactly one address is in the robot side's network and exactly one in another.
+    """
     ends: dict[bool, list[End]] = {True: [], False: []}
     for shown in interfaces:
         for held in shown["addr_info"]:

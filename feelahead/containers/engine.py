@@ -1,4 +1,4 @@
-"""Docker and compose, driven by their commands: either generation of compose."""
+"""Run the commands of Docker and of compose, either as `docker compose` or as `docker-compose`."""
 
 import json
 import os
@@ -16,18 +16,21 @@ _LIMIT_S: Final = 60.0
 _READS: Final = 3
 _READ_AGAIN_S: Final = 1.0
 _LAST_WORDS: Final = 3
-"""Number of quoted lines: compose ends with a summary, below the reason."""
+"""Number of last lines that an error quotes: compose prints the reason above a summary."""
 
 
 class EngineError(FeelaheadError):
-    """A command of the engine failed; the text is the engine's."""
+    """A command of Docker or compose failed; the text is that of the command."""
 
 
 class Engine:
-    """Project of compose: containers, networks and volumes under a separate name."""
+    """One project of compose: containers, networks and volumes with names of their own."""
 
     def __init__(self, project: str, environment: Mapping[str, str] | None = None) -> None:
-        """`environment`: added to this process's, such as DOCKER_HOST. Raises ConfigurationError without an engine."""
+        """environment: variables besides those of this process, such as DOCKER_HOST.
+
+        Raises ConfigurationError if Docker or compose is missing or cannot be used.
+        """
         self.project = project
         self._environment = os.environ | dict(environment or {})
         if not COMPOSE_FILE.is_file():
@@ -45,7 +48,7 @@ class Engine:
         return self._run(["docker", *words], self._environment, _LIMIT_S)
 
     def compose(self, *words: str, settings: Mapping[str, str] | None = None, limit_s: float = _LIMIT_S) -> str:
-        """Run `docker compose WORDS` for this project; `settings`: the variables of compose.yaml."""
+        """Run `docker compose WORDS` for this project and return the output. settings: variables of compose.yaml."""
         project = ["--project-name", self.project, "--file", str(COMPOSE_FILE)]
         return self._run([*self._compose, *project, *words], self._environment | dict(settings or {}), limit_s)
 
@@ -54,7 +57,7 @@ class Engine:
         self.compose("down", "--volumes", "--timeout", "2")
 
     def container(self, service: str) -> str:
-        """Return the container of a service; raises EngineError unless there is exactly one."""
+        """Return the id of the container of a service; raises EngineError unless there is exactly one."""
         labels = {"project": self.project, "service": service}
         filters = [
             word for name, value in labels.items() for word in ("--filter", f"label=com.docker.compose.{name}={value}")
@@ -65,15 +68,15 @@ class Engine:
         return found[0]
 
     def inspect(self, container: str) -> dict[str, Any]:
-        """Return `docker inspect` of a container."""
+        """Return what `docker inspect` says about a container."""
         [known] = json.loads(self.docker("inspect", container))
         return dict(known)
 
     def read_json(self, container: str, path: str) -> dict[str, Any]:
-        """Read a file of JSON from a container, which need not run.
+        """Read a JSON file in a container, which need not be running.
 
-        A container that has just ended may lack its volumes for a moment. Raises EngineError, with the exit code and
-        the last lines of the log, if the file stays away.
+        The volumes of a container that has just ended may be missing for a moment, so several attempts are made. If
+        all fail, raises EngineError with the container's exit code and the last lines of its log.
         """
         for remaining in reversed(range(_READS)):
             try:
@@ -85,17 +88,17 @@ class Engine:
                     log = self.docker("logs", "--tail", str(_LAST_WORDS), container).strip()
                     raise EngineError(f"{error}; exit code {ended}; last logged: {log}") from error
                 time.sleep(_READ_AGAIN_S)
-        # A tar of one file, whose text reaches from the first brace to the last.
+        # The output is a tar archive of one file; the JSON reaches from the first brace to the last.
         content: dict[str, Any] = json.loads(packed[packed.index("{") : packed.rindex("}") + 1])
         return content
 
     def attached(self, container: str) -> list[str]:
-        """Return a command that starts a container, shows its output, forwards signals and returns its exit code."""
+        """Return a command that starts a container, shows its output, forwards signals and ends with its exit code."""
         return ["docker", "start", "--attach", container]
 
     @property
     def environment(self) -> Mapping[str, str]:
-        """Environment of the engine's commands."""
+        """Environment variables with which the commands run."""
         return self._environment
 
     def _find_compose(self) -> list[str]:
@@ -117,7 +120,7 @@ class Engine:
                 timeout=limit_s,
                 check=False,
                 stdin=subprocess.DEVNULL,
-                # Ctrl-C is ours to handle: a command that has begun, such as `down`, must finish.
+                # Only this process gets Ctrl-C: a command that has begun, such as `down`, must finish.
                 start_new_session=True,
             )
         except (OSError, subprocess.TimeoutExpired) as error:

@@ -1,4 +1,4 @@
-"""Trials in containers: the sides in separate networks, with the router's link between them."""
+"""Run trials in containers: the sides are in separate networks, and the router between them emulates the link."""
 
 import json
 import shlex
@@ -16,19 +16,19 @@ from feelahead.containers.engine import Engine
 from feelahead.containers.netem import Counted, count_packets
 
 PROJECT: Final = "feelahead-latency"
-"""Prefix of the projects' names, one project a link."""
+"""Prefix of the compose projects' names; each link has its own project."""
 _BUILD_LIMIT_S: Final = 1500.0
 _SIDES: Final = ("robot", "operator")
 
 
 class ContainerMedium:
-    """Medium of trials: two networks and a router are kept for each link; both sides are new for each trial."""
+    """Runs trials in containers. Two networks and a router are kept for each link; both sides are new in each trial."""
 
     def __init__(self, stack: ExitStack, number: int) -> None:
         """Build the missing images.
 
-        `stack` removes all containers at the end; `number` makes names unique among our runs. Raises ConfigurationError
-        without an engine, EngineError if an image cannot be built.
+        stack: removes all containers when it is closed. number: distinguishes the projects' names from those of other
+        instances. Raises ConfigurationError if Docker cannot be used, EngineError if an image cannot be built.
         """
         self._stack = stack
         self._number = number
@@ -38,7 +38,9 @@ class ContainerMedium:
         Engine(PROJECT).compose("build", limit_s=_BUILD_LIMIT_S)
 
     def run(self, trial: Trial) -> dict[str, Any]:
-        """Run a trial in real time; raises SideFailedError if a side fails, EngineError if the engine does.
+        """Run a trial in real time and return its figures.
+
+        Raises SideFailedError if a side fails, EngineError if a command of Docker does.
 
         If netem cannot emulate this link, the sides emulate it as on loopback, and standard error reports that.
         """
@@ -78,7 +80,7 @@ class ContainerMedium:
         return {"LINK": trial.link, "LINK_MODEL": trial.link_model, "RESTART": "no"}
 
     def _packets(self, engine: Engine) -> Mapping[Direction, Counted]:
-        """Read netem's counters."""
+        """Read how many packets netem has passed and dropped in each direction."""
         return count_packets(json.loads(self._in_router(engine, "tc -statistics -json qdisc show")))
 
     def _in_router(self, engine: Engine, command: str) -> str:

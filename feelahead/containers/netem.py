@@ -1,4 +1,4 @@
-"""Arguments of the kernel's netem for a link, and links that are beyond netem."""
+"""Arguments of the kernel's netem for a link, and the check whether netem can emulate it."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from common.errors import FeelaheadError
 from feelahead.containers.cable import HANDLES
 
 CARRIED: tuple[Literal["haptics", "telemetry"], ...] = ("haptics", "telemetry")
-"""Streams between the sides, over one cable here."""
+"""Streams between the sides; netem cannot tell them apart, as they share the interfaces."""
 _NOTHING = "delay 0ms"
 
 
@@ -19,22 +19,26 @@ class BeyondNetemError(FeelaheadError):
 
 
 def netem_words(link: LinkSpec) -> dict[Direction, str]:
-    """Return each direction's arguments of `tc qdisc ... netem`; raises BeyondNetemError if netem cannot do it.
+    """Return the arguments of `tc qdisc ... netem` for each direction.
 
-    netem sees packets, not messages and not streams: both ports of a direction share one cable.
+    Raises BeyondNetemError if netem cannot emulate the link. netem sees packets, neither messages nor streams, so both
+    ports of a direction get the same link.
     """
     return {direction: _direction_words(link, direction) for direction in get_args(Direction)}
 
 
 @dataclass(frozen=True)
 class Counted:
-    """Numbers of packets since netem was set up."""
+    """Packets that one direction's netem has passed and dropped since it was set up."""
 
     sent: int
     dropped: int
 
     def lost_share_since(self, before: "Counted") -> float | None:
-        """Return the share lost since `before`; None if no packet came, or netem was set up again."""
+        """Return the share of packets lost since the count `before`.
+
+        None if no packet came since, or if netem was set up again.
+        """
         if self.sent < before.sent or self.dropped < before.dropped:
             return None
         dropped = self.dropped - before.dropped
@@ -43,7 +47,7 @@ class Counted:
 
 
 def count_packets(queues: Iterable[Mapping[str, Any]]) -> dict[Direction, Counted]:
-    """Read each direction's netem from `tc -statistics -json qdisc show`."""
+    """Read the packets of each direction's netem from the output of `tc -statistics -json qdisc show`."""
     netems = {queue["handle"]: queue for queue in queues if queue["kind"] == "netem"}
     return {
         direction: Counted(netems[handle]["packets"], netems[handle]["drops"])
@@ -55,7 +59,7 @@ def count_packets(queues: Iterable[Mapping[str, Any]]) -> dict[Direction, Counte
 def _direction_words(link: LinkSpec, direction: Direction) -> str:
     words = {link.profile(direction, stream).words for stream in CARRIED}
     if len(words) > 1:
-        raise BeyondNetemError(f"{direction}: its streams have links of their own, and netem sees only packets")
+        raise BeyondNetemError(f"{direction}: its streams have different links, and netem cannot tell streams apart")
     if (beyond := _beyond(link.profile(direction))) is not None:
         raise BeyondNetemError(f"{direction}: {beyond}")
     return words.pop() or _NOTHING

@@ -1,11 +1,11 @@
 """Router between the two networks of docker/compose.yaml: `python -m feelahead.containers.router`.
 
-It forwards ports 5555 and 5556 from the operator's network to the robot side, under its own address, so that neither
-side needs a route or a right. It applies the link to outgoing packets, with one netem for each direction. If the
-kernel has no netem, or the link is beyond netem, the sides emulate the link themselves: they wait for the file
-`--said`, which holds the link to emulate. The log reports which.
+The router forwards ports 5555 and 5556 from the operator's network to the robot side, under the router's own address.
+So neither side needs a route or a privilege. The kernel's netem applies the link to outgoing packets, once for each
+direction. If the kernel has no netem, or netem cannot emulate the link, the sides emulate it themselves. For this they
+wait for the file `--said`: it holds the link to emulate, or nothing if netem does it. The log says which is the case.
 
-Containers, addresses and interfaces come and go: the router checks twice a second, and sets up again what changed.
+Containers, addresses and interfaces may change. The router checks them twice a second, and sets up again what changed.
 """
 
 import json
@@ -31,12 +31,12 @@ from feelahead.containers.netem import BeyondNetemError, netem_words
 PROGRAM = "feelahead-router"
 _PERIOD_S: Final = 0.5
 _MOST_FAILED: Final = 10
-"""Number of failed checks in a row that end the router."""
+"""Number of consecutive failed checks after which the router ends."""
 _LIMIT_S: Final = 10.0
 
 
 class CommandFailedError(FeelaheadError):
-    """ip, tc or nft ended with an error; the text is the command's."""
+    """The command ip, tc or nft ended with an error; the text is that of the command."""
 
 
 @dataclass(frozen=True)
@@ -48,16 +48,16 @@ class RouterSettings:
     robot: Annotated[str, tyro.conf.arg(metavar="HOST")] = "robot-side"
     """Name or address of the robot side in its network."""
     said: Annotated[Path, tyro.conf.arg(metavar="FILE")] = Path("/link/emulated")
-    """File for the link that the sides must emulate themselves; empty if netem does."""
+    """File to write: the link that the sides must emulate themselves, or nothing if netem emulates it."""
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """File with these settings."""
+    """File from which to read these settings."""
 
     def __post_init__(self) -> None:
         LinkSpec.parse(self.link)
 
 
 def command(arguments: Sequence[str]) -> int:
-    """Route until SIGTERM; raises CommandFailedError if the network cannot be changed."""
+    """Run the router until SIGTERM; raises CommandFailedError if the network cannot be set up."""
     router, failed = Router(parse_settings(RouterSettings, PROGRAM, arguments)), 0
     with StopSignal() as stop:
         while not stop.is_set:
@@ -65,7 +65,7 @@ def command(arguments: Sequence[str]) -> int:
                 router.look()
                 failed = 0
             except CommandFailedError as error:
-                # For example, a network was removed meanwhile.
+                # For example, a network was removed during the check.
                 failed += 1
                 _say(str(error))
                 if failed == _MOST_FAILED:
@@ -75,13 +75,13 @@ def command(arguments: Sequence[str]) -> int:
 
 
 class Router:
-    """Routing and link, set up again after each change."""
+    """Sets up forwarding and link in the kernel, and sets up again what changed."""
 
     def __init__(self, settings: RouterSettings) -> None:
         self._settings = settings
         self._cable: Cable | None = None
         self._words: Mapping[Direction, str] | None = None
-        """Arguments for netem; None: the sides emulate the link."""
+        """Arguments for netem, by direction; None: the sides emulate the link"""
         try:
             words = netem_words(LinkSpec.parse(settings.link))
             for direction, said in words.items():
@@ -93,8 +93,8 @@ class Router:
             _say(f"NO netem ({reason}): the sides emulate the link themselves: {settings.link!r}")
 
     def look(self) -> None:
-        """Set up again what has changed; raises CommandFailedError if that fails."""
-        cable = self._find() or self._cable  # an absent side mostly comes back at the same address
+        """Check addresses and interfaces once; set up again what changed. Raises CommandFailedError if that fails."""
+        cable = self._find() or self._cable  # a side that is gone mostly comes back with the same address
         if cable is None:
             return
         if cable != self._cable:
@@ -104,7 +104,7 @@ class Router:
             if self._cable is None:
                 _say(f"{cable.operator.name} to {cable.robot_address} over {cable.robot.name}")
             self._cable = cable
-        if not self._settings.said.exists():  # the service `keys`, which each `up` runs again, removes it
+        if not self._settings.said.exists():  # each `up` runs the service `keys`, which removes the file
             with output_file("--said", self._settings.said) as file:
                 file.write("" if self._words is not None else self._settings.link)
 
@@ -117,7 +117,10 @@ class Router:
 
 
 def run_system(words: Sequence[str], given: str | None = None) -> str:
-    """Run a command of the system with the input `given`; raises CommandFailedError if it fails."""
+    """Run a command of the system with `given` as standard input, and return its output.
+
+    Raises CommandFailedError if the command fails.
+    """
     try:
         done = subprocess.run(words, input=given, capture_output=True, text=True, timeout=_LIMIT_S, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:

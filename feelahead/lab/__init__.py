@@ -1,1 +1,4 @@
-"""Questions to the whole system, and the engine that answers them: `feelahead bench NAME` and `feelahead try NAME`."""
+"""Measurements and experiments (questions) on the whole system, and the engine that runs them.
+
+Commands: `feelahead bench NAME` and `feelahead try NAME`.
+"""

@@ -1,4 +1,4 @@
-"""Measure how closely a gripper's spheres cover it, by points of both surfaces, and draw it in its spheres."""
+"""Measure how closely spheres cover a gripper, by points of both surfaces, and draw the gripper in its spheres."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -25,7 +25,7 @@ _AT_A_TIME: Final = 4096
 
 @dataclass(frozen=True)
 class Gripper:
-    """One gripper, and the number of sampled points of either surface."""
+    """One gripper, and how many points are sampled on the surface of its geoms, and as many on that of its spheres."""
 
     gripper: str
     model: Path | None
@@ -35,7 +35,7 @@ class Gripper:
 
 
 def measure_cover(cell: Gripper, seed: int) -> Iterator[Row]:
-    """Cover the gripper, and yield a row for each link; distances in mm."""
+    """Cover the gripper with spheres, and yield a row for each of its links; distances are in mm."""
     scene = load_scene(cell.model, cell.site)
     geoms = scene.robot.gripper_geoms
     began_s = time.process_time()
@@ -64,7 +64,10 @@ def _spread(stands_out_mm: FloatArray) -> Row:
 def _sticks_out_m(
     solids: Sequence[Solid], centers_m: FloatArray, radii_m: FloatArray, count: int, random: np.random.Generator
 ) -> float:
-    """Return how far the solids stick out of the spheres: points of their surfaces and corners outside other solids."""
+    """Return the largest distance of the solids' surface from the spheres, where it is outside of all spheres.
+
+    Points and corners of a solid's surface are sampled, except those within another solid. 0: the cover is complete.
+    """
     farthest_m = 0.0
     for number, solid in enumerate(solids):
         corners = solid.corners_m
@@ -82,7 +85,7 @@ def _sticks_out_m(
 def _stand_out_m(
     solids: Sequence[Solid], centers_m: FloatArray, radii_m: FloatArray, count: int, random: np.random.Generator
 ) -> FloatArray:
-    """Return the distances from points of the spheres' common surface to the nearest solid."""
+    """Return how far sampled points of the spheres' outer surface are from the nearest solid, in metres."""
     library = MeshLibrary(
         [Mesh(one.corners_m.reshape(-1, 3), np.arange(3 * len(one.corners_m)).reshape(-1, 3)) for one in solids]
     )
@@ -94,7 +97,7 @@ def _stand_out_m(
         outer = np.ascontiguousarray(piece[_from_spheres(piece, centers_m, radii_m) >= -1e-9])
         turns = np.ascontiguousarray(np.broadcast_to(np.eye(3), (len(outer), 3, 3)))
         still = np.zeros((len(outer), 3))
-        # A round geom is up to `excess_m` smaller than its polyhedron.
+        # A round geom lies up to `excess_m` within the polyhedron that stands for it.
         from_each = [
             nearest_mesh_pairs(outer, library, np.full(len(outer), number), still, turns)[0] + solid.excess_m
             for number, solid in enumerate(solids)
@@ -113,7 +116,7 @@ def _pieces(points: FloatArray) -> list[FloatArray]:
 
 
 def draw_cover(table: Table, path: Path) -> None:
-    """Draw each gripper's geoms in black on its spheres, from the front and from the side, the approach upwards."""
+    """Draw each gripper's geoms in black on its spheres, from the front and from the side; the approach points up."""
     from matplotlib.collections import EllipseCollection, PolyCollection  # noqa: PLC0415  # slow to load
 
     grippers = list(table.groups("gripper", "model", "site"))

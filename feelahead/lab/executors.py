@@ -1,6 +1,6 @@
 """Run cells in several processes of this machine, or on a cluster of dask.distributed, through one interface.
 
-Both are executors of concurrent.futures. They raise FeelaheadError if a process, or the whole cluster, is gone.
+Both yield an executor of concurrent.futures. They raise FeelaheadError if a process or the whole cluster is gone.
 """
 
 import logging
@@ -23,10 +23,10 @@ _CONNECT_S = "10s"
 
 @contextmanager
 def processes(workers: int) -> Iterator[Executor]:
-    """Yield a pool of processes of this machine; they end with this process, even after kill -9."""
+    """Yield a pool of `workers` processes on this machine; they end when this process ends, even by kill -9."""
     pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _end_with_parent, (os.getpid(),))
     try:
-        # A process inherits ignored signals: this process alone answers Ctrl-C.
+        # The workers inherit that SIGINT is ignored: only this process reacts to Ctrl-C.
         before = signal.signal(signal.SIGINT, signal.SIG_IGN)
         try:
             pool.submit(os.getpid)
@@ -37,7 +37,7 @@ def processes(workers: int) -> Iterator[Executor]:
         for child in multiprocessing.active_children():
             child.terminate()
         if isinstance(error, BrokenProcessPool):
-            raise FeelaheadError("a worker process was ended from outside") from error
+            raise FeelaheadError("a worker process ended unexpectedly (killed, or out of memory)") from error
         raise
     finally:
         pool.shutdown(cancel_futures=True)
@@ -45,15 +45,15 @@ def processes(workers: int) -> Iterator[Executor]:
 
 @contextmanager
 def cluster(address: str, own_file: str | None) -> Iterator[Executor]:
-    """Yield the workers of the dask scheduler at `address`; ConfigurationError if none answers there.
+    """Yield an executor on the workers of the dask scheduler at `address`; ConfigurationError if none answers there.
 
-    own_file: a question's file that the cluster lacks; it is uploaded.
+    own_file: file of a user's own question, which is sent to the workers; None for a question of feelahead.
     """
     require_packages("--scheduler", "distributed", extra="experiments")
     import distributed  # noqa: PLC0415  # large
     from distributed.comm.core import CommClosedError  # noqa: PLC0415
 
-    for name in ("distributed", "distributed.client"):  # set up by the import; the raised error says what went wrong
+    for name in ("distributed", "distributed.client"):  # the import sets their levels; errors are raised below
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client: Any = distributed.Client(address, timeout=_CONNECT_S, set_as_default=False)  # type: ignore[no-untyped-call]
@@ -72,7 +72,7 @@ def cluster(address: str, own_file: str | None) -> Iterator[Executor]:
 
 
 def _end_with_parent(parent: int) -> None:
-    """End a worker soon after its parent is gone."""
+    """Start a thread that ends this worker within a second after its parent process is gone."""
 
     def watch() -> None:
         never = threading.Event()

@@ -1,4 +1,4 @@
-"""Compute contact distances before objects at known distances: where each strength begins."""
+"""Measure how far before objects at known distances each strength of R2 begins."""
 
 import functools
 import math
@@ -25,29 +25,29 @@ from robot_side.surroundings.scene_table import scene_table
 CONVEX: Final = ("wall", "plate", "ball", "post", "rod_10mm", "rod_5mm", "rod_2mm", "wall_45")
 """Frozen scenes with one convex object ahead."""
 DRAWN: Final = {1: ":", 4: "--", 8: "-"}
-"""Strengths that are drawn, and their lines."""
+"""Strengths that are drawn, with their kind of line."""
 _PROBABILITY: Final = 0.99
 _REACH_M, _FARTHEST_M, _MOST_MM = 0.4, 2.0, 150.0
 
 
 @dataclass(frozen=True)
 class Facing:
-    """Gripper in the home pose of one scene; its objects are moved along the approach."""
+    """Gripper in the home pose of one scene, whose objects are moved along the approach."""
 
     scene: str
     model: Path
     site: str
     step_mm: float
-    """Step of the free distances, 0 to 150 mm."""
+    """Step between the tried distances from the gripper to the object, 0 to 150 mm."""
 
 
 Look = Callable[[], Field]
 
 
 def looks_before(cell: Facing, free_mm: Iterable[float]) -> Iterator[Look]:
-    """Yield a function that looks along R2, for each free distance in `free_mm`.
+    """Yield, for each distance to the object in `free_mm`, a function that evaluates the law along R2 (a look).
 
-    ConfigurationError for an unusable model, or one with nothing ahead of its gripper.
+    ConfigurationError if the model cannot be used or has nothing ahead of its gripper.
     """
     scene = load_scene(cell.model, cell.site)
     posed, gripper, things = PosedScene(scene), PosedGripper(scene), len(scene.objects)
@@ -71,7 +71,10 @@ def looks_before(cell: Facing, free_mm: Iterable[float]) -> Iterator[Look]:
 
 
 def look_ahead(cell: Facing) -> Iterator[Row]:
-    """Yield a row for each free distance with those of R2's strengths, in mm; ConfigurationError as `looks_before`."""
+    """Yield a row for each distance to the object, with the onset distances of R2's eight strengths, in mm.
+
+    ConfigurationError as for `looks_before`.
+    """
     ways_mm = np.arange(0.0, _MOST_MM + 0.1, cell.step_mm).tolist()
     for free_mm, look in zip(ways_mm, looks_before(cell, ways_mm), strict=True):
         found = look()
@@ -84,12 +87,12 @@ def look_ahead(cell: Facing) -> Iterator[Row]:
 
 
 def strength_column(strength: int) -> str:
-    """Name the column of the distance from which a strength is felt; None in it if it never is."""
+    """Return the name of the column with a strength's onset distance, which is None if the strength never begins."""
     return f"strength_{strength}_mm"
 
 
 def draw_field(table: Table, frozen: str, path: Path) -> None:
-    """Draw how far before each object strengths begin: a colour for each scene, a kind of line for each strength."""
+    """Draw how far before each object the strengths begin: one colour for each scene, one line for each strength."""
     with figure(path, 1, 1, f"where strength begins (frozen {frozen})", figsize=(7.5, 4.2)) as (_, axes):
         for number, ((scene,), rows) in enumerate(table.groups("scene")):
             for strength, line in DRAWN.items():

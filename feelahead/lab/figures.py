@@ -1,4 +1,4 @@
-"""Draw figures with matplotlib: off screen, and the same bytes from the same data."""
+"""Draw figures with matplotlib without a screen, so that the same data give the same file to the byte."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ from common.errors import ConfigurationError
 from common.recording.packages import require_packages
 
 PICTURES: Final = (".png", ".svg", ".pdf")
-"""Valid endings of a picture's file name."""
+"""Endings that a picture's file name may have."""
 LAW_COLOURS: Final = {
     "swept": "#0072b2",
     "swept_robot": "#56b4e9",
@@ -21,9 +21,9 @@ LAW_COLOURS: Final = {
 
 @contextmanager
 def figure(path: Path, rows: int = 1, columns: int = 1, title: str = "", **options: Any) -> Iterator[tuple[Any, Any]]:
-    """Yield a figure and its axes, as `matplotlib.pyplot.subplots` makes them, and write it at the end.
+    """Yield a figure and its axes, as `matplotlib.pyplot.subplots` makes them; afterwards write the figure to `path`.
 
-    ConfigurationError without matplotlib, or if the file cannot be written.
+    ConfigurationError if matplotlib is missing or the file cannot be written.
     """
     require_packages("--picture", "matplotlib", extra="experiments")
     import matplotlib as mpl  # noqa: PLC0415  # slow to load, and only for pictures
@@ -38,7 +38,7 @@ def figure(path: Path, rows: int = 1, columns: int = 1, title: str = "", **optio
             yield drawn, axes
             if title:
                 drawn.suptitle(title, fontsize=9)
-            # Without the date and the library's version, the same data give the same file.
+            # No date and no version of the library in the file: the same data give the same bytes.
             dated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
             drawn.savefig(path, metadata=dated.get(path.suffix.lower(), {"Software": None}))
         except OSError as error:

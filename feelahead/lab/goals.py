@@ -1,4 +1,4 @@
-"""Goals: upper or lower limits of figures, and whether they are met."""
+"""Goals: upper or lower limits for measured figures, and whether the figures meet them."""
 
 import math
 from collections.abc import Iterable
@@ -10,18 +10,18 @@ from rich.console import Console
 
 @dataclass(frozen=True)
 class Goal:
-    """One figure with its limit."""
+    """One measured figure with its upper or lower limit."""
 
     claim: str
     value: float | None
-    """Measured figure; None: not measured."""
+    """Measured value; None: not measured"""
     limit: float
     compare: Literal["at most", "at least"] = "at most"
     detail: str = ""
 
     @property
     def verdict(self) -> str:
-        """`met`, `missed` or `not measured`."""
+        """Whether the goal is `met`, `missed` or `not measured`."""
         if self.value is None or math.isnan(self.value):
             return "not measured"
         reached = self.value <= self.limit if self.compare == "at most" else self.value >= self.limit
@@ -29,7 +29,7 @@ class Goal:
 
 
 def show_goals(console: Console, goals: Iterable[Goal]) -> None:
-    """Print a line for each goal."""
+    """Print a line for each goal: verdict, claim, value and limit."""
     for goal in goals:
         value = "-" if goal.value is None else short(goal.value)
         detail = f" ({goal.detail})" if goal.detail else ""
@@ -40,7 +40,7 @@ def show_goals(console: Console, goals: Iterable[Goal]) -> None:
 
 
 def short(value: float) -> str:
-    """Round to three digits: 0.00123 to 1.23e-03, 1234.5 to 1234."""
+    """Return `value` as text with two to four digits: 0.00123 as 1.2e-03, 0.123 as 0.123, 1234.5 as 1234."""
     if value == 0.0 or not math.isfinite(value):
         return f"{value:g}"
     if value == int(value) and abs(value) < 1e7:

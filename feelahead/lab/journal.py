@@ -1,4 +1,4 @@
-"""Finished work, line by line in a file, from which a stopped sweep continues: `--resume FILE.jsonl`."""
+"""File with the finished work of a sweep (`--resume FILE.jsonl`), from which a stopped sweep continues."""
 
 import fcntl
 import json
@@ -14,20 +14,25 @@ from feelahead.lab.table import Row
 
 
 class Journal:
-    """File whose first line holds the settings and versions, with one line for each finished piece of work.
+    """File whose first line identifies the question and its code; each further line has one finished piece of work.
 
-    A piece is written and synced before the next one. A last line torn by kill -9 is cut off and its piece is run
-    again, so that no row is lost or doubled.
+    Each piece is written and synced to the disk before the next one. If kill -9 has left an incomplete last line, the
+    line is removed and its piece is run again, so that no row is lost or doubled.
     """
 
     def __init__(self, path: Path | None, made_by: Mapping[str, Any]) -> None:
-        """Open or create the file; ConfigurationError if it holds another run's work or another run writes to it."""
+        """Open or create the file; `path` None: keep the work in memory only.
+
+        ConfigurationError if the file is of another question or code than `made_by`, or if another run writes to it.
+        """
         self.done: dict[str, list[Row]] = {}
         self._file: FileIO | None = None
         if path is None:
             return
         if path.exists() and not path.is_file():
-            raise ConfigurationError(f"--resume {path}: not a regular file; valid: a file of its own, or a new one")
+            raise ConfigurationError(
+                f"--resume {path}: not a regular file; valid: a new file, or one that --resume wrote"
+            )
         try:
             with ExitStack() as stack:
                 self._file = stack.enter_context(FileIO(path, "a+"))
@@ -35,7 +40,7 @@ class Journal:
                 self._load(path, self._file, json.dumps({"made_by": made_by}).encode())
                 stack.pop_all()
         except BlockingIOError as error:
-            raise ConfigurationError(f"--resume {path}: another run writes to it; valid: a file of its own") from error
+            raise ConfigurationError(f"--resume {path}: another run writes to it; valid: another file") from error
         except OSError as error:
             raise ConfigurationError(f"--resume {path}: cannot be opened and locked: {error.strerror}") from error
 
@@ -47,7 +52,7 @@ class Journal:
             self._file.close()
 
     def keep(self, key: str, rows: list[Row]) -> None:
-        """Write one finished piece; FeelaheadError if the write fails, though the piece is then in `done`."""
+        """Add one finished piece to `done` and to the file; FeelaheadError if the file cannot be written."""
         self.done[key] = rows
         self._write(json.dumps({"key": key, "rows": rows}).encode())
 

@@ -1,4 +1,4 @@
-"""One cell of a grid with one seed, and the execution of all: here, in processes, or on a cluster."""
+"""Pieces of work, each one cell of a grid with one seed, and their execution: here, in processes, or on a cluster."""
 
 import functools
 import importlib
@@ -22,19 +22,19 @@ _WORKERS = 2
 
 @dataclass(frozen=True)
 class Piece:
-    """One cell with one seed."""
+    """Piece of work: one cell of the grid with one seed."""
 
     cell: Any
     seed: int
 
     @functools.cached_property
     def key(self) -> str:
-        """Key in the journal: equal for equal cells, whatever else the grid holds."""
+        """Key in the journal: the cell's values and the seed, independent of the rest of the grid."""
         return f"{json.dumps(_plain(self.cell), sort_keys=True)} {self.seed}"
 
     @property
     def columns(self) -> Row:
-        """Scalars of the cell, and the seed."""
+        """Columns that the piece adds to each of its rows: the cell's scalar values, and the seed."""
         scalars = {name: value for name, value in _plain(self.cell).items() if not isinstance(value, list | dict)}
         return scalars | {"seed": self.seed}
 
@@ -45,7 +45,7 @@ class Piece:
 def results(
     question: Any, settings: Any, todo: Sequence[Piece], shown: Shown
 ) -> Iterator[tuple[Piece, list[Row] | str]]:
-    """Yield each piece with its rows or failure, as they end."""
+    """Run all pieces in `todo`; yield each when it has ended, with its rows, or with the failure as text."""
     module = question.run.__module__
     if not todo:
         return
@@ -70,12 +70,12 @@ def results(
             found = future.result()
             left.remove(futures[future])
             if left:
-                shown.begin(str(left[0]))  # The longest waiting piece.
+                shown.begin(str(left[0]))  # the piece that has waited longest
             yield futures[future], found
 
 
 def run_piece(module: str, cell: Any, seed: int) -> list[Row] | str:
-    """Run one cell of the question in `module`, here or in a worker; return its rows, or the failure as a line."""
+    """Run one cell of the question in `module`, here or in a worker; return its rows, or the failure as text."""
     question: Any = importlib.import_module(module).QUESTION
     columns = Piece(cell, seed).columns
     try:
@@ -90,18 +90,18 @@ def run_piece(module: str, cell: Any, seed: int) -> list[Row] | str:
 
 
 def _own_file(module: str) -> str | None:
-    """Return the file of a question outside any package; None for one of the lab, which every release has."""
+    """Return the file of a user's own question; None for a question of feelahead, which every worker has installed."""
     return None if "." in module else sys.modules[module].__file__
 
 
 def _of_numpy(value: Any) -> Any:
-    """Convert numbers and arrays of NumPy to plain ones."""
+    """Convert a number or array of NumPy to Python's numbers and lists."""
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     raise TypeError(f"a row holds {value!r}; valid: numbers, texts, lists and None")
 
 
 def _plain(cell: object) -> dict[str, Any]:
-    """Convert a cell to JSON values."""
+    """Return a cell's fields as JSON values."""
     plain: dict[str, Any] = msgspec.to_builtins(cell, enc_hook=str)
     return plain

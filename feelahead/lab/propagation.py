@@ -1,6 +1,6 @@
-"""Standard deviation of a point of the gripper from the encoders' errors: eq. 5 and its alternatives.
+"""Standard deviation of a point of the gripper that follows from the encoders' errors, by eq. 5 and by other methods.
 
-The truth is a Monte Carlo of the exact kinematics, with its own standard error.
+As the truth counts a Monte Carlo simulation of the exact kinematics, given with its own standard error.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,13 +19,13 @@ from robot_side.drivers.mujoco.scene import Scene
 from robot_side.enlargement.kinematic_error import directional_variance, position_covariance
 
 NOISE_RAD: Final = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
-"""Standard deviations of every joint's error, in rad."""
+"""Tried standard deviations of the joints' errors, in rad; all joints have the same."""
 BATCHES: Final = 20
-"""Number of batches of the draws; their spread gives the standard error of the whole."""
+"""Number of batches into which the draws are split; the spread between batches gives the standard error."""
 METHODS: Final = ("linear", "once", "unscented")
 SINGULAR: Final = "singular"
 _SAMPLED: Final = 256
-"""Number of configurations over which `once` takes the largest variance, as the robot side does."""
+"""Number of sampled configurations over which the paper's method `once` takes the largest error."""
 _ENCODER_RAD: Final = 2e-4
 
 Displacements = Callable[[FloatArray], FloatArray]
@@ -33,17 +33,17 @@ Displacements = Callable[[FloatArray], FloatArray]
 
 
 class Chain:
-    """One point carried by n joints, near one configuration, as a product of exponentials (Brockett 1984).
+    """Kinematics of one point that n joints carry, near one configuration: product of exponentials (Brockett 1984).
 
-    x = exp(ξ₁ δ₁) ... exp(ξₙ δₙ) p with the joints' screws ξ at that configuration, base to tip: joint i turns
-    everything beyond it about its axis there, by δᵢ. The screws are the columns of the geometric Jacobian, so that no
-    other model of the robot is needed.
+    x = exp(ξ₁ δ₁) ... exp(ξₙ δₙ) p, where ξ are the joints' screws at that configuration, from base to tip. Joint i
+    turns all links beyond it about its axis by δᵢ. The screws are the columns of the geometric Jacobian, so no other
+    model of the robot is needed.
     """
 
     def __init__(self, jacobian: FloatArray, tool_position_m: FloatArray, point_m: FloatArray) -> None:
-        """jacobian (6, n) of the tool's point, linear rows first, base to tip; all in the world frame.
+        """jacobian (6, n): of the tool's point, linear rows first, joints from base to tip.
 
-        point_m (3,): the point to follow, anywhere on the last joint's link.
+        point_m (3,): point to follow, anywhere on the last joint's link. Everything is in the world frame.
         """
         self._point_m = point_m
         self._axes = np.ascontiguousarray(jacobian[3:].T)
@@ -52,9 +52,9 @@ class Chain:
         self._on_axes_m = tool_position_m - np.cross(self._linear, self._axes)
 
     def displacements(self, changes_rad: FloatArray) -> FloatArray:
-        """Return the point's displacements (k, 3) in metres after joint changes (k, n).
+        """Return the point's displacements (k, 3) in metres for joint changes (k, n).
 
-        The differences themselves are summed: changes of 1e-5 rad keep their digits.
+        Displacements are summed, not positions, so that changes of 1e-5 rad lose no digits.
         """
         moved = np.zeros((len(changes_rad), 3))
         for joint in reversed(range(len(self._axes))):
@@ -68,54 +68,61 @@ class Chain:
 
 
 class PosedGripper:
-    """Gripper by eq. 4 in any configuration; the fingers stay as the scene starts."""
+    """Gripper of a scene, placed by eq. 4 in any configuration; the fingers stay as at the scene's start."""
 
     def __init__(self, scene: Scene) -> None:
         robot = scene.robot
         self.home_rad: FloatArray = scene.data.qpos[robot.arm_positions].copy()
         self.fingers: FloatArray = scene.data.qpos[robot.finger_positions].copy()
-        # A joint without limits is sampled over one turn.
+        # A joint without limits is drawn over one turn.
         self._lower_rad = np.where(np.isfinite(robot.lower_rad), robot.lower_rad, -np.pi)
         self._upper_rad = np.where(np.isfinite(robot.upper_rad), robot.upper_rad, np.pi)
         self._kinematics = MujocoKinematics(scene)
 
     def at(self, joint_positions_rad: FloatArray) -> GripperPose:
-        """Return the gripper's pose for joints (n,)."""
+        """Return the gripper's pose for the joint positions (n,)."""
         still = np.zeros_like(joint_positions_rad)
         return self._kinematics.pose(ArmState(0.0, joint_positions_rad, still, self.fingers, 0.0, False))
 
     def drawn(self, count: int, *seed: int) -> FloatArray:
-        """Draw configurations (count, n) all over the joints' ranges."""
+        """Draw joint positions (count, n), uniform over the joints' ranges."""
         shape = count, len(self.home_rad)
         return np.random.default_rng(seed).uniform(self._lower_rad, self._upper_rad, shape)
 
 
 def linear_sd_m(jacobian: FloatArray, noise_rad: float, axis: FloatArray) -> float:
-    """Return the standard deviation by eq. 5: √(ûᵀ J diag(σ²) Jᵀ û); jacobian (3, n) of the point."""
+    """Return the standard deviation along `axis` by eq. 5: √(ûᵀ J diag(σ²) Jᵀ û). jacobian (3, n): of the point."""
     covariances = position_covariance(jacobian[None], np.full(jacobian.shape[1], noise_rad))
     return float(np.sqrt(directional_variance(covariances, axis[None])[0]))
 
 
 def unscented_sd_m(displacements: Displacements, joints: int, noise_rad: float, axis: FloatArray) -> float:
-    """Propagate 2n + 1 points: zero, and each joint alone by ±√3 σ, κ = 3 - n (Julier, Uhlmann 1997)."""
+    """Return the standard deviation along `axis` by the unscented transform (Julier, Uhlmann 1997), κ = 3 - n.
+
+    Its 2n + 1 points are no error, and an error of ±√3 σ in each joint alone.
+    """
     step = np.sqrt(3.0) * noise_rad * np.eye(joints)
     along = displacements(np.concatenate([np.zeros((1, joints)), step, -step])) @ axis
     weights = np.concatenate([[1.0 - joints / 3.0], np.full(2 * joints, 1.0 / 6.0)])
-    # The first weight is negative from n = 4 on, so the variance may be negative, too.
+    # The first weight is negative from n = 4 on, so the variance may become negative.
     return float(np.sqrt(max(float(weights @ (along - weights @ along) ** 2), 0.0)))
 
 
 def monte_carlo_sd_m(displacements: Displacements, errors_rad: FloatArray, axis: FloatArray) -> tuple[float, float]:
-    """Return the true deviation for joint errors (k, n), k a multiple of BATCHES, and its standard error."""
+    """Return the true standard deviation along `axis` for drawn joint errors (k, n), and its standard error.
+
+    k must be a multiple of BATCHES.
+    """
     along = np.concatenate([displacements(batch) for batch in np.split(errors_rad, BATCHES)]) @ axis
     spread = along.reshape(BATCHES, -1).std(axis=1).std(ddof=1)
     return float(along.std()), float(spread / np.sqrt(BATCHES))
 
 
 def places(gripper: PosedGripper, count: int, seed: int) -> dict[str, FloatArray]:
-    """Return named configurations (n,): home, `count` seeded ones within the joints' ranges, and a singular one.
+    """Return joint positions (n,) by name: home, `count` random ones within the joints' ranges, and a singular one.
 
-    Of all samples, the singular one has the least error along the approach relative to the largest in any direction.
+    The singular one is the sample with the smallest ratio of the error along the approach to the largest error in any
+    direction.
     """
 
     def share_along(configuration: FloatArray) -> float:
@@ -129,15 +136,18 @@ def places(gripper: PosedGripper, count: int, seed: int) -> dict[str, FloatArray
 
 
 def once_sd_m(gripper: PosedGripper, seed: int) -> float:
-    """Return the paper's factor, m/rad: the largest singular value of J of any sphere in any sampled configuration."""
+    """Return the factor of the paper's method `once`, in m/rad: the largest singular value of all spheres' Jacobians.
+
+    It is taken over all sampled configurations.
+    """
     jacobians = (gripper.at(configuration).sphere_jacobians for configuration in gripper.drawn(_SAMPLED, seed, 2))
     return max(float(np.linalg.norm(of_spheres, 2, axis=(1, 2)).max()) for of_spheres in jacobians)
 
 
 def measure(gripper: PosedGripper, number: int, configurations: int, draws: int, seed: int) -> Iterator[Row]:
-    """Yield a row for each point and noise in configuration `number`; `draws` is a multiple of BATCHES.
+    """Yield a row for each point and joint noise in configuration `number`. draws: a multiple of BATCHES.
 
-    The points are the tool's and the centre of the gripper's sphere farthest from it.
+    The two points are the tool's, and the centre of the gripper's sphere that is farthest from the tool's point.
     """
     once_m = once_sd_m(gripper, seed)
     place, configuration = list(places(gripper, configurations, seed).items())[number]
@@ -163,9 +173,10 @@ def measure(gripper: PosedGripper, number: int, configurations: int, draws: int,
 
 
 def run_times_us(gripper: PosedGripper, turns: int) -> dict[str, float]:
-    """Measure one call of each method at home, for one point and direction: the least time of all turns.
+    """Return the run time of one call of each method in the home configuration, for one point and one direction.
 
-    "linear" uses a given Jacobian, as a tick does. "unscented" computes 2n + 1 poses one by one.
+    The least time of all turns counts. "linear" uses a Jacobian that is given, as in a tick. "unscented" computes its
+    2n + 1 poses one by one.
     """
     pose = gripper.at(gripper.home_rad)
     axis, joints = pose.tool_rotation[:, 2], len(gripper.home_rad)

@@ -25,21 +25,21 @@ _GREY: Final = (0.25, 0.27, 0.30)
 
 @dataclass(frozen=True)
 class ScenePictures:
-    """Draw the built-in scenes: the gripper at its start, and faint where it grasps."""
+    """Draw the built-in scenes, with the gripper at its start, and faintly where it will grasp the target."""
 
     out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path()
-    """Folder for one PNG of each scene."""
+    """Existing folder for the pictures, one PNG for each scene."""
     seed: Annotated[int, Meta(ge=0), tyro.conf.arg(metavar="N")] = 0
-    """Seed that draws wall, posts and shelf."""
+    """Seed from which wall, posts and shelf are drawn."""
 
     def __post_init__(self) -> None:
         check_limits(self)
         if not self.out.is_dir():
-            raise ValueError(f"--out {self.out}: there is no such folder; valid: an existing folder")
+            raise ValueError(f"--out {self.out}: the folder does not exist; valid: an existing folder")
 
 
 def draw_scene(path: Path, name: SceneName, seed: int) -> None:
-    """Write one scene's picture."""
+    """Draw the scene `name` from above and from the side, and write the picture to `path`."""
     from matplotlib.collections import PolyCollection  # noqa: PLC0415  # only pictures need it
 
     scene = load_scene(name=name, seed=seed)
@@ -52,7 +52,7 @@ def draw_scene(path: Path, name: SceneName, seed: int) -> None:
     drawn = [(corners, colour) for corners, colour in drawn if len(corners)] + [(gripper, (*_GREY, 1.0))]
     with figure(path, 1, 2, f"{name}, seed {seed}", figsize=(9, 4), dpi=80) as (_, panels):
         for ax, view, up, towards in zip(panels, ("from above", "from the side"), (1, 2), (1.0, -1.0), strict=True):
-            # Faces nearer to the eye hide those behind.
+            # Faces nearer to the viewer hide those behind.
             nearest = sorted(drawn, key=lambda one: float((towards * one[0][:, :, 3 - up]).max()))
             for corners, colour in (*nearest, (gripper + to_grasp_m, (*_GREY, 0.15))):
                 ax.add_collection(PolyCollection(list(corners[:, :, [0, up]]), facecolor=colour))

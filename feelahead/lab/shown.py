@@ -1,4 +1,4 @@
-"""Tables for people."""
+"""Tables of a question's figures, as they are printed."""
 
 from collections.abc import Iterable
 
@@ -9,7 +9,7 @@ from feelahead.lab.goals import short
 
 
 def shown(title: str, headings: Iterable[str], rows: Iterable[Iterable[str | float | None]]) -> Table:
-    """Return a table whose first column names the row; numbers have three digits, and None is a dash."""
+    """Return a printable table; the first entry of a row is its name. Numbers get three digits, None becomes a dash."""
     table = Table(title=title, title_justify="left", box=MARKDOWN)
     for number, heading in enumerate(headings):
         table.add_column(heading, justify="right" if number else "left")

@@ -1,8 +1,9 @@
-"""Engine of all questions: run each cell of a grid with each seed, and collect one tidy table of the rows.
+"""Engine of all questions: run each cell of a grid with each seed, and collect all rows in one tidy table.
 
-A question defines its cells, the run of one, and its tables. The engine does the rest: seeds that depend on no order,
-progress, workers or a cluster, a journal that survives kill -9, CSV and Parquet, goals and figures. The table is the
-same to the byte for any number of workers and after any interruption: rows are in the order of the grid.
+A question defines its cells, how to run one cell, and its tables. The engine does the rest: seeds that do not depend on
+the order, progress, workers or a cluster, a journal that survives kill -9, CSV and Parquet, goals and figures. The
+table's rows are in the order of the grid. So the table is the same to the byte for any number of workers, and after any
+interruption.
 """
 
 import functools
@@ -36,35 +37,36 @@ _PACKAGES = ("common", "operator_side", "robot_side", "feelahead")
 _MOST_RUNS = 10_000_000
 _SCHEDULER = re.compile(r"[a-z]+://[^/:]+:\d{1,5}")
 _INTERRUPTED = 130
-"""Exit code that shells give a command ended by Ctrl-C."""
+"""Exit code by which shells report that Ctrl-C has ended a command."""
 _WIDTH = 200
-"""Width of output outside a terminal, in columns."""
+"""Width of the output where it goes to no terminal, in columns."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """Flags of every question; a question's own settings inherit them."""
+    """Flags that every question has; the settings class of a question inherits from this class."""
 
     quick: bool = False
-    """Run a small grid that shows in a few minutes whether anything is wrong."""
+    """Run only a small grid, which shows in a few minutes whether anything is wrong."""
     seed: Annotated[int, Meta(ge=0), tyro.conf.arg(metavar="N")] = 0
     """First seed."""
     seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 1
-    """Number of seeds; each cell is run with each."""
+    """Number of seeds; each cell is run with each of them."""
     workers: Annotated[Annotated[int, Meta(ge=1)] | None, tyro.conf.arg(metavar="N")] = None
-    """Number of parallel cells, each in a process of this machine; 2 unless given. 1: in this process."""
+    """Number of cells that run at the same time, each in its own process on this machine; 2 unless given. With 1 the
+    cells run one by one in this process."""
     scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """Run the cells on the dask.distributed cluster of this scheduler instead."""
+    """Run the cells on the cluster of this dask.distributed scheduler, instead of on this machine."""
     resume: Annotated[Path | None, tyro.conf.arg(metavar="FILE.jsonl")] = None
-    """Write each finished cell to this file, and skip the cells in it."""
+    """Write each finished cell to this file, and skip the cells that the file already has."""
     csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
     """Write the table to this file, and settings, versions and hashes to FILE.csv.json."""
     parquet: Annotated[Path | None, tyro.conf.arg(metavar="FILE.parquet")] = None
-    """Write the same as Parquet."""
+    """Write the table to this file as Parquet, and settings, versions and hashes to FILE.parquet.json."""
     summary: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
-    """Write all figures, lists included: those of the one run, or of several as `runs`."""
+    """Write all figures to this file, lists included: those of a single run directly, those of several as `runs`."""
     picture: Annotated[Path | None, tyro.conf.arg(metavar="FILE.png")] = None
-    """Draw the question's figure."""
+    """Draw the question's figure into this file."""
     config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """Read settings from this file."""
 
@@ -94,7 +96,7 @@ C = TypeVar("C")
 
 
 def cell_of(kind: type[C], settings: Sweep) -> C:
-    """Make the cell whose fields the settings inherit from it."""
+    """Return a cell of class `kind` with the values that `settings`, which inherit its fields, have for them."""
     return kind(**{name: getattr(settings, name) for name in kind.__dataclass_fields__})  # type: ignore[attr-defined]
 
 
@@ -104,42 +106,43 @@ def _nothing(*_: Any) -> tuple[()]:
 
 @dataclass(frozen=True)
 class Question(Generic[S, C]):
-    """One question; its module holds it as `QUESTION`, and the module's docstring begins with the question itself."""
+    """One question. Its module defines it as `QUESTION`; the module's docstring begins with the question in words."""
 
     name: str
-    """Command: `try approach`, `bench tick`."""
+    """Command by which it is asked, such as `try approach` or `bench tick`"""
     settings: type[S]
-    """Parameters of the grid, each a flag; the class's docstring is shown by `--help`."""
+    """Class of the grid's parameters, each of which is a flag; `--help` shows the class's docstring"""
     cells: Callable[[S], Iterable[C]]
-    """Return the grid: frozen dataclasses of plain values, whose scalars become columns."""
+    """Function that returns the grid's cells: frozen dataclasses of plain values, whose scalars become columns"""
     run: Callable[[C, int], Iterable[Row]]
-    """Run one cell with one seed; all randomness comes from the seed, as through `generator`."""
+    """Function that runs one cell with one seed and returns its rows; all randomness must come from the seed, as by
+    `generator`"""
     show: Callable[[S, Table], Iterable[RenderableType]]
-    """Return the tables and sentences for people."""
+    """Function that returns the tables and sentences to print"""
     draw: Callable[[S, Table, Path], object] | None = None
-    """Draw the figure of `--picture`."""
+    """Function that draws the figure of `--picture`; None: the question has no figure"""
     goals: Callable[[S, Table], Iterable[Goal]] = _nothing
-    """Return the figures with their limits."""
+    """Function that returns the goals: figures with their limits"""
     also: Callable[[S, Table], object] = _nothing
-    """Write the files of the question's own flags."""
+    """Function that writes the files of the question's own flags"""
     frozen: Callable[[S], str] = lambda _: ""
-    """Hash the inputs that must not change, so that the figures of two runs stay comparable."""
+    """Function that returns a hash of the inputs that must not change; figures with the same hash may be compared"""
     failed: Callable[[Row], bool] = lambda _: False
-    """Return whether a row answers nothing: then the exit code is 1."""
+    """Function that returns whether a row is a failure; with any such row the exit code is 1"""
     timed: bool = False
-    """Whether cells measure time: they take turns in this process alone, and `--workers` is refused."""
+    """Whether cells measure time: they then run one by one in this process, and more workers are refused"""
     prepare: Callable[[], object] = _nothing
-    """Do once the work that each worker would repeat, such as compiling kernels."""
+    """Function that does in advance what each worker would otherwise repeat, such as compiling kernels"""
 
 
 def ask(question: Question[Any, Any], arguments: Sequence[str]) -> int:
-    """Answer a question from the command line; return 0 if every cell gave its rows, 130 after Ctrl-C, else 1."""
+    """Run a question with the arguments of its command; return 0 if all cells succeeded, 130 after Ctrl-C, else 1."""
     settings = parse_settings(question.settings, f"feelahead {question.name}", arguments)
     if settings.picture is not None and question.draw is None:
         raise ConfigurationError(f"--picture {settings.picture}: {question.name} has no figure")
     done = sweep(question, settings)
     try:
-        _write(question, settings, done.table)  # before anything is printed: a reader may leave early, as `head` does
+        _write(question, settings, done.table)  # before printing, which fails if the reader ends early, as `head` does
     finally:
         _show(question, settings, done)
     if done.ended is not None:
@@ -154,7 +157,7 @@ def ask(question: Question[Any, Any], arguments: Sequence[str]) -> int:
 
 
 def _show(question: Question[S, C], settings: S, done: "Swept") -> None:
-    """Print tables, goals and failures of the finished rows."""
+    """Print the tables and goals of the finished rows, and the failures."""
     console = Console(width=None if sys.stdout.isatty() else _WIDTH, highlight=False, markup=False)
     if len(done.table):
         for shown in question.show(settings, done.table):
@@ -168,27 +171,29 @@ def _show(question: Question[S, C], settings: S, done: "Swept") -> None:
 
 @dataclass(frozen=True)
 class Swept:
-    """Result of a sweep."""
+    """Result of a sweep: the finished rows, the failures, and how the sweep ended."""
 
     table: Table
     failures: list[str]
-    """A line for each failed cell."""
+    """One line for each piece (cell with seed) that failed"""
     left: int
-    """Number of runs that are neither finished nor failed."""
+    """Number of pieces that are neither finished nor failed"""
     ended: str | None = None
-    """Reason of an early end."""
+    """Reason for an early end; None if all pieces were run"""
     interrupted: bool = False
 
 
 def sweep(question: Question[S, C], settings: S) -> Swept:
-    """Run all pieces that the journal lacks.
+    """Run all pieces that the journal does not have yet, and return all finished rows.
 
-    A cell that raises FeelaheadError fails by itself. Ctrl-C, a killed worker and an unwritable journal end the sweep
-    with the finished rows. ConfigurationError for a grid that cannot be run.
+    A cell that raises FeelaheadError fails alone; the others are run. Ctrl-C, a killed worker or a journal that cannot
+    be written ends the sweep early, with the rows finished so far. ConfigurationError for a grid that cannot be run.
     """
     if question.timed and (settings.scheduler or settings.workers not in (None, 1)):
         flag = f"--scheduler {settings.scheduler}" if settings.scheduler else f"--workers {settings.workers}"
-        raise ConfigurationError(f"{flag}: {question.name} measures time, in turns and alone; valid: --workers 1")
+        raise ConfigurationError(
+            f"{flag}: {question.name} measures time, so its cells must run one by one; valid: --workers 1"
+        )
     seeds = range(settings.seed, settings.seed + settings.seeds)
     cells = list(question.cells(settings))
     if not 0 < len(cells) * len(seeds) <= _MOST_RUNS:
@@ -199,7 +204,7 @@ def sweep(question: Question[S, C], settings: S) -> Swept:
     failures: list[str] = []
     ended, interrupted = None, False
     with Journal(settings.resume, made_by) as journal:
-        # Seed by seed, so that an interrupted sweep has rows of every cell.
+        # All cells with the first seed come first, so that an interrupted sweep has rows of every cell.
         todo = sorted((piece for piece in order if piece.key not in journal.done), key=lambda piece: piece.seed)
         try:
             with progress(question.name, float(len(todo) or 1)) as shown:
@@ -223,14 +228,14 @@ def sweep(question: Question[S, C], settings: S) -> Swept:
 
 
 def generator(cell: object, seed: int) -> np.random.Generator:
-    """Return the random generator of one cell and seed: independent of the order and of other cells."""
+    """Return the random generator for one cell and seed; it does not depend on other cells or on the order."""
     digest = hashlib.sha256(Piece(cell, seed).key.encode()).digest()
     return np.random.default_rng(int.from_bytes(digest[:16], "little"))
 
 
 @functools.cache
 def _code_hash(own: Path) -> str:
-    """Hash the packages' code and the question's own file."""
+    """Return a hash of the code of feelahead's packages and of the question's own file."""
     digest = hashlib.sha256(own.read_bytes())
     for package in _PACKAGES:
         for path in sorted((_ROOT / package).rglob("*.py")):
@@ -239,12 +244,12 @@ def _code_hash(own: Path) -> str:
 
 
 def code_hash(question: Question[Any, Any]) -> str:
-    """Hash the code that a question's figures come from."""
+    """Return a hash of all code on which a question's figures depend."""
     return _code_hash(Path(question.run.__code__.co_filename))
 
 
 def _write(question: Question[S, C], settings: S, table: Table) -> None:
-    """Write the files of the flags."""
+    """Write the files that the flags name: summary, tables, picture and the question's own."""
     frozen = question.frozen(settings)
     if settings.summary is not None:
         runs = list(table)

@@ -28,10 +28,11 @@ from robot_side.outcome.placing import Placing
 from robot_side.settings import CameraSettings, RobotSettings
 
 Arm = Literal["off", "mechanical", "reacting"]
-"""off: nothing is felt. mechanical: triggers resist, and the person does not react. reacting: the person reacts."""
+"""Condition (arm of the experiment). off: no haptics. mechanical: the triggers resist, but the person does not react.
+reacting: the triggers resist and the person reacts."""
 _L2, _R2 = 0, 1
 _SAME_CONTACT_S: Final = 0.1
-"""Time within which a renewed contact with an object is the same contact, in seconds."""
+"""Time in seconds after a contact within which another contact with the same object counts as the same one."""
 _LOOK_S: Final = 0.05
 _TRUTH_S: Final = 0.01
 _SETTLES_S: Final = 0.3
@@ -39,7 +40,7 @@ _SETTLES_S: Final = 0.3
 
 @dataclass(frozen=True)
 class Trial:
-    """Task of one trial; two with the same seed that differ in `arm` alone are a pair."""
+    """Settings of one trial; two trials with the same seed that differ only in `arm` are a pair."""
 
     scene: SceneName
     link: str
@@ -56,36 +57,36 @@ class Trial:
 
 
 class _Silent:
-    """Stand-in for a law that nobody feels; computes nothing."""
+    """Replacement for the law in trials without haptics, which computes nothing."""
 
     def __init__(self, law: Law) -> None:
         self._law = law
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Return free triggers."""
+        """Return the field of two free triggers."""
         del situation, now_s
         free = uniform_field(0)
         return Sensed.of(free, free)
 
     def around(self, pose: GripperPose) -> Around | None:
-        """Return no map."""
+        """Return None: there is no map of the surroundings."""
         del pose
         return None
 
     def summary(self) -> dict[str, int]:
-        """Return the law's summary: no work at all."""
+        """Return the summary of the replaced law, which counts no work."""
         return self._law.summary()
 
 
 class _Watch(Listener):
-    """Watcher of the truth, tick by tick."""
+    """Run of both sides, and what is counted from the simulation's truth in each tick: hits, strengths, placing."""
 
     def __init__(self, trial: Trial, seed: int) -> None:
         self.hits = 0
         self.hit_first: str | None = None
         self.fastest_m_s: float | None = None
         self.pulled_s = self.full_s = 0.0
-        """Time of R2 pulled, and of full strength under its finger, in seconds"""
+        """Time for which R2 was pulled, and for which the finger met full strength at R2, in seconds"""
         self.placing = Placing()
         self.scene = load_scene(name=trial.scene, seed=seed)
         self._contact, self._truth = TrueContact(self.scene), GroundTruth(self.scene)
@@ -116,11 +117,11 @@ class _Watch(Listener):
         )
 
     def on_sent(self, now_s: float) -> None:
-        """Sample the true contact, the strength and the target."""
+        """Sample the true contacts, the strength under the finger, and the target's position."""
         held, roles = self.loopback.robot.held, self.scene.roles
         onset = self._contact.update(held)
         if onset is not None and roles[onset.thing] is not Role.TARGET:
-            # The held object, set down on a support, is where it should be.
+            # A held object that touches a support is being set down, which is no hit.
             where_it_should_be = onset.gripper_part not in self._parts and roles[onset.thing] is Role.SUPPORT
             if not where_it_should_be:
                 self._hit(onset.thing, onset.closing_speed_m_s, now_s)
@@ -141,25 +142,26 @@ class _Watch(Listener):
         self.fastest_m_s = max(speed_m_s, self.fastest_m_s or 0.0)
 
     def _felt(self) -> bool:
-        """Return whether a finger meets an effect, or the controller rumbles."""
+        """Return whether a finger meets resistance at a trigger, or the left motor rumbles."""
         stiff = any((self._strength_of(trigger) or 0) > 0 for trigger in (_L2, _R2))
         return stiff or self.loopback.device.rumble.left > 0.0
 
     def _strength_of(self, trigger: int) -> int | None:
-        """Return the strength of the zone under the finger; None for a trigger that is not pulled."""
+        """Return the strength of the zone that the trigger has reached; None for a trigger that is not pulled."""
         device = self.loopback.device
         travel = device.travel[trigger]
         return device.strengths[trigger][zone_of(travel)] if travel > 0.0 else None
 
 
 def run_trial(trial: Trial, seed: int) -> Row:
-    """Run until the person is done, or for the trial's duration; the same trial gives the same row.
+    """Run until the person is done, or until the trial's duration is over. The same trial and seed give the same row.
 
-    The seed draws the scene, the errors of camera and encoders, the link and the person.
+    From the seed the scene, the errors of camera and encoders, the link's delays and the person are drawn.
     hits: contacts of the gripper with anything but the target, and of the held object with obstacles.
-    full_share: share of the time with R2 pulled in which the zone under the finger is at full strength.
-    finished_s: from arming until the object is placed and the hand has withdrawn; None if time ran out.
-    felt_before_s: how long rumble or a stiff trigger was felt without a break before the object touched its place.
+    full_share: share of the time with R2 pulled in which the finger meets full strength.
+    finished_s: time from arming until the object is placed and the gripper has drawn back; None if time ran out.
+    felt_before_s: time for which rumble or a stiff trigger was felt, without a break, before the held object touched
+    the surface on which it was set down.
     """
     watch = _Watch(trial, seed)
     loopback, person = watch.loopback, watch.loopback.person

@@ -1,4 +1,4 @@
-"""Times of calls in turns: the least of many, as other work on the machine only adds."""
+"""Run times of calls that take turns. The least of many times counts, as other work on the machine only adds time."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -9,13 +9,14 @@ from common.arrays import FloatArray
 from common.clock import Clock
 
 _TURN_S = 0.03
-"""Least length of a turn, in seconds."""
+"""Minimum length of a turn, in seconds."""
 
 
 def in_turns(contenders: Mapping[str, Callable[[], FloatArray]], turns: int) -> dict[str, float]:
-    """Sum the least time of each contender's parts, by name; all stay on one core where the system can.
+    """Return for each contender, by name, the sum of its parts' least times.
 
-    A turn gives the times of all parts. Each part is short enough to run undisturbed in some turn.
+    A call of a contender returns the times of all its parts. A part is so short that some turn leaves it undisturbed.
+    Everything runs on one processor core, where the system can arrange this.
     """
     least: dict[str, FloatArray] = {}
     allowed = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
@@ -33,7 +34,7 @@ def in_turns(contenders: Mapping[str, Callable[[], FloatArray]], turns: int) -> 
 
 
 def least_ns(parts: Sequence[Callable[[], object]], clock: Clock) -> FloatArray:
-    """Call all parts one after another for 30 ms, twice at least; return the least ns of each."""
+    """Call all parts in sequence, repeatedly for 30 ms and at least twice; return each part's least time in ns."""
     times_s, rounds, end_s = np.full(len(parts), np.inf), 0, clock.now() + _TURN_S
     while rounds < 2 or clock.now() < end_s:
         for number, part in enumerate(parts):

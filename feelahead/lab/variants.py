@@ -1,4 +1,4 @@
-"""The same recorded ticks with covers of fewer or more spheres: cost of a look, and errors of contact distances."""
+"""Run the law over the same recorded ticks with fewer or more spheres: its run time, and errors of onset distances."""
 
 import math
 import time
@@ -16,41 +16,42 @@ from robot_side.settings import RobotSettings
 
 COVER_M: Final = RobotSettings().cover_m
 COVERS_M: Final = (0.015, 0.008, 0.005, COVER_M, 0.0015, 0.001)
-"""Limits of how far spheres stand out of the gripper, in metres; the last is the finest cover."""
+"""Tried covers, by how far spheres may protrude from the gripper, in metres. The last cover is the finest."""
 WAYS: Final = tuple(
     f"{side} {kind} {strength}" for side in ("R2", "L2") for kind in ("fast", "slow") for strength in ("first", "full")
 )
-"""Compared distances: where strength begins and is full, in both triggers' fast and slow lists."""
+"""Compared onset distances: of the first strength and of full strength, in both triggers' fast and slow lists."""
 KINDS: Final = ("fast first", "fast full", "slow first", "slow full")
 _FULL_SLOW: Final = 3
-"""Index of the last strength of objects to be touched: four of the eight at most."""
+"""Index, in the slow list, of the greatest strength of objects to be touched: the fourth of eight."""
 _CHUNK: Final = 250
 
 
 @dataclass(frozen=True)
 class Replayed:
-    """One cover, over the ticks of one run."""
+    """Results of the law with one cover, over all ticks of one run."""
 
     took_us: FloatArray
-    """(t,) processor time of the law: the least of all passes over the tick"""
+    """(t,) processor time of the law in each tick, in µs: the least of all passes"""
     onsets_m: FloatArray
-    """(t, 8) distances of WAYS; the horizon where nothing is felt"""
+    """(t, 8) onset distances named by WAYS; the horizon where nothing is felt"""
     horizon_m: FloatArray
-    """(t,)"""
+    """(t,) distance ahead that the looks examined"""
     spheres: int
     looks_per_s: float
 
     def costs(self) -> dict[str, float]:
-        """Return the costs as a row."""
+        """Return the number of spheres, looks a second, and quantiles of the law's time as a row."""
         p50, p99 = np.quantile(self.took_us, (0.5, 0.99)).tolist()
         times = {"p50_us": p50, "p99_us": p99, "mean_us": float(self.took_us.mean())}
         return {"spheres": self.spheres, "looks_per_s": self.looks_per_s, **times}
 
 
 def errors_mm(found: Replayed, finest: Replayed, kind: str) -> dict[str, float]:
-    """Compare one kind of distance of both triggers, in mm: too late is above 0, too early below.
+    """Compare the onset distances of one kind, of both triggers, with those of the finest cover, in mm.
 
-    A tick counts if either cover feels something; a distance that only one of them feels counts up to the horizon.
+    Above 0 the distance is too late, below 0 too early. A tick counts if something is felt with either cover. Where it
+    is felt with one cover only, the other's distance counts as the horizon.
     """
     columns = [place for place, name in enumerate(WAYS) if name.endswith(kind)]
     horizon = np.minimum(found.horizon_m, finest.horizon_m)[:, None]
@@ -63,7 +64,7 @@ def errors_mm(found: Replayed, finest: Replayed, kind: str) -> dict[str, float]:
 
 
 def replay(recorded: Recorded, covers_m: Sequence[float], times: int) -> list[Replayed]:
-    """Run the law over the same ticks with each cover, in turns of a chunk, `times` times."""
+    """Run the law `times` times over the same ticks with each cover; covers take turns after each chunk of ticks."""
     warm_up()
     ticks = [with_cover(recorded, cover_m) if cover_m != COVER_M else recorded.ticks for cover_m in covers_m]
     count = len(recorded.ticks)
@@ -73,7 +74,7 @@ def replay(recorded: Recorded, covers_m: Sequence[float], times: int) -> list[Re
         for first in range(0, count, _CHUNK):
             for number, (law, own) in enumerate(zip(laws, ticks, strict=True)):
                 for place, tick in enumerate(own[first : first + _CHUNK], first):
-                    # Take over the frame outside the measured time, equally for each cover.
+                    # Reading the frame is not measured, as it is the same work for each cover.
                     law.surroundings.see(tick.situation.objects)
                     began_s = time.thread_time()
                     sensed = law.sense(tick.situation, tick.now_s)

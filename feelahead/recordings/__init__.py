@@ -1,1 +1,1 @@
-"""Replay, display, export and plots of recordings."""
+"""What can be done with a recording: compute its run again, show it, export it, draw it."""

@@ -1,4 +1,4 @@
-"""Comparison of a core's recomputed output with the recorded one: equal bit for bit, or the largest difference."""
+"""Compare the output that a core computes again with the recorded output: equal bit for bit, or how far apart."""
 
 import contextlib
 import math
@@ -22,30 +22,33 @@ _NEEDED: Final = ("settings", "epoch", "clock_domain")
 
 @dataclass
 class Comparison:
-    """Comparison of one side."""
+    """Counts and largest differences between one side's recorded and recomputed output."""
 
     side: str
     counted: str
-    """Name of the items that `made` counts"""
+    """Name, in words, of the items that `made` counts"""
     made: int = 0
     equal: int = 0
     others: int = 0
-    """Number of other messages, of which `others_equal` were the same"""
+    """Number of other messages; `others_equal` of them were equal"""
     others_equal: int = 0
     worst_eighths: float = 0.0
-    """Largest difference of a strength; infinite if a message is missing or different otherwise"""
+    """Largest difference of a strength, in eighths; infinite if a message is missing, or differs in anything else"""
     worst_m: float = 0.0
-    """Largest difference of a distance"""
+    """Largest difference of a distance, in metres"""
     notes: list[str] = field(default_factory=list)
-    """Notes for people"""
+    """Remarks for the person who compares"""
 
     @property
     def within(self) -> bool:
-        """Whether the differences are at most those between processors."""
+        """Whether the differences are no larger than those between two kinds of processor."""
         return self.worst_eighths <= WITHIN_EIGHTHS and self.worst_m <= WITHIN_M
 
     def take(self, first: bytes | None, second: bytes | None, feel_kind: int | None = None) -> None:
-        """Compare a recorded message with the recomputed one; None if missing. `feel_kind`: a kind of FEELS."""
+        """Compare the recorded message `first` with the recomputed `second`; None for a missing one.
+
+        feel_kind: kind of entry, one of FEELS, if the two are effects for the controller instead.
+        """
         counts = feel_kind is not None or _is_stiffness(first if second is None else second) or self.side == "operator"
         same = first == second
         if counts:
@@ -63,13 +66,16 @@ class Comparison:
         self.worst_m = max(self.worst_m, metres)
 
     def missed(self, made: deque[Any], feel_kind: int | None = None) -> None:
-        """Compare, and remove, items that had not been recorded: messages, or values for the controller."""
+        """Count each recomputed item left in `made` as missing in the recording, and remove it.
+
+        The items are messages, or effects for the controller.
+        """
         while made:
             one = made.popleft()
             self.take(None, one if isinstance(one, bytes) else b"", feel_kind)
 
     def lines(self) -> list[str]:
-        """Return lines for people."""
+        """Return the lines that report the comparison."""
         difference = "none"
         if not math.isfinite(self.worst_eighths):
             difference = "missing or different messages"
@@ -85,7 +91,10 @@ class Comparison:
 
 
 def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Iterator[Entry]:
-    """Yield a side's entries in order, up to the first gap: a core cannot be replayed beyond."""
+    """Yield a side's recorded entries in order, up to the first gap, beyond which a core cannot be replayed.
+
+    A reason for an early end is appended to `notes`.
+    """
     began_s = None
     for expected, message in enumerate(recording.messages([f"/{side}/inputs"])):
         block: Block = unpack_block(message.content)
@@ -104,7 +113,7 @@ def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Itera
 
 
 def differing_origin(recorded: Mapping[str, object], present: Mapping[str, object]) -> list[str]:
-    """Name the differences of origin between this run and the recorded one: with any, bits may differ."""
+    """Return a line for each difference of processor or kernels between `recorded` and `present`: bits may differ."""
     notes = []
     for name, here in present.items():
         there = recorded.get(name)
@@ -117,7 +126,7 @@ def differing_origin(recorded: Mapping[str, object], present: Mapping[str, objec
 
 
 def require_side(recording: Recording, side: str) -> Mapping[str, Any]:
-    """Return the header of a side; raises ConfigurationError if the side was not recorded."""
+    """Return the header of `side`; raises ConfigurationError if it is missing or incomplete."""
     if side not in recording.headers:
         raise ConfigurationError(
             f"{recording.path}: the {side} side was not recorded; valid: {', '.join(recording.headers)}"
@@ -136,7 +145,7 @@ def _is_stiffness(payload: bytes | None) -> bool:
 
 
 def _difference(first: bytes, second: bytes, feel_kind: int | None) -> tuple[float, float]:
-    """Return the difference in eighths of strength and in metres; infinite eighths if anything else differs."""
+    """Return the largest difference in eighths of strength and in metres; infinite eighths if anything else differs."""
     with contextlib.suppress(RemoteProtocolError):
         if feel_kind is not None:
             return _feel_difference(recorded_feel(feel_kind, first), recorded_feel(feel_kind, second))

@@ -1,4 +1,4 @@
-"""Controller's entries of a recording: values, and in older recordings a DualSense's reports."""
+"""Read and write a recording's entries of the controller: values, or in older recordings a DualSense's reports."""
 
 from typing import Final, TypeVar
 
@@ -13,18 +13,18 @@ from operator_side.dualsense.reports.output_report import build_output_report, p
 
 _Value = TypeVar("_Value")
 STATES: Final = (Kind.HANDS, Kind.REPORT)
-"""Kinds of entries with a controller's state"""
+"""Kinds of entries with a state of the controller: as a value, and as a report"""
 FEELS: Final = (Kind.TOLD, Kind.WRITTEN)
-"""Kinds of entries with the feel sent to a controller"""
+"""Kinds of entries with effects for the controller: as a value, and as a report"""
 
 
 def recorded_state(kind: int, content: bytes) -> ControllerState:
-    """Read an entry of STATES; raises RemoteProtocolError if it is invalid."""
+    """Read an entry whose kind is one of STATES; raises RemoteProtocolError if it is invalid."""
     return parse_input_report(content) if kind == Kind.REPORT else _read(content, ControllerState)
 
 
 def recorded_feel(kind: int, content: bytes) -> Feel:
-    """Read an entry of FEELS; raises RemoteProtocolError if it is invalid."""
+    """Read an entry whose kind is one of FEELS; raises RemoteProtocolError if it is invalid."""
     return parse_output_report(content) if kind == Kind.WRITTEN else _read(content, Feel)
 
 
@@ -36,5 +36,5 @@ def _read(content: bytes, kind: type[_Value]) -> _Value:
 
 
 def as_recorded(kind: int, feel: Feel) -> bytes:
-    """Pack `feel` as an entry of `kind`, one of FEELS."""
+    """Pack `feel` as the content of an entry of `kind`, which is one of FEELS."""
     return build_output_report(feel) if kind == Kind.WRITTEN else msgspec.msgpack.encode(feel)

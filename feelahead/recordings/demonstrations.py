@@ -174,10 +174,10 @@ def _median_rate_hz(seen: Mapping[str, list[Picture]]) -> int:
 
 
 def _vectors(joined: Table) -> dict[str, dict[str, str]]:
-    """Return each feature's parts by name, with their columns."""
+    """Return for each feature of the dataset its parts, and the joined table's column for each part."""
     joints = [column for column in joined.columns() if column.startswith("arm.position_rad.")]
     if not joints or "command.r2" not in joined.columns():
-        raise ConfigurationError("--format lerobot: no arm or no commands in it; valid: a recording of the demo")
+        raise ConfigurationError("--format lerobot: arm states or commands are missing; valid: both sides recorded")
     state = {f"joint_{index}_rad": column for index, column in enumerate(joints)}
     velocity = {f"joint_{index}_rad_s": f"arm.velocity_rad_s.{index}" for index in range(len(joints))}
     vectors = {
@@ -201,7 +201,7 @@ def _vectors(joined: Table) -> dict[str, dict[str, str]]:
 
 
 def _first_whole_row(vectors: Mapping[str, Mapping[str, str]], seen: Mapping[str, list[Picture]], joined: Table) -> int:
-    """Return the first row that has every required column."""
+    """Return the first row from which every required column has a value and every camera a picture."""
     needed = [*vectors["observation.state"].values(), *vectors["action"].values()]
     if "observation.stiffness" in vectors:
         needed += vectors["observation.stiffness"].values()
@@ -209,12 +209,12 @@ def _first_whole_row(vectors: Mapping[str, Mapping[str, str]], seen: Mapping[str
     begins += [int(np.searchsorted(np.array(joined.times_s), found[0].time_s)) for found in seen.values()]
     first = max(begins)
     if first >= len(joined.times_s):
-        raise ConfigurationError("--format lerobot: at no moment was there something of everything")
+        raise ConfigurationError("--format lerobot: the recording ends before every required value has come")
     return first
 
 
 def _held(values: Any) -> Any:
-    """Fill each gap with the last value before it, or 0 for none."""
+    """Fill each gap with the last value before it, or with 0 if there is none."""
     filled = values.copy()
     rows = np.where(np.isfinite(filled), np.arange(len(filled))[:, None], -1)
     newest = np.maximum.accumulate(rows, axis=0)

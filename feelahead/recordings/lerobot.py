@@ -1,8 +1,8 @@
 """Export of a recording's episodes as a LeRobot dataset, v3.0, for learning from demonstrations.
 
-data/chunk-000/file-000.parquet            one row a frame, pictures as encoded bytes
+data/chunk-000/file-000.parquet            one row for each frame, pictures as encoded bytes
 meta/info.json, stats.json, tasks.parquet
-meta/episodes/chunk-000/file-000.parquet   one row an episode
+meta/episodes/chunk-000/file-000.parquet   one row for each episode
 """
 
 import io
@@ -21,7 +21,7 @@ _VERSION: Final = "v3.0"
 _FILE: Final = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 _TASK: Final = "reach the target, grasp it, lift it and set it down"
 _SAMPLED_PICTURES: Final = 20
-"""Largest number of pictures, roughly, in the statistics."""
+"""About the maximum number of pictures from which the statistics are computed."""
 _ENLARGED_QUALITY: Final = 90
 
 
@@ -88,7 +88,10 @@ def _counters(frames: Demonstrations) -> dict[str, Any]:
 
 
 def _of_one_size(shown: list[Picture]) -> tuple[list[Picture], tuple[int, int]]:
-    """Enlarge pictures that a narrow link made smaller, as the format has one size; return them and (width, height)."""
+    """Enlarge pictures that were sent smaller over a narrow link, as the format allows one size only.
+
+    Return the pictures and their (width, height).
+    """
     from PIL import Image  # noqa: PLC0415
 
     opened = [Image.open(io.BytesIO(picture.jpeg)) for picture in shown]
@@ -111,7 +114,7 @@ def _statistics(values: FloatArray) -> dict[str, Any]:
 
 
 def _picture_statistics(shown: list[Picture]) -> dict[str, Any]:
-    """Return statistics of each colour, 0 to 1, (3, 1, 1)."""
+    """Return each statistic of the pictures' colours, 0 to 1, in the shape (3, 1, 1)."""
     from PIL import Image  # noqa: PLC0415
 
     step = max(1, len(shown) // _SAMPLED_PICTURES)
@@ -123,7 +126,7 @@ def _picture_statistics(shown: list[Picture]) -> dict[str, Any]:
 
 
 def _hint(feature: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the `datasets` library's description of a column."""
+    """Return the description of a column that Hugging Face's library `datasets` expects."""
     if feature["dtype"] == "image":
         return {"_type": "Image"}
     if feature["shape"] == [1]:
@@ -133,7 +136,7 @@ def _hint(feature: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _tasks(pyarrow: Any) -> Any:
-    """Return the table of tasks; the texts are the index of a data frame, as the format's reader expects."""
+    """Return the table of tasks. Their texts are the index of a pandas data frame, as the format's reader expects."""
     table = pyarrow.table({"task_index": np.zeros(1, dtype=np.int64), "task": [_TASK]})
     frame = {
         "index_columns": ["task"],

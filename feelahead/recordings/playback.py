@@ -1,4 +1,4 @@
-"""Playback of a recording: the facts and views that people saw, in order, at any speed and from any moment."""
+"""Play a recording: the facts and views that the operator saw, in order, at any speed and from any time."""
 
 from collections.abc import Iterable, Iterator
 from itertools import chain
@@ -25,19 +25,19 @@ _TOPICS: Final = (_ROBOT, _FACTS, "/view", "/camera/overview", "/camera/first_pe
 
 
 class Seen(NamedTuple):
-    """Item for the console."""
+    """One recorded item that the console can show."""
 
     time_s: float
-    """Since the recording began"""
+    """Time since the recording began"""
     kind: bytes
     """FACTS: OperatorFacts as JSON. VIEW: a view payload. ROBOT: the robot side's status as JSON."""
     name: str
-    """Name; the newest item of a name replaces earlier ones"""
+    """Name of what the item shows; an item replaces earlier items of the same name"""
     content: bytes
 
 
 def require_protocol(recording: Recording) -> None:
-    """Raise ConfigurationError if the first message sent is of another protocol version."""
+    """Raise ConfigurationError if the first recorded message that a side sent has another protocol version."""
     for message in recording.messages([f"/{side}/inputs" for side in recording.headers]):
         for entry in unpack_block(message.content).unpacked():
             if entry.kind == Kind.SENT:
@@ -49,7 +49,7 @@ def require_protocol(recording: Recording) -> None:
 
 
 def require_statuses(recording: Recording) -> None:
-    """Raise ConfigurationError if a side's first status is of a release with other fields."""
+    """Raise ConfigurationError if a side's first status was written by a release with other fields."""
     for topic, struct in ((_FACTS, OperatorFacts), (_ROBOT, RobotStatus)):
         for message in recording.messages((topic,)):
             try:
@@ -61,7 +61,7 @@ def require_statuses(recording: Recording) -> None:
 
 
 def seen(recording: Recording) -> Iterator[Seen]:
-    """Yield all items that can be shown, in order; pictures are put back into their payloads."""
+    """Yield all items that the console can show, in order; pictures are put back into the payloads of their views."""
     began_ns = recording.began_ns()
     pictures: dict[tuple[str, int], bytes] = {}
     for message in recording.messages(_TOPICS):
@@ -76,11 +76,11 @@ def seen(recording: Recording) -> Iterator[Seen]:
 
 
 def _view(message: Message, pictures: dict[tuple[str, int], bytes]) -> tuple[str, bytes]:
-    """Return the view's name and its payload as sent."""
+    """Return the name of what the view payload shows, and the payload as it was sent."""
     try:
         view = decode_view(message.content)
     except RemoteProtocolError:
-        return "telemetry", message.content  # or of another version
+        return "telemetry", message.content  # also for a payload of another version
     if not isinstance(view, VideoFrame):
         return "state" if isinstance(view, SceneState) else "shapes", message.content
     jpeg = pictures.get((view.view, message.log_ns), b"")
@@ -92,7 +92,7 @@ FASTEST: Final = 1000.0
 
 
 class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Wish of a person; None: no change."""
+    """Change of the playback that a person wishes at the page; None: no change."""
 
     paused: bool | None = None
     speed: float | None = None
@@ -100,28 +100,28 @@ class Wish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Playback:
-    """Playback; begins at the first moment, paused."""
+    """Playback of one recording; it begins at the start of the recording, paused."""
 
     def __init__(self, recording: Recording, speed: float = 1.0) -> None:
         self.at_s = 0.0
-        """Position, counted from the recording's begin"""
+        """Position, in seconds since the recording began"""
         self.length_s = recording.length_s()
         self.speed = speed
-        """Playing speed; 1 is the recorded one"""
+        """Speed of playing; 1 is the speed of the recorded run"""
         self.paused = True
         self._recording = recording
         self._coming = seen(recording)
         self._jumped: list[Seen] = []
         self._newest: dict[str, Seen] = {}
-        """Items on show, by name"""
+        """Items that are shown at present, by name"""
 
     @property
     def over(self) -> bool:
-        """Whether all was shown."""
+        """Whether the end of the recording is reached."""
         return self.at_s >= self.length_s
 
     def wish(self, content: Any) -> None:
-        """Apply a page's wish; ignore an invalid one and values out of range."""
+        """Apply the wish that a page sent; ignore an invalid wish, and values out of range."""
         try:
             wish = msgspec.convert(content, Wish)
         except msgspec.ValidationError:
@@ -136,7 +136,10 @@ class Playback:
             self.paused = wish.paused
 
     def advance(self, passed_s: float) -> list[Seen]:
-        """Advance by `passed_s` seconds; return the due items. After a jump these are the newest of each name."""
+        """Advance by `passed_s` seconds of real time; return the items that are now due.
+
+        After a jump, the due items are the newest of each name before the new position.
+        """
         due, self._jumped = self._jumped, []
         if not self.paused:
             self.at_s = min(self.at_s + self.speed * passed_s, self.length_s)
@@ -146,11 +149,11 @@ class Playback:
         return due
 
     def show_again(self) -> None:
-        """Return the present items again at the next step, for a new viewer."""
+        """Have the next `advance` return the items that are shown at present once more, for a new viewer."""
         self._jumped = _newest((*self._newest.values(), *self._jumped))
 
     def state(self) -> dict[str, Any]:
-        """Return the state for the page."""
+        """Return position, length, speed and pause, as the page shows them."""
         return {"at_s": self.at_s, "length_s": self.length_s, "speed": self.speed, "paused": self.paused}
 
     def _jump(self, to_s: float) -> None:
@@ -169,5 +172,5 @@ class Playback:
 
 
 def _newest(many: Iterable[Seen]) -> list[Seen]:
-    """Keep the newest of each name; facts first, because pictures age by their clock."""
+    """Keep the newest item of each name; facts come first, as the age of pictures is computed by the facts' clock."""
     return sorted({one.name: one for one in many}.values(), key=lambda one: one.kind != FACTS)

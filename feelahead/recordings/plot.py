@@ -1,4 +1,4 @@
-"""Plot of a run on one page: onset distances, travel and strengths, and delays, over one time axis."""
+"""Draw a run on one page: onset distances, travel, strengths, errors and delays over one time axis."""
 
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -15,7 +15,7 @@ from feelahead.recordings.tables import Table, Tables
 PLOT_HZ: Final = 100.0
 _INCHES: Final = (8.27, 11.69)
 _BLUE, _ORANGE, _GREEN, _PURPLE, _GREY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#666666"
-"""Colours that remain distinct with red-green blindness."""
+"""Colours that people with red-green blindness can tell apart."""
 _STATES: Final = {"armed": "#DDEEDD", "stopped": "#F6D5CC", "disarmed": "#EEEEEE"}
 _FULL: Final = 8.0
 _HEIGHTS: Final = (1.3, 1.1, 1.1, 1.0, 1.0, 1.0, 1.0)
@@ -28,7 +28,7 @@ _SIDES: Final = (("r2", "R2 (advances)", _ORANGE), ("l2", "L2 (retreats)", _BLUE
 
 
 def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
-    """Draw the page into `out`, PNG, SVG or PDF by the ending."""
+    """Draw the page into the file `out`, as PNG, SVG or PDF by its ending."""
     import matplotlib as mpl  # noqa: PLC0415
 
     mpl.use("Agg")
@@ -48,7 +48,7 @@ def plot_run(recording: Recording, tables: Tables, out: Path) -> None:
             axis.margins(x=0)
         axes[-1].set_xlabel("time since the recording began (s)")
         for axis, columns in ((axes[0], 2), (axes[3], 2), (axes[5], 2), (axes[6], 4)):
-            if axis.get_legend_handles_labels()[0]:  # a short run may have none
+            if axis.get_legend_handles_labels()[0]:  # a short run may have no curve in this panel
                 axis.legend(loc="upper right", ncols=columns)
         bands = [Patch(color=color, label=state) for state, color in _STATES.items()]
         figure.align_ylabels()
@@ -74,7 +74,7 @@ def _title(recording: Recording, tables: Tables) -> str:
 
 
 def _bands(axis: Any, joined: Table, times_s: FloatArray) -> None:
-    """Draw the states as coloured bands in the background."""
+    """Draw the robot side's states (armed, stopped, disarmed) as coloured bands in the background."""
     states = [row.get("stiffness.state") or row.get("telemetry.state") for row in joined.rows]
     begins = [0, *(i for i in range(1, len(states)) if states[i] != states[i - 1]), len(states)]
     for start, end in pairwise(begins):
@@ -104,7 +104,7 @@ def _felt(side: str, name: str) -> Callable[[Any, Any, Table, FloatArray], None]
         extent = 0.0, end_s, 0.0, 1.0
         shown = axis.imshow(np.where(zones > 0, zones, np.nan), aspect="auto", origin="lower", extent=extent, **look)
         travel = joined.numbers(f"controller.{side}_raw")
-        # Visible on light and on dark.
+        # Black on white, so that the curve is visible on light and on dark zones.
         axis.plot(times_s, travel, color="white", lw=2.4)
         axis.plot(times_s, travel, color="black", lw=1.0)
         title = f"{name}: the finger's travel, and the strength of its tenths as written to the controller"
@@ -116,7 +116,10 @@ def _felt(side: str, name: str) -> Callable[[Any, Any, Table, FloatArray], None]
 
 
 def _curves(axis: Any, joined: Table, times_s: FloatArray, *curves: tuple[str, float, str, str]) -> None:
-    """Draw columns, each with factor, colour and label; missing columns are left out."""
+    """Draw columns of the table as curves; missing columns are left out.
+
+    curves: (column, factor on its values, colour, label) of each.
+    """
     for column, factor, color, label in curves:
         values = factor * joined.numbers(column)
         if np.isfinite(values).any():
@@ -151,7 +154,7 @@ def _enlargement(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
     other.set(ylim=(0.0, 1.05), ylabel="s(δ)")
     handles, labels = axis.get_legend_handles_labels()
     more, names = other.get_legend_handles_labels()
-    # The upper axes draw the legend, else curves would cross it; before arming there are no strengths.
+    # The axes drawn last get the legend, else curves would cross it. Before arming there are no strengths.
     other.legend([*handles, *more], [*labels, *names], loc="upper left", ncols=2)
 
 
@@ -172,7 +175,7 @@ def _delays(_: Any, axis: Any, joined: Table, times_s: FloatArray) -> None:
         ("ages.frame_ms", 1.0, _GREEN, "camera frame"),
         ("robot_status.loop_age_ms", 1.0, "black", "loop age that the law assumes"),
     )
-    # The worst case, which is assumed at first, would hide all else.
+    # Scale by the armed time: the worst case, which is assumed at first, would make all else invisible.
     armed = np.array([row.get("stiffness.state") == "armed" for row in joined.rows], dtype=bool)
     settled = joined.numbers("robot_status.loop_age_ms")[armed]
     if np.isfinite(settled).any():

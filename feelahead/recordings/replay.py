@@ -1,4 +1,4 @@
-"""Replay of the cores with the recorded inputs: the same stiffness bit for bit, or the difference."""
+"""Run both cores again with their recorded inputs, and compare their outputs with the recorded ones."""
 
 import contextlib
 from collections import deque
@@ -31,7 +31,7 @@ from robot_side.surroundings.perceived import PerceivedObjects
 
 
 class _Given(Arm):
-    """Arm and ObjectSource that return recorded values and ignore commands."""
+    """Arm and ObjectSource in one, which return the recorded values and ignore commands."""
 
     joint_count = 0
 
@@ -47,15 +47,15 @@ class _Given(Arm):
         """Do nothing."""
 
     def state(self, now_s: float) -> ArmState:
-        """Return the recorded state."""
+        """Return the newest recorded state of the arm; ConfigurationError before the first."""
         if self.newest_state is None:
-            raise ConfigurationError(f"no state of the arm was recorded before {now_s}")
+            raise ConfigurationError(f"no state of the arm is recorded before {now_s} s; valid: a whole recording")
         return self.newest_state
 
     def perceive(self, now_s: float) -> PerceivedObjects:
-        """Return the recorded frame."""
+        """Return the newest recorded frame; ConfigurationError before the first."""
         if self.newest_frame is None:
-            raise ConfigurationError(f"no frame was recorded before {now_s}")
+            raise ConfigurationError(f"no frame of objects is recorded before {now_s} s; valid: a whole recording")
         return self.newest_frame
 
     def set_role(self, name: str, role: Role) -> None:
@@ -63,17 +63,17 @@ class _Given(Arm):
 
 
 def replay_robot(recording: Recording) -> Comparison:
-    """Recompute the robot side's stiffness messages; raises ConfigurationError if the side was not recorded."""
+    """Compute the robot side's messages again and compare them; ConfigurationError if the side was not recorded."""
     header = require_side(recording, "robot")
     settings = settings_from(header["settings"], RobotSettings)
     parts = build_parts(settings, header["epoch"], header["clock_domain"])
     given = _Given(parts.arm.joint_count)
     frames = FrameUnpacker(parts.camera.perceive(0.0))
-    # No truth is observed: nothing moves in the simulation.
+    # Without a truth to observe, as nothing moves in this simulation.
     core = RobotSide(replace(parts, arm=given, camera=given, truth=None))
     compared, recorded = Comparison("robot", "stiffness messages"), _by_last_names(header.get("kernels", {}))
     if not recorded.keys() <= _by_last_names(kernel_digests()).keys():
-        import_kernels()  # of other scenes and laws
+        import_kernels()  # those of other scenes and laws, too
     warm_up()
     here = _by_last_names(kernel_digests())
     if gone := [name for name in recorded if name not in here]:
@@ -105,7 +105,7 @@ def replay_robot(recording: Recording) -> Comparison:
 
 
 def _by_last_names(digests: Mapping[str, str]) -> dict[str, str]:
-    """Return kernels by file and function: one that only moved to another package is the same."""
+    """Return the digests by file and function, so that a kernel that moved to another package counts as the same."""
     return {".".join(name.split(".")[-2:]): digest for name, digest in digests.items()}
 
 
@@ -120,11 +120,11 @@ _INPUTS: Final[Mapping[int, Callable[[OperatorSide, bytes, float], object]]] = {
     Kind.MARKED: lambda core, content, now_s: core.marker.mark(msgspec.json.decode(content), now_s),
     Kind.TUNED: lambda core, content, now_s: core.tune(**msgspec.json.decode(content), now_s=now_s),
 }
-"""Inputs of the operator side's core, by kind of entry."""
+"""For each kind of entry, the call that gives the recorded input to the operator side's core."""
 
 
 def replay_operator(recording: Recording) -> Comparison:
-    """Recompute the motion commands and all feel for the controller.
+    """Compute the motion commands and the effects for the controller again, and compare them with the recorded ones.
 
     Raises ConfigurationError if the side was not recorded.
     """
@@ -139,7 +139,7 @@ def replay_operator(recording: Recording) -> Comparison:
         if (give := _INPUTS.get(entry.kind)) is not None:
             give(core, content, now_s)
         elif entry.kind in STATES:
-            with contextlib.suppress(RemoteProtocolError):  # the core ignored invalid reports, too
+            with contextlib.suppress(RemoteProtocolError):  # invalid reports were ignored in the recorded run, too
                 core.read_state(recorded_state(entry.kind, content), now_s)
         elif entry.kind in FEELS:
             compared.take(content, as_recorded(entry.kind, feels.popleft()) if feels else None, entry.kind)

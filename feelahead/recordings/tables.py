@@ -1,7 +1,7 @@
-"""Tables of a recording: one for each topic or kind of input, at the original rate, and one with all joined.
+"""Tables of a recording: one for each topic or kind of input, and a joined table; as CSV or Parquet, too.
 
-Researchers want both, also as CSV or Parquet: original rates and stamps, to compute delays; and one table on one
-clock, to load and plot in a line. The joined one holds the newest of everything at each moment.
+The tables of topics keep their rates and stamps, from which delays can be computed. The joined table has an even rate
+and one clock, so that it can be plotted at once. Each of its rows has the newest value of every column at that time.
 """
 
 import csv
@@ -24,7 +24,7 @@ JOINED_HZ: Final = 100.0
 _NANOSECONDS: Final = 1e-9
 _NO_ZONES: Final = (0.0,) * 10
 _STAMPS: Final = ("time_s", "now_s", "sent_s", "sequence", "side")
-"""Columns that a joined table leaves out."""
+"""Columns that the joined table leaves out."""
 _TOPICS: Final = (
     *("/stiffness", "/command", "/ages", "/telemetry", "/enlargement", "/overlap"),
     *("/robot/status", "/operator/status", "/operator/facts", "/episode"),
@@ -37,10 +37,10 @@ _JOINED: Final = (
 
 @dataclass
 class Table:
-    """Rows in order of time; a missing column of a row counts as None."""
+    """Rows in order of time; a column that a row lacks counts as None."""
 
     times_s: list[float] = field(default_factory=list)
-    """Times since the recording began"""
+    """Time of each row since the recording began"""
     rows: list[dict[str, Any]] = field(default_factory=list)
 
     def add(self, time_s: float, row: dict[str, Any]) -> None:
@@ -53,17 +53,17 @@ class Table:
         return list(dict.fromkeys(name for row in self.rows for name in row))
 
     def numbers(self, name: str) -> FloatArray:
-        """Return a column as numbers, NaN for all else."""
+        """Return a column as numbers; NaN for missing values and texts."""
         values = [row.get(name) for row in self.rows]
         return np.array([value if isinstance(value, int | float) else np.nan for value in values], dtype=np.float64)
 
     def sorted(self) -> "Table":
-        """Return the table sorted by time: two sides' messages arrive slightly out of order."""
+        """Return the table sorted by time; messages of the two sides are recorded slightly out of order."""
         order = np.argsort(np.array(self.times_s), kind="stable")
         return Table([self.times_s[i] for i in order], [self.rows[i] for i in order])
 
     def before(self, times_s: FloatArray) -> list[dict[str, Any]]:
-        """Return the newest row at each time; empty before the first."""
+        """Return for each time the newest row until then; an empty one before the first row."""
         found = np.searchsorted(np.array(self.times_s), times_s + 1e-9, side="right") - 1
         return [self.rows[index] if index >= 0 else {} for index in found]
 
@@ -78,11 +78,11 @@ class Tables:
     by_name: Mapping[str, Table]
 
     def table(self, name: str) -> Table:
-        """Return the table of that name; an empty one for none."""
+        """Return the table of that name; an empty table if there is none."""
         return self.by_name.get(name) or Table()
 
     def joined(self, rate_hz: float = JOINED_HZ) -> Table:
-        """Return one table at an even rate, with the newest of everything at each moment."""
+        """Return one table at an even rate, whose rows have the newest value of every column at their time."""
         times_s = np.arange(0.0, self.duration_s, 1.0 / rate_hz)
         rows: list[dict[str, Any]] = [{} for _ in times_s]
         for name in _JOINED:
@@ -97,7 +97,7 @@ class Tables:
 
 
 def read_tables(recording: Recording) -> Tables:
-    """Read all but pictures and scenes."""
+    """Read all tables of a recording; pictures and scenes are left out."""
     tables: dict[str, Table] = {}
     first_ns = last_ns = recording.began_ns()
     zones: dict[str, tuple[float, ...]] = {"l2": _NO_ZONES, "r2": _NO_ZONES}
@@ -111,7 +111,7 @@ def read_tables(recording: Recording) -> Tables:
             continue
         block = unpack_block(message.content)
         for entry in block.unpacked():
-            # A block is stamped with the time of its first entry.
+            # A block has the time stamp of its first entry.
             if (found := _row(entry, zones)) is not None:
                 tables.setdefault(found[0], Table()).add(time_s + entry.now_s - block.first_s, found[1])
     sorted_tables = {name: table.sorted() for name, table in sorted(tables.items())}
@@ -120,7 +120,10 @@ def read_tables(recording: Recording) -> Tables:
 
 
 def _row(entry: Entry, zones: dict[str, tuple[float, ...]]) -> tuple[str, dict[str, Any]] | None:
-    """Return the table and the row of an input; None for inputs that other topics contain."""
+    """Return the name of the table and the row for one recorded input.
+
+    None for an input that is invalid, or that other topics contain.
+    """
     try:
         if entry.kind == Kind.STATE:
             state = unpack_state(entry.content)
@@ -143,7 +146,10 @@ def _row(entry: Entry, zones: dict[str, tuple[float, ...]]) -> tuple[str, dict[s
 
 
 def _flat(values: Any, name: str = "") -> Iterator[tuple[str, Any]]:
-    """Flatten `{"l2": {"fast_m": [1, 2]}}` to `l2.fast_m.0`, `l2.fast_m.1`; overlaps by their objects' names."""
+    """Yield nested values with flat names: `{"l2": {"fast_m": [1, 2]}}` as `l2.fast_m.0` and `l2.fast_m.1`.
+
+    Overlaps have the names of their objects in front.
+    """
     if isinstance(values, dict):
         if "object" in values:
             thing = values["object"]
@@ -162,7 +168,7 @@ JOINED: Final = "joined"
 
 
 def export_csv(tables: Tables, folder: Path) -> list[str]:
-    """Write the tables; return the files' names. Missing values are empty fields."""
+    """Write all tables as CSV into `folder`; return the files' names. Missing values become empty fields."""
     written = []
     for name, table in _all(tables):
         columns = table.columns()
@@ -176,7 +182,7 @@ def export_csv(tables: Tables, folder: Path) -> list[str]:
 
 
 def export_parquet(tables: Tables, folder: Path) -> list[str]:
-    """Write the tables; return the files' names. Missing values are null."""
+    """Write all tables as Parquet into `folder`; return the files' names. Missing values become null."""
     import pyarrow  # noqa: PLC0415
     from pyarrow import parquet  # noqa: PLC0415
 
@@ -200,7 +206,7 @@ def _text(value: Any) -> Any:
 
 
 def _one_kind(values: list[Any]) -> list[Any]:
-    """Convert a column to one type: numbers to floats, or all to text if there is any text."""
+    """Convert a column of mixed types to one type: numbers to floats; everything to text if any value is no number."""
     kinds = {type(value) for value in values if value is not None}
     if kinds <= {bool} or kinds <= {int} or kinds <= {str}:
         return values

@@ -1,4 +1,4 @@
-"""Wrapper of a controller that writes in a thread of its own, so that the operator side's loop does not wait.
+"""Wrapper of a controller that writes in its own thread, so that the operator side's loop does not wait.
 
 On USB a write lasts until the controller fetches it: some milliseconds (its interrupt endpoint's interval), longer on
 a bad cable. Waiting writes are merged: of each part, the newest value is written.

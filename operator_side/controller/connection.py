@@ -22,6 +22,10 @@ process was suspended between reading the clock and the beat."""
 LOOK_PERIOD_S: Final = 1.0
 """Seconds between searches, and from a loss to the next search: by then the arm has long stopped"""
 
+WITHOUT_ONE: Final = (
+    "until it is back nothing is sent to move the robot, which stops: then release the triggers and arm it again"
+)
+
 
 class Listener(Protocol):
     """Receiver of events: a controller was found or lost."""
@@ -52,7 +56,10 @@ class Guard(Protocol):
 class Connection:
     """Connection to one controller at a time. No method waits; only `update` raises, and only NoDriverError."""
 
-    def __init__(self, search: BackgroundSearch, listener: Listener, guard: Guard | None = None) -> None:
+    def __init__(
+        self, search: BackgroundSearch, listener: Listener, guard: Guard | None = None, meanwhile: str = WITHOUT_ONE
+    ) -> None:
+        """meanwhile: what the note of a loss says about the time until the controller is back."""
         self.state = ConnectionState.ABSENT
         self.found = 0
         """Number of times that a controller was found."""
@@ -62,7 +69,7 @@ class Connection:
         """Connected controller; None without one."""
         self._search = search
         self._listener = listener
-        self._guard = guard
+        self._guard, self._meanwhile = guard, meanwhile
         self._held = False
         self._beat_s: float | None = None
         self._address: str | None = None
@@ -177,10 +184,7 @@ class Connection:
     def _lose(self, error: DeviceError, now_s: float) -> None:
         self.state = ConnectionState.LOST
         self._next_look_s = now_s + LOOK_PERIOD_S
-        self._say_once(
-            f"{error}; until it is back nothing is sent to move the robot, which stops: then release the triggers and"
-            " arm it again"
-        )
+        self._say_once(f"{error}; {self._meanwhile}")
         self._listener.controller_lost(now_s)
         self._let_go()
 

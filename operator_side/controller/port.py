@@ -49,10 +49,19 @@ class OpenController:
     """Function that returns whether a write to `device` hangs at a time `now_s`."""
 
 
-def checked_address(address: object) -> str:
-    """Return `address`; ValueError unless it has the form "aa:bb:cc:dd:ee:ff"."""
+def checked_address(address: object, name: str = "address") -> str:
+    """Return `address`; ValueError, which begins with `name`, unless it has the form "aa:bb:cc:dd:ee:ff"."""
     if not isinstance(address, str) or not _ADDRESS.fullmatch(address):
         raise ValueError(
-            f"address = {reprlib.repr(address)}; valid: six pairs of hexadecimal digits like aa:bb:cc:dd:ee:ff"
+            f"{name} = {reprlib.repr(address)}; valid: six pairs of hexadecimal digits like aa:bb:cc:dd:ee:ff"
         )
     return address
+
+
+def check_choice(device: str, controller: str | None) -> None:
+    """Check the flags --device and --controller: ValueError unless `controller` is None, or an address for "hid"."""
+    if controller is None:
+        return
+    checked_address(controller, "controller")
+    if device != "hid":
+        raise ValueError(f"--controller with --device {device}; valid: with --device hid")

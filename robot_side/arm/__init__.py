@@ -1,1 +1,1 @@
-"""Joint velocities of a command, and the port of any arm."""
+"""Computation of joint velocities from a command, and the port of any arm."""

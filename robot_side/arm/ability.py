@@ -1,4 +1,4 @@
-"""Speed and acceleration of the tool along a direction in one pose, within the joints' limits."""
+"""Speed and acceleration that the tool can reach along a direction in one pose, within the joints' limits."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,27 +13,27 @@ from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, input_array, out
 from robot_side.compiled.stack import on_stack
 
 _MET = 1e-6
-"""Largest deviation of the tool's motion that counts as none, as a share of full speed."""
+"""Largest deviation of the tool's motion from the commanded motion that counts as none, as a share of full speed"""
 _LEAST_SPEED_M_S = 1e-6
 _LEAST_RATE_RAD_S = 1e-9
 FOUND: Final = 3
-"""Count of the numbers that `find_ability` fills before the joints' rates."""
+"""How many numbers `find_ability` fills before the joints' rates"""
 _twist = on_stack(6)
 
 
 @dataclass(frozen=True)
 class JointLimits:
-    """Limits of the joints in the arm's own controller, (n,) each; metres for a prismatic joint."""
+    """Limits of the joints in the arm's own controller, (n,) each; metres instead of radians for a prismatic joint."""
 
     velocity_rad_s: FloatArray
     acceleration_rad_s2: FloatArray
     lower_rad: FloatArray | None = None
-    """Lower end of each joint; None where unknown or without ends"""
+    """Lower end of each joint's range; None if all are unknown or without ends"""
     upper_rad: FloatArray | None = None
 
     @cached_property
     def ends_rad(self) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper ends of the joints; infinite where there are none."""
+        """Lower and upper ends of the joints' ranges; infinite if not given."""
         infinite = np.full(self.velocity_rad_s.size, np.inf)
         return (
             -infinite if self.lower_rad is None else np.ascontiguousarray(self.lower_rad),
@@ -43,18 +43,18 @@ class JointLimits:
 
 @dataclass(frozen=True)
 class Ability:
-    """Speed and acceleration of the tool along one direction."""
+    """Speed and acceleration that the tool can reach along one direction."""
 
     full_speed_m_s: float
-    """v_max here: speed at full travel, after the joints' limits and the damping at a singularity."""
+    """v_max in this pose: speed at full travel of a trigger, after the joints' limits and damping near a singularity"""
     acceleration_m_s2: float
-    """a here: least acceleration along the direction, with one joint at its limit."""
+    """a in this pose: acceleration along the direction when the joint that needs longest accelerates at its limit"""
     within_reach: bool
-    """Whether full travel moves the tool as commanded."""
+    """Whether the tool moves as commanded at full travel."""
 
 
 def ability(pose: GripperPose, limits: JointLimits, direction: FloatArray, full_speed_m_s: float) -> Ability:
-    """Resolve full travel along the unit vector `direction` (3,) into joint speeds; return the tool's resulting motion.
+    """Return the tool's ability at full travel of a trigger along the unit vector `direction` (3,), by joint speeds.
 
     full_speed_m_s: v_max of the settings.
     """
@@ -70,7 +70,7 @@ def ability(pose: GripperPose, limits: JointLimits, direction: FloatArray, full_
 
 
 ABILITY: Final = (*(input_array(2), input_array(1), FLOAT64, input_array(1), input_array(1), output_array(1)),)
-"""Numba types of the arguments of `find_ability`, for a call by its address."""
+"""Numba types of the arguments of `find_ability`, which other kernels call by its address."""
 
 
 @compiled(*ABILITY, returns=BOOL)
@@ -82,9 +82,9 @@ def find_ability(
     accelerations: FloatArray,
     found: FloatArray,
 ) -> bool:
-    """Fill `found` (3 + n,): speed, least acceleration, largest deviation of the tool's motion, joints' rates.
+    """Fill `found` (3 + n,): the tool's speed, acceleration and largest deviation of its motion, and joints' rates.
 
-    jacobian (6, n), direction (3,), limits and accelerations (n,). False where `resolve` refuses them.
+    jacobian (6, n), direction (3,), limits and accelerations (n,). Return False if `resolve` refuses them.
     """
     twist, rates = _twist(), found[FOUND:]
     for i in range(3):
@@ -111,10 +111,10 @@ def along_approach(pose: GripperPose, limits: JointLimits, full_speed_m_s: float
 
 
 def change_times_s(pose: GripperPose, limits: JointLimits, twists: FloatArray) -> FloatArray:
-    """Return each joint's times K (n, 5) from rest to full travel of R2, and to each full stick deflection.
+    """Return the times K (n, 5) from rest to full travel of R2 and to each full stick deflection, for each joint, in s.
 
-    A change Δ (5,) of travel and deflections takes max |K Δ|: the joint that changes most limits all. twists (5, 6):
-    from `tool_motion.full_twists`. ValueError as for `joint_velocities`.
+    A change Δ (5,) of travel and stick deflections takes max |K Δ|: the joint that changes most limits all. twists (5,
+    6): from `tool_motion.full_twists`. ValueError as for `joint_velocities`.
     """
     times_s = np.empty((len(twists), limits.velocity_rad_s.size))
     jacobian, rotation = np.ascontiguousarray(pose.tool_jacobian), np.ascontiguousarray(pose.tool_rotation)

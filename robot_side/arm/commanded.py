@@ -1,4 +1,4 @@
-"""Joint velocities of a command, in one compiled call a tick."""
+"""Joint velocities that follow from a command, in one compiled call in a tick."""
 
 import math
 
@@ -14,7 +14,7 @@ from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, input_array, out
 from robot_side.compiled.stack import on_stack
 
 _AT_END_RAD = 0.002
-"""Distance from its end within which a joint counts as at the end, in rad: allows for encoder noise."""
+"""Distance from the end of its range, in rad, within which a joint counts as at the end: allows for encoder noise."""
 _twist = on_stack(6)
 
 
@@ -27,10 +27,11 @@ def commanded(
     *,
     stands: bool = False,
 ) -> tuple[FloatArray, float]:
-    """Return the joint velocities (n,) in rad/s, by `joint_velocities`, and the speed along the approach axis.
+    """Return joint velocities (n,) in rad/s by `joint_velocities`, and the tool's speed along the approach axis in m/s.
 
-    The speed, in m/s, leaves out joints that are commanded beyond their ends. joint_positions_rad (n,). stands: no
-    motion downwards. ValueError for a pose that is not finite: nothing must move by it.
+    The speed leaves out joints that are commanded beyond their ends. joint_positions_rad (n,). stands: whether a held
+    object stands on something; there is then no motion downwards. ValueError for a pose that is not finite, as nothing
+    may move by it.
     """
     linear, angular = tool_motion(command, settings)
     velocity = np.empty(joint_positions_rad.size)
@@ -71,7 +72,7 @@ def _command_loop(
     stands: bool,
     velocity: FloatArray,
 ) -> float:
-    """Fill `velocity`; return the speed along the approach axis, NaN for an unusable argument."""
+    """Fill `velocity` (n,); return the tool's speed along the approach axis, NaN for an unusable argument."""
     if not jacobian.shape[1] == positions.size == limits.size == lower.size == upper.size:
         return math.nan
     twist = _twist()

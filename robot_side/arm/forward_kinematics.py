@@ -1,4 +1,4 @@
-"""Forward kinematics (eq. 4) of a robot's tree of links: tool, Jacobian and spheres from joint readings in one pass."""
+"""Forward kinematics (eq. 4) of a tree of links: tool, Jacobian and sphere centres from joint readings in one pass."""
 
 import math
 from typing import Any, Final, NamedTuple
@@ -24,8 +24,8 @@ LINK: Final = np.dtype(
         ("quaternion", np.float64, (4,)),
     ]
 )
-"""Link: its parent's row, which is an earlier one; its joints; and its pose in the parent's frame with these at their
-references. The first row is the world, which is its own parent."""
+"""Link of the tree: index of the parent's row, which comes earlier; range of the link's joints; and the link's pose in
+the parent's frame with these joints at their references. The first row is the world, which is its own parent."""
 JOINT: Final = np.dtype(
     [
         ("reading", np.int64),
@@ -36,45 +36,46 @@ JOINT: Final = np.dtype(
         ("axis", np.float64, (3,)),
     ]
 )
-"""Joint in the frame of its link: a hinge about the unit axis through the anchor, or a slide along the axis. reading:
-index among the arm's or the fingers' readings. Only the arm's joints move the tool and are columns of the Jacobian."""
+"""Joint in its link's frame: a hinge about the unit axis through the anchor, or a slide along the axis. reading: index
+among the arm's or the fingers' readings. Only the arm's joints move the tool, and only these have columns in the
+Jacobian."""
 POINT: Final = np.dtype([("link", np.int64), ("position", np.float64, (3,))])
 """Point that is fixed to a link, in the link's frame."""
 
 _UNIT: Final = 1e-15
-"""Deviation from the length 1 below which a quaternion is not normalised: rounding."""
+"""A quaternion whose length deviates from 1 by at most this, by rounding, is not normalised."""
 
 
 class LinkTree(NamedTuple):
-    """Links and joints of a robot, with the tool and the points to place."""
+    """Links and joints of a robot, its tool, and the points whose positions are wanted."""
 
     links: Records
-    """(l,) of LINK"""
+    """(l,) records of LINK"""
     joints: Records
-    """(j,) of JOINT, in the order of their links"""
+    """(j,) records of JOINT, in the order of their links"""
     tool: Records
-    """(1,) of POINT"""
+    """(1,) record of POINT: origin of the tool's frame"""
     tool_quaternion: FloatArray
-    """(4,) orientation of the tool's frame in its link's, w first"""
+    """(4,) orientation of the tool's frame in the frame of its link, w first"""
     points: Records
-    """(m,) of POINT"""
+    """(m,) records of POINT"""
 
 
 class Placed(NamedTuple):
-    """Placed tool and points, in the world frame; every array is new."""
+    """Tool and points in the world frame; every array is new."""
 
     tool_position_m: FloatArray
-    """(3,)"""
+    """(3,) origin of the tool's frame"""
     tool_rotation: FloatArray
     """(3, 3) tool to world"""
     tool_jacobian: FloatArray
-    """(6, n) linear rows first"""
+    """(6, n) Jacobian of the tool, linear rows first"""
     points_m: FloatArray
-    """(m, 3)"""
+    """(m, 3) positions of the points"""
 
 
 def place(tree: LinkTree, arm_readings: FloatArray, finger_readings: FloatArray, link_poses: FloatArray) -> Placed:
-    """Place the tree by the readings of the arm's joints (n,) and of the fingers' (f,) (eq. 4).
+    """Return the tree's tool and points by readings of the arm's joints (n,) and of the fingers' joints (f,) (eq. 4).
 
     link_poses (l, 7): filled with each link's position and quaternion, w first. ValueError unless there is one reading
     for each joint.
@@ -100,7 +101,7 @@ def _product(a: Quaternion, b: Quaternion) -> Quaternion:
 
 @inlined
 def _turned(q: Quaternion, v: Vector) -> Vector:
-    """Return `v` rotated by a unit quaternion: v + 2 u × (w v + u × v) with its vector part u."""
+    """Return `v` rotated by a unit quaternion with scalar part w and vector part u: v + 2 u × (w v + u × v)."""
     x = q[0] * v[0] + q[2] * v[2] - q[3] * v[1]
     y = q[0] * v[1] + q[3] * v[0] - q[1] * v[2]
     z = q[0] * v[2] + q[1] * v[1] - q[2] * v[0]
@@ -125,7 +126,7 @@ def _rotation(q: Quaternion) -> Rotation:
 
 @inlined
 def _on_link(pose: FloatArray, rotation: Rotation, v: Vector) -> Vector:
-    """Return the point `v` of a link with this pose and rotation in the world frame."""
+    """Return in the world frame the point `v` of a link that has this pose and rotation."""
     return (
         rotation[0][0] * v[0] + rotation[0][1] * v[1] + rotation[0][2] * v[2] + pose[0],
         rotation[1][0] * v[0] + rotation[1][1] * v[1] + rotation[1][2] * v[2] + pose[1],
@@ -167,9 +168,9 @@ def _place_links(
     poses: FloatArray,
     axes: FloatArray,
 ) -> None:
-    """Fill the links' poses (l, 7), and each arm joint's axis and anchor as columns (6, n), in the world frame.
+    """Fill the links' poses (l, 7), and each arm joint's axis and anchor as a column (6, n), all in the world frame.
 
-    The order of operations is MuJoCo's, so that nearly all digits are the same.
+    Operations have MuJoCo's order, so that nearly all digits equal MuJoCo's.
     """
     for row in range(links.size):
         link = links[row]

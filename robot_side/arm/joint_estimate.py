@@ -1,8 +1,8 @@
-"""Estimate of joint and finger positions: a filter averages the noise of single readings.
+"""Estimate of joint and finger positions, by a filter that averages the noise of single readings.
 
-Position readings are noisy; the drive's velocity is less so. The estimate moves with the velocity and is drawn to the
-readings over a time constant (a complementary filter). It has no lag, and about a sixth of the noise at 1 kHz. The
-fingers' velocity is not measured, but estimated as well (an α-β filter).
+Position readings are noisy; the drives' velocity is less so. The estimate moves with the velocity, and approaches the
+readings with a time constant (a complementary filter). It has no lag, and at 1 kHz about a sixth of the readings'
+noise. The fingers' velocity is not measured, but estimated as well (an α-β filter).
 """
 
 import math
@@ -17,13 +17,13 @@ TIME_CONSTANT_S = 0.02
 _LOST_S = 0.1
 """Time without a reading after which the estimate restarts, in seconds."""
 _AT_ONCE_S = 2e-3
-"""Age up to which a state counts as present, in seconds: a simulation's is one step old."""
+"""Age, in seconds, up to which a state counts as present: a simulation's state is one step old."""
 _LOST = 0.01
-"""Distance from a reading, in rad or m, at which the estimate restarts: larger than any noise."""
+"""Distance from a reading, in rad or m, at which the estimate restarts: larger than any noise of a reading."""
 
 
 def lateness_s(measured: ArmState, now_s: float) -> float:
-    """Return the age of a state at `now_s`, in seconds; 0 up to 2 ms."""
+    """Return the age of a state at `now_s`, in seconds; an age of up to 2 ms counts as 0."""
     age_s = now_s - measured.time_s
     return age_s if age_s > _AT_ONCE_S else 0.0
 
@@ -36,7 +36,7 @@ class JointEstimate:
         self._finger_velocities: FloatArray = np.empty(0)
 
     def update(self, measured: ArmState) -> ArmState:
-        """Return `measured` with estimated positions; a state of the same time changes nothing."""
+        """Return `measured` with estimated positions; a second state with the same time changes nothing."""
         last = self._last
         since_s = math.inf if last is None else measured.time_s - last.time_s
         if last is None or not 0.0 <= since_s < _LOST_S:
@@ -63,9 +63,10 @@ class JointEstimate:
         return self._last
 
     def carried(self, late_s: float) -> ArmState:
-        """Return the state extrapolated by `late_s` from the last one, with constant velocities.
+        """Return the last state, extrapolated by `late_s` with constant velocities.
 
-        At most by 0.1 s: an arm that is silent for longer may stand still. ValueError before the first `update`.
+        The extrapolation ends at 0.1 s, because an arm that is silent for longer may stand still. ValueError before the
+        first `update`.
         """
         last = self._last
         if last is None:
@@ -106,7 +107,7 @@ def _estimate_loop(
     fingers: FloatArray,
     finger_velocities: FloatArray,
 ) -> bool:
-    """Fill `joints` (n,) and `fingers` (f,), update `finger_velocities` (f,); False for readings too far off."""
+    """Fill `joints` (n,) and `fingers` (f,), update `finger_velocities` (f,); False if a reading is too far off."""
     near = last_joints.size == last_velocities.size == velocities.size == joints.size
     near &= last_fingers.size == finger_velocities.size == fingers.size
     if not near:

@@ -13,10 +13,10 @@ from robot_side.compiled.kernel import BOOL, building_block, compiled, inlined, 
 from robot_side.compiled.stack import on_stack
 
 _THRESHOLD_2: Final = 0.06 * 0.06
-"""Square of the singular value below which the damping begins"""
+"""Square of the smallest singular value below which damping begins"""
 _LARGEST_DAMPING: Final = 0.06
 _HALVINGS: Final = 60
-"""Number of bisections that find the smallest eigenvalue to the last digit"""
+"""Number of bisections by which the smallest eigenvalue is found to its last digit"""
 _gram, _factor, _solution = on_stack(6, 6), on_stack(6, 6), on_stack(6)
 
 
@@ -25,13 +25,13 @@ def joint_velocities(
     twist: FloatArray,
     velocity_limits_rad_s: FloatArray,
 ) -> FloatArray:
-    """Find joint velocities (n,) in rad/s that give the tool `twist`, at most `velocity_limits_rad_s` (n,) each.
+    """Find joint velocities (n,) in rad/s that give the tool `twist`; velocity_limits_rad_s (n,): their limits.
 
-    jacobian (6, n) and twist (6,), linear rows first, are in one frame. Without damping, the twist is met exactly, or
-    with fewer than six joints in the least-squares sense. The damping begins where the smallest of the Jacobian's
-    min(6, n) singular values is below σ_0 = 0.06: λ² = λ_max² (1 - (σ_min/σ_0)²), so that no joint runs away at a
-    singularity. A joint over its limit slows all joints by the same factor, which keeps the direction. The singular
-    values mix metres and radians: the defaults suit an arm of about one metre's reach.
+    jacobian (6, n) and twist (6,), linear rows first, are in one frame. Without damping the twist is met exactly; with
+    fewer than six joints, in the least-squares sense. The damping begins where the smallest of the Jacobian's min(6, n)
+    singular values is below σ_0 = 0.06: λ² = λ_max² (1 - (σ_min/σ_0)²), so that no joint runs away at a singularity. If
+    a joint is over its limit, all joints are slowed by the same factor, which keeps the direction. The singular values
+    mix metres and radians: σ_0 and λ_max suit an arm with a reach of about one metre.
     ValueError for a wrong shape, a limit that is not above 0, or a value that is not finite.
     """
     if (jacobian.shape, twist.shape) != ((6, velocity_limits_rad_s.size), (6,)):
@@ -43,7 +43,7 @@ def joint_velocities(
 
 
 def refuse(jacobian: FloatArray, twist: FloatArray, velocity_limits_rad_s: FloatArray) -> NoReturn:
-    """Raise the ValueError that names the argument that `resolve` refused."""
+    """Raise a ValueError that names the argument because of which `resolve` returned False."""
     for name, values in (("jacobian", jacobian), ("twist", twist)):
         require_finite(name, values)
     if not (velocity_limits_rad_s > 0.0).all():
@@ -107,7 +107,7 @@ def _solve_damped(gram: FloatArray, solution: FloatArray) -> bool:
 
 @inlined
 def _of_rows(jacobian: FloatArray, wide: bool, row: int, k: int) -> float:
-    """Return an element of A, whose rows are the shorter side: A = J, or Jᵀ with fewer than six joints."""
+    """Return an element of A, the Jacobian with its shorter side as rows: A = J, or Jᵀ with fewer than six joints."""
     return float(jacobian[row, k] if wide else jacobian[k, row])
 
 
@@ -118,10 +118,10 @@ def resolve(
     limits: FloatArray,
     velocity: FloatArray,
 ) -> bool:
-    """Fill `velocity` (n,) as in `joint_velocities`; False for values that are not finite or limits not above 0.
+    """Fill `velocity` (n,) as `joint_velocities` does; False for values that are not finite or limits not above 0.
 
-    Solves the normal equations of the shorter side: (J Jᵀ + λ² I) y = v and q = Jᵀ y, or (JᵀJ + λ² I) q = Jᵀ v with
-    fewer than six joints. Singular values from 0.06 to 3 make a condition number of 2500, so few digits are lost.
+    Solve the normal equations of the shorter side: (J Jᵀ + λ² I) y = v and q = Jᵀ y, or with fewer than six joints (JᵀJ
+    + λ² I) q = Jᵀ v. Singular values from 0.06 to 3 make a condition number of 2500, so few digits are lost.
     """
     wide = velocity.size >= 6
     size, length = (6, velocity.size) if wide else (velocity.size, 6)
@@ -145,7 +145,7 @@ def resolve(
 
 @building_block
 def _limit(velocity: FloatArray, limits: FloatArray) -> bool:
-    """Scale all joints by one factor so that none is over its limit; False for an invalid velocity or limit."""
+    """Scale all joints by one factor, so that none is over its limit; False for an invalid velocity or limit."""
     excess = 1.0
     for joint in range(velocity.size):
         # An infinite limit is no limit; NaN fails the comparison.

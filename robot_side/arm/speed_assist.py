@@ -1,7 +1,7 @@
-"""Cap of the speed along the triggers by the robot side (`--assist speed`), from the field that the fingers feel.
+"""Limit of the speed along the triggers by the robot side (`--assist speed`), from the fields that the triggers render.
 
-Stiffness is advice, which a strong finger overcomes. This assist limits the speed u. From there, with acceleration a,
-the robot stops within w_8, the onset distance of full strength:
+A strong finger can overcome stiffness. This assist therefore limits the speed u, so that the robot, decelerating at a,
+stops within w_8, the onset distance of full strength:
 
     u τ + u²/2a <= w_8        τ: delay until the arm follows a command
 """
@@ -15,11 +15,11 @@ from common.protocol.messages import MotionCommand, TriggerField
 from common.touch_speed import touch_speed_m_s
 
 FOLLOWS_S: Final = 0.03
-"""τ, in seconds: the age of a field, up to 10 ms, and the drive's lag."""
+"""Delay τ in seconds: age of a field, up to 10 ms, plus the drive's lag"""
 
 
 def fastest_m_s(field: TriggerField) -> float:
-    """Return the greatest speed along a trigger that stops in time; a target may be touched, at touching speed."""
+    """Return the greatest speed along a trigger that stops in time; a target may be touched at the touching speed."""
     by_slow = _stops_within_m_s(field.slow_m[-1], field.acceleration_m_s2)
     return max(
         min(by_slow, touch_speed_m_s(field.full_speed_m_s)),
@@ -28,7 +28,7 @@ def fastest_m_s(field: TriggerField) -> float:
 
 
 def assisted(command: MotionCommand, l2: TriggerField, r2: TriggerField) -> MotionCommand:
-    """Return `command` with its travel capped by `fastest_m_s`; sticks and buttons stay."""
+    """Return `command` with its travel limited by `fastest_m_s`; sticks and buttons are unchanged."""
     travel = command.r2 - command.l2
     field = r2 if travel > 0.0 else l2
     most = fastest_m_s(field) / field.full_speed_m_s

@@ -1,7 +1,8 @@
-"""Map from trigger travel and sticks to the tool's motion; on the robot side, as stiffness depends on it.
+"""Map from trigger travel and sticks to the tool's motion.
 
-The tool frame is a camera's optical frame: z forward along the approach axis, x right, y down. R2 advances
-along +z and L2 retreats. The left stick moves the tool sideways, the right stick turns it about its origin.
+The map is on the robot side, because the stiffness depends on it. The tool frame is as a camera's optical frame: z
+forward along the approach axis, x right, y down. R2 advances along +z and L2 retreats. The left stick moves the tool
+sideways; the right stick turns the tool about its origin.
 """
 
 from dataclasses import dataclass
@@ -20,10 +21,10 @@ _Speed = Annotated[float, Meta(gt=0.0, le=5.0)]
 
 @dataclass(frozen=True)
 class ToolMotionSettings:
-    """Speeds of the tool at full travel and full deflection."""
+    """Speeds of the tool at full travel of a trigger and at full deflection of a stick."""
 
     trigger_speed_m_s: _Speed = 0.25
-    """ISO 10218's reduced speed for an arm near people."""
+    """Speed at full travel of a trigger; the default is ISO 10218's reduced speed for an arm near people."""
     stick_speed_m_s: _Speed = 0.1
     turn_speed_rad_s: _Speed = 0.5
 

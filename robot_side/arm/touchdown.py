@@ -2,7 +2,7 @@
 
     carried ─▶ stands ─▶ carried
             │         └ the tool has risen by 3 mm, or the object is released
-            └ the tool is commanded to sink, and the load has fallen by more than 5 N and half of the weight
+            └ the tool is commanded to sink, and the load has fallen by more than 5 N plus half of the weight
 
 The robot side then stops motion downwards, and relaxes the torque that the drives have built up.
 """
@@ -16,30 +16,33 @@ from common.arrays import FloatArray
 from robot_side.arm.resolved_rate import joint_velocities
 
 _BORNE_N: Final = 5.0
-"""Fall of the load at touchdown, in N: more than a measured load's error changes in a second."""
+"""Fall of the load that shows a touchdown, in N: larger than the change within a second of a measured load's error."""
 _BORNE_SHARE: Final = 0.5
-"""Fall as a share of the weight. A tool that starts to sink accelerates by less than half of g, so it carries more."""
+"""Further fall of the load that shows a touchdown, as a share of the weight. A tool that starts to sink accelerates by
+less than half of g, so the arm still carries more than half of the weight."""
 _HARDLY: Final = 0.25
 _STALLED_S: Final = 0.15
-"""Time, in seconds, for which a tool without measured loads must sink at less than a quarter of the commanded speed to
-stand. An arm needs less time to begin to move."""
+"""Time, in seconds, after which a tool without measured loads counts as standing, if it sinks at less than a quarter of
+the commanded speed. An arm needs less time to begin to move."""
 _SINKS_M_S: Final = 1e-3
 _LEAVES_M: Final = 3e-3
 _PERIOD_S: Final = 0.004
 _GIVES_WAY_S: Final = 0.01
-"""Time for which the arm halts at its measured position, in seconds: longer than a step of physics or controller."""
+"""Time, in seconds, for which the arm halts at its measured position: longer than a step of physics or
+of a controller"""
 _NOISE_S: Final = 0.01
 _USUAL_S: Final = 1.0
-"""Time constants of the present load and of the usual one, which follows a lift and errors of the arm's model."""
+"""Time constants, in seconds, of the present load (`_NOISE_S`) and of the usual load (`_USUAL_S`). The usual load
+follows a lift, and errors of the arm's model."""
 _SPEED_S: Final = 0.03
-"""Time constant of the measured speed."""
+"""Time constant of the measured speed, in seconds"""
 _UP: Final = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
 def carried_n(tool_jacobian: FloatArray, joint_loads_nm: FloatArray | None) -> float | None:
-    """Force upwards, in N, that drives with these loads (n,) exert at the tool, by virtual work; None without loads.
+    """Return the upward force in N that drives with these loads (n,) exert at the tool; None without loads.
 
-    tool_jacobian (6, n), linear rows first.
+    By virtual work. tool_jacobian (6, n), linear rows first.
     """
     if joint_loads_nm is None or not np.isfinite(joint_loads_nm).all():
         return None
@@ -47,7 +50,7 @@ def carried_n(tool_jacobian: FloatArray, joint_loads_nm: FloatArray | None) -> f
 
 
 class Touchdown:
-    """Touchdown state of one object, from grip to release."""
+    """State of one held object, from grip to release: carried, or standing on something."""
 
     def __init__(self) -> None:
         self.stands = False
@@ -56,7 +59,7 @@ class Touchdown:
         self._carried_n = self._usual_n = 0.0
 
     def due(self, time_s: float) -> bool:
-        """Return whether a load is due at `time_s`, every 4 ms: computing one takes a tenth of a tick."""
+        """Return whether `update` needs a load at `time_s`: every 4 ms, as computing a load takes a tenth of a tick."""
         return time_s - self._time_s >= _PERIOD_S
 
     @property
@@ -65,9 +68,9 @@ class Touchdown:
         return self.stands and self._time_s - self._since_s < _GIVES_WAY_S
 
     def update(self, carried_n: float | None, height_m: float, told_m_s: float, time_s: float) -> None:
-        """Take the load, None where unknown, and the tool's height, as measured at `time_s`.
+        """Take the load (None if unknown) and the tool's height, both measured at `time_s`.
 
-        told_m_s: commanded speed of the tool upwards until then.
+        told_m_s: commanded speed of the tool upwards since the last update.
         """
         passed_s, sunk_m = time_s - self._time_s, self._height_m - height_m
         if passed_s <= 0.0:

@@ -1,1 +1,1 @@
-"""Compilation with Numba: decorators, a safe cache, columns, arrays on the stack, vectors in registers."""
+"""Tools for compilation with Numba: decorators, a safe cache, bundles of arrays, arrays on the stack, vectors."""

@@ -1,4 +1,4 @@
-"""Calls of kernels by address from other kernels: Numba would compile the called kernel again, at full cost."""
+"""Calls from kernel to kernel by address. For an ordinary call Numba would compile the called kernel again."""
 
 from collections.abc import Callable
 from typing import Any, cast
@@ -11,9 +11,10 @@ from robot_side.compiled.numba_inside import call_at
 
 
 def call_at_address(returns: Any, arguments: tuple[Any, ...]) -> Callable[[int, tuple[Any, ...]], Any]:
-    """Return the function (address, tuple of arguments) with which kernels call others of these types.
+    """Return a function with which a kernel calls another kernel of these argument and return types.
 
-    In kernels only. Arguments of other types raise numba.TypingError when the caller is compiled.
+    It takes the address and a tuple of arguments, and works in kernels only. Arguments of other types raise
+    numba.TypingError when the calling kernel is compiled.
     """
     wanted = returns(*arguments)
 
@@ -32,7 +33,7 @@ def call_at_address(returns: Any, arguments: tuple[Any, ...]) -> Callable[[int, 
 
 
 def _fits(given: Any, wanted: Any) -> bool:
-    """Return whether two types have the same layout in memory: only one of two arrays may be read-only."""
+    """Return whether an argument of the type `given` fits: arrays need the same layout, but may differ in read-only."""
     if isinstance(wanted, numba.types.Array):
         of = ("dtype", "ndim", "layout")
         return isinstance(given, numba.types.Array) and all(getattr(given, a) == getattr(wanted, a) for a in of)

@@ -1,6 +1,6 @@
-"""Bundles of arrays that go to a kernel as one argument, by their addresses; declared once for Python and kernels.
+"""Bundles: many arrays that go to a kernel as one argument, a table of their addresses and lengths.
 
-One argument costs a fifth of twenty.
+The arrays are declared once for Python and kernels. Passing one argument costs a fifth of passing twenty.
 """
 
 import functools
@@ -21,53 +21,54 @@ BUNDLE: Final = numba.types.Array(numba.types.int64, 2, "C", readonly=True)
 
 
 class Form(NamedTuple):
-    """Form of a column: an array (n, *inner) of elements of one type."""
+    """Type of a bundled array: its shape is (n, *inner), its elements have the type `dtype`."""
 
     dtype: np.dtype
     inner: tuple[int, ...] = ()
 
 
 NUMBERS: Final = Form(np.dtype(np.float64))
-"""(n,) floats"""
+"""Form of an array (n,) of floats"""
 INDICES: Final = Form(np.dtype(np.int64))
-"""(n,) int64"""
+"""Form of an array (n,) of int64"""
 FLAGS: Final = Form(np.dtype(np.bool_))
-"""(n,) bools"""
+"""Form of an array (n,) of bools"""
 BUNDLED: Final = Form(np.dtype(np.int64), (2,))
-"""(n, 2) another bundle"""
+"""Form of another bundle (n, 2)"""
 
 
 def rows(width: int) -> Form:
-    """Return the form of (n, width) floats."""
+    """Return the form of an array (n, width) of floats."""
     return Form(NUMBERS.dtype, (width,))
 
 
 def matrices(height: int, width: int) -> Form:
-    """Return the form of (n, height, width) floats."""
+    """Return the form of an array (n, height, width) of floats."""
     return Form(NUMBERS.dtype, (height, width))
 
 
 def records(dtype: Any) -> Form:
-    """Return the form of (n,) records of `dtype`."""
+    """Return the form of an array (n,) of records of the type `dtype`."""
     return Form(dtype)
 
 
 class Declared(Generic[_Columns]):
-    """Named tuple of arrays, with the form of each array."""
+    """Declaration of a bundle: a named tuple type whose fields are arrays, and the form of each array."""
 
     def __init__(self, columns: type[_Columns], *forms: Form) -> None:
-        """forms: one for each field, in order; TypeError for another number of forms."""
+        """columns: the named tuple type. forms: one for each of its fields, in order; TypeError for another number."""
         self._fields: tuple[str, ...] = cast(Any, columns)._fields
         if len(forms) != len(self._fields):
             raise TypeError(f"{columns.__name__} has {len(self._fields)} columns, not {len(forms)}")
         self._forms = forms
         self.at: Callable[[IntArray], _Columns] = _view(columns, forms)
-        """Function from a bundle to the columns; in kernels only"""
+        """Function that returns the named tuple of arrays for a bundle; in kernels only"""
 
     def bundle(self, owner: object) -> IntArray:
-        """Return addresses and numbers of rows (n, 2) of the owner's arrays of these names; the owner must keep them.
+        """Return the bundle (n, 2): address and number of rows of each of the owner's arrays named like the fields.
 
-        ValueError for an array that is not C-contiguous, not aligned, or of another form than declared.
+        The owner must keep these arrays alive. ValueError for an array that is not C-contiguous, not aligned, or of
+        another form than declared.
         """
         arrays = [getattr(owner, name) for name in self._fields]
         for name, array, form in zip(self._fields, arrays, self._forms, strict=True):
@@ -81,7 +82,7 @@ class Declared(Generic[_Columns]):
 
 
 def _view(columns: Any, forms: tuple[Form, ...]) -> Any:
-    # One intrinsic for all: a call for each column would take longer to compile than the code that uses them.
+    # One intrinsic for all arrays: one call per array would take longer to compile than the code that uses them.
     def at(_typing: Any, bundle: Any) -> Any:
         arrays = [numba.types.Array(numba.from_dtype(form.dtype), 1 + len(form.inner), "C") for form in forms]
         tuple_type = cast(Any, numba.types.BaseTuple).from_types(arrays, columns)

@@ -1,4 +1,7 @@
-"""Compilation in other processes, which leave machine code on disk: Numba compiles in one thread only."""
+"""Compilation of kernels in several processes, because Numba compiles in one thread only.
+
+The helper processes store the machine code on disk, where this process finds it.
+"""
 
 import os
 import select
@@ -17,14 +20,15 @@ from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import code_sizes
 
 _MOST_PROCESSES: Final = 4
-"""Most processes: with more, half of the work would be done twice. Each takes 0.4 GB."""
+"""Maximum number of helper processes. With more, half of the work would be done twice; each takes 0.4 GB of memory."""
 
 
 class KernelQueue:
-    """Queue of kernels for several processes, largest first: each process asks for its next, so that all end together.
+    """Queue of kernels for several processes, largest first.
 
-    A function that several kernels call is compiled once in each process that needs it. So the size of a kernel
-    counts only the bytecode of functions that no other process has.
+    Each process takes its next kernel when it is free, so that all processes end at about the same time. A function
+    that several kernels call is compiled once in each process that needs it. So a kernel's size for one process is the
+    bytecode of its functions, without those that only other processes have taken.
     """
 
     def __init__(self, kernels: Sequence[Compiled], processes: int) -> None:
@@ -32,7 +36,7 @@ class KernelQueue:
         self._has: list[set[FunctionType]] = [set() for _ in range(processes)]
 
     def take(self, process: int) -> Compiled | None:
-        """Take the next kernel for a process, by its number; None if the queue is empty."""
+        """Remove and return the next kernel for the process with the number `process`; None if the queue is empty."""
         if not self._sizes:
             return None
         elsewhere = set[FunctionType]().union(*self._has) - self._has[process]
@@ -46,9 +50,9 @@ class KernelQueue:
 
 
 def compile_in_helpers(kernels: Sequence[Compiled], count: int, done: Callable[[str], None] = lambda _: None) -> None:
-    """Compile kernels of our modules in `count` processes, at most 4; call `done` with each kernel's name.
+    """Compile kernels of our modules in `count` processes, at most 4; call `done` with each compiled kernel's name.
 
-    A process may be killed, or the disk may be full. Then `prepare` compiles the missing kernels.
+    If a process is killed or the disk is full, some kernels are missing afterwards. `Compiled.prepare` compiles them.
     """
     count = min(count, _MOST_PROCESSES, len(kernels))
     waiting = KernelQueue(kernels, count)
@@ -75,7 +79,7 @@ def compile_in_helpers(kernels: Sequence[Compiled], count: int, done: Callable[[
 
 
 def _listen(owner: Channel, speaking: threading.Lock, names: SimpleQueue[str]) -> None:
-    """Receive kernels' names from the owner, and end the process with it: a compilation cannot be cancelled."""
+    """Receive kernels' names from the owner process. When it ends, end this process at once, even in a compilation."""
     while not owner.ended:
         select.select([owner], [], [])
         with speaking:
@@ -85,7 +89,7 @@ def _listen(owner: Channel, speaking: threading.Lock, names: SimpleQueue[str]) -
 
 
 def main() -> None:
-    """Compile each kernel by its name, which begins with its module; end if machine code cannot be stored."""
+    """Run a helper process: compile each kernel whose name is received. End if machine code cannot be stored."""
     owner, _ = companion_channel(sys.argv[1:])
     speaking, names = threading.Lock(), SimpleQueue[str]()
     threading.Thread(target=_listen, args=(owner, speaking, names), daemon=True).start()

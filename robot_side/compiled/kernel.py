@@ -1,6 +1,6 @@
-"""Typed decorators around Numba: `inlined` for building blocks, `compiled` for kernels that Python calls.
+"""Typed decorators around Numba: `compiled` for kernels, which Python calls, and two for the functions that they call.
 
-Numba is imported untyped; all other modules see ordinary typed functions.
+Numba has no type hints. Through these decorators all other modules see ordinary typed functions.
 """
 
 import contextlib
@@ -67,7 +67,7 @@ def record_array(dtype: np.dtype) -> Any:
 
 
 def tuple_type(*parts: Any) -> Any:
-    """Return the Numba type of a tuple of these; a kernel takes a tuple of a dozen arrays as fast as one array."""
+    """Return the Numba type of a tuple of `parts`. A dozen arrays in a tuple are passed as fast as one array."""
     return cast(Any, numba.types).Tuple(parts)
 
 
@@ -88,7 +88,7 @@ def inlined(function: _Function) -> _Function:
 
 
 def building_block(function: _Function) -> _Function:
-    """Compile `function` once for the kernels that call it; LLVM decides about inlining."""
+    """Compile `function` once for all kernels that call it; LLVM decides whether it is inlined."""
     return cast(_Function, ignore_constant_flags(numba.njit(**_FOR_CALLERS)(function)))
 
 
@@ -100,7 +100,7 @@ def _fused_multiply_add(_typing: Any, _a: Any, _b: Any, _c: Any) -> Any:
 
 
 fused_multiply_add: Callable[[float, float, float], float] = cast(Any, numba.extending.intrinsic)(_fused_multiply_add)
-"""Product and sum a · b + c with one rounding (IEEE 754-2008, 5.4.1); in kernels only"""
+"""Function (a, b, c) that returns a · b + c with a single rounding (IEEE 754-2008, 5.4.1); in kernels only"""
 
 
 def _power_of_two_below(_typing: Any, _length: Any) -> Any:
@@ -113,12 +113,13 @@ def _power_of_two_below(_typing: Any, _length: Any) -> Any:
 
 
 power_of_two_below: Callable[[float], float] = cast(Any, numba.extending.intrinsic)(_power_of_two_below)
-"""Largest power of two that is at most a positive normal float, by its exponent's bits; in kernels only"""
+"""Function that returns the largest power of two at most equal to its argument, a positive normal float; in kernels
+only"""
 
 
 @contextlib.contextmanager
 def _uncollected() -> Iterator[None]:
-    """Stop the garbage collector, which takes a tenth of a compilation and finds little."""
+    """Switch off the garbage collector for a while: it takes a tenth of a compilation's time and frees little."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -137,17 +138,17 @@ def imported_kernels() -> tuple["Compiled", ...]:
 
 
 class Compiled:
-    """Kernel with one signature, compiled (or loaded from the cache on disk) on first use.
+    """Kernel with a single signature. It is compiled, or loaded from the cache on disk, on first use.
 
-    With one signature, no later call can start a compilation. An array of another type, number of dimensions or
-    layout raises TypeError instead of stalling a running tick.
+    As there is only one signature, no later call can start a compilation and so stall a running tick. An array of
+    another type, number of dimensions or layout raises TypeError.
     """
 
     def __init__(self, function: Callable[..., Any], arguments: tuple[Any, ...], returns: Any = None) -> None:
         self.name = f"{function.__module__}.{function.__qualname__}"
         self._dispatcher: Any = numba.njit(**_OPTIONS)(function)
         self.function = function
-        """Python function of the kernel"""
+        """Python function from which the kernel is compiled"""
         self.signature = (returns or numba.types.void)(*arguments)
         self._preparing = threading.Lock()
         self.ready = False
@@ -156,11 +157,11 @@ class Compiled:
         _kernels.append(self)
 
     __call__: Any = property(operator.attrgetter("_run"))
-    """Run the kernel; TypeError for arrays of other types than its signature. A property, as a method that passes all
-    arguments on would take longer than some kernels."""
+    """Run the kernel; TypeError for arrays that do not fit its signature. It is a property because a method that passes
+    all arguments on would take longer than some kernels."""
 
     def prepare(self) -> None:
-        """Compile or load the kernel now."""
+        """Compile the kernel, or load it from disk, unless that is done already."""
         with self._preparing:
             if not self.ready:
                 keep_on_disk(self._dispatcher, self.name, self._key())
@@ -171,7 +172,7 @@ class Compiled:
 
     @property
     def is_ours(self) -> bool:
-        """Whether another process finds the kernel by its name"""
+        """Whether another process can find the kernel by its name: a top-level function of `robot_side`"""
         top_level = self.function.__qualname__ == self.function.__name__
         return top_level and self.name.startswith("robot_side.")
 
@@ -190,7 +191,7 @@ class Compiled:
 
     @property
     def address(self) -> int:
-        """Address of the kernel's machine code, for `calls.call_at_address`; compiled if necessary"""
+        """Address of the kernel's machine code, for `calls.call_at_address`; the kernel is compiled if necessary"""
         if not self.ready:
             self.prepare()
         return entry_point(self._dispatcher, self.signature)

@@ -1,4 +1,7 @@
-"""Machine code on disk: one file for each kernel, processor and version of the sources, complete or absent."""
+"""Cache of kernels' machine code on disk: one file for each kernel, processor and version of the sources.
+
+An incomplete file counts as absent.
+"""
 
 import contextlib
 import hashlib
@@ -12,24 +15,24 @@ from common.files.user_folders import cache_folder
 _ENDING: Final = ".machine-code"
 _CHECK_BYTES: Final = 32
 _VERSIONS: Final = 8
-"""Most files for one kernel: processors and versions of the sources may alternate."""
+"""Maximum number of files for one kernel, as processors and versions of the sources may alternate"""
 
 
 def machine_code_folder(environment: Mapping[str, str] = os.environ) -> Path:
-    """Return the folder: $NUMBA_CACHE_DIR, else `kernels` in the user's cache."""
+    """Return the folder for machine code: $NUMBA_CACHE_DIR, else `kernels` in our folder of the user's cache."""
     given = environment.get("NUMBA_CACHE_DIR")
     return Path(given) if given else cache_folder(environment) / "kernels"
 
 
 def can_keep() -> bool:
-    """Return whether the folder can be written to, or made."""
+    """Return whether the folder for machine code can be written to or created."""
     folder = machine_code_folder().absolute()
     there = next(place for place in (folder, *folder.parents) if place.exists())
     return os.access(there, os.W_OK | os.X_OK)
 
 
 def kept(name: str, key: str) -> bytes | None:
-    """Return the machine code of the kernel `name` by its `key`; None if absent or incomplete."""
+    """Return the stored machine code of the kernel `name` for this `key`; None if absent or incomplete."""
     try:
         content = _path(name, key).read_bytes()
     except OSError:
@@ -40,9 +43,9 @@ def kept(name: str, key: str) -> bytes | None:
 
 
 def keep(name: str, key: str, code: bytes) -> None:
-    """Store the machine code for the next start. Nothing is stored if the folder is read-only or the disk is full."""
+    """Store a kernel's machine code for later starts. If the folder is read-only or the disk full, store nothing."""
     path = _path(name, key)
-    # Renamed when complete: meanwhile other processes may read or write the same file.
+    # The file is renamed when complete, because other processes may read or write the same file meanwhile.
     part = path.with_suffix(f".{os.getpid()}")
     with contextlib.suppress(OSError):
         try:

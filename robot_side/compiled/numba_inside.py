@@ -27,7 +27,7 @@ from robot_side.compiled.machine_code import keep, kept, machine_code_folder
 
 @register_pass(mutates_CFG=False, analysis_only=True)  # type: ignore[no-untyped-call]
 class _ForCallers(LoweringPass):
-    """Compiler pass that registers a function for its callers; `NativeLowering` does not, without machine code."""
+    """Compiler pass that registers a function for its callers. `NativeLowering` does so only with machine code."""
 
     _name = "for_callers"
 
@@ -43,9 +43,9 @@ class _ForCallers(LoweringPass):
 
 
 class _ForLinking(JITCodeLibrary):
-    """Library of optimised code that is linked into kernels, and never loaded to run.
+    """Library of optimised code that is only linked into kernels, and never loaded to run by itself.
 
-    Otherwise a kernel's loops over lanes are half as fast.
+    With Numba's usual library a kernel's loops over lanes are half as fast.
     """
 
     def _finalize_final_module(self) -> None:
@@ -54,13 +54,13 @@ class _ForLinking(JITCodeLibrary):
 
 
 class WithoutMachineCode(CompilerBase):
-    """Compiler of functions that only kernels call: it stops at the code that a kernel links.
+    """Compiler of functions that only kernels call. It stops once there is code that a kernel can link.
 
-    By default Numba also generates machine code, and wrappers for Python and C. They take more than half of the time.
+    By default Numba goes on to machine code and wrappers for Python and C, which take more than half of the time.
     """
 
     def define_pipelines(self) -> list[Any]:
-        """Return the ordinary passes and `_ForCallers`."""
+        """Return the pipeline: Numba's ordinary passes, with `_ForCallers` added."""
         self.state.flags.no_cpython_wrapper = True
         self.state.flags.no_cfunc_wrapper = True
         self.state.flags.no_compile = True
@@ -74,7 +74,10 @@ class WithoutMachineCode(CompilerBase):
 
 
 def ignore_constant_flags(dispatcher: Any) -> Any:
-    """Compile one version of a function for all callers: by default Numba compiles one for True and one for False."""
+    """Let Numba compile one version of a function for all bools; return the function's dispatcher.
+
+    By default Numba compiles one version for a literal True and one for a literal False.
+    """
     of_types = dispatcher.get_call_template
 
     def plain(given: Any) -> Any:
@@ -88,16 +91,16 @@ def ignore_constant_flags(dispatcher: Any) -> Any:
 
 
 def machine() -> str:
-    """Return versions and processor: machine code depends on these and on its sources."""
+    """Return the versions of Numba, llvmlite and Python, and the processor, on which machine code depends."""
     processor = cast(Any, cpu_target).target_context.codegen().magic_tuple()
     return f"{numba.__version__} {llvmlite.__version__} {sys.implementation.cache_tag} {processor}"
 
 
 class _OnDisk(_Cache):
-    """Cache of a kernel's machine code in a file of `machine_code`.
+    """Cache of one kernel's machine code, in a file of `machine_code`. It replaces Numba's own cache.
 
-    Numba's own cache checks only the kernel's file: it would continue to run an old version of a building block from
-    another file. It stores nothing in a read-only folder, and a full disk ends the start.
+    Numba's checks only the kernel's own source file, so it would run an old version of a building block from another
+    file. It also stores nothing in a read-only folder, and a full disk raises an error that would end the program.
     """
 
     cache_path = property(lambda _: str(machine_code_folder()))
@@ -106,7 +109,7 @@ class _OnDisk(_Cache):
         self._names: Final = name, key
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled kernel, or None."""
+        """Return the compiled kernel from disk; None if there is none that can be read."""
         del sig
         target_context.refresh()
         code = kept(*self._names)
@@ -129,18 +132,21 @@ class _OnDisk(_Cache):
 
 
 def keep_on_disk(dispatcher: Any, name: str, key: str) -> None:
-    """Let the dispatcher load machine code from disk by `name` and `key`, and store new code there."""
+    """Let a kernel's dispatcher load machine code for `name` and `key` from disk, and store new code there."""
     dispatcher._cache = cast(Any, _OnDisk)(name, key)
 
 
 def entry_point(dispatcher: Any, signature: Any) -> int:
-    """Return the address of a compiled kernel's machine code, for calls from kernels."""
+    """Return the address of a compiled kernel's machine code, for calls from other kernels."""
     result = dispatcher.overloads[signature.args]
     return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
 
 
 def call_at(context: Any, builder: Any, signature: Any, address: Any, given: list[Any]) -> Any:
-    """Build the call of a kernel of this signature at an address, and its result."""
+    """Emit LLVM code that calls a kernel of this signature at an address; return the result's value.
+
+    An error in the called kernel is passed on to the caller.
+    """
     convention = context.call_conv
     callee = builder.inttoptr(address, convention.get_function_type(signature.return_type, signature.args).as_pointer())
     status, result = convention.call_function(builder, callee, signature.return_type, signature.args, given)
@@ -150,7 +156,10 @@ def call_at(context: Any, builder: Any, signature: Any, address: Any, given: lis
 
 
 def array_at(context: Any, builder: Any, array_type: Any, pointer: Any, shape: list[Any]) -> Any:
-    """Build the C-contiguous array of this type and shape (64-bit integers) at a pointer; it is never freed."""
+    """Emit LLVM code that makes a C-contiguous array of this type around the memory at a pointer, and return the array.
+
+    shape: 64-bit integers. The memory is not owned, so it is never freed.
+    """
     array = make_array(array_type)(context, builder)  # type: ignore[no-untyped-call]
     itemsize = shape[0].type(get_itemsize(context, array_type))  # type: ignore[no-untyped-call]
     strides = [itemsize]
@@ -162,13 +171,16 @@ def array_at(context: Any, builder: Any, array_type: Any, pointer: Any, shape: l
 
 
 def element_of(context: Any, builder: Any, table_type: Any, table: Any, row: int, column: int) -> Any:
-    """Build the read of one element of a C-contiguous table of two columns."""
+    """Emit LLVM code that reads one element of a C-contiguous table of two columns; return the element's value."""
     array = make_array(table_type)(context, builder, table)  # type: ignore[no-untyped-call]
     return builder.load(builder.gep(array.data, [array.itemsize.type(2 * row + column)]))
 
 
 def room_on_stack(context: Any, builder: Any, element: Any, count: int) -> Any:
-    """Build the pointer to `count` elements in the frame of the function, at the start of a cache line."""
+    """Emit LLVM code that reserves `count` elements in the function's stack frame; return the pointer.
+
+    The memory begins at a cache line.
+    """
     room = alloca_once(builder, context.get_data_type(element), count)  # type: ignore[no-untyped-call]
     room.align = 64
     return room

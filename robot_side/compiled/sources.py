@@ -1,4 +1,4 @@
-"""Sources of a kernel: the files of all functions that it compiles, and the constants that these read."""
+"""Sources of a kernel: the files of all functions that are compiled with it, and the constants that these read."""
 
 import functools
 import hashlib
@@ -17,9 +17,9 @@ _COMPILERS = ("kernel.py", "numba_inside.py")
 
 
 def sources(function: Callable[..., Any]) -> frozenset[Path]:
-    """Return the source files of `function` and of every function of ours that it names, directly or through others.
+    """Return the source files of `function` and of every function of ours that it uses, directly or through others.
 
-    They may be in any folder. A module that is named as a whole counts with all that it names.
+    The files may be in any folder. If a function names a whole module, all that this module names counts, too.
     """
     here = Path(__file__).parent
     return frozenset(here / name for name in _COMPILERS) | {
@@ -30,7 +30,7 @@ def sources(function: Callable[..., Any]) -> frozenset[Path]:
 def digest(function: Callable[..., Any]) -> str:
     """Return a digest of `sources(function)` and of the values of the constants that its parts read by name.
 
-    Constants count by value, because a number has no record of the file from which it was imported.
+    Constants are included by value, because a number does not tell from which file it was imported.
     """
     result = hashlib.sha256()
     for path in sorted(sources(function)):
@@ -41,7 +41,7 @@ def digest(function: Callable[..., Any]) -> str:
 
 
 def code_sizes(function: Callable[..., Any]) -> dict[FunctionType, int]:
-    """Return `function` and all functions that are compiled with it, with the sizes of their bytecode in bytes."""
+    """Return the size of the bytecode in bytes of `function` and of each function that is compiled with it."""
     return {part: len(part.__code__.co_code) for part in _parts(function) if isinstance(part, FunctionType)}
 
 
@@ -67,7 +67,7 @@ def _parts(function: Callable[..., Any]) -> set[Any]:
 
 
 def _ours(value: object, user: FunctionType | ModuleType) -> Any:
-    """Return the function, class or module of ours behind a value that `user` names, or None."""
+    """Return the function, class or module behind a value that `user` names, if it is ours; else None."""
     if isinstance(value, ModuleType):
         return value if value.__name__.partition(".")[0] in _OURS else None
     if hasattr(value, "__wrapped__"):
@@ -80,7 +80,7 @@ def _ours(value: object, user: FunctionType | ModuleType) -> Any:
 
 
 def _named(function: FunctionType) -> Iterator[tuple[str, object]]:
-    """Yield the globals and the variables of surrounding functions that `function` names, with their values."""
+    """Yield name and value of each global, and of each variable of an enclosing function, that `function` names."""
     for name in _names(function.__code__):
         if name in function.__globals__:
             yield name, function.__globals__[name]

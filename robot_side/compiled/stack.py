@@ -1,4 +1,4 @@
-"""Small arrays on the stack: kernels allocate no heap memory."""
+"""Small arrays on the stack, for kernels, which allocate no heap memory."""
 
 import math
 from collections.abc import Callable
@@ -13,10 +13,10 @@ from robot_side.compiled.numba_inside import array_at, room_on_stack
 
 
 def on_stack(*shape: int, dtype: Any = np.float64) -> Callable[[], np.ndarray]:
-    """Return a function with which a kernel gets an uninitialised array of this shape; in kernels only.
+    """Return a function that gives a kernel an uninitialised array of this shape on the stack; in kernels only.
 
-    The array ends with the function that called: never return it, nor a tuple with it. Each place of a call has one
-    array, in a loop the same each time.
+    The array is valid until the function that asked for it returns: never return the array, or a tuple with it. Each
+    call in the source code has its own array; in a loop a call gives the same array each time.
     """
     element = np.dtype(dtype)
 

@@ -1,6 +1,7 @@
 """Transposition of rows to columns by vector instructions, four rows at a time; in kernels only.
 
-LLVM compiles such a loop number by number: gathering the pairs' arrays would cost as much as their bounds.
+LLVM would compile an ordinary loop to copies of single numbers. Then copying the pairs' numbers into columns would cost
+as much as the bounds that are computed from them.
 """
 
 from collections.abc import Callable
@@ -55,18 +56,22 @@ def _transpose_three(_typing: Any, rows: Any, _start: Any, columns: Any, _end: A
 transpose_four: Callable[[FloatArray, int, int, int, int, FloatArray, int, int], None] = cast(
     Any, numba.extending.intrinsic
 )(_transpose_four)
-"""(rows, first, second, third, fourth, columns, end, apart): copy four numbers of each of four rows, which begin at
-these places in `rows`, to four numbers from `end` on in each of four columns, which are `apart` numbers apart in
-`columns`. Both arrays are flat."""
+"""Function (rows, first, second, third, fourth, columns, end, apart) that transposes four rows of four numbers. The
+rows begin at the indices `first` to `fourth` of the flat array `rows`. In the flat array `columns`, the first column's
+four numbers go to the indices from `end` on, the next column's to those `apart` farther, and so on."""
 
 transpose_three: Callable[[FloatArray, int, FloatArray, int, int], None] = cast(Any, numba.extending.intrinsic)(
     _transpose_three
 )
-"""(rows, start, columns, end, apart): the same for four consecutive rows of three numbers, from `start` on"""
+"""Function (rows, start, columns, end, apart) that transposes four consecutive rows of three numbers, from the index
+`start` on, into three columns, as `transpose_four` does"""
 
 
 def _access(context: Any, builder: Any, source_type: Any, source: Any, target_type: Any, target: Any) -> Any:
-    """Return functions that read four numbers from an index of `source`, and write four to one of `target`."""
+    """Return two functions: one reads four numbers from an index of `source`, one writes four at an index of `target`.
+
+    Both arrays are flat.
+    """
     pointers = [
         context.make_array(kind)(context, builder, array).data
         for kind, array in ((source_type, source), (target_type, target))
@@ -91,5 +96,5 @@ def _plus(builder: Any, start: Any, step: Any, count: int) -> Any:
 
 
 def _pick(builder: Any, first: Any, second: Any, *numbers: int) -> Any:
-    """Return four of the numbers of two vectors, indexed through both."""
+    """Return a vector of four numbers picked from two vectors; `numbers` are indices into both, one after the other."""
     return builder.shuffle_vector(first, second, ir.Constant(ir.VectorType(ir.IntType(32), 4), numbers))

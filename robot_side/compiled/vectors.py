@@ -1,4 +1,4 @@
-"""Vectors of three as tuples: Numba keeps them in registers, but small arrays on the heap."""
+"""Vectors of three numbers as tuples, which Numba keeps in registers; it would put small arrays on the heap."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Compilation of all kernels beforehand, so that no tick waits for one."""
+"""Compilation of all kernels before a run, so that no tick waits for a compilation."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -14,9 +14,10 @@ from robot_side.compiled.machine_code import can_keep
 from robot_side.compiled.sources import code_sizes, digest
 
 NOTEWORTHY_WARM_UP_S = 1.0
-"""Duration from which a warm-up is announced"""
+"""Duration of a warm-up after which it is announced"""
 _WORTH_A_PROCESS: Final = 20_000
-"""Bytes of bytecode that are worth more processes: they compile in some five seconds; a process starts in one."""
+"""Bytes of bytecode above which helper processes are started. So many compile in some five seconds; a process starts in
+one."""
 
 
 def warm_up(
@@ -24,12 +25,12 @@ def warm_up(
     kernels: Sequence[Compiled] | None = None,
     done: Callable[[str], None] = lambda _: None,
 ) -> float:
-    """Compile all kernels of the imported modules, or `kernels`, or load them from disk. Return the duration in s.
+    """Compile kernels, or load them from disk; return the duration in s. By default: all of the imported modules.
 
-    Otherwise the first call of each kernel does so, which takes up to seconds. If much is to be compiled, other
-    processes share the work on all processors that this one may use; the rest is compiled here. `announce` is called
-    once, before other processes start, or when compilation has taken more than a second. `done` is called with the
-    name of each kernel that has been compiled.
+    Without this the first call of each kernel does so, which takes up to seconds. If much is to be compiled, helper
+    processes share the work on the processors that this process may use; the rest is compiled here. `announce` is
+    called once, before helpers start or when compilation has taken more than a second. `done` is called with the name
+    of each kernel that has been compiled.
     """
     clock = MonotonicClock()
     start_s = clock.now()
@@ -56,7 +57,7 @@ def warm_up(
 
 
 def import_kernels() -> tuple[Compiled, ...]:
-    """Import every module of ours, and so all kernels that a scene may need. Return these kernels."""
+    """Import every module of `robot_side`, and so all kernels that a scene may need. Return these kernels."""
     for module in walk_packages(import_module("robot_side").__path__, "robot_side."):
         if module.name.endswith("__main__"):
             continue
@@ -70,5 +71,5 @@ def import_kernels() -> tuple[Compiled, ...]:
 
 
 def kernel_digests() -> dict[str, str]:
-    """Return digests of the sources of all kernels so far, by name: equal digests compute the same bits."""
+    """Return a digest of each imported kernel's sources, keyed by name. Equal digests compute the same bits."""
     return {kernel.name: digest(kernel.function)[:16] for kernel in imported_kernels()}

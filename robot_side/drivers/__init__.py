@@ -1,1 +1,1 @@
-"""Drivers of arms and cameras: each implements the ports of arm and surroundings, independently of the law."""
+"""Drivers of arms and cameras: each implements the port of an arm or of perceived objects; none knows the law."""

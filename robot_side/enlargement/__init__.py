@@ -1,4 +1,4 @@
-"""Position error of the gripper, and the enlargement that covers it (eq. 3-10)."""
+"""Position error of the gripper, and the enlargement D_σ that covers this and other errors (eq. 3-10)."""
 
 from robot_side.enlargement.distance import enlargement_distance
 

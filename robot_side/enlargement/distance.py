@@ -1,4 +1,4 @@
-"""Enlargement of the gripper by which a warning comes in time with probability P (eq. 9-10)."""
+"""Enlargement of the gripper, so large that a warning comes in time with probability P (eq. 9-10)."""
 
 import math
 from dataclasses import dataclass, field
@@ -18,7 +18,7 @@ Vector3 = tuple[float, float, float]
 
 
 def standard_quantile(probability: npt.ArrayLike) -> FloatArray:
-    """Return Φ⁻¹(P; 0, 1); ValueError for P outside (0, 1)."""
+    """Return the standard normal quantile Φ⁻¹(P; 0, 1); ValueError for P outside (0, 1)."""
     p = np.asarray(probability, dtype=np.float64)
     if not ((p > 0.0) & (p < 1.0)).all():
         raise ValueError(f"probability = {p} is outside (0, 1); valid: 0 < probability < 1")
@@ -26,7 +26,7 @@ def standard_quantile(probability: npt.ArrayLike) -> FloatArray:
 
 
 def _non_negative(name: str, value: npt.ArrayLike) -> FloatArray:
-    """Return `value` as floats; ValueError with `name` if an element is negative or not finite."""
+    """Return `value` as floats; ValueError that mentions `name` if an element is negative or not finite."""
     values = np.asarray(value, dtype=np.float64)
     if not (np.isfinite(values) & (values >= 0.0)).all():
         raise ValueError(f"{name} = {values} is negative or not finite; valid: finite and at least 0")
@@ -56,7 +56,7 @@ def enlargement_distance(
 ) -> float | FloatArray:
     """Return the enlargement D_incr(P) = ΔT_d + max(0, Φ⁻¹(P; mean, variance)) in metres (eq. 9-10).
 
-    probability: P in (0, 1). mean_m: a magnitude, as |μ_ee| + √3 |μ_c|, so never negative.
+    probability: P in (0, 1). mean_m: a sum of magnitudes |μ_ee| + √3 |μ_c|, so never negative.
     variance_m2: σ_p² + σ_c²; if 0, the statistical part is the mean itself.
     delay_displacement_m: ΔT_d = |v| t_d (eq. 8). The arguments broadcast; four scalars give a float.
     ValueError for P outside (0, 1) and for any other argument that is negative or not finite.
@@ -74,7 +74,7 @@ def enlargement_distance(
 
 @inlined
 def statistical_distance(mean: float, variance: float, quantile: float) -> float:
-    """Return D_σ = max(0, μ + Φ⁻¹(P) √σ²), lengths in m (eq. 9-10): the one formula for all laws and explanations."""
+    """Return D_σ = max(0, μ + Φ⁻¹(P) √σ²), lengths in m (eq. 9-10); all laws and explanations use this one formula."""
     return max(0.0, mean + quantile * math.sqrt(variance))
 
 
@@ -89,15 +89,15 @@ class Uncertainty:
     """Errors of gripper, camera and delay prediction, and the probability P (eq. 9-10), in the world frame."""
 
     probability: float = 0.99
-    """P in (0, 1): share of approaches in which the warning comes before the contact; one surface, one-sided"""
+    """Probability P in (0, 1) that the warning comes before the contact, in an approach of one surface (one-sided)"""
     camera_mean_m: Vector3 = (0.0, 0.0, 0.0)
-    """μ_c, true minus perceived."""
+    """Mean μ_c of the camera's error, true minus perceived position"""
     camera_sd_m: float = 0.0
-    """σ_c of each axis."""
+    """Standard deviation σ_c of the camera's error along each axis"""
     kinematic_mean_m: Vector3 = (0.0, 0.0, 0.0)
-    """μ_ee, true minus estimated."""
+    """Mean μ_ee of the gripper's position error, true minus estimated position"""
     prediction: PredictionErrors = field(default_factory=PredictionErrors)
-    """μ_δ and σ_δ."""
+    """Errors μ_δ and σ_δ of the predicted delay displacement"""
 
     def __post_init__(self) -> None:
         try:
@@ -110,27 +110,27 @@ class Uncertainty:
 
     @cached_property
     def quantile(self) -> float:
-        """Φ⁻¹(P)."""
+        """Standard normal quantile Φ⁻¹(P)"""
         return float(standard_quantile(self.probability))
 
     @cached_property
     def mean_m(self) -> FloatArray:
-        """μ_ee - μ_c (3,)."""
+        """Mean μ_ee - μ_c (3,) of the gripper's and the camera's errors together"""
         mean_m: FloatArray = np.asarray(self.kinematic_mean_m) - np.asarray(self.camera_mean_m)
         return mean_m
 
     def mean_along_m(self, direction: FloatArray) -> float:
-        """Return û·(μ_ee - μ_c) along a unit vector `direction` (3,): how much nearer than perceived objects are."""
+        """Return û·(μ_ee - μ_c) for a unit vector û = `direction` (3,): how much nearer objects are than perceived."""
         return float(direction @ self.mean_m)
 
 
 def plain_enlargements_m(
     uncertainty: Uncertainty, covariances: FloatArray, velocities_m_s: FloatArray, loop_age_s: float
 ) -> FloatArray:
-    """Return D_incr of each sphere (m,) as the paper prints it: equal in all directions, with |v| t_d and Σ's trace.
+    """Return D_incr (m,) of each sphere as the paper prints it: equal in all directions, from |v| t_d and Σ's trace.
 
-    |μ_c| is the vector's length: √3 times the mean if that is the same on each axis.
-    covariances (m, 3, 3) from `position_covariance`, velocities_m_s (m, 3) of the centres.
+    μ_c| is the vector's length: √3 times the mean along one axis if all axes have the same mean.
+    covariances (m, 3, 3) from `position_covariance`, velocities_m_s (m, 3) of the spheres' centres.
     """
     mean_m = math.hypot(*uncertainty.kinematic_mean_m) + math.hypot(*uncertainty.camera_mean_m)
     variance_m2 = np.trace(covariances, axis1=-2, axis2=-1) + uncertainty.camera_sd_m**2

@@ -22,7 +22,7 @@ def position_covariance(jacobians: FloatArray, encoder_sigma_rad: FloatArray) ->
 
 @compiled(input_array(3), input_array(1), output_array(3))
 def _covariance_loop(jacobians: FloatArray, sigma: FloatArray, covariances: FloatArray) -> None:
-    """Fill Σ_ee of each point."""
+    """Fill the covariance Σ_ee (m, 3, 3) of each point."""
     for point in range(jacobians.shape[0]):
         for row in range(3):
             for column in range(row + 1):

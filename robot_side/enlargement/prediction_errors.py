@@ -13,25 +13,25 @@ from common.errors import ConfigurationError
 from common.protocol.messages import Compensation
 
 BUILT_IN: Final = Path(__file__).parent / "prediction_errors.toml"
-"""Table of the built-in arm, written by `feelahead bench error --table`"""
+"""File with the errors of the built-in arm, written by `feelahead bench error --table`"""
 WITHOUT_TABLE: Final = 0.2
-"""Share of v_max t_d that is taken as μ_δ without a table"""
+"""Without a table, μ_δ is this share of v_max t_d"""
 _KEYS: Final = ("loop_age_ms", "mu_mm", "sigma_mm")
 
 Rows = tuple[tuple[float, float, float], ...]
-"""Rows (loop age in s, μ_δ in m, σ_δ in m), loop ages rising"""
+"""Rows (loop age in s, μ_δ in m, σ_δ in m), in the order of rising loop ages"""
 
 
 @dataclass(frozen=True)
 class PredictionErrors:
-    """Tables of μ_δ and σ_δ; without rows, μ_δ is 20 % of the distance at full speed in the loop age."""
+    """Tables of μ_δ and σ_δ, by compensating side; without rows, μ_δ is 20 % of v_max times the loop age."""
 
     rows: Mapping[Compensation, Rows] = field(default_factory=dict)
     arm: str | None = None
     """Fingerprint of the arm on which the errors were measured"""
 
     def table(self, kind: Compensation) -> FloatArray:
-        """Return the rows (k, 3) for one compensating side, or no rows if unknown."""
+        """Return the rows (k, 3) for one compensating side; no rows if its errors are unknown."""
         return np.array(self.rows.get(kind, ()), dtype=np.float64).reshape(-1, 3)
 
     def at(self, kind: Compensation, loop_age_s: float, full_speed_m_s: float) -> tuple[float, float]:
@@ -40,7 +40,10 @@ class PredictionErrors:
 
 
 def prediction_error(rows: FloatArray, loop_age_s: float, full_speed_m_s: float) -> tuple[float, float]:
-    """Interpolate μ_δ and σ_δ in m at a loop age in the rows (k, 3); beyond the last, in proportion to loop age."""
+    """Return μ_δ and σ_δ in m at a loop age, by linear interpolation between the rows (k, 3).
+
+    The first row also holds before it. Beyond the last row, its values grow in proportion to the loop age.
+    """
     count, after = rows.shape[0], 0
     if count == 0:
         return WITHOUT_TABLE * full_speed_m_s * loop_age_s, 0.0
@@ -56,13 +59,13 @@ def prediction_error(rows: FloatArray, loop_age_s: float, full_speed_m_s: float)
 
 
 def load_prediction_errors(path: Path) -> PredictionErrors:
-    """Read a table; ConfigurationError names what is wrong in an invalid file."""
+    """Read tables from a file; ConfigurationError names what is wrong in an invalid file."""
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         reason = (isinstance(error, OSError) and error.strerror) or error
         raise ConfigurationError(
-            f"--prediction-errors {path}: {reason}; valid: a table of: feelahead bench error --table"
+            f"--prediction-errors {path}: {reason}; valid: a file that feelahead bench error --table wrote"
         ) from None
     rows = {kind: _rows(path, kind, content.get(kind, [])) for kind in get_args(Compensation)}
     arm = content.get("arm")

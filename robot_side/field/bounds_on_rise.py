@@ -1,7 +1,7 @@
-"""Bounds on whether a pair can shorten any onset distance.
+"""Upper bounds of an overlap, which show early that a pair of sphere and object can shorten no onset distance.
 
-Rule: a bound may end the work early, never move a result. Regret: three bounds for three cases (the contact plane of a
-convex primitive, Brunn and Minkowski's concave cube root, the sphere's disc) are more than one would wish.
+A bound may only end the work early; it never changes a result. There are three bounds: by the contact plane of a convex
+primitive, by the concave cube root of the overlap (Brunn and Minkowski), and by the disc of the moving sphere.
 """
 
 import math
@@ -15,14 +15,14 @@ from robot_side.field.samples import NOTHING, Profile
 from robot_side.field.scratch import STRENGTHS, TOUCH_STRENGTH
 
 _SLACK_M: Final = 5e-5
-"""Smallest shortening of an onset distance that is pursued: many spheres of a face touch at once."""
+"""Smallest shortening of an onset distance that is worth computing, as many spheres of a face touch nearly at once"""
 _ENOUGH: Final = 1e-6
-"""Share of R³ above which an overlap's tangent bounds well"""
+"""Share of R³ above which an overlap's tangent is accurate enough to bound the overlap"""
 
 
 @inlined
 def latest_of(profile: Profile, level: int, distances: FloatArray) -> float:
-    """Return the distance up to which the profile may shorten the onset distance of a strength."""
+    """Return the distance along the profile beyond which the onset of a strength shortens no onset distance."""
     pair = profile.pair
     latest: float = distances[0, level]
     if not pair.touchable or level < TOUCH_STRENGTH:
@@ -32,7 +32,7 @@ def latest_of(profile: Profile, level: int, distances: FloatArray) -> float:
 
 @inlined
 def matters(profile: Profile, level: int, at: float, distances: FloatArray) -> bool:
-    """Return whether the profile beyond `at` may shorten any onset distance from `level` on."""
+    """Return whether the profile beyond `at` may still shorten an onset distance of any strength from `level` on."""
     any_does = False
     for k in range(level, STRENGTHS):
         any_does = any_does or latest_of(profile, k, distances) > at
@@ -41,7 +41,7 @@ def matters(profile: Profile, level: int, at: float, distances: FloatArray) -> b
 
 @inlined
 def begin(profile: Profile, level: int, at: float, distances: FloatArray) -> None:
-    """Shorten a strength's onset distances to the profile's onset `at`, if they are longer."""
+    """Shorten a strength's fast and slow onset distances to its onset `at` in this profile, if they are longer."""
     pair, found = profile.pair, at - profile.margin - profile.pair.lead
     distances[0, level] = min(distances[0, level], found)
     if not pair.touchable or level < TOUCH_STRENGTH:
@@ -50,21 +50,27 @@ def begin(profile: Profile, level: int, at: float, distances: FloatArray) -> Non
 
 @inlined
 def _cap(depth: float, radius: float) -> float:
-    """Return the volume of a sphere's cap (eq. 12)."""
+    """Return the volume of a sphere's cap of height `depth`, V_c of eq. 12."""
     height = min(max(depth, 0.0), 2.0 * radius)
     return math.pi * height * height * (3.0 * radius - height) / 3.0
 
 
 @inlined
 def _uncovered(distance: float, radius: float) -> float:
-    """Return the volume that a ball newly covers after a distance: no overlap rises by more."""
+    """Return the part of a ball's volume outside its former place after it moves by `distance`.
+
+    No overlap rises by more.
+    """
     moved = min(max(distance, 0.0), 2.0 * radius)
     return math.pi * moved * (radius * radius - moved * moved / 12.0)
 
 
 @inlined
 def _touched(part: Any, least: float) -> tuple[float, float]:
-    """Return the cube root of a part's newest overlap and its slope; infinite without a good tangent."""
+    """Return the cube root of one primitive's newest overlap, and the root's slope along û.
+
+    Where the overlap is at most `least`, a tangent would bound badly: the root is infinite then.
+    """
     if not part.volume > least:
         return math.inf, 0.0
     root = part.volume ** (1.0 / 3.0)
@@ -73,9 +79,11 @@ def _touched(part: Any, least: float) -> tuple[float, float]:
 
 @building_block
 def keep_tangents(profile: Profile, at: float, second: bool, entries: np.ndarray) -> bool:
-    """Keep the tangents of the newest sample, at `at`. Return whether V rises up to there.
+    """Keep, for each entered primitive, the tangent to the cube root of its overlap at the newest sample, at `at`.
 
-    The cube root is concave while one convex primitive is entered (Brunn, Minkowski), so a tangent bounds it.
+    The cube root is concave while a sphere enters a convex primitive (Brunn, Minkowski), so a tangent bounds it. An
+    entry holds two tangents; second: which one is written. Return whether all entered primitives are convex and their
+    overlaps still rise at `at`: then V rises all the way up to `at`.
     """
     least, falls = _ENOUGH * profile.pair.radius**3, -NOTHING * math.pi * profile.pair.radius**2
     rises = True
@@ -95,7 +103,10 @@ def keep_tangents(profile: Profile, at: float, second: bool, entries: np.ndarray
 
 @inlined
 def _by_tangent(at: float, touches: float, root: float, steep: float) -> float:
-    """Return an upper bound of a cube root up to `at`; infinite for a tangent that falls, unless it touches at 0."""
+    """Return an upper bound of a concave cube root at all distances up to `at`, from its tangent at `touches`.
+
+    A tangent that falls bounds only what follows. So its bound is infinite unless it touches at distance 0.
+    """
     if steep > 0.0:
         return root + steep * (at - touches)
     return root if touches == 0.0 else math.inf
@@ -103,7 +114,7 @@ def _by_tangent(at: float, touches: float, root: float, steep: float) -> float:
 
 @inlined
 def _most(profile: Profile, at: float, entries: np.ndarray) -> float:
-    """Return an upper bound of V at a distance; infinite if a primitive is not convex."""
+    """Return an upper bound of V at all distances up to `at`; infinite if an entered primitive is not convex."""
     most = 0.0
     for k in range(profile.entries):
         part = entries[k]
@@ -119,9 +130,9 @@ def _most(profile: Profile, at: float, entries: np.ndarray) -> float:
 
 @building_block
 def may_count(profile: Profile, baseline: float, full: float, distances: FloatArray, entries: np.ndarray) -> bool:
-    """Return whether a pair may shorten any onset distance.
+    """Return whether a pair may still shorten any onset distance, by the bounds of its overlap.
 
-    baseline: V(0). full: least rise of the overlap at full strength. entries: with their bounds.
+    baseline: V(0). full: smallest rise of the overlap that can mean full strength. entries: the pair's, with tangents.
     """
     pair = profile.pair
     for level in range(STRENGTHS):

@@ -1,4 +1,4 @@
-"""Field along one direction: the onset distances of the eight strengths."""
+"""Looks from Python: each returns the field along one direction, the onset distances of the eight strengths."""
 
 from dataclasses import dataclass
 from typing import NoReturn
@@ -21,19 +21,19 @@ class Along:
     direction: FloatArray
     """û (3,), unit, in the world frame"""
     mean_m: float
-    """û·(μ_ee - μ_c)"""
+    """Mean error of arm and camera along û: û·(μ_ee - μ_c)"""
     variance_m2: float
-    """σ_c²"""
+    """Variance of the camera's error: σ_c²"""
     quantile: float
-    """Φ⁻¹(P)"""
+    """Standard normal quantile of the probability P: Φ⁻¹(P)"""
     reach_m: float
-    """Distance that is examined"""
+    """Distance that is examined along û"""
     mean_along_m: float = 0.0
-    """μ_δ"""
+    """Mean prediction error of the delay displacement: μ_δ"""
     variance_along_m2: float = 0.0
-    """σ_δ²"""
+    """Variance of the prediction error: σ_δ²"""
     approach_m: FloatArray | None = None
-    """Approach of each object (k,), by which its contact distances shorten; None: all are at rest"""
+    """Distance by which each object (k,) approaches; its contact distances are shortened by it. None: all at rest."""
 
 
 @dataclass(frozen=True)
@@ -41,32 +41,33 @@ class Field:
     """Result of one look."""
 
     onsets_m: FloatArray
-    """(2, 8) onset distances of strengths 1 to 8, rising, infinite beyond the reach. The fast list, then the slow one:
-    there an object that is to be touched is felt less, and at its expected place."""
+    """(2, 8) onset distances of strengths 1 to 8, ascending, infinite beyond the examined distance. Row 0 is the fast
+    list, row 1 the slow list. In the slow list an object that is to be touched has strength 4 at most, and its expected
+    position counts: the spread D_σ(P) - D_σ(0.5) is left out."""
     sigma_m: float
     """Largest D_σ of the gripper's spheres"""
     counts: IntArray
-    """Counts of the work, indexed by `Count`"""
+    """Counts of the look's work, indexed by `Count`"""
 
     @property
     def fast_m(self) -> FloatArray:
-        """(8,)"""
+        """Fast list of onset distances (8,)"""
         fast_m: FloatArray = self.onsets_m[0]
         return fast_m
 
     @property
     def slow_m(self) -> FloatArray:
-        """(8,)"""
+        """Slow list of onset distances (8,)"""
         slow_m: FloatArray = self.onsets_m[1]
         return slow_m
 
 
 @dataclass
 class Ahead:
-    """Single looks from Python, as the law's compiled call has them; keeps the scratch memory."""
+    """Makes single looks from Python, equal to those in the law's compiled call. It keeps the scratch memory."""
 
     encoder_sigma_rad: FloatArray
-    """(n,)"""
+    """Standard deviation σ_θ of each joint's measured angle (n,)"""
 
     def __post_init__(self) -> None:
         self._encoder_variance = self.encoder_sigma_rad * self.encoder_sigma_rad
@@ -75,16 +76,17 @@ class Ahead:
     def look(
         self, pose: GripperPose, scene: SceneTable, classes: IntArray, along: Along, widest_m: float = np.inf
     ) -> Field:
-        """Return the field at `pose`. classes (k,): the objects' (`object_class`). widest_m: half the fingers' gap.
+        """Return the field along `along` from `pose`. classes (k,): class of each object (`object_class`).
 
-        ValueError names the field of `pose` or `along` that holds NaN or infinity: it would compare as far away, and
-        silently give no warning.
+        widest_m: half the gap between the fingers, the largest inflation of a finger's sphere towards the target. NaN
+        or infinity would compare as far away and silently give no warning. So a ValueError names the field of `pose` or
+        `along` that holds it.
         """
         objects = len(scene.first_rows) - 1
         approach_m = _STILL if along.approach_m is None else along.approach_m
         if len(classes) != objects or len(approach_m) not in (0, objects):
             raise ValueError(
-                f"classes holds {len(classes)}, approach_m {len(approach_m)}; valid: each of {objects} objects"
+                f"classes has {len(classes)} entries, approach_m {len(approach_m)}; valid: {objects}, one per object"
             )
         needed = len(pose.sphere_radii_m), len(scene.kinds), len(scene.first_rows)
         if not self.scratch.fits(*needed):
@@ -103,11 +105,11 @@ class Ahead:
 
 
 def _refuse(pose: GripperPose, along: Along) -> NoReturn:
-    """Raise the ValueError that names the field that is not finite."""
+    """Raise a ValueError that names the field of `pose` or `along` that is not finite."""
     for name in ("tool_position_m", "tool_jacobian", "sphere_centers_m", "sphere_radii_m"):
         require_finite(f"pose.{name}", getattr(pose, name))
     for name in ("direction", "mean_m", "variance_m2", "mean_along_m", "variance_along_m2", "quantile", "reach_m"):
         require_finite(f"along.{name}", getattr(along, name))
     if along.approach_m is not None:
-        require_finite("along.early_m", along.approach_m)
-    raise ValueError("the encoders' errors or the sums of all these are not finite; valid: metres and radians")
+        require_finite("along.approach_m", along.approach_m)
+    raise ValueError("encoder_sigma_rad or a sum of all numbers is not finite; valid: numbers in metres and radians")

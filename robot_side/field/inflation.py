@@ -1,7 +1,7 @@
-"""D_σ of each of the gripper's spheres along a direction (eq. 3-7, 9, 10), and the part that inflates the sphere.
+"""D_σ of each of the gripper's spheres along a direction (eq. 3-7, 9, 10), and its part that inflates the sphere.
 
-Errors of camera and arm lie in any direction: they inflate. Prediction errors of the delay lie along the motion: they
-shorten the contact distances (docs/feel.md).
+Errors of camera and arm may have any direction, so they inflate the sphere. Prediction errors of the delay lie along
+the motion, so they only shorten the contact distances (docs/feel.md).
 """
 
 import math
@@ -14,14 +14,16 @@ from robot_side.enlargement.distance import statistical_distance
 from robot_side.field.scratch import CLUSTER, Error, ScratchColumns
 
 Spread = tuple[float, Vector, Vector, Vector]
-"""Quadratic form: the value at the tool, the factors of x, y and z, of their squares, and of yz, zx and xy"""
+"""Quadratic form in a point's position (x, y, z) from the tool: the constant; the factors of x, y and z; those of x²,
+y² and z²; those of yz, zx and xy"""
 
 
 @inlined
 def spread_along(jacobian: FloatArray, encoder_variance: FloatArray, along: Vector) -> Spread:
-    """Return ûᵀ J diag(σ_θ²) Jᵀ û (eq. 5) of points that move with the tool, as a quadratic form of their place.
+    """Return the variance ûᵀ J diag(σ_θ²) Jᵀ û (eq. 5) of a point that moves with the tool, for every such point.
 
-    A joint moves the point r from the tool by û·(v + ω × r) = û·v + (û × ω)·r. jacobian (6, n): the tool's.
+    It is a quadratic form in the point's position r from the tool. Turned by 1 rad, a joint moves the point along û by
+    û·(v + ω × r) = û·v + (û × ω)·r, where v and ω are the joint's column of `jacobian` (6, n), the tool's.
     """
     at_tool, linear, xx, yy, zz, others = 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, 0.0, (0.0, 0.0, 0.0)
     for joint in range(encoder_variance.size):
@@ -37,7 +39,7 @@ def spread_along(jacobian: FloatArray, encoder_variance: FloatArray, along: Vect
 
 @inlined
 def variance_at(spread: Spread, arm: Vector) -> float:
-    """Return the variance (m²) of the point at `arm` from the tool."""
+    """Return the variance (m²) of the point at the position `arm` from the tool."""
     at_tool, linear, squares, others = spread
     x, y, z = arm
     products = others[0] * y * z + others[1] * z * x + others[2] * x * y
@@ -47,23 +49,23 @@ def variance_at(spread: Spread, arm: Vector) -> float:
 
 
 class DirectionalErrors(NamedTuple):
-    """Errors along a direction, without the joints' part (eq. 9-10)."""
+    """Errors along a direction û, without the variance from the encoders (eq. 9-10)."""
 
     mean: float
-    """û·(μ_ee - μ_c) in m"""
+    """Mean error of arm and camera along û: û·(μ_ee - μ_c) in m"""
     variance: float
-    """σ_c² in m²"""
+    """Variance of the camera's error: σ_c² in m²"""
     mean_along: float
-    """μ_δ in m"""
+    """Mean prediction error: μ_δ in m"""
     variance_along: float
-    """σ_δ² in m²"""
+    """Variance of the prediction error: σ_δ² in m²"""
     quantile: float
-    """Φ⁻¹(P)"""
+    """Standard normal quantile: Φ⁻¹(P)"""
 
 
 @inlined
 def inflation_and_distance(missed: DirectionalErrors, kinematic: float) -> tuple[float, float]:
-    """Return the inflation and D_σ of a point. kinematic: variance (m²) from the joints."""
+    """Return the inflation I and D_σ (both in m) at a point. kinematic: the point's variance (m²) from the encoders."""
     both = kinematic + missed.variance
     inflation = statistical_distance(missed.mean, both, missed.quantile)
     return inflation, statistical_distance(
@@ -112,7 +114,10 @@ def inflate(
 
 @inlined
 def around_spheres(spheres: FloatArray, inflated: FloatArray, first: int, end: int) -> tuple[Vector, float]:
-    """Return a sphere around those from `first` to `end` of spheres (m, 4), each inflated by the first column."""
+    """Return centre and radius of a sphere that contains the inflated spheres from `first` to before `end`.
+
+    spheres (m, 4). Each is inflated by the first column of `inflated` (m, 1 or more).
+    """
     x, y, z, count = 0.0, 0.0, 0.0, max(end - first, 1)
     for i in range(first, end):
         x, y, z = x + spheres[i, 0], y + spheres[i, 1], z + spheres[i, 2]
@@ -140,7 +145,7 @@ def explain_inflation(
     kinematic_variance: FloatArray,
     distances: FloatArray,
 ) -> None:
-    """Fill ûᵀΣû (m,) in m² and D_σ (m,) in m of points (m, 3), as in `inflate`, for explanations."""
+    """Fill the variances ûᵀΣû (m,) in m² and D_σ (m,) in m at `centers` (m, 3), as in `inflate`, for explanations."""
     along = load(direction.reshape(1, 3), 0)
     spread, origin = spread_along(jacobian, encoder_variance, along), load(tool.reshape(1, 3), 0)
     for i in range(distances.size):

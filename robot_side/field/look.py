@@ -1,9 +1,9 @@
-"""One look along a direction, in one compiled call: the onset distances of the eight strengths (eq. 3-12, §4.2).
+"""One look along a direction in one compiled call: it finds the onset distances of the strengths (eq. 3-12, §4.2).
 
     inflate ─▶ broad phase: objects, clusters of spheres ─▶ contact of each sphere ─▶ overlap profiles
 
-Best-first search: the next object, cluster or sphere is the one that may be touched first. An overlap is computed only
-where it may shorten an onset distance (`profile`).
+Best-first search: the object, cluster or sphere that may touch at the shortest distance is examined next. An overlap is
+computed only where it may shorten an onset distance (`profile`).
 """
 
 import math
@@ -35,16 +35,17 @@ from robot_side.surroundings.kinds.layout import HALF_SPACE, MESH
 from robot_side.surroundings.scene_columns import SCENE, contact_with, next_object
 
 MARGIN_M: Final = 0.012
-"""m: distance before that of full strength, over which strength grows"""
+"""Margin m: distance before the onset of full strength over which strength grows from 0"""
 LEAST_DEPTH_M: Final = 0.0005
-"""Depth up to which an overlap is a graze: V_min = π R (0.5 mm)². Encoder noise turns the motion aside by less."""
+"""Depth into a sphere up to which an overlap is a graze: V_min = π R (0.5 mm)². Encoder noise diverts the motion by
+less."""
 
 scene_at, scratch_at = SCENE.at, SCRATCH.at
 
 
 @inlined
 def _last_to_count(scratch: ScratchColumns, margin: float) -> float:
-    """Return the distance beyond which a contact, less its lead, changes no onset distance."""
+    """Return the contact distance, lead subtracted, beyond which a contact changes no onset distance."""
     last: float = max(scratch.distances_m[0, STRENGTHS - 1], scratch.distances_m[1, STRENGTHS - 1])
     return last + margin
 
@@ -53,7 +54,10 @@ def _last_to_count(scratch: ScratchColumns, margin: float) -> float:
 def _near_rows(
     bundles: Bundles, first: int, end: int, center: Vector, size: float, along: Vector, reach: float
 ) -> tuple[int, float]:
-    """Keep the rows that a bounding sphere touches within the reach. Return their number and the least distance."""
+    """Keep those rows from `first` to before `end` whose primitives a bounding sphere touches within `reach`.
+
+    Return the number of kept rows and the least contact distance. Meshes count as their bounding boxes.
+    """
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     count, least = 0, math.inf
     for row in range(first, end):
@@ -68,7 +72,10 @@ def _near_rows(
 
 @building_block
 def _cluster_bound(bundles: Bundles, rows: int, cluster: int, along: Vector, reach: float) -> tuple[float, bool]:
-    """Return a lower bound of `_cluster_contact`, with boxes around meshes, and whether there are meshes."""
+    """Return a lower bound of `_cluster_contact`, in which meshes count as their bounding boxes.
+
+    Also return whether any mesh came into question.
+    """
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     center, radius, least, rough = load(scratch.clusters, cluster), scratch.clusters[cluster, 3], math.inf, False
     for k in range(rows):
@@ -82,7 +89,7 @@ def _cluster_bound(bundles: Bundles, rows: int, cluster: int, along: Vector, rea
 
 @building_block
 def _cluster_contact(bundles: Bundles, rows: int, cluster: int, along: Vector, reach: float, clear: bool) -> float:
-    """Return the least distance at which a cluster's bounding sphere touches any of the first rows kept."""
+    """Return the least distance at which a cluster's bounding sphere touches a primitive of the kept rows."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     center, radius, least = load(scratch.clusters, cluster), scratch.clusters[cluster, 3], math.inf
     for k in range(rows):
@@ -94,7 +101,7 @@ def _cluster_contact(bundles: Bundles, rows: int, cluster: int, along: Vector, r
 
 @building_block
 def _follow(bundles: Bundles, item: int, rows: int, thing: int, along: Vector, reach: float, waits: bool) -> bool:
-    """Follow the overlap profile of pair `item`; see `follow`."""
+    """Set up the overlap profile of pair `item`, and do with it as `follow` does. waits: see `follow`."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     pair = scratch.pairs[item]
     center, end = load(scratch.spheres, pair.sphere), reach + MARGIN_M + pair.lead
@@ -117,10 +124,11 @@ def _look_at(
     half_gap: float,
     reach: float,
 ) -> None:
-    """Shorten the onset distances by one object, whose rows within the reach are kept: best first.
+    """Shorten the onset distances by one object, best first. The object's rows within the reach have been kept.
 
-    Clusters and pairs share one queue: pair p as p, cluster c as -1 - c. While only a lower bound of its contact is
-    known, cluster c is -1 - c - (number of clusters). Pairs that wait lie at the other end.
+    Clusters and pairs share one queue: pair p is the item p, cluster c the item -1 - c. While only a lower bound of a
+    cluster's contact is known, the cluster is the item -1 - c - (number of clusters). Pairs that wait until all others
+    are done lie at the other end of the queue's array. early: lead that all pairs of the object have in common.
     """
     scratch = scratch_at(bundles.scratch)
     keys, items, count, pairs, waiting, margin = scratch.keys_m, scratch.items, 0, 0, 0, MARGIN_M
@@ -140,7 +148,7 @@ def _look_at(
                 waiting += 1
                 items[items.size - waiting] = item
         elif item < -clusters:
-            # At first at most a margin beyond the nearest cluster: most clusters never come nearer.
+            # Search at first only to a margin beyond the nearest cluster: most clusters are farther.
             near = min(last, max(nearest, first + early) + margin)
             bound = _cluster_contact(bundles, rows, -1 - item - clusters, along, near, True)
             if bound <= near:
@@ -165,7 +173,10 @@ def _look_at(
 
 @inlined
 def _key(bound: float, early: float, rough: bool) -> float:
-    """Return the key in the queue: a cluster that may overlap comes first."""
+    """Return a cluster's key in the queue: its contact distance less the lead, or -∞ if it may overlap already.
+
+    rough: whether `bound` is only a lower bound.
+    """
     return bound - early if bound > 0.0 or rough else -math.inf
 
 
@@ -199,11 +210,11 @@ def look(
 ) -> bool:
     """Fill the scratch's onset distances. Return False for numbers that are not finite: they would compare as far away.
 
-    centers (m, 3), radii (m,), on_finger (m,): the gripper's spheres. tool (3,), jacobian (6, n),
-    encoder_variance (n,), direction: the unit û (3,). mean, variance, mean_along, variance_along, quantile: see
-    `DirectionalErrors`. half_gap: half the gap between the fingers, the largest inflation of a finger's sphere towards
-    the target (§3.4). classes (k,): the objects' (`object_class`). early (k,): the objects' approach, by which contact
-    distances shorten; empty if all are at rest.
+    centers (m, 3), radii (m,), on_finger (m,): the gripper's spheres. tool (3,), jacobian (6, n): the tool's.
+    encoder_variance (n,): σ_θ². direction (3,): the unit vector û. mean, variance, mean_along, variance_along,
+    quantile: see `DirectionalErrors`. half_gap: half the gap between the fingers, the largest inflation of a finger's
+    sphere towards the target (§3.4). reach: distance examined. classes (k,): the objects' (`object_class`). early (k,):
+    distance by which each object approaches, subtracted from its contact distances; empty if all are at rest.
     """
     bundles, scene, scratch = Bundles(scene_bundle, scratch_bundle), scene_at(scene_bundle), scratch_at(scratch_bundle)
     along, margin, spheres = load(direction.reshape(1, 3), 0), MARGIN_M, radii.size

@@ -1,4 +1,4 @@
-"""Binary heap of numbered items, least key first."""
+"""Queue of numbered items in two arrays: a binary heap with the item of the least key first."""
 
 from common.arrays import FloatArray, IntArray
 from robot_side.compiled.kernel import building_block
@@ -6,7 +6,7 @@ from robot_side.compiled.kernel import building_block
 
 @building_block
 def push(keys: FloatArray, items: IntArray, count: int, key: float, item: int) -> int:
-    """Add an item to a heap of `count`; return the new count."""
+    """Add an item with its key to a queue of `count` items; return the new count."""
     place = count
     while place > 0 and keys[(place - 1) // 2] > key:
         above = (place - 1) // 2
@@ -18,7 +18,7 @@ def push(keys: FloatArray, items: IntArray, count: int, key: float, item: int) -
 
 @building_block
 def drop_first(keys: FloatArray, items: IntArray, count: int) -> int:
-    """Remove the first of `count` items; return the new count."""
+    """Remove the first item, that of the least key, from a queue of `count` items; return the new count."""
     left, place = count - 1, 0
     key, item = keys[left], items[left]
     while 2 * place + 1 < left:

@@ -6,6 +6,6 @@ OBSTACLE: Final = 0
 TOUCHABLE: Final = 1
 """Object that is to be touched: a support, while an object is held"""
 TARGET: Final = 2
-"""Object that is to be touched: a finger's inflation towards it ends at half the gap."""
+"""Object that is to be grasped. The inflation of a finger's sphere towards it is at most half the gap (§3.4)."""
 SKIPPED: Final = 3
 """Object that is ignored or held"""

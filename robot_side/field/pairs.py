@@ -12,7 +12,7 @@ from robot_side.surroundings.kinds.layout import HALF_SPACE, Contact
 from robot_side.surroundings.scene_columns import SCENE, contact_with
 
 _ROUNDED: Final = 5e-3
-"""Error of the cosine at a contact where rounding chose another nearest point"""
+"""Largest error of û·n at a contact, where rounding may have chosen another nearest point"""
 
 scene_at, scratch_at = SCENE.at, SCRATCH.at
 
@@ -21,7 +21,10 @@ scene_at, scratch_at = SCENE.at, SCRATCH.at
 def _meet_sphere(
     bundles: Bundles, i: int, rows: int, radius: float, along: Vector, reach: float, clear: bool
 ) -> Contact:
-    """Return the first contact of a sphere with any of the first rows kept."""
+    """Return the first contact of gripper sphere `i`, with this radius, with a primitive of the first `rows` kept rows.
+
+    clear: the sphere is known not to overlap any of them yet.
+    """
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     least, least_closing, center = math.inf, 0.0, load(scratch.spheres, i)
     for k in range(rows):
@@ -49,7 +52,11 @@ def _pair(
     reach: float,
     clear: bool,
 ) -> Any:
-    """Write the pair of a sphere and an object. The contact is infinite if they do not touch within the reach."""
+    """Write and return the pair of gripper sphere `i` and object `thing`, in row `place` of the scratch's pairs.
+
+    The contact is infinite if they do not touch within the reach. uninflated: the sphere keeps its own radius, and the
+    inflation becomes part of the lead instead. early: lead that all pairs of the object have in common.
+    """
     scratch = scratch_at(bundles.scratch)
     pair, inflated = scratch.pairs[place], scratch.inflation_m[i, 0]
     if object_class == TARGET and scratch.on_finger[i] and inflated > half_gap:
@@ -67,7 +74,7 @@ def _pair(
 
 @inlined
 def _write_entry(entry: Any, row: int, enters: float, closing: float) -> None:
-    """Write an entry without tangents."""
+    """Write an entry that has no samples and no tangents yet."""
     entry.row, entry.enters, entry.again, entry.volume, entry.slope = row, enters, math.inf, 0.0, 0.0
     entry.closing = min(closing + _ROUNDED, 1.0) if closing > 0.0 else 0.0
     entry.root_0, entry.root_1 = math.inf, math.inf
@@ -76,7 +83,7 @@ def _write_entry(entry: Any, row: int, enters: float, closing: float) -> None:
 
 @building_block
 def enter(bundles: Bundles, pair: Any, rows: int, along: Vector, reach: float) -> int:
-    """Write entries of the kept rows that a pair's sphere enters; return their number."""
+    """Write an entry for each kept row whose primitive the pair's sphere enters within `reach`; return their number."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     if rows == 1:
         _write_entry(scratch.entries[0], scratch.rows[0], pair.contact, pair.closing)
@@ -106,14 +113,17 @@ def pairs_of(
     reach: float,
     clear: bool,
 ) -> int:
-    """Write the pairs of a sphere and an object that touch within the reach; return their number."""
+    """Write the pair of a sphere and an object, if they touch within the reach; return the number of pairs, 0 to 2.
+
+    An inflated sphere that overlaps the object already gets a second pair, in which it is not inflated.
+    """
     found = 0
     for uninflated in (False, True):
         pair = _pair(
             bundles, place + found, i, uninflated, rows, thing, object_class, early, along, half_gap, reach, clear
         )
         found += 1 if pair.contact < math.inf else 0
-        # An inflated sphere that overlaps may contain the object ahead: the sphere counts uninflated, too.
+        # An inflated sphere that overlaps may contain the whole object: the uninflated sphere may still touch it ahead.
         if not pair.overlaps:
             break
     return found

@@ -3,8 +3,8 @@
     W(E) = max over 0 <= E' <= E of (V(E') - V(0))⁺,   d = sup{E >= 0 : W(E) = 0}
     s(D) = min(1, W(D + m) / max(W(d + m), m |∇V(0)|, V_min))
 
-V(E) is the overlap after the distance E along û. It is sampled only as far as an onset distance can still become
-shorter (`sooner`). A cubic interpolates between two samples (`samples`). Where the cubic has an onset, V is sampled.
+V(E) is the overlap after the distance E along û; s(D) is the stiffness after D. V is sampled while an onset distance can
+still become shorter (`bounds_on_rise`), and where a strength begins by the cubic between two samples (`samples`).
 """
 
 import math
@@ -18,39 +18,44 @@ from robot_side.field.scratch import SAMPLES, SCRATCH, STRENGTHS, Bundles, Count
 
 scratch_at = SCRATCH.at
 _TOLERANCE_M: Final = 2e-5
-"""Tolerance of an onset distance"""
+"""Length of the interval to which the search for an onset is narrowed"""
 _NEWTON_M: Final = 5e-5
-"""Distance from the onset at which one step of Newton's method ends the search"""
+"""Distance from an onset up to which one last step of Newton's method finds it, without another sample"""
 _DOUBT_M: Final = 5e-4
 _DOUBT: Final = 1.0 / 6.0
-"""Share of the distance between samples, at most _DOUBT_M, by which the cubic may err when an onset seems too late"""
+"""Share of the distance between two samples, at most _DOUBT_M, by which the cubic's onset may be wrong. Onsets that are
+too late by less are checked by samples."""
 _MOST_STEPS: Final = 12
 _MOST_SAMPLES: Final = 400
 _MOST_OF_A_PEAK: Final = 4
 _FLAT: Final = 0.005
-"""Tolerance of a peak, as a share of the overlap's rise"""
+"""Tolerance of a peak's overlap, as a share of the overlap's rise up to the peak"""
 _FINE: Final = 1.0 / 6.0
 _COARSE: Final = 0.5
-"""Distance between samples beyond the margin, in margins: near the entry of another primitive, and elsewhere"""
+"""Distance between samples beyond the margin, in margins: _FINE just before another primitive is entered, _COARSE
+elsewhere"""
 _EARLY: Final = 0.4
-"""Position of the second sample of a smooth profile, in margins: early strengths begin there. Other profiles have it
-in the middle, as one of the samples kept over the margin."""
+"""Position of the second sample of a smooth profile, in margins; weak strengths begin near it. Other profiles have this
+sample in the middle, because it is one of the samples kept over the margin."""
 
 
 class Rise(NamedTuple):
-    """Start of an overlap's rise, and the rise that full strength takes."""
+    """Where an overlap begins to rise, and by how much it must rise at least for full strength."""
 
     free: Sample
-    """Sample at d"""
+    """Sample at the contact distance d, up to which the overlap does not grow"""
     baseline: float
-    """V(0)"""
+    """Overlap at the start, V(0)"""
     least: float
-    """max(m |∇V(0)|, V_min)"""
+    """Smallest rise for full strength, max(m |∇V(0)|, V_min)"""
 
 
 @building_block
 def _crossing(profile: Profile, a: Sample, b: Sample, wanted: float, latest: float, bundles: Bundles) -> Sample:
-    """Return the first crossing of V = wanted between two samples, or any sample from `latest` on if it is later."""
+    """Return the sample between `a` and `b` where V first reaches `wanted`.
+
+    If V does so only beyond the distance `latest`, any sample at or beyond `latest` is returned: it has no effect.
+    """
     for step in range(_MOST_STEPS):
         guess = on_cubic(a, b, wanted)
         if b.at - a.at <= _TOLERANCE_M:
@@ -72,9 +77,10 @@ def _crossing(profile: Profile, a: Sample, b: Sample, wanted: float, latest: flo
 
 @building_block
 def _top(profile: Profile, a: Sample, b: Sample, baseline: float, bundles: Bundles) -> tuple[bool, Sample]:
-    """Return whether V has a peak between two samples, and the sample of the highest overlap.
+    """Return whether V has a peak between two samples, and the sample with the highest overlap.
 
-    There may be a peak although V rises, or falls, at both. The cubic misses a peak with a kink: it is refined.
+    V may have a peak even if it rises at both samples, or falls at both. At a kink the cubic's peak is inaccurate, so
+    the search repeats with the new sample.
     """
     best = a if a.volume > b.volume else b
     peaks = False
@@ -93,9 +99,10 @@ def _top(profile: Profile, a: Sample, b: Sample, baseline: float, bundles: Bundl
 
 @building_block
 def _first_rise(profile: Profile, last: Sample, rises: bool, full: float, bundles: Bundles) -> tuple[bool, Rise]:
-    """Find d beyond 0 for a pair that overlaps there. Return False if no onset distance can become shorter.
+    """Find the contact distance d of a pair that overlaps at the start: the overlap may first fall, then grow.
 
-    full: least rise of the overlap at full strength.
+    Return False if no onset distance can become shorter. last: sample at 0. rises: whether any primitive's overlap may
+    rise from there. full: smallest rise of the overlap for full strength.
     """
     scratch, baseline = scratch_at(bundles.scratch), last.volume
     pair, ball = profile.pair, 4.0 / 3.0 * math.pi * profile.pair.radius**3
@@ -129,13 +136,13 @@ def _first_rise(profile: Profile, last: Sample, rises: bool, full: float, bundle
                     last = middle
             return True, Rise(last, baseline, full)
         last, rises = found, may_rise
-    # After the last sample the overlap counts as rising from there: early, and never silent.
+    # Without an end of the search, the overlap counts as rising from the last sample on: too early rather than never.
     return given_up, Rise(last, baseline, full)
 
 
 @building_block
 def _most_over_margin(profile: Profile, rise: Rise, middle: Sample, full: Sample, bundles: Bundles) -> float:
-    """Return W(d + m), and keep samples over the margin. middle, full: the samples at its half and its end."""
+    """Return W(d + m), and keep the samples over the margin. middle, full: samples at the margin's middle and end."""
     scratch = scratch_at(bundles.scratch)
     samples, step, most = scratch.samples, profile.margin / SAMPLES, max(0.0, full.volume - rise.baseline)
     last = rise.free
@@ -167,7 +174,10 @@ def _take(
     reference: float,
     bundles: Bundles,
 ) -> int:
-    """Enter the strengths from `level` on that begin between two samples; return the next level."""
+    """Shorten the onset distances of the strengths, from `level` on, that begin between two samples.
+
+    Return the first level that does not. reference: rise of the overlap at full strength.
+    """
     distances = scratch_at(bundles.scratch).distances_m
     while level < STRENGTHS:
         wanted = baseline + (level + 0.5) / STRENGTHS * reference
@@ -188,9 +198,9 @@ def _take(
 
 @building_block
 def follow(profile: Profile, least: float, waits: bool, bundles: Bundles) -> bool:
-    """Shorten the onset distances by one pair. Return True to be called again, after all other pairs.
+    """Shorten the onset distances by one pair. Return True if nothing was done: call again after all other pairs.
 
-    least: V_min. waits: a pair whose overlap falls at first may wait, as it takes many samples.
+    least: V_min. waits: whether a pair whose overlap falls at first is put off, because it takes many samples.
     """
     scratch = scratch_at(bundles.scratch)
     pair, distances, entries, margin = profile.pair, scratch.distances_m, scratch.entries, profile.margin
@@ -243,7 +253,10 @@ def _is_late(
     reference: float,
     distances: FloatArray,
 ) -> bool:
-    """Return whether every strength begins too late to count, of an overlap that seems to rise all along the margin."""
+    """Return whether the overlap seems to rise all along the margin, and every strength begins too late to count.
+
+    free, second, full: samples at the beginning of the margin, within it and at its end.
+    """
     if not (baseline <= second.volume <= full.volume and min(free.slope, second.slope, full.slope) >= 0.0):
         return False
     late = True
@@ -267,7 +280,11 @@ def _go_on(
     reference: float,
     bundles: Bundles,
 ) -> None:
-    """Enter the strengths from `level` on that begin beyond a sample. The next `stored` samples are kept ones."""
+    """Shorten the onset distances of the strengths, from `level` on, that begin beyond the sample `last`.
+
+    The first `stored` samples are those kept over the margin; later ones are computed. may_rise: whether any
+    primitive's overlap may rise beyond the last of them.
+    """
     scratch, baseline = scratch_at(bundles.scratch), rise.baseline
     step = profile.margin / SAMPLES
     for k in range(_MOST_SAMPLES):

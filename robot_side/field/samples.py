@@ -11,24 +11,24 @@ from robot_side.surroundings.scene_columns import SCENE, contact_in_front
 
 scene_at, scratch_at = SCENE.at, SCRATCH.at
 NOTHING: Final = 1e-9
-"""Share of the sphere's volume, or of its disc, below which a change is rounding"""
+"""Share of the sphere's volume, or of its disc's area, below which a change of V, or its slope, is only rounding"""
 
 
 class Profile(NamedTuple):
-    """Pair, and the parameters of the overlap profile."""
+    """A pair of gripper sphere and object, with the parameters of the pair's overlap profile."""
 
     pair: Any
     entries: int
-    """Number of the scratch's entries that belong to the pair"""
+    """Number of the scratch's entries that belong to the pair, from the first on"""
     center: Vector
     along: Vector
     margin: float
     end: float
-    """Distance beyond which no strength within the reach begins"""
+    """Distance at which the profile ends: strengths that begin farther on lie beyond the examined distance"""
 
 
 class Sample(NamedTuple):
-    """V and its slope dV/dE at a distance."""
+    """Overlap V and its slope dV/dE after the distance E = `at` along û."""
 
     at: float
     volume: float
@@ -37,7 +37,7 @@ class Sample(NamedTuple):
 
 @building_block
 def sample(profile: Profile, at: float, bundles: Bundles) -> tuple[Sample, float, bool]:
-    """Return V at a distance, |∇V| there, and whether any primitive's part of V may still rise."""
+    """Compute V after the distance `at`. Return the sample, |∇V|, and whether any primitive's part may still rise."""
     scene, scratch = scene_at(bundles.scene), scratch_at(bundles.scratch)
     radius, overlap_gradient = profile.pair.radius, scratch.overlap_gradient
     center = add(profile.center, scale(at, profile.along))
@@ -58,7 +58,7 @@ def sample(profile: Profile, at: float, bundles: Bundles) -> tuple[Sample, float
         entry.volume, entry.slope = part, slope
         rising = slope > NOTHING * math.pi * radius * radius or part <= NOTHING * radius**3
         if entry.closing == 0.0 and not rising:
-            # The part may rise again where the next triangle in front is touched.
+            # A mesh's part may rise again where the sphere touches the next front triangle.
             left = profile.end - at
             entry.again = at + contact_in_front(scene, entry.row, center, profile.along, radius, left)
             rising = entry.again <= at
@@ -69,7 +69,7 @@ def sample(profile: Profile, at: float, bundles: Bundles) -> tuple[Sample, float
 
 @inlined
 def next_entry(profile: Profile, at: float, scratch: ScratchColumns) -> float:
-    """Return the distance beyond `at` at which another primitive is entered, or a fallen part may rise again."""
+    """Return the next distance beyond `at` where another primitive is entered, or a part that fell may rise again."""
     nearest = math.inf
     for k in range(profile.entries):
         entry = scratch.entries[k]
@@ -81,7 +81,7 @@ def next_entry(profile: Profile, at: float, scratch: ScratchColumns) -> float:
 
 @inlined
 def cubic(a: Sample, b: Sample, part: float) -> float:
-    """Return V at `part`, 0 to 1, of the distance between two samples."""
+    """Return the cubic's V between two samples, at the share `part`, 0 to 1, of the distance from `a` to `b`."""
     rest, step = 1.0 - part, b.at - a.at
     return (
         rest * rest * (1.0 + 2.0 * part) * a.volume
@@ -92,7 +92,7 @@ def cubic(a: Sample, b: Sample, part: float) -> float:
 
 @inlined
 def cubic_slope(a: Sample, b: Sample, part: float) -> float:
-    """Return the cubic's derivative by `part`."""
+    """Return the derivative of `cubic` with respect to `part`."""
     rest, step = 1.0 - part, b.at - a.at
     return 6.0 * (b.volume - a.volume) * part * rest + step * (
         a.slope * rest * (1.0 - 3.0 * part) + b.slope * part * (3.0 * part - 2.0)
@@ -101,7 +101,7 @@ def cubic_slope(a: Sample, b: Sample, part: float) -> float:
 
 @inlined
 def peak(a: Sample, b: Sample) -> float:
-    """Return the part, 0 to 1, of the distance between two samples at which the cubic peaks; -1 if there is no peak."""
+    """Return where the cubic has its peak, as a share 0 to 1 of the distance from `a` to `b`; -1 without a peak."""
     step, rise = b.at - a.at, b.volume - a.volume
     begin, end = step * a.slope, step * b.slope
     # Root of dV = begin + bend t + more t² at which dV falls.
@@ -116,7 +116,10 @@ def peak(a: Sample, b: Sample) -> float:
 
 @inlined
 def on_cubic(a: Sample, b: Sample, wanted: float) -> Sample:
-    """Find where the cubic passes a volume between two samples: Newton's method, bisection if it leaves the bracket."""
+    """Return the point where the cubic between two samples reaches the volume `wanted`.
+
+    It takes steps of Newton's method, and bisects where a step would leave the bracket.
+    """
     low, high, part = 0.0, 1.0, 0.5
     for _ in range(8):
         off = cubic(a, b, part) - wanted

@@ -1,4 +1,4 @@
-"""Scratch memory of a look: allocated for a gripper and a scene, and kept, so that a look allocates nothing."""
+"""Scratch memory of a look. It is allocated once for a gripper and a scene, so that a look allocates nothing."""
 
 from enum import IntEnum
 from typing import Final, NamedTuple
@@ -12,9 +12,9 @@ STRENGTHS: Final = 8
 TOUCH_STRENGTH: Final = 4
 """Highest strength in slow zones for an object that is to be touched"""
 CLUSTER: Final = 6
-"""Number of consecutive gripper spheres in one bounding sphere"""
+"""Number of consecutive gripper spheres that share one bounding sphere"""
 SAMPLES: Final = 4
-"""Steps between samples of an overlap profile over the margin; even, so that one sample lies in the middle"""
+"""Number of steps into which samples divide an overlap profile's margin; even, so that one sample is in the middle"""
 
 PAIR: Final = np.dtype(
     [
@@ -22,10 +22,11 @@ PAIR: Final = np.dtype(
         *((name, np.float64) for name in ("radius", "contact", "closing", "lead", "expected")),
     ]
 )
-"""One gripper sphere and one object. radius: inflated, unless the sphere counts uninflated. contact: distance of the
-first contact, 0 if they overlap (`overlaps`). closing: û·n of the contact plane; 0 for a mesh. lead: distance by which
-strengths begin sooner: errors along the motion, the object's approach, and the inflation of an uninflated sphere.
-expected: D_σ(P) - D_σ(0.5) of an object that is to be touched (`touchable`), else 0."""
+"""Pair of one gripper sphere and one object. radius: with inflation, unless this pair takes the uninflated sphere.
+contact: distance of the first contact, 0 if they overlap at the start (`overlaps` is 1 then). closing: û·n of the
+contact plane; 0 for a mesh with dents. lead: distance by which all strengths begin sooner. It is the sum of the errors
+along the motion, the object's approach, and the inflation if the sphere is uninflated. touchable: 1 for an object that
+is to be touched. expected: D_σ(P) - D_σ(0.5) for such an object, else 0."""
 
 ENTRY: Final = np.dtype(
     [
@@ -34,39 +35,40 @@ ENTRY: Final = np.dtype(
         *((f"{name}_{place}", np.float64) for place in (0, 1) for name in ("at", "root", "steep")),
     ]
 )
-"""Row of a primitive that a pair's sphere enters. enters: distance. closing: û·n of the contact plane, above 0 if the
-primitive is convex. again: distance at which its overlap may rise again after a fall. volume, slope: of the newest
-sample. at, root, steep: distance, value and slope of two tangents to the overlap's cube root."""
+"""Primitive that a pair's sphere enters. row: the primitive's row in the scene's table. enters: distance at which the
+sphere enters. closing: û·n of the contact plane, above 0 if the primitive is convex. again: distance at which the
+overlap may rise again after a fall. volume, slope: overlap and its slope at the newest sample. Two tangents to the
+overlap's cube root, 0 and 1, each touch at the distance `at` with the value `root` and the slope `steep`."""
 
 
 class Count(IntEnum):
-    """Counts of a look."""
+    """What a look counts, as indices."""
 
     PAIRS = 0
-    """Pairs of a sphere and an object within the reach"""
+    """Pairs of a gripper sphere and an object that touch within the examined distance"""
     PROFILES = 1
-    """Overlap profiles of pairs that were sampled"""
+    """Pairs whose overlap profile was sampled"""
     OVERLAPS = 2
-    """Overlaps of one sphere and one primitive"""
+    """Computed overlaps of one sphere and one primitive"""
     LIMITED = 3
-    """Spheres whose D_σ was limited to half the gap between the fingers (§3.4)"""
+    """Spheres whose inflation was limited to half the gap between the fingers (§3.4)"""
 
 
 class Error(IntEnum):
-    """Errors along the direction of a look, in m."""
+    """Indices of the errors along the direction of a look, in m, over all gripper spheres."""
 
     LARGEST = 0
     """Largest D_σ"""
     ALONG = 1
-    """Largest part of D_σ that does not inflate: it shortens contact distances"""
+    """Largest D_σ - I: the part that does not inflate a sphere but shortens its contact distances"""
     EXPECTED = 2
-    """D_σ at P = 0.5"""
+    """D_σ at P = 0.5, the same for all spheres"""
 
 
 class Bundles(NamedTuple):
-    """Bundles of a scene and the scratch.
+    """Bundles of a scene and of the scratch.
 
-    Kernels pass these on: a call with all columns costs more than most functions here.
+    Kernels pass these two arguments to each other, because passing all arrays would cost more than most functions here.
     """
 
     scene: IntArray
@@ -74,7 +76,7 @@ class Bundles(NamedTuple):
 
 
 class ScratchColumns(NamedTuple):
-    """Columns of the bundle; the fields are those of Scratch."""
+    """Arrays of the scratch memory as kernels see them; `Scratch` describes each field."""
 
     spheres: FloatArray
     on_finger: BoolArray
@@ -107,31 +109,31 @@ class Scratch:
 
     def __init__(self, spheres: int, primitives: int, objects: int) -> None:
         self.spheres: FloatArray = np.zeros((spheres, 4))
-        """Centres and radii"""
+        """Centre and radius of each gripper sphere, in m"""
         self.on_finger: BoolArray = np.zeros(spheres, dtype=np.bool_)
         self.inflation_m: FloatArray = np.zeros((spheres, 1))
-        """Inflation by errors of camera and arm at P"""
+        """Inflation I of each sphere: errors of camera and arm at P"""
         self.sigma_m: FloatArray = np.zeros((spheres, 1))
-        """D_σ at P, with the prediction error"""
+        """D_σ of each sphere at P: errors of camera, arm and prediction"""
         self.clusters: FloatArray = np.zeros((spheres // CLUSTER + 1, 4))
         """Bounding sphere of each cluster of inflated spheres"""
         self.keys_m: FloatArray = np.zeros(2 * spheres + len(self.clusters))
         self.items: IntArray = np.zeros(len(self.keys_m), dtype=np.int64)
-        """Queue of clusters and pairs, nearest first"""
+        """Queue of one object's clusters and pairs, nearest first; `keys_m` has their keys"""
         self.pairs: np.ndarray = np.zeros(2 * spheres + 1, dtype=PAIR)
-        """Pairs of one object, and one more"""
+        """Pairs of the present object, at most two for each sphere, and one row to try"""
         self.objects: IntArray = np.zeros(objects, dtype=np.int64)
         self.bounds_m: FloatArray = np.zeros(objects)
-        """Queue of objects within the reach, nearest first"""
+        """Keys of `objects`, the queue of the objects within the reach, nearest first"""
         self.rows: IntArray = np.zeros(primitives, dtype=np.int64)
-        """Primitives of one object within the reach"""
+        """Rows of the present object's primitives within the reach"""
         self.entries: np.ndarray = np.zeros(primitives, dtype=ENTRY)
         self.samples: FloatArray = np.zeros((SAMPLES + 1, 2))
-        """V and dV/dE over the margin"""
+        """Kept samples of an overlap profile over the margin: V and dV/dE"""
         self.overlap_gradient: FloatArray = np.zeros(3)
-        """dV/dcentre of the newest overlap"""
+        """Gradient dV/dcentre of the newest overlap"""
         self.distances_m: FloatArray = np.zeros((2, STRENGTHS))
-        """Onset distances, fast and slow"""
+        """Result: onset distances, the fast list and the slow list"""
         self.along_m: FloatArray = np.zeros(len(Error))
         """Errors, indexed by `Error`"""
         self.counts: IntArray = np.zeros(len(Count), dtype=np.int64)

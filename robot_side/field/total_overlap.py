@@ -1,4 +1,4 @@
-"""Overlap of a gripper's spheres with all objects, and with each (eq. 11-12)."""
+"""Sum of the overlaps of a gripper's spheres with all objects, and the sum for each object (eq. 11-12)."""
 
 import math
 from typing import Final
@@ -29,10 +29,11 @@ def total_overlap_m3(
     moved_m: FloatArray | None = None,
     of_objects_m3: FloatArray = _NOWHERE,
 ) -> float:
-    """Return Σ V_ij in m³ of spheres (m, 4), centres and radii, with all objects but those passed over.
+    """Return Σ V_ij in m³ of spheres i (m, 4), centres and radii, with all objects j except those of the class SKIPPED.
 
-    classes (k,). inflated_m (m, 1 or more): its first column counts. moved_m (3,). of_objects_m3 (k,): by object.
-    ValueError for a sphere that is not finite: it would compare as far away.
+    classes (k,): the objects'. inflated_m (m, 1 or more): its first column is added to the radii. moved_m (3,): added
+    to all centres. of_objects_m3 (k,), if given, is filled with the sum for each object that is near; other entries
+    stay. ValueError for a sphere that is not finite, because it would compare as far away.
     """
     by_m = np.zeros_like(spheres) if inflated_m is None else inflated_m
     total = sum_overlaps(
@@ -59,7 +60,7 @@ def sum_overlaps(
     overlap_gradient: FloatArray,
     of_objects: FloatArray,
 ) -> float:
-    """Sum V_ij in m³ as in `total_overlap_m3`; NaN for non-finite numbers. overlap_gradient (3,): scratch."""
+    """Return Σ V_ij in m³ as `total_overlap_m3` does; NaN if a number is not finite. overlap_gradient (3,): scratch."""
     scene, shift, count = _scene_at(scene_bundle), load(moved.reshape(1, 3), 0), spheres.shape[0]
     check = shift[0] + shift[1] + shift[2]
     for i in range(count):

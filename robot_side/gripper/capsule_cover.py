@@ -1,4 +1,4 @@
-"""Cover of a capsule by a row of spheres along its axis. A ball is a capsule of length 0, and its own cover."""
+"""Cover of a capsule by a row of spheres along its axis. A ball is a capsule of length 0, which covers itself."""
 
 import math
 
@@ -10,10 +10,11 @@ from common.arrays import FloatArray
 def cover_capsule(
     radius_m: float, half_length_m: float, stand_out_m: float, most: int = 2000
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return centres (m, 3), radii (m,) and the distance by which the spheres stand out of the capsule.
+    """Return centres (m, 3) and radii (m,) of the spheres, and the distance by which they protrude from the capsule.
 
-    The capsule's axis goes from -half_length_m to half_length_m on the z axis. The ends are those of the capsule. Two
-    neighbouring spheres meet at its radius. There are at most `most` spheres, which then stand out farther.
+    The capsule's axis goes from -half_length_m to half_length_m on the z axis; the first and the last sphere are
+    centred at its ends. Neighbouring spheres intersect at the capsule's surface. If more than `most` spheres would be
+    needed, `most` spheres protrude farther than `stand_out_m`.
     """
     if half_length_m <= 0.0:
         return np.zeros((1, 3)), np.array([radius_m]), 0.0

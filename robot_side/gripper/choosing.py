@@ -1,4 +1,4 @@
-"""Greedy set cover: few spheres that together contain many points."""
+"""Greedy set cover: choice of few spheres that together contain many points."""
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -9,7 +9,7 @@ _ROWS_AT_A_TIME = 512
 
 
 def containing(centers_m: FloatArray, radii_m: FloatArray, points_m: FloatArray) -> BoolArray:
-    """Return (m, p): whether each sphere, centres (m, 3), radii (m,), contains each point (p, 3)."""
+    """Return (m, p): whether each sphere, of centres (m, 3) and radii (m,), contains each point (p, 3)."""
     # Squared distances by one matrix product; the rounding, some 1e-15 of the frame's size, is far below the margins.
     inside: BoolArray = (centers_m**2).sum(axis=1)[:, None] - 2.0 * centers_m @ points_m.T + (points_m**2).sum(
         axis=1
@@ -18,7 +18,7 @@ def containing(centers_m: FloatArray, radii_m: FloatArray, points_m: FloatArray)
 
 
 def contained_points(centers_m: FloatArray, radii_m: FloatArray, points_m: FloatArray, images: FloatArray) -> csr_array:
-    """Return (m, p), true if an image of the sphere contains the point; `images` (g, 3, 3) map the centres."""
+    """Return (m, p), true if any image of a sphere contains the point; `images` (g, 3, 3) map the spheres' centres."""
     pieces = [(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64))]
     for first in range(0, len(centers_m), _ROWS_AT_A_TIME):
         rows = slice(first, first + _ROWS_AT_A_TIME)
@@ -32,10 +32,11 @@ def contained_points(centers_m: FloatArray, radii_m: FloatArray, points_m: Float
 
 
 def greedy_set_cover(inside: csr_array, costs: FloatArray) -> IntArray:
-    """Choose rows of `inside` (m, p) that together cover every column that any row covers; `costs` (m,).
+    """Choose rows of `inside` (m, p) that together cover every column that any row covers; `costs` (m,) of the rows.
 
-    The next column is the one hardest to cover, such as a corner: its best row gains least. That row is chosen. Thus
-    the cover grows from corners and edges inwards, without slivers there. Redundant rows are removed at the end.
+    Each step takes the column that is hardest to cover, such as a corner: the one whose best row gains least. That best
+    row is chosen. Thus the cover grows from corners and edges inwards, and leaves no slivers there. Redundant rows are
+    removed at the end.
     """
     of_column = inside.T.tocsr()
     bearing = np.flatnonzero(np.diff(of_column.indptr))
@@ -66,7 +67,7 @@ def greedy_set_cover(inside: csr_array, costs: FloatArray) -> IntArray:
 
 
 def without_redundant(inside: csr_array, chosen: IntArray, costs: FloatArray) -> IntArray:
-    """Return the rows of `chosen` without redundant ones; the costliest and smallest are removed first."""
+    """Return the rows of `chosen` without redundant rows; costly rows, and then small ones, are removed first."""
     times: FloatArray = np.asarray(inside[chosen].sum(axis=0), dtype=np.float64).ravel()
     sizes = np.diff(inside.indptr)
     kept = []

@@ -1,4 +1,4 @@
-"""State of the held object, from grip to release, and whether it stands on something."""
+"""State of the held object, from grip to release, and whether the object stands on something."""
 
 from typing import Final
 
@@ -12,14 +12,14 @@ from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
 
 _LET_GO_S: Final = 0.1
-"""Time without holding after which an object is released, in seconds: fingers may move as they follow a slip."""
+"""Time, in seconds, without holding after which an object counts as released: fingers may move as they follow a slip"""
 
 
 class Grip:
-    """Held object, or none."""
+    """Held object of the gripper, if any."""
 
     def __init__(self, surroundings: Surroundings, covers: HeldCovers | None = None) -> None:
-        """covers: spheres of the objects, made beforehand; None: made when an object is gripped."""
+        """covers: spheres of the objects, made beforehand; None: made at each grip, which takes longer than a tick."""
         self.held: HeldObject | None = None
         self.touchdown = Touchdown()
         self._surroundings, self._covers = surroundings, covers
@@ -27,7 +27,7 @@ class Grip:
 
     @property
     def index(self) -> int | None:
-        """Index of the held object among the perceived ones; None for none."""
+        """Index of the held object among the perceived objects; None if nothing is held."""
         return None if self.held is None else self.held.index
 
     def let_go(self) -> None:
@@ -37,7 +37,7 @@ class Grip:
     def follow(self, objects: PerceivedObjects, pose: GripperPose, state: ArmState, rises_m_s: float) -> None:
         """Detect grip, release and touchdown of an object.
 
-        rises_m_s: commanded speed of the tool upwards until now.
+        rises_m_s: commanded speed of the tool upwards since the last call.
         """
         if state.gripper_holding:
             self._held_s = state.time_s
@@ -52,5 +52,5 @@ class Grip:
             self.touchdown.update(carried, float(pose.tool_position_m[2]), rises_m_s, state.time_s)
 
     def joined(self, pose: GripperPose) -> GripperPose:
-        """Return the pose with the held object's spheres."""
+        """Return the pose of the gripper, with the held object's spheres if an object is held."""
         return pose if self.held is None else with_held(pose, self.held)

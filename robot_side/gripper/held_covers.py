@@ -1,4 +1,4 @@
-"""Spheres of the objects that may be held, found when the objects are first known: a tick has no time for it."""
+"""Spheres of the objects that may be held, found when the objects are first known: a tick is too short for it."""
 
 from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
@@ -17,10 +17,11 @@ if TYPE_CHECKING:
     from robot_side.overlap.meshes.mesh_library import MeshLibrary
 
 _MOST_SHAPES = 32
-"""Most meshes and objects of tetrahedra that get a search; each takes up to seconds the first time."""
+"""Maximum number of meshes, and of objects of tetrahedra, for which spheres are searched; a first search takes up to
+seconds."""
 _MOST_TETRAHEDRA = 64
 _WIDEST_M = 0.2
-"""Width, in m, beyond which an object, if so in every direction, fits no gripper."""
+"""Width, in m: an object that is wider in every direction fits no gripper."""
 _SAME_VOLUME = 1e-6
 _SLIVER = 1e-3
 _DIGITS = 9
@@ -30,11 +31,12 @@ _Spheres = tuple[FloatArray, FloatArray]
 
 
 class HeldCovers:
-    """Covers of all objects of a scene, whose shapes stay constant.
+    """Covers by spheres of all objects of a scene, whose shapes stay constant.
 
     Balls need no search, and boxes a short one. A mesh is covered in its own frame, once for each shape. Spheres of
-    tetrahedra are stored by barycentric coordinates. An object that is too large to grip, has too many parts or comes
-    after 32 others gets the spheres of a box, or a ball around each tetrahedron.
+    tetrahedra are stored by barycentric coordinates. Some objects are not searched: those too large to grip, those of
+    too many tetrahedra, and those after the first 32. Such an object gets the spheres of a box, or a ball around each
+    tetrahedron.
     """
 
     def __init__(
@@ -44,7 +46,7 @@ class HeldCovers:
         fixed: Collection[str] = (),
         searching: Callable[[], None] | None = None,
     ) -> None:
-        """Search covers for any frame of the objects. fixed: names of immovable objects, left out.
+        """Find covers that serve every frame of these objects. fixed: names of immovable objects, which are left out.
 
         searching: called before each search, but not for a stored cover.
         """
@@ -85,10 +87,10 @@ class HeldCovers:
                 coarse[name] = max(stand_outs)
         self._plan_boxes(objects, fixed)
         self.coarse: tuple[tuple[str, float], ...] = tuple(coarse.items())
-        """(name, distance in m) of objects whose spheres stand out by more than asked, despite a search."""
+        """(name, distance in m) of the objects whose spheres protrude by more than `stand_out_m`, despite a search"""
 
     def _plan_boxes(self, objects: PerceivedObjects, fixed: Collection[str]) -> None:
-        """Cover a box of each size once, for the cache: the first time takes several ticks."""
+        """Cover a box of each size once, to fill the cache: the first cover of a size takes several ticks."""
         names_and_roles = zip(objects.names, objects.roles, strict=True)
         lifted = [role is not Role.SUPPORT and name not in fixed for name, role in names_and_roles]
         for kind in KINDS:
@@ -133,10 +135,10 @@ class HeldCovers:
 def _near_ellipsoids(
     spheres: _Spheres, middles_m: FloatArray, rotations: FloatArray, half_axes_m: FloatArray
 ) -> _Spheres:
-    """Return the spheres that may reach any of the ellipsoids (e,).
+    """Return those of the spheres that may reach any of the ellipsoids (e,).
 
-    If a sphere reaches an ellipsoid, its centre is in an enlarged one. Each half axis of that one is longer by the
-    radius times the ratio of the longest half axis to the shortest.
+    If a sphere reaches an ellipsoid, the sphere's centre is in an enlarged ellipsoid. Its half axes are longer by the
+    sphere's radius times the ratio of the longest half axis to the shortest.
     """
     centers_m, radii_m = spheres
     own = np.einsum("eij,mei->mej", rotations, centers_m[:, None] - middles_m)
@@ -147,7 +149,7 @@ def _near_ellipsoids(
 
 
 def _mesh_solid(library: "MeshLibrary", mesh: int, corners_m: FloatArray) -> Solid:
-    """Return the solid of a library's mesh in the mesh's frame."""
+    """Return the solid of a library's mesh, in the mesh's own frame."""
     hull = convex_solid(np.unique(corners_m.reshape(-1, 3), axis=0))
     if hull is not None and _fills(hull, float(library.tables.volumes[mesh])):
         return hull
@@ -163,14 +165,14 @@ def _mesh_solid(library: "MeshLibrary", mesh: int, corners_m: FloatArray) -> Sol
 
 
 def _fills(hull: Solid, volume_m3: float) -> bool:
-    """Return whether a solid of this volume is its own convex hull."""
+    """Return whether a solid with this volume and convex hull fills the hull, so is convex."""
     a, b, c = np.moveaxis(hull.corners_m - hull.corners_m[0, 0], 1, 0)
     around_m3 = float(np.sum(a * np.cross(b, c)) / 6.0)
     return abs(volume_m3 - around_m3) <= _SAME_VOLUME * around_m3
 
 
 def _tetrahedra_solids(vertices_m: FloatArray) -> list[Solid]:
-    """Return one solid if the tetrahedra (t, 4, 3) fill a convex shape, else a solid for each that is not flat."""
+    """Return one solid if the tetrahedra (t, 4, 3) fill a convex shape, else one for each that is not flat."""
     volumes = np.abs(np.linalg.det(vertices_m[:, 1:] - vertices_m[:, :1])) / 6.0
     whole = convex_solid(vertices_m.reshape(-1, 3))
     if whole is None:
@@ -181,7 +183,10 @@ def _tetrahedra_solids(vertices_m: FloatArray) -> list[Solid]:
 
 
 def _shares(vertices_m: FloatArray, centers_m: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the tetrahedra (m,) of (t, 4, 3) that contain centres (m, 3), and barycentric coordinates (m, 4)."""
+    """Return for each centre (m, 3) the tetrahedron (m,) that contains it, and its barycentric coordinates (m, 4).
+
+    vertices_m (t, 4, 3): of all tetrahedra.
+    """
     volumes = np.abs(np.linalg.det(vertices_m[:, 1:] - vertices_m[:, :1]))
     # Slivers are ill-conditioned as frames of reference.
     rows = np.flatnonzero(volumes >= _SLIVER * volumes.max())

@@ -1,4 +1,4 @@
-"""Held object: it leaves the surroundings, and moves with the gripper as spheres."""
+"""Held object: it is removed from the surroundings, and its spheres move with the gripper."""
 
 from dataclasses import dataclass
 
@@ -17,24 +17,24 @@ from robot_side.surroundings.scene_table import SceneTable
 
 @dataclass(frozen=True)
 class HeldObject:
-    """Object with its spheres, fixed in the tool frame since the grip."""
+    """Object and its spheres, which are fixed in the tool frame since the grip."""
 
     index: int
-    """Index among the perceived objects' names."""
+    """Index of the object among the perceived objects."""
     name: str
     centers_in_tool_m: FloatArray
-    """(k, 3) contiguous"""
+    """(k, 3) centres of the object's spheres in the tool frame, contiguous"""
     radii_m: FloatArray
-    """(m + k,) radii of the gripper's spheres and of these"""
+    """(m + k,) radii of the gripper's spheres, then of the object's"""
     on_finger: BoolArray
-    """(m + k,) whether the sphere belongs to a finger"""
+    """(m + k,) whether each sphere belongs to a finger"""
 
 
 def gripped_object(scene: SceneTable, tool_position_m: FloatArray, reach_m: float) -> int | None:
-    """Return the object nearest to the point between the fingertips, within `reach_m`; None without one.
+    """Return the index of the object nearest to the point between the fingertips, within `reach_m`; None without one.
 
-    Supports are never held: an arm that closes its fingers on the table does not lift it. Nor is an object with a
-    half-space, whatever its role, as it is unbounded.
+    Supports are never held: an arm that closes its fingers on the table does not lift the table. Nor is an object with
+    a half-space, whatever its role, because it is unbounded.
     """
     objects = scene.objects
     unbounded = set(objects.half_space_object.tolist())
@@ -49,7 +49,7 @@ def gripped_object(scene: SceneTable, tool_position_m: FloatArray, reach_m: floa
 
 
 def grip(objects: PerceivedObjects, index: int, pose: GripperPose, covers: HeldCovers | None = None) -> HeldObject:
-    """Return the object `index`, fixed to the tool from now on.
+    """Return the object `index` as held, fixed to the tool from now on.
 
     covers: made from an earlier frame of the same objects; None: made now, which takes longer than a tick.
     """
@@ -64,7 +64,7 @@ def grip(objects: PerceivedObjects, index: int, pose: GripperPose, covers: HeldC
 
 
 def with_held(pose: GripperPose, held: HeldObject) -> GripperPose:
-    """Return the pose with the gripper's spheres and the held object's, which move with the tool."""
+    """Return the pose with the spheres of the gripper and of the held object, which moves with the tool."""
     centers_m = np.empty((len(held.radii_m), 3))
     _join(pose.sphere_centers_m, held.centers_in_tool_m, pose.tool_position_m, pose.tool_rotation, centers_m)
     spheres = centers_m, held.radii_m, held.on_finger
@@ -73,7 +73,7 @@ def with_held(pose: GripperPose, held: HeldObject) -> GripperPose:
 
 @compiled(input_array(2), input_array(2), input_array(1), input_array(2), output_array(2))
 def _join(own: FloatArray, held: FloatArray, tool: FloatArray, rotation: FloatArray, centers: FloatArray) -> None:
-    """Fill `centers` (m + k, 3) with the gripper's `own` (m, 3) and with `held` (k, 3) from the tool frame: t + R c."""
+    """Fill `centers` (m + k, 3): the gripper's `own` (m, 3), then t + R c of the `held` (k, 3) in the tool frame."""
     first = own.shape[0]
     for i in range(first):
         for axis in range(3):

@@ -13,7 +13,7 @@ from common.arrays import FloatArray
 from common.files.user_folders import cache_folder
 
 _Cover = tuple[FloatArray, FloatArray, float]
-"""Centres (m, 3), radii (m,), and the distance by which they stand out, in m."""
+"""Centres (m, 3), radii (m,), and the distance by which the spheres protrude, in m."""
 
 
 def kept_cover(
@@ -22,10 +22,10 @@ def kept_cover(
     folder: Path | None = None,
     searching: Callable[[], None] | None = None,
 ) -> _Cover:
-    """Return the cover that `make` computes for a `shape`, from disk if the same code made it before.
+    """Return the cover that `make` computes for a `shape`; read it from disk if the same code stored it before.
 
     An unreadable file is replaced. A folder without write permission stores nothing. `searching` is called before
-    `make`, so that a person learns the reason for waiting.
+    `make`, so that a person learns the reason for the wait.
     """
     name = hashlib.sha256(_code() + shape).hexdigest()[:32]
     path = (cache_folder() / "covers" if folder is None else folder) / f"{name}.npy"

@@ -1,4 +1,4 @@
-"""Mirror planes of a solid."""
+"""Search for the mirror planes of a solid."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -8,16 +8,16 @@ import numpy as np
 from common.arrays import FloatArray
 
 _SAME_M = 5e-5
-"""Tolerance of symmetry, in m: the rounding of a drawn solid's vertices."""
+"""Tolerance of a mirror symmetry, in m: allows for rounded vertices of a drawn solid."""
 
 
 def mirror_images(
     points_m: FloatArray, depth_m: Callable[[FloatArray], FloatArray], frames: Sequence[FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the origin (3,) and the images (g, 3, 3), identity first, that map a solid to itself by mirrors.
+    """Return the origin (3,) of the mirror planes, and maps (g, 3, 3), identity first, that mirror a solid to itself.
 
-    points_m (p, 3) are on the surface; `depth_m` gives the depth of points. Candidate planes are normal to the axes of
-    `frames` (3, 3) and to the points' principal axes; the frame with the most planes counts.
+    points_m (p, 3) are on the surface; `depth_m` returns the depth of points. Candidate planes are normal to the axes
+    of each of the `frames` (3, 3), or to the points' principal axes. The frame with the most mirror planes is used.
     """
     middle = 0.5 * (points_m.min(axis=0) + points_m.max(axis=0))
     principal = np.linalg.eigh(np.cov(points_m.T))[1]

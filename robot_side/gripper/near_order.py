@@ -1,4 +1,4 @@
-"""Order of spheres in which consecutive ones are near each other."""
+"""Order of spheres in which consecutive spheres are near each other."""
 
 import numpy as np
 
@@ -6,9 +6,9 @@ from common.arrays import FloatArray, IntArray
 
 
 def near_order(centers_m: FloatArray, size: int) -> IntArray:
-    """Return an order (m,) of points (m, 3) in which each run of `size` is close together.
+    """Return an order (m,) of points (m, 3) in which each run of `size` consecutive points is close together.
 
-    The points are halved across their longest extent recursively, so that all runs but the last are full.
+    The points are halved recursively across their longest extent, in such a way that all runs but the last are full.
     """
     order = np.arange(len(centers_m))
     waiting = [(0, len(order))]

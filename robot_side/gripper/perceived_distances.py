@@ -1,4 +1,4 @@
-"""Distances from the gripper to perceived objects, for people to read; never the simulation's truth."""
+"""Distances from the gripper to perceived objects, for people to read; never from the simulation's truth."""
 
 from dataclasses import dataclass
 
@@ -15,13 +15,13 @@ _FARTHEST_M = 3.2
 
 @dataclass(frozen=True)
 class PerceivedDistances:
-    """Distances from the gripper's spheres, not enlarged, to the objects' perceived surfaces; negative inside."""
+    """Distances from the gripper's spheres (not enlarged) to the objects' perceived surfaces; negative inside."""
 
     nearest: str | None = None
-    """Nearest object that is no support and not held; None without one within 3 m"""
+    """Name of the nearest object that is neither a support nor held; None if there is none within about 3 m"""
     nearest_m: float | None = None
     target_m: float | None = None
-    """Distance to the target; None without one, for a held one, and for one farther away"""
+    """Distance to the target; None if there is no target, if it is held, or if it is farther away"""
 
 
 def perceived_distances(

@@ -1,4 +1,4 @@
-"""Closed shapes to cover: the surface as triangles, and the depth of points inside."""
+"""Closed shapes to be covered by spheres: triangles of the surface, and the depth of points inside."""
 
 import math
 from collections.abc import Callable
@@ -18,17 +18,17 @@ _SUBDIVISIONS = 16
 
 @dataclass(frozen=True)
 class Solid:
-    """Closed solid, or a polyhedron around it."""
+    """Closed solid, or a polyhedron that contains it."""
 
     corners_m: FloatArray
     """(t, 3, 3) triangles of the surface; corners anticlockwise as seen from outside"""
     depth_m: Callable[[FloatArray], FloatArray]
-    """Function from points (n, 3) to lower bounds (n,) of their depths below this surface; negative outside"""
+    """Function from points (n, 3) to lower bounds (n,) of their depth below the surface; negative outside"""
     excess_m: float = 0.0
-    """Largest distance outside the true solid"""
+    """Largest distance by which the polyhedron protrudes from the true solid"""
 
     def placed(self, rotation: FloatArray, position_m: FloatArray) -> "Solid":
-        """Return the solid at the pose `rotation` (3, 3), `position_m` (3,)."""
+        """Return the solid moved to the pose `rotation` (3, 3), `position_m` (3,)."""
         return Solid(
             self.corners_m @ rotation.T + position_m,
             lambda points: self.depth_m((points - position_m) @ rotation),
@@ -37,7 +37,7 @@ class Solid:
 
 
 def convex_solid(points_m: FloatArray, excess_m: float = 0.0) -> Solid | None:
-    """Return the convex hull of `points_m` (n, 3), which exceeds the true solid by at most `excess_m`.
+    """Return the convex hull of `points_m` (n, 3), which protrudes from the true solid by at most `excess_m`.
 
     None for coplanar points, which enclose nothing.
     """
@@ -62,7 +62,7 @@ def convex_solid(points_m: FloatArray, excess_m: float = 0.0) -> Solid | None:
 
 
 def cylinder(radius_m: float, half_length_m: float) -> Solid | None:
-    """Return a prism around a cylinder about the z axis; None without volume."""
+    """Return a prism that contains a cylinder about the z axis; None without volume."""
     sides = math.ceil(math.pi / math.acos(1.0 / (1.0 + _EXCESS)))
     # A multiple of four has the cylinder's mirror planes.
     sides += -sides % 4
@@ -74,19 +74,19 @@ def cylinder(radius_m: float, half_length_m: float) -> Solid | None:
 
 
 def ellipsoid(semi_axes_m: FloatArray) -> Solid | None:
-    """Return a polyhedron around an ellipsoid with semi-axes (3,) along the axes; None without volume."""
+    """Return a polyhedron that contains an ellipsoid with semi-axes (3,) along x, y and z; None without volume."""
     around = ellipsoid_mesh(semi_axes_m, _SUBDIVISIONS)
     return convex_solid(around.vertices, around.stands_out_m)
 
 
 def capsule(radius_m: float, half_length_m: float) -> Solid | None:
-    """Return a polyhedron around a capsule along the z axis; None without volume."""
+    """Return a polyhedron that contains a capsule along the z axis; None without volume."""
     around = capsule_mesh(radius_m, half_length_m, _SUBDIVISIONS)
     return convex_solid(around.vertices, around.stands_out_m)
 
 
 def triangles_within(corners_m: FloatArray, longest_m: float) -> FloatArray:
-    """Return the triangles `corners_m` (t, 3, 3) subdivided to (k, 3, 3), with edges up to `longest_m`."""
+    """Return the triangles `corners_m` (t, 3, 3) subdivided into (k, 3, 3), with edges of at most `longest_m`."""
     done = []
     while len(corners_m):
         lengths = np.linalg.norm(corners_m - np.roll(corners_m, -1, axis=1), axis=2)
@@ -97,7 +97,7 @@ def triangles_within(corners_m: FloatArray, longest_m: float) -> FloatArray:
 
 
 def halved(corners_m: FloatArray) -> FloatArray:
-    """Return each triangle of (t, 3, 3) halved at its longest edge: (2 t, 3, 3)."""
+    """Return the triangles (2 t, 3, 3) that result when each triangle (t, 3, 3) is halved at its longest edge."""
     lengths = np.linalg.norm(corners_m - np.roll(corners_m, -1, axis=1), axis=2)
     rows, first = np.arange(len(corners_m)), lengths.argmax(axis=1)
     a, b, c = (corners_m[rows, (first + turn) % 3] for turn in range(3))
@@ -106,7 +106,7 @@ def halved(corners_m: FloatArray) -> FloatArray:
 
 
 def corner_points(corners_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return each corner of triangles (t, 3, 3) once (p, 3), and the means of the faces' normals (p, 3)."""
+    """Return each corner of the triangles (t, 3, 3) once (p, 3), and the mean normal (p, 3) of the faces there."""
     across = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
     lengths = np.linalg.norm(across, axis=1, keepdims=True)
     units = np.divide(across, lengths, out=np.zeros_like(across), where=lengths > 0.0)

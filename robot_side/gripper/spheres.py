@@ -1,10 +1,10 @@
-"""Cover a gripper's boxes with spheres: the volume that is enlarged and overlapped (§4.1).
+"""Cover of a gripper's boxes by spheres, which are enlarged and overlapped with the objects (§4.1).
 
-Every sphere's centre is in its box. Its radius is the centre's depth below the nearest face plus the allowed
-stand-out. Such a sphere covers a disc of each face that it reaches. From the edges inwards, each frame of spheres
-covers a band of every face: one sphere near each corner of the box, and rows along the edges between them. Deeper
-frames have larger spheres. When a frame is as deep as half the box, one layer of spheres in the middle, each of which
-reaches both sides, covers the rest. A thin box has only that layer.
+Every sphere's centre is in its box. The radius is the centre's depth below the nearest face plus the distance by which
+spheres may protrude. Such a sphere covers a disc of each face that it reaches. From the edges inwards, each frame of
+spheres covers a band of every face: one sphere near each corner of the box, and rows along the edges between these.
+Deeper frames have larger spheres. When a frame is as deep as half the box, one layer of spheres in the middle covers
+the rest; each of its spheres reaches both sides. A thin box has only that layer.
 """
 
 import math
@@ -18,7 +18,7 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 
 _MOST_SPHERES_OF_A_BOX = 2000
-# Unused share of the stand-out in a plan, far above rounding, so that no corner is just outside.
+# Share of the allowed protrusion that a plan leaves unused, far above rounding, so that no corner is just outside.
 _MARGIN = 1e-6
 _FRACTIONS = tuple(0.40 + 0.04 * step for step in range(15))
 
@@ -27,21 +27,21 @@ _FRACTIONS = tuple(0.40 + 0.04 * step for step in range(15))
 class SphereCover:
     """Spheres whose union contains the surfaces of the boxes.
 
-    The inside of a thick box may be empty: from outside, a sphere at the surface is met first.
+    The inside of a thick box may be empty: whatever comes from outside meets a sphere at the surface first.
     """
 
     centers_m: FloatArray
-    """(m, 3) in the frame of the given boxes"""
+    """(m, 3) centres of the spheres, in the frame in which the boxes are given"""
     radii_m: FloatArray
-    """(m,)"""
+    """(m,) radii of the spheres"""
     box: IntArray
     """(m,) index of each sphere's box, ascending"""
     stand_out_m: FloatArray
-    """(k,) distances by which the spheres stand out of each box: as asked, or more for a very large box"""
+    """(k,) distance by which the spheres protrude from each box: as given, or more for a very large box"""
 
 
 class _Lattice(NamedTuple):
-    """Evenly spaced centres from minus to plus a span along each axis; a count of 1 means the middle."""
+    """Evenly spaced centres, from minus to plus a span along each axis; a count of 1 means only the middle."""
 
     spans_m: tuple[float, ...]
     counts: tuple[int, ...]
@@ -50,11 +50,11 @@ class _Lattice(NamedTuple):
 def cover_boxes(
     centers_m: FloatArray, rotations: FloatArray, half_sizes_m: FloatArray, stand_out_m: float = 0.003
 ) -> SphereCover:
-    """Cover the surface of oriented boxes with spheres that stand out by at most `stand_out_m`.
+    """Cover the surface of oriented boxes with spheres that protrude by at most `stand_out_m`.
 
-    centers_m (k, 3), rotations (k, 3, 3) box to frame, half_sizes_m (k, 3); a half size may be 0. The spheres of a
-    box are mirror-symmetric in its three middle planes, and in a fixed order. A box that would need more than 2000
-    spheres gets the least stand-out that needs at most 2000.
+    centers_m (k, 3), rotations (k, 3, 3) box to frame, half_sizes_m (k, 3); a half size may be 0. The spheres of a box
+    are mirror-symmetric in its three middle planes, and in a fixed order. If a box would need more than 2000 spheres,
+    they protrude by the least distance for which at most 2000 are needed.
     """
     covers = [_cover_box(tuple(half_sizes.tolist()), float(stand_out_m)) for half_sizes in half_sizes_m]
     box = np.repeat(np.arange(len(covers)), [len(radii) for _, radii, _ in covers])
@@ -69,7 +69,7 @@ def cover_boxes(
 
 @lru_cache(maxsize=256)
 def _cover_box(half_sizes_m: tuple[float, ...], stand_out_m: float) -> tuple[FloatArray, FloatArray, float]:
-    """Return centres (m, 3) in the box's frame, radii (m,), and the stand-out of one box."""
+    """Return one box's spheres: centres (m, 3) in its frame, radii (m,), and the distance by which they protrude."""
     axes = sorted(range(3), key=lambda axis: half_sizes_m[axis])
     ascending = tuple(half_sizes_m[axis] for axis in axes)
     plan = _fewest(ascending, stand_out_m)
@@ -100,7 +100,7 @@ def _spread(span_m: float, count: int) -> list[float]:
 
 
 def _fewest(half_sizes_m: tuple[float, ...], stand_out_m: float) -> list[_Lattice]:
-    """Return the frames and the layer with the fewest spheres for ascending half sizes; empty if 2000 are too few."""
+    """Return the frames and the layer with the fewest spheres; half sizes ascend. Return none if 2000 are too few."""
     usable_m = stand_out_m * (1.0 - _MARGIN)
     fewest, best = _MOST_SPHERES_OF_A_BOX + 1, list[_Lattice]()
     for at_edges, deeper in product(_FRACTIONS, _FRACTIONS):
@@ -120,8 +120,8 @@ def _fewest(half_sizes_m: tuple[float, ...], stand_out_m: float) -> list[_Lattic
 def _corner_depth(done_m: float, stand_out_m: float) -> float:
     """Return the greatest depth below three faces at which a sphere's discs reach the corners of the uncovered rest.
 
-    At depth t the discs' radius is √(2 t stand_out + stand_out²). With a band of width `done` covered along every
-    edge, the corner of a face's rest is √2 (t - done) from the disc's centre. With done = 0 it is the box's corner.
+    At depth t the discs' radius is √(2 t stand_out + stand_out²). With a band of width `done` covered along every edge,
+    the corner of a face's uncovered rest is √2 (t - done) from the disc's centre. With done = 0 it is the box's corner.
     """
     return done_m + 0.5 * stand_out_m + 0.5 * math.sqrt(4.0 * done_m * stand_out_m + 3.0 * stand_out_m**2)
 
@@ -129,9 +129,10 @@ def _corner_depth(done_m: float, stand_out_m: float) -> float:
 def _frame(
     half_sizes_m: tuple[float, ...], done_m: float, fraction: float, stand_out_m: float
 ) -> tuple[list[_Lattice], float]:
-    """Return spheres that widen the covered band along every edge of every face, and the new width.
+    """Return spheres that widen the covered band along every edge of every face, and the band's new width.
 
-    The discs of the deepest possible row just touch the covered band. fraction: share of that row's depth beyond done.
+    The discs of the deepest possible row just touch the covered band. fraction: the row's depth beyond `done`, as a
+    share of the deepest row's.
     """
     corner = _corner_depth(done_m, stand_out_m)
     # The corner's sphere covers a square of every face, from `done` to here.
@@ -154,8 +155,8 @@ def _frame(
 def _layer(half_sizes_m: tuple[float, ...], done_m: float, stand_out_m: float) -> _Lattice:
     """Return spheres in the middle of the shortest axis that cover everything farther than `done` from the edges.
 
-    They form a rectangular lattice; the discs on both large faces contain its cells. The outermost spheres are near
-    enough to the narrow faces to contain a strip that is left there.
+    The spheres form a rectangular lattice; their discs on both large faces contain the lattice's cells. The outermost
+    spheres are near enough to the narrow faces to contain a strip that the frames left there.
     """
     thin, *sides = half_sizes_m
     radius, strip = thin + stand_out_m, max(thin - done_m, 0.0)

@@ -1,9 +1,9 @@
-"""Few spheres that contain the surface of any closed solid, or of several that overlap, and hardly stand out.
+"""Cover of a closed solid, or of several overlapping solids: few spheres that contain the surface and hardly protrude.
 
-Every sphere's centre is inside, and its radius is the centre's depth plus the allowed stand-out. Candidate centres are
-below points of the surface, in several depths; a set cover chooses enough of them to contain many of these points.
-Then the whole surface is checked, down to small cells: a sphere that contains a corner contains the cell, within the
-margin of the radii. Corners that are not contained yet are added to the points.
+Every sphere's centre is inside, and its radius is the centre's depth plus the distance by which spheres may protrude.
+Candidate centres lie in several depths below points of the surface. A set cover chooses enough of them to contain these
+points. Then the whole surface is checked, down to small cells: a sphere that contains a cell's corners contains the
+cell, within the margin of the radii. Corners that no sphere contains are added to the points.
 """
 
 from collections.abc import Sequence
@@ -21,11 +21,11 @@ _MOST_CENTERS = 2500
 _MOST_ROUNDS = 40
 _CHOSEN_ANEW = 5
 _CELL = 0.03
-"""Longest edge of the smallest cells, as a share of the stand-out."""
+"""Longest edge of the smallest cells, as a share of the distance by which spheres may protrude"""
 _CHOSEN_WITH = 0.97
-"""Share of the stand-out used in choosing spheres for points; the rest contains most of the surface between."""
+"""Share of that distance used in choosing spheres for points; the rest lets them contain most of the surface between"""
 _DEPTHS = np.array([0.15, 0.35, 0.6, 1.0, 1.5, 2.2, 3.0, 4.0, 5.5, 7.5, 10.0, 14.0, 20.0, 30.0])
-"""Depths as multiples of the stand-out."""
+"""Depths of candidate centres, as multiples of the distance by which spheres may protrude"""
 _COARSER = 1.2
 _ROUNDING_M = 1e-9
 
@@ -34,19 +34,19 @@ Spheres = tuple[FloatArray, FloatArray]
 
 
 class _Union:
-    """Union of solids; parts within another solid are no surface."""
+    """Union of solids; a part of one solid's surface inside another solid is no surface of the union."""
 
     def __init__(self, solids: Sequence[Solid]) -> None:
         self._solids = solids
         self.area_m2 = float(sum(_area_m2(solid.corners_m) for solid in solids))
 
     def depth_m(self, points_m: FloatArray) -> FloatArray:
-        """Return (n,): greatest depth of each point (n, 3) in any solid."""
+        """Return (n,): the greatest depth of each point (n, 3) in any of the solids."""
         depths: FloatArray = np.max([solid.depth_m(points_m) for solid in self._solids], axis=0)
         return depths
 
     def room_m(self, points_m: FloatArray) -> FloatArray:
-        """Return (n,): lower bound of each point's (n, 3) depth in a true solid; -infinity outside."""
+        """Return (n,): a lower bound of each point's depth (n, 3) in a true solid; -infinity outside."""
         rooms = []
         for solid in self._solids:
             depths = solid.depth_m(points_m)
@@ -55,11 +55,11 @@ class _Union:
         return deepest
 
     def cells(self, longest_m: float) -> list[FloatArray]:
-        """Return, for each solid, the triangles (t, 3, 3) of the surface, with edges up to `longest_m`."""
+        """Return for each solid the triangles (t, 3, 3) of its surface, subdivided to edges of at most `longest_m`."""
         return [triangles_within(solid.corners_m, longest_m) for solid in self._solids]
 
     def points(self, longest_m: float, margin_m: float) -> tuple[FloatArray, FloatArray]:
-        """Return points (p, 3) and normals (p, 3) of the union's surface, neighbours up to `longest_m` apart."""
+        """Return points (p, 3) and normals (p, 3) of the union's surface; neighbours are at most `longest_m` apart."""
         found = []
         for number, corners in enumerate(self.cells(longest_m)):
             points, normals = corner_points(corners)
@@ -69,7 +69,7 @@ class _Union:
         return both[:, :3], both[:, 3:]
 
     def outside(self, solid: int, points_m: FloatArray, margin_m: float) -> BoolArray:
-        """Return (n,): whether no other solid contains a point (n, 3) of a solid's surface at least `margin_m` deep."""
+        """Return (n,): whether no other solid contains a point (n, 3) of this solid's surface by `margin_m` or more."""
         outside = np.ones(len(points_m), dtype=np.bool_)
         for number, other in enumerate(self._solids):
             if number != solid:
@@ -80,10 +80,11 @@ class _Union:
 def cover_surface(
     solids: Sequence[Solid], stand_out_m: float, frames: Sequence[FloatArray] = (), most: int = 2000
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return centres (m, 3), radii (m,), and the greatest distance by which they stand out of the union of `solids`.
+    """Return spheres' centres (m, 3), radii (m,), and the distance by which they protrude from the union of `solids`.
 
-    The distance is `stand_out_m`, or as much more as `most` spheres need. The spheres share the union's mirror planes
-    normal to axes of `frames` (3, 3) or to its principal axes. The result depends on nothing else.
+    The distance is `stand_out_m`, or as much more as is needed for at most `most` spheres. The spheres share the
+    union's mirror planes normal to axes of `frames` (3, 3) or to its principal axes. The result depends on nothing
+    else.
     """
     union = _Union(solids)
     # Skip hopeless searches: discs of radius √30 s, those of centres 14.5 s deep, cannot cover the area.
@@ -97,7 +98,7 @@ def cover_surface(
 
 
 def _cover(union: _Union, stand_out_m: float, frames: Sequence[FloatArray], most: int) -> Spheres | None:
-    """Return the spheres; None if more than `most` are needed."""
+    """Return spheres that cover the union; None if more than `most` are needed."""
     cell_m = _CELL * stand_out_m
     # Every point of a cell is nearer than this to one of the corners.
     margin_m = cell_m / np.sqrt(3.0)
@@ -139,7 +140,10 @@ def _below(
     images: FloatArray,
     origin_m: FloatArray,
 ) -> FloatArray:
-    """Return centres (c, 3) below points of the surface, down to the thickest place, and these on mirror planes."""
+    """Return candidate centres (c, 3) below points of the surface, down to the thickest place.
+
+    The deepest centre below each point is also projected onto the mirror planes.
+    """
     every = max(1, -(-len(points_m) // _MOST_STARTS))
     points_m, normals = points_m[::every], normals[::every]
     steps = np.concatenate([[0.0], _DEPTHS]) * stand_out_m
@@ -165,7 +169,7 @@ def _below(
 
 
 def _between(points_m: FloatArray, centers_m: FloatArray, depths_m: FloatArray) -> FloatArray:
-    """Return centres (c, 3) between missed points (p, 3) and the centres that reach nearest to them."""
+    """Return candidate centres (c, 3) between missed points (p, 3) and the centres of the spheres nearest to them."""
     # The points themselves are included, so that none is left in the end.
     found = [points_m]
     for point in points_m[:: max(1, -(-len(points_m) // 200))]:
@@ -175,14 +179,17 @@ def _between(points_m: FloatArray, centers_m: FloatArray, depths_m: FloatArray) 
 
 
 def _alike(union: _Union, centers_m: FloatArray, origin_m: FloatArray, images: FloatArray) -> Spheres:
-    """Return the centres (c, 3) inside, and depths (c,) of their shallowest images, so that none stands out more."""
+    """Return the centres (c, 3) whose images are all inside, and the depth (c,) of each centre's shallowest image.
+
+    With that depth, no image protrudes by more than another.
+    """
     depths = np.min([union.room_m((centers_m - origin_m) @ image.T + origin_m) for image in images], axis=0)
     inside = np.isfinite(depths)
     return centers_m[inside], depths[inside]
 
 
 def _onto_planes(points_m: FloatArray, images: FloatArray) -> FloatArray:
-    """Return points (n, 3) projected onto each mirror plane and onto their intersections: (k, 3)."""
+    """Return the points (n, 3) projected onto each mirror plane, and onto their intersections: (k, 3)."""
     return np.concatenate([np.empty((0, 3)), *(0.5 * (points_m + points_m @ image.T) for image in images[1:])])
 
 
@@ -201,7 +208,7 @@ def _first_images(points_m: FloatArray, normals: FloatArray, origin_m: FloatArra
 
 
 def _orbit_sizes(centers_m: FloatArray, images: FloatArray) -> FloatArray:
-    """Return (n,): number of different images of each centre (n, 3)."""
+    """Return (n,): the number of different mirror images of each centre (n, 3), itself included."""
     still = [np.linalg.norm(centers_m @ image.T - centers_m, axis=1) < 1e-7 for image in images]
     sizes: FloatArray = len(images) / np.sum(still, axis=0)
     return sizes
@@ -217,7 +224,7 @@ def _all_images(centers_m: FloatArray, radii_m: FloatArray, origin_m: FloatArray
 def _not_contained(
     union: _Union, cells: Sequence[FloatArray], centers_m: FloatArray, radii_m: FloatArray, smallest_m: float
 ) -> tuple[list[FloatArray], FloatArray]:
-    """Return the cells that no single sphere contains even when subdivided, and their corners (n, 3) outside all."""
+    """Return the cells that no single sphere contains, even when subdivided, and their corners outside all spheres."""
     left, points = [], [np.empty((0, 3))]
     for number, of_solid in enumerate(cells):
         waiting, still = of_solid, [np.empty((0, 3, 3))]
@@ -239,7 +246,7 @@ def _not_contained(
 
 
 def _within_one(cells: FloatArray, centers_m: FloatArray, radii_m: FloatArray) -> BoolArray:
-    """Return (t,): whether one sphere contains all three corners, and so the triangle (t, 3, 3)."""
+    """Return (t,): whether one sphere contains all three corners of a triangle (t, 3, 3), and so the triangle."""
     pieces = []
     for first in range(0, len(cells), 2048):
         corners = cells[first : first + 2048]

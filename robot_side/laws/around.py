@@ -1,8 +1,9 @@
-"""Coarse map of onset distances around the gripper, for an operator side that traces its path.
+"""Coarse map of onset distances around the gripper, for an operator side that traces the gripper's path.
 
-The operator side knows its sticks one loop age before the robot side. It traces its path through the map
-(`operator_side/feel/path_ahead.py`). A probe is a place that a fully deflected stick reaches (`Around`). Each probe
-keeps only the onset distances of full strength, fast and slow.
+The operator side knows the sticks' deflection one loop age before the robot side does. It traces the path through the
+map (`operator_side/feel/path_ahead.py`). A probe is a pose of the gripper from which looks are made: the present pose,
+or one that a fully deflected stick leads to (`Around`). Each probe keeps the onset distances of full strength only, of
+the fast and the slow list.
 """
 
 import math
@@ -20,27 +21,30 @@ from robot_side.laws.path import move
 from robot_side.laws.sensed import HORIZON, L2, NUMBERS_PER_SIDE, R2
 
 FIRST_PROBE: Final = 1 + MOST_PLACES
-"""Place number of the first probe"""
+"""Number of the first probe, counted after the places on the path"""
 STILL_M_S: Final = 0.002
 _STILL_RAD_S: Final = 0.01
-"""Speeds up to which gripper and objects count as at rest"""
+"""Speed and angular speed up to which the gripper counts as at rest; objects count so up to STILL_M_S"""
 _RETREATS_M_S: Final = 0.01
-"""Speed below which both triggers count as leading"""
+"""Speed along the approach axis, forwards or backwards, below which both triggers count as the one that moves the
+gripper"""
 _SELDOM: Final = 4.0
-"""Periods between looks along the trigger that does not lead"""
+"""Period of a probe's looks along the trigger against which the gripper moves, in periods of the other trigger's"""
 _HOLDS_S: Final = 1.5
-"""Age at which a probe's look expires while something moves. Where ticks are rare, probes come late."""
+"""Age at which a probe's look expires while something moves. It is long because looks from probes come late if ticks
+are rare."""
 _SAME_TIME: Final = 0.05
-"""Relative change of T up to which the probes' looks count"""
+"""Largest relative change of T, the time until the arm stands, after which the probes' looks still count"""
 
 
 @inlined
 def follow_motion(
     bundle: IntArray, velocity: Vector, turning: Vector, moves: bool, until: float, now: float, by_operator: bool
 ) -> None:
-    """Record when the gripper last moved. Discard the probes' looks if T (s) has changed.
+    """Record when anything last moved. Discard the probes' looks if T, the time until the arm stands, has changed.
 
-    by_operator: the operator side traces the map; otherwise no look counts.
+    moves: the gripper's spheres have changed in number. until: T in s. by_operator: whether the operator side traces
+    the map; if not, no probe's look counts.
     """
     memory = memory_at(bundle)
     state = memory.state[0]
@@ -55,7 +59,7 @@ def follow_motion(
 
 @inlined
 def is_known(bundle: IntArray) -> bool:
-    """Return whether the map holds: each probe's look counts, and is recent if anything has moved since."""
+    """Return whether the map is valid: all probes have looks that count, each recent or made since the last motion."""
     memory = memory_at(bundle)
     state, known = memory.state[0], bool(memory.settings[0].around != 0.0)
     for probe in range(2 * PROBES):
@@ -67,7 +71,7 @@ def is_known(bundle: IntArray) -> bool:
 
 @inlined
 def probe_waiting(bundle: IntArray, now: float, speed: float) -> tuple[float, int, int]:
-    """Find the probe that has waited longest: periods waited, side and place, as in `longest_waiting`."""
+    """Return the longest wait of a probe in periods, and its side and place, as `longest_waiting` does for places."""
     memory = memory_at(bundle)
     most, of_side, of_place = -math.inf, 0, 0
     state = memory.state[0]
@@ -98,7 +102,10 @@ def go_to_probe(
     speed: float,
     loop_age: float,
 ) -> float:
-    """Move to a probe, 0 for the gripper's place. Return the distance (m) covered by then, as `go_to` does."""
+    """Move the memory's gripper to a probe; probe 0 is its present pose.
+
+    Return the distance (m) that the trigger has moved it by then, as `go_to` does.
+    """
     memory = memory_at(bundle)
     settings, until = memory.settings[0], float(memory.state[0].until)
     linear, turning, after, since = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0
@@ -120,7 +127,7 @@ def go_to_probe(
 
 @inlined
 def keep_probe(bundle: IntArray, side: int, probe: int, now: float, tool: Vector, onsets: FloatArray) -> None:
-    """Keep a look from a probe, as `keep` does from a place."""
+    """Store a probe's newest look; `keep` does the same for places on the path. onsets (2, 8): fast and slow list."""
     memory = memory_at(bundle)
     along, prospect = load(memory.direction.reshape(1, 3), 0), memory.prospect[0]
     new = memory.around[side * PROBES + probe]
@@ -133,7 +140,10 @@ def keep_probe(bundle: IntArray, side: int, probe: int, now: float, tool: Vector
 
 @inlined
 def _closing(approach: Vector, classes: IntArray, velocities: FloatArray) -> float:
-    """Return the highest speed of an object against `approach`, without objects that are passed over."""
+    """Return the highest speed (m/s) at which an object comes against `approach`, 0 if none does.
+
+    Objects of the class SKIPPED do not count.
+    """
     closing = 0.0
     for thing in range(velocities.shape[0]):
         if classes[thing] != SKIPPED:
@@ -154,9 +164,10 @@ def ways_around(
     felt: FloatArray,
     onsets: FloatArray,
 ) -> bool:
-    """Fill ways (LISTS, PROBES), onset distances in m from the tool (3,). Return False while one is unknown.
+    """Fill the map `onsets` (LISTS, PROBES) with onset distances in m from the tool. Return False if it is not valid.
 
-    rotation (3, 3), classes (k,), velocities (k, 3), or (0, 3) if unknown, and felt as `sense` filled it.
+    tool (3,), rotation (3, 3): the tool's present pose. classes (k,). velocities: (k, 3), or (0, 3) if unknown.
+    felt: as `sense` filled it.
     """
     memory, place = memory_at(bundle), load(tool.reshape(1, 3), 0)
     if velocities.shape[0] > classes.size or not is_known(bundle):
@@ -167,12 +178,12 @@ def ways_around(
         for probe in range(PROBES):
             one = memory.around[side * PROBES + probe]
             gone = dot((one.direction[0], one.direction[1], one.direction[2]), place) - one.began
-            # A look includes the objects' motion until the gripper stands, but not their motion since the look.
+            # A look includes the objects' motion until the gripper stops, but not their motion since the look.
             gone += closing * (memory.state[0].measured - one.at)
             for kind in range(2):
                 onsets[2 * side + kind, probe] = one.onsets[kind] - gone
         for kind in range(2):
-            # Straight ahead the newest look knows more: new objects and the motion of the fingers.
+            # Straight ahead the present field knows more: new objects and the motion of the fingers.
             newest = felt[side * NUMBERS_PER_SIDE + kind * STRENGTHS + STRENGTHS - 1]
             if newest < felt[HORIZON]:
                 onsets[2 * side + kind, 0] = min(onsets[2 * side + kind, 0], newest)

@@ -1,4 +1,4 @@
-"""Terms of the enlargement, and overlaps by object, for display. Computed only on request."""
+"""Terms of the enlargement and overlap with each object, for display. They are computed on request only."""
 
 import math
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from robot_side.surroundings.scene_table import SceneTable
 
 Trigger = Literal["l2", "r2"]
 Overlaps = dict[int, float]
-"""Overlap in m³ by object, without objects that do not overlap"""
+"""Overlap in m³, keyed by the object's index; objects without overlap are left out"""
 
 
 @dataclass(frozen=True)
@@ -27,14 +27,15 @@ class TriggerExplained:
 
     terms: EnlargementTerms
     overlaps_m3: Overlaps
-    """Overlaps of the gripper, inflated by D_σ and moved by the robot side's δ (eq. 11-12)"""
+    """Overlaps (eq. 11-12) of the enlarged gripper. swept: inflated by D_σ and moved by the robot side's δ. paper:
+    inflated by D_incr and not moved."""
 
 
 class Explains(Protocol):
-    """Law that explains its result."""
+    """Interface of a law that can explain its result."""
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """Explain one trigger of `sensed`, the result for `situation`."""
+        """Return the terms and overlaps behind one trigger's field in `sensed`, which the law found for `situation`."""
         ...
 
 
@@ -44,7 +45,10 @@ def enlargement_terms(
     encoder_sigma_rad: FloatArray,
     displacement_m: float,
 ) -> tuple[EnlargementTerms, FloatArray]:
-    """Return the terms of eq. 8-10 for the largest D_σ, and D_σ of all spheres (m,). encoder_sigma_rad (n,)."""
+    """Return the terms of eq. 8-10 for the sphere with the largest D_σ, and D_σ of all spheres (m,).
+
+    encoder_sigma_rad (n,).
+    """
     pose, count = situation.pose, len(situation.pose.sphere_radii_m)
     kinematic_m2, sigma_m = np.empty(count), np.empty(count)
     explain_inflation(
@@ -67,12 +71,15 @@ def enlargement_terms(
 
 
 def overlaps_by_object(spheres: FloatArray, scene: SceneTable, classes: IntArray) -> Overlaps:
-    """Return Σ_i V_ij of each object j that the spheres (m, 4) overlap and that is not passed over; classes (k,)."""
+    """Return Σ_i V_ij of each object j that the spheres i (m, 4) overlap, without objects of the class SKIPPED.
+
+    classes (k,).
+    """
     found_m3 = np.zeros(len(classes))
     total_overlap_m3(spheres, scene, classes, of_objects_m3=found_m3)
     return {int(thing): float(found_m3[thing]) for thing in np.flatnonzero(found_m3)}
 
 
 def moved_and_inflated(pose: GripperPose, moved_m: FloatArray, by_m: FloatArray) -> FloatArray:
-    """Return the gripper's spheres (m, 4), moved by (3,) and inflated by (m,)."""
+    """Return the gripper's spheres (m, 4), displaced by moved_m (3,), their radii increased by by_m (m,)."""
     return np.concatenate([pose.sphere_centers_m + moved_m, (pose.sphere_radii_m + by_m)[:, None]], axis=1)

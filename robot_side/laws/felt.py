@@ -1,6 +1,6 @@
-"""Onset distances at this moment: those of the recent looks, less the tool's motion since.
+"""Present onset distances: the shortest of the recent looks, each less the tool's motion since the look.
 
-The shortest ones count. For a translation the result is exact.
+If the tool has only translated since, the subtraction is exact.
 """
 
 import math
@@ -34,11 +34,12 @@ from robot_side.laws.sensed import (
 )
 
 MOST_M: Final = 100.0
-"""Limit of distances and speeds in a message. A simulation that becomes unstable exceeds it, and must still report."""
+"""Largest distance (m) or speed (m/s) in a message; larger ones are cut to it. An unstable simulation would exceed it,
+and must still report."""
 
 
 def felt_array() -> FloatArray:
-    """Return an array for the numbers of `Sensed`, followed by the onset distances along the stick."""
+    """Return an array for the numbers of `Sensed`, followed by the 16 onset distances in the stick's direction."""
     return np.zeros(NUMBERS + 2 * STRENGTHS)
 
 
@@ -55,7 +56,7 @@ def _moved(one: Any, tool: Vector) -> float:
 
 @building_block
 def _shortest(seen: np.ndarray, side: int, count: int, tool: Vector, onsets: FloatArray) -> None:
-    """Fill ways (16,), fast and slow, with the shortest onset distances from the tool's present position."""
+    """Fill onsets (16,), fast then slow, with a side's shortest onset distances from the tool's present position."""
     onsets[: 2 * STRENGTHS] = math.inf
     for k in range(ROOM * side, ROOM * side + count):
         one = seen[k]
@@ -68,7 +69,7 @@ def _shortest(seen: np.ndarray, side: int, count: int, tool: Vector, onsets: Flo
 
 @inlined
 def _reached(onsets: FloatArray, first: int, reach: float) -> int:
-    """Count the onset distances, of the eight from `first` on, that are at most `reach`."""
+    """Count those of the eight onset distances from index `first` on that are at most `reach`."""
     count = 0
     for place in range(first, first + STRENGTHS):
         if onsets[place] <= reach:
@@ -78,7 +79,7 @@ def _reached(onsets: FloatArray, first: int, reach: float) -> int:
 
 @inlined
 def _known(bundle: IntArray, side: int, tool: Vector) -> float:
-    """Return the distance examined ahead of the tool: the rest of the newest look's reach from place 0."""
+    """Return the distance ahead of the tool that the newest look from place 0, the gripper's own, still covers."""
     memory = memory_at(bundle)
     known = -math.inf
     latest = -math.inf
@@ -101,10 +102,10 @@ def feel(
     deflection: float,
     felt: FloatArray,
 ) -> None:
-    """Fill `felt`, made by `felt_array`, for a tool at `tool` that moves with `velocity`.
+    """Fill `felt`, made by `felt_array`: both triggers' fields and the rumble. The tool is at `tool`, with `velocity`.
 
-    loop_age: t_d in s, the worst case while unknown. deflection: the stick's, 0 to 1. Below the touch speed the slow
-    onset distances count.
+    loop_age: t_d in s. is_known: whether t_d is measured; if not, it is the configured worst case. deflection: the
+    stick's, 0 to 1. Where the stick commands less than the touch speed, the rumble takes the slow onset distances.
     """
     memory = memory_at(bundle)
     seen, counts, newest, settings = memory.seen, memory.counts, memory.newest, memory.settings[0]

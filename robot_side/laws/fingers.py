@@ -1,4 +1,4 @@
-"""Velocities of the fingers' spheres against the tool, measured from their recent positions."""
+"""Velocities of the gripper's spheres relative to the tool, measured from recent positions: the fingers' motion."""
 
 from typing import Final
 
@@ -8,7 +8,7 @@ from robot_side.compiled.vectors import Vector, dot, load, scale, subtract
 from robot_side.laws.memory import FINGER_POSES, memory_at
 
 _NOISE_M_S: Final = 0.015
-"""Speed up to which fingers count as at rest: their readings are noisy."""
+"""Speed up to which the fingers count as at rest, because their position readings are noisy"""
 _FINGERS_S: Final = 0.06
 """Time over which the fingers' speed is measured"""
 
@@ -17,7 +17,10 @@ _FINGERS_S: Final = 0.06
 def measure_fingers(
     bundle: IntArray, centers: FloatArray, tool: Vector, rotation: FloatArray, now: float, changed: bool
 ) -> None:
-    """Measure the velocities of the spheres (m, 3) against the tool. changed: the spheres are new; 0 for these."""
+    """Measure the velocity of each sphere relative to the tool. centers (m, 3): the spheres' present centres.
+
+    changed: whether the spheres have changed in number; then earlier positions are dropped and all velocities are 0.
+    """
     memory = memory_at(bundle)
     state, count = memory.state[0], centers.shape[0]
     oldest = 0

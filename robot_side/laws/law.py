@@ -1,4 +1,4 @@
-"""Interface of every law: from a situation to two trigger fields and a rumble, once a tick."""
+"""Interface of every law: once a tick it computes two trigger fields and a rumble from a situation."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -18,12 +18,12 @@ class Situation:
     pose: GripperPose
     """Pose of the gripper, with the spheres of the held object"""
     joint_velocities_rad_s: FloatArray
-    """(n,)"""
+    """Measured rates of the joints (n,)"""
     objects: PerceivedObjects
     loop_age_s: float
-    """t_d of eq. 8; the configured worst case while unknown"""
+    """t_d of eq. 8; the configured worst case while no loop age is known"""
     loop_age_known: bool
-    """Whether the owner has echoed a stamp. Then commands under way are at most `loop_age_s` old."""
+    """Whether the operator with the lease has echoed a stamp. Then commands under way are at most `loop_age_s` old."""
     compensation: Compensation
     """The side that compensates the delay; eq. 10 uses its prediction errors."""
     gap_m: float | None
@@ -31,20 +31,23 @@ class Situation:
     held: int | None
     """Index of the held object, if any"""
     lateral: Vector2
-    """Deflection of the stick that moves across, as commanded"""
+    """Commanded deflection, right and up, of the stick that moves the tool across its approach axis"""
 
 
 class Law(Protocol):
-    """Law from a situation to stiffness."""
+    """Computes the stiffness of both triggers from a situation."""
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Compute one tick."""
+        """Return the fields and the rumble of one tick."""
         ...
 
     def around(self, pose: GripperPose) -> Around | None:
-        """Return the map of onset distances around the gripper, for an operator side that traces its path, or None."""
+        """Return the map of onset distances around the gripper, or None if there is no valid one.
+
+        An operator side traces the gripper's path through the map.
+        """
         ...
 
     def summary(self) -> dict[str, int]:
-        """Return counts of the work, done and saved, over the run."""
+        """Return counts of the law's work over the run, for the run's summary."""
         ...

@@ -1,8 +1,9 @@
-"""Schedule of looks: in each tick the field that has waited longest comes first.
+"""Schedule of looks: in each tick the look that has waited longest is made first.
 
-R2, L2, and the stick while it is deflected are fields. Each is looked along from the gripper's place, and from where
-the gripper will have drifted, turned or closed its fingers. A tick has one look, two while a field is 1.5 periods old,
-and all that are due after 5 periods, or if a place is new.
+A look evaluates the law along one side from one place. Sides are R2, L2, and the stick while it is deflected. Places
+are the gripper's present pose, and the poses to which it will have drifted, turned or closed its fingers. A tick has at
+most one look; two once a look is 1.5 periods old; and all that are due once one is 5 periods old, or if a place is new.
+A tick that measures the motion has none, unless a look is 1.5 periods old.
 """
 
 import math
@@ -24,13 +25,14 @@ from robot_side.laws.recent_looks import keep, longest_waiting
 from robot_side.laws.sensed import L2, R2
 
 OVERLAP_PERIOD_S: Final = 0.02
-"""Period of the overlap at δ: a figure for people to read"""
+"""Period at which the overlap at δ is computed; this figure is for display only"""
 ROUNDING_S: Final = 1e-9
 _ROUNDING: Final = 1e-6
 _OVERDUE: Final = 1.5
-"""Age of a field, in periods, from which a tick has two looks"""
+"""Age of a side's look from a place, in periods, from which a tick has two looks"""
 _FAR_BEHIND: Final = 5.0
-"""Age of a field, in periods, from which a tick has all looks that are due. A new place is infinitely old."""
+"""Age of a side's look from a place, in periods, from which a tick has all looks that are due. A place without a look
+counts as infinitely old."""
 _ALL: Final = 1000
 
 scratch_at = SCRATCH.at
@@ -40,7 +42,7 @@ _sum_overlaps = call_at_address(FLOAT64, SUM_OVERLAPS)
 
 
 class Moment(NamedTuple):
-    """Input of the kernel in one tick."""
+    """Input of the law's kernel in one tick: the gripper, the link and the scene."""
 
     rotation: FloatArray
     jacobian: FloatArray
@@ -50,7 +52,7 @@ class Moment(NamedTuple):
     tool: Vector
     approach: Vector
     speed: float
-    """m/s along the approach axis"""
+    """Tool's speed along its approach axis, m/s"""
     now: float
     loop_age: float
     by_operator: bool
@@ -59,19 +61,22 @@ class Moment(NamedTuple):
     """Half the gap between the fingers, m (§3.4)"""
     right: float
     up: float
-    """Deflection of the stick, with `right`"""
+    """Deflection of the stick that moves across: `right` and `up`"""
     classes: IntArray
     closing: IntArray
-    """Classes while the fingers move: the target is passed over, as they shall touch it."""
+    """Classes of the objects while the fingers move: the target is SKIPPED, because the fingers shall touch it."""
     velocities: FloatArray
-    """Velocities of the objects (k, 3); empty if unknown: they count as at rest"""
+    """Velocities of the objects (k, 3); empty if unknown, and then all objects count as at rest"""
     scene: IntArray
     scratch: IntArray
 
 
 @inlined
 def _fill_early(bundle: IntArray, velocities: FloatArray, stopping: float) -> None:
-    """Fill the distance by which each object approaches until the arm stands: its contact distances shorten."""
+    """Fill the distance by which each object approaches in `stopping` seconds, until the arm stands.
+
+    A look shortens the object's contact distances by it.
+    """
     memory = memory_at(bundle)
     along = load(memory.direction.reshape(1, 3), 0)
     for thing in range(velocities.shape[0]):
@@ -80,7 +85,7 @@ def _fill_early(bundle: IntArray, velocities: FloatArray, stopping: float) -> No
 
 @building_block
 def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool:
-    """Look along one side from one place and keep the result. Return False for numbers that are not finite."""
+    """Look along one side from one place or probe and keep the result. Return False for numbers that are not finite."""
     memory = memory_at(bundle)
     state, prospect, count = memory.state[0], memory.prospect[0], moment.radii.size
     there = moment.tool, moment.rotation, moment.centers, side
@@ -129,9 +134,10 @@ def _look_along(bundle: IntArray, moment: Moment, side: int, place: int) -> bool
 
 @inlined
 def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
-    """Run the `at_most` looks that have waited longest, or more if they have waited too long.
+    """Make up to `at_most` due looks, those that have waited longest first; more if one has waited too long.
 
-    A due probe waits for a tick without a look and without measuring the motion (`at_most` 0); an overdue one does not.
+    at_most is 0 in a tick that measures the motion. A due probe waits for a tick that neither measures the motion nor
+    has another look; an overdue probe does not wait. Return False for numbers that are not finite.
     """
     busy = at_most == 0
     waited, side, place = longest_waiting(bundle, moment.now)
@@ -147,7 +153,7 @@ def look_at_due(bundle: IntArray, moment: Moment, at_most: int) -> bool:
     of_probe, side, place = probe_waiting(bundle, moment.now, moment.speed)
     due = _OVERDUE if busy else 1.0 - _ROUNDING
     while of_probe >= due:
-        # After the first probe, only those without any look.
+        # After the first probe, only probes that have no look yet.
         due = math.inf
         if not _look_along(bundle, moment, side, place):
             return False

@@ -1,4 +1,4 @@
-"""Laws by name, imported on demand. Another law is one file and one entry here."""
+"""Laws by name, each imported on first use. To add a law, add its file and one entry here."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ if TYPE_CHECKING:
     from robot_side.laws.law import Law
 
     class NamedLaw(Law, Explains, Protocol):
-        """Law that a robot side can follow."""
+        """Interface of a law that a robot side can run: it senses, explains its result, and takes another P."""
 
         def expect(self, probability: float) -> None:
-            """Set P of eq. 10; ConfigurationError outside (0, 1)."""
+            """Set the probability P of eq. 10; ConfigurationError outside (0, 1)."""
 
 
 LawName = Literal["swept", "paper"]
-"""swept: onset distances along each trigger. paper: the plain law of §4.2, one number for both triggers."""
+"""swept: onset distances along each trigger. paper: the paper's own law (§4.2), one stiffness for both triggers."""
 
 
 def _swept(*arguments: Any) -> NamedLaw:
@@ -35,4 +35,5 @@ def _paper(*arguments: Any) -> NamedLaw:
 
 
 LAWS: Final[Mapping[LawName, Callable[..., NamedLaw]]] = {"swept": _swept, "paper": _paper}
-"""Factories; arguments: uncertainty, encoders' standard deviations (n,) in rad, joint limits, motion, surroundings"""
+"""Factory of each law. Its arguments: uncertainty, standard deviations of the encoders (n,) in rad, joint limits,
+motion settings, surroundings."""

@@ -1,6 +1,7 @@
-"""The paper's plain law (§4.2), for comparison. Every sphere is enlarged by D_incr in all directions.
+"""The paper's own law (§4.2), for comparison. Every sphere is enlarged by D_incr of eq. 10 in all directions.
 
-s = min(1, Σ_ij V_ij / (f Σ_i V_i)), the same for both triggers and at every travel. The delay is in D_incr (eq. 8).
+The stiffness is s = min(1, Σ_ij V_ij / (f Σ_i V_i)) for both triggers and at every travel. V_ij is the overlap of the
+enlarged sphere i with object j, V_i the sphere's volume. D_incr includes the delay (eq. 8).
 """
 
 import math
@@ -27,12 +28,13 @@ from robot_side.laws.sensed import Sensed
 from robot_side.surroundings.surroundings import Surroundings
 
 REFERENCE_SHARE: Final = 0.05
-"""f. The paper names no reference. A smaller one gives full strength earlier, for objects beside and behind, too."""
+"""f, the share of the spheres' volume that must overlap for full strength. The paper gives no value. A smaller f gives
+full strength earlier, but also for objects beside and behind."""
 PERIOD_S: Final = 0.01
 
 
 class PaperLaw:
-    """The paper's law; keeps its result until the next look."""
+    """The paper's law. It computes a result every PERIOD_S and returns this result in between."""
 
     def __init__(
         self,
@@ -42,7 +44,7 @@ class PaperLaw:
         motion: ToolMotionSettings,
         surroundings: Surroundings | None = None,
     ) -> None:
-        """encoder_sigma_rad (n,): eq. 3. surroundings: owner of the perceived scene; a new one by default."""
+        """encoder_sigma_rad (n,): σ_θ of eq. 3. surroundings: owner of the perceived scene; a new one by default."""
         self.surroundings = surroundings or Surroundings()
         self.looked = 0
         self._uncertainty = uncertainty
@@ -52,13 +54,13 @@ class PaperLaw:
         self._sensed: tuple[float, Sensed] | None = None
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Compute one tick; the overlap at most a hundred times a second."""
+        """Return the fields of one tick. The overlap is computed again at most a hundred times a second."""
         if self._sensed is None or now_s - self._sensed[0] >= PERIOD_S - 1e-9:
             self._sensed = now_s, self._look(situation)
         return self._sensed[1]
 
     def expect(self, probability: float) -> None:
-        """Set P of eq. 10; ConfigurationError outside (0, 1)."""
+        """Set the probability P of eq. 10; ConfigurationError outside (0, 1)."""
         self._uncertainty = replace(self._uncertainty, probability=probability)
 
     def around(self, pose: GripperPose) -> Around | None:
@@ -67,11 +69,14 @@ class PaperLaw:
         return None
 
     def summary(self) -> dict[str, int]:
-        """Return the number of looks over the run."""
+        """Return how often the overlap was computed during the run."""
         return {"fields": self.looked}
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """Explain D_incr, the same for both triggers and in all directions; |v| t_d is the displacement."""
+        """Return the terms of D_incr and the overlaps with each object; both triggers have the same.
+
+        The terms are those of the sphere with the largest D_incr; its displacement is |v| t_d.
+        """
         del trigger, sensed
         enlargement_m, covariances, velocities = self._enlargements(situation)
         largest = int(enlargement_m.argmax())
@@ -92,7 +97,7 @@ class PaperLaw:
         return TriggerExplained(terms, overlaps_by_object(spheres, table, _classes_of(situation)))
 
     def _enlargements(self, situation: Situation) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return D_incr (m,), covariances (m, 3, 3) and velocities (m, 3) of the spheres."""
+        """Return D_incr (m,), position covariances (m, 3, 3) and velocities (m, 3) of the spheres."""
         jacobians = situation.pose.sphere_jacobians
         covariances = position_covariance(jacobians, self._encoder_sigma_rad)
         velocities_m_s = jacobians @ situation.joint_velocities_rad_s

@@ -1,12 +1,14 @@
-"""Path of the gripper until the arm stands: a screw motion by trigger, sticks and fingers, and samples along it.
+"""Predicted path of the gripper until the arm stands, and places on the path from which looks are made.
 
-Sticks move and turn the tool in its own frame. Its point moves with v, and it turns with ω. After t it has turned by
-θ = |ω| t, and its point has gone
+Sticks move and turn the tool in the tool's own frame, at the velocities v and ω, so the tool makes a screw motion.
+After the time t the tool has turned by θ = |ω| t, and the sticks have displaced its point by
 
     t V v,    V = 1 + (1 - cos θ)/θ [a] + (1 - sin θ/θ) [a]²,    a = ω/|ω|
 
-(exponential map of SE(3)). The trigger moves it along the approach axis z, and so along the chord V z by then. The
-chord points along z turned by θ/2. Commands under way have moved the tool by then: distances at a place include that.
+(exponential map of SE(3)). The trigger moves the tool along its approach axis z, which turns too. So the trigger
+displaces it along the chord V z. Where the turn is across z, the chord points along z turned by θ/2. Fingers add their
+own motion to their spheres. Onset distances from a place include the distance that commands under way will have moved
+the tool by then.
 """
 
 import math
@@ -20,15 +22,18 @@ from robot_side.laws.memory import EVEN_PLACES, memory_at
 from robot_side.laws.sensed import L2
 
 SPACING_M: Final = 0.015
-"""Largest motion of a sphere between two places: less than an inflated fingertip's sphere is wide. A gripper that would
-need more than EVEN_PLACES has them farther apart."""
+"""Largest motion of any sphere between two places: less than the width of an inflated fingertip's sphere. On a path
+that would need more than EVEN_PLACES, places are farther apart."""
 _LEAST_M: Final = 0.003
-"""Smaller motions are ignored."""
+"""Largest motion of any sphere up to which the path has no places ahead"""
 
 
 @inlined
 def fastest_m_s(bundle: IntArray, centers: FloatArray, tool: Vector, ahead: Vector) -> float:
-    """Return the largest |v + ω × r + own| of all spheres, there and farther on by `ahead`, in m/s; NaN for NaN."""
+    """Return the largest speed |v + ω × r + own| of all spheres in m/s; NaN if any is not finite.
+
+    Each sphere counts at its present position r from the tool, and as if it were displaced by `ahead`.
+    """
     memory = memory_at(bundle)
     velocity, turning = load(memory.velocity, 0), load(memory.velocity, 1)
     fastest, check = 0.0, 0.0
@@ -45,9 +50,10 @@ def fastest_m_s(bundle: IntArray, centers: FloatArray, tool: Vector, ahead: Vect
 def plan_places(
     bundle: IntArray, centers: FloatArray, tool: Vector, approach: Vector, until: float, ahead: float
 ) -> None:
-    """Choose the times of the places on the path, even, the last at `until`. There are none if the gripper stays.
+    """Choose the times of the even places on the path; the last is `until`. A gripper at rest gets no such places.
 
-    ahead: distance ahead (m) at which places shall be as close as at the gripper. It matters in turns.
+    ahead: distance (m) along the approach axis at which the places must be as close together as at the gripper. In a
+    turn, points farther ahead move faster.
     """
     memory = memory_at(bundle)
     state, farthest = memory.state[0], until * fastest_m_s(bundle, centers, tool, scale(ahead, approach))
@@ -60,7 +66,10 @@ def plan_places(
 
 @inlined
 def time_of_place(bundle: IntArray, side: int, place: int) -> float:
-    """Return the time until the gripper is at a place. The last two places lie half a step beside the nearest one."""
+    """Return the time in s until the gripper is at a place.
+
+    The last two places lie half a step before and after the place with the shortest onset distance of full strength.
+    """
     memory = memory_at(bundle)
     even = memory.state[0].even_places
     if place <= even:
@@ -77,7 +86,7 @@ def time_of_place(bundle: IntArray, side: int, place: int) -> float:
 
 @inlined
 def _along_screw(vector: Vector, axis: Vector, across: float, twice: float) -> Vector:
-    """Return v + across · a × v + twice · a × (a × v), the form of both a rotation and V (Rodrigues)."""
+    """Return v + across · a × v + twice · a × (a × v), with a = `axis`. Rotations (Rodrigues) and V have this form."""
     turned = cross(axis, vector)
     return add(vector, add(scale(across, turned), scale(twice, cross(axis, turned))))
 
@@ -93,10 +102,11 @@ def move(
     after: float,
     ahead: float,
 ) -> None:
-    """Move the tool and its spheres to their places in `after` seconds, and find the chord that leads on from there.
+    """Fill the memory with the pose of tool and spheres in `after` seconds, and with the chord of the trigger's path.
 
-    origin, rotation (3, 3), centers (m, 3): the present ones, kept exactly after 0 s. linear, turning: velocities of
-    the tool without the trigger's part (m/s, rad/s). ahead: the trigger's part by then, along the approach axis (m).
+    origin, rotation (3, 3), centers (m, 3): the present pose; `after` = 0 copies it without rounding. linear, turning:
+    velocities of the tool without the trigger's part (m/s, rad/s). ahead: distance (m) along the approach axis that
+    the trigger moves the tool by then.
     """
     memory = memory_at(bundle)
     stays, axis, angle = after == 0.0, unit(turning), after * norm(turning)
@@ -132,10 +142,11 @@ def go_to(
     speed: float,
     loop_age: float,
 ) -> float:
-    """Move to a place of one side, 0 for the gripper's. Return the distance (m) that the trigger has covered by then.
+    """Fill the memory with the gripper's pose at a place of one side; place 0 is the present pose.
 
-    speed: along the approach axis. Commands under way last for the loop age. A place represents the path from half a
-    step before it.
+    Return the distance (m) that the trigger has moved the gripper by then: at `speed`, along the approach axis, for at
+    most the loop age, as commands under way last no longer. It is taken half a step before the place, because a place
+    represents the path from there on.
     """
     memory, after = memory_at(bundle), time_of_place(bundle, side, place)
     forth, since = 1.0 if side != L2 else -1.0, max(after - 0.5 * memory.moments_s[0], 0.0)
@@ -156,5 +167,5 @@ def go_to_place(
     speed: float,
     loop_age: float,
 ) -> float:
-    """Move as `go_to` does, called from Python. bundle: the memory's. tool (3,)."""
+    """Do the same as `go_to`, as a kernel that Python can call. bundle: the memory's. tool (3,): position."""
     return go_to(bundle, load(tool.reshape(1, 3), 0), rotation, centers, side, place, speed, loop_age)

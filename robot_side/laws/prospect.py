@@ -1,4 +1,4 @@
-"""Parameters of a look along one side: direction, the arm's ability in it, and errors (eq. 9-10)."""
+"""Parameters of a look along one side: direction, the arm's speed and acceleration in it, and errors (eq. 9-10)."""
 
 import math
 from typing import Final
@@ -15,26 +15,27 @@ from robot_side.laws.memory import Kernel, memory_at
 from robot_side.laws.sensed import R2, STICK
 
 BEYOND_M: Final = 0.05
-"""Distance examined beyond that of loop age, reaction and braking, as the loop age varies"""
+"""Distance examined beyond the stopping distance (loop age, reaction and braking), because the loop age varies"""
 FIELD_PERIOD_S: Final = 0.01
-"""Period of looks from the gripper's place: controllers are written to no more often. Other places: three times it."""
+"""Period of looks from the gripper's present pose, as controllers are written to no more often. Looks from places ahead
+on the path have three times this period."""
 
 _find_ability = call_at_address(BOOL, ABILITY)
 _prediction_error = inlined(prediction_error)
 
 
 def stopping_s(speed: float, acceleration: float, loop_age: float) -> float:
-    """Return the time from a report until the arm stands: full speed for loop age and reaction, then braking."""
+    """Return the time in s from a report until the arm stands: full speed for loop age and reaction, then braking."""
     return loop_age + HORIZON_S + speed / acceleration
 
 
 stopping = inlined(stopping_s)
-"""`stopping_s` in kernels"""
+"""The function `stopping_s` for calls from kernels"""
 
 
 @inlined
 def horizon_m(speed: float, acceleration: float, loop_age: float) -> float:
-    """Return the distance that full speed covers before a reaction has stopped it, plus BEYOND_M."""
+    """Return the distance to examine: the stopping distance from full speed, reaction included, plus BEYOND_M."""
     return speed * (loop_age + HORIZON_S) + speed * speed / (2.0 * acceleration) + BEYOND_M
 
 
@@ -54,11 +55,12 @@ def find_prospect(
     by_operator: bool,
     gone: float,
 ) -> bool:
-    """Fill the memory's prospect and direction for one side. Return False for a Jacobian that cannot be resolved.
+    """Fill the memory's `prospect` and `direction` for a look along one side.
 
-    bundle: the memory's. rotation (3, 3): the tool's at the place of the look. jacobian (6, n): the tool's present one.
-    right, up: the stick's deflection. by_operator: the operator side predicts δ. gone: distance (m) covered before the
-    place, from which the memory's chord leads on.
+    Return False if the Jacobian or direction is not finite, or a joint's limit is not above 0. bundle: the memory's.
+    rotation (3, 3): the tool's at the look's place. jacobian (6, n): the tool's present one. right, up: the stick's
+    deflection. by_operator: whether the operator side predicts δ. gone: distance (m) that the trigger has moved the
+    gripper when it is at the look's place.
     """
     memory = memory_at(bundle)
     settings, found, able = memory.settings[0], memory.prospect[0], memory.able

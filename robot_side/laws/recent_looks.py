@@ -1,4 +1,4 @@
-"""Recent looks along each side and from each place; the shortest onset distances count."""
+"""Store of the recent looks along each side from each place. `felt` takes the shortest of their onset distances."""
 
 import math
 from typing import Final
@@ -11,14 +11,14 @@ from robot_side.laws.memory import ROOM, SIDES, memory_at
 from robot_side.laws.prospect import FIELD_PERIOD_S
 
 STEADY_S: Final = 0.1
-"""Time for which an onset distance counts: in the trigger, too, strength falls over 0.1 s."""
+"""Time for which a look's onset distances count. The operator side also lets a trigger's strength fall over 0.1 s."""
 _SAME_DIRECTION: Final = 0.999
-"""Cosine of the largest angle between looks along the same direction: 2.6°"""
+"""Cosine of the largest angle, 2.6°, at which two looks count as along the same direction"""
 
 
 @inlined
 def look_from(bundle: IntArray, side: int, places: int) -> None:
-    """Set the number of places from which one side is looked along; forget looks from the others."""
+    """Set the number of places from which looks along one side are made; forget looks from any further places."""
     memory = memory_at(bundle)
     first, kept = ROOM * side, 0
     for place in range(memory.places[side], places):
@@ -34,9 +34,9 @@ def look_from(bundle: IntArray, side: int, places: int) -> None:
 
 @inlined
 def longest_waiting(bundle: IntArray, now: float) -> tuple[float, int, int]:
-    """Return the longest wait in periods, with its side and place.
+    """Return the longest time since a look, in periods, with the look's side and place.
 
-    Places ahead on the path have three times the period.
+    Places ahead on the path have three times the period of place 0.
     """
     memory = memory_at(bundle)
     most, of_side, of_place = -math.inf, 0, 0
@@ -51,7 +51,7 @@ def longest_waiting(bundle: IntArray, now: float) -> tuple[float, int, int]:
 
 @inlined
 def longest_ago(bundle: IntArray) -> float:
-    """Return the earliest of the times of the last looks, of all sides and places."""
+    """Return the time of the longest-waiting last look: the earliest of all sides and places."""
     memory = memory_at(bundle)
     first = math.inf
     for side in range(SIDES):
@@ -62,9 +62,10 @@ def longest_ago(bundle: IntArray) -> float:
 
 @inlined
 def keep(bundle: IntArray, side: int, place: int, now: float, tool: Vector, onsets: FloatArray) -> None:
-    """Store a look along the memory's prospect. onsets (2, 8): its onset distances, fast and slow. tool: its position.
+    """Store a look that was made along the memory's prospect. onsets (2, 8): its onset distances, fast and slow list.
 
-    Looks from the same place are forgotten if too old or along another direction. Without room the oldest is dropped.
+    tool: the tool's position. Earlier looks from the same place are forgotten if they are older than STEADY_S or along
+    another direction. If the store is full, the oldest look is replaced.
     """
     memory = memory_at(bundle)
     along, first, kept = load(memory.direction.reshape(1, 3), 0), ROOM * side, 0

@@ -1,4 +1,4 @@
-"""The swept law's one compiled call a tick, from a situation to stiffness.
+"""The swept law's one compiled call per tick: it computes the stiffness of both triggers from a situation.
 
 measure the motion ─▶ due looks ─▶ prospect ─▶ look ─▶ keep ─▶ feel
 """
@@ -45,7 +45,10 @@ def _velocity(jacobian: FloatArray, first: int, rates: FloatArray) -> Vector:
 
 @building_block
 def _measure(bundle: IntArray, moment: Moment, velocity: Vector, turning: Vector, changed: bool) -> bool:
-    """Measure the gripper's motion besides the triggers. Return False for a Jacobian that cannot be resolved."""
+    """Measure the gripper's motion besides the triggers' and plan the places on its path.
+
+    Return False if the Jacobian is not finite or a joint's limit is not above 0.
+    """
     memory = memory_at(bundle)
     state, across = memory.state[0], subtract(velocity, scale(moment.speed, moment.approach))
     # The operator side traces the sticks' motion through the map.
@@ -96,10 +99,11 @@ def sense(
     bundle: IntArray,
     felt: FloatArray,
 ) -> bool:
-    """Fill `felt`, made by `felt_array`. Return False for wrong sizes, and for NaN, which would compare as far away.
+    """Fill `felt`, made by `felt_array`, with the tick's result. Return False for wrong sizes or non-finite numbers.
 
-    tool_position (3,), rotation (3, 3), jacobian (6, n), rates (n,), centers (m, 3), radii (m,), on_finger (m,). The
-    others are those of `Moment`; is_known: the loop age is.
+    NaN would compare as far away, and so give no warning. tool_position (3,), rotation (3, 3), jacobian (6, n),
+    rates (n,): the joints'. centers (m, 3), radii (m,), on_finger (m,): the spheres'. is_known: whether the loop age
+    is known. bundle: the memory's. All other arguments are those of `Moment`.
     """
     memory = memory_at(bundle)
     joints, spheres = rates.size, radii.size

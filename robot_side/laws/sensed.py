@@ -1,4 +1,4 @@
-"""Result of one tick: numbers in one array, from which messages are made when they are sent."""
+"""Result of one tick of the law: numbers in one array. Messages are made from it only when they are sent."""
 
 from functools import cached_property
 from typing import Final
@@ -10,15 +10,16 @@ from common.protocol.messages import OnsetDistances, TriggerField
 from robot_side.field.scratch import STRENGTHS
 
 R2, L2, STICK = 0, 1, 2
-"""Sides along which a law looks"""
+"""Numbers of the sides along which a law looks: the directions of both triggers and of the deflected stick"""
 DISPLACEMENT, STIFFNESS, FULL_SPEED, ACCELERATION, NUMBERS_PER_SIDE = (2 * STRENGTHS + k for k in range(5))
-"""Indices of a side's numbers, R2 before L2: after eight fast and eight slow onset distances, δ (m), s(δ), v_max, a"""
+"""Indices within one side's numbers: eight fast and eight slow onset distances come first, then δ (m), s(δ), v_max
+(m/s), a (m/s²). R2's numbers come before L2's."""
 SPEED, HORIZON, RUMBLE, ENLARGEMENT, OVERLAP, TOOL_SPEED, NUMBERS = (2 * NUMBERS_PER_SIDE + k for k in range(7))
-"""Indices after the numbers of R2 and L2; and the count of all numbers"""
+"""Indices of the numbers that follow those of R2 and L2; NUMBERS is the count of all"""
 
 
 class Sensed:
-    """Result of one tick."""
+    """Result of one tick of the law: a field along each trigger, the rumble, and figures for display."""
 
     def __init__(self, numbers: FloatArray) -> None:
         """numbers (NUMBERS,): SI units, at the indices above. They must not change later."""
@@ -26,7 +27,10 @@ class Sensed:
 
     @classmethod
     def of(cls, l2: TriggerField, r2: TriggerField, **others: float) -> "Sensed":
-        """Build one from two fields and the properties below, 0 if not given; ValueError for NaN or infinity."""
+        """Build a result from two fields and any of the properties below by name; those not given are 0.
+
+        ValueError for a property that is NaN or infinite.
+        """
         numbers: FloatArray = np.zeros(NUMBERS)
         for side, field in ((R2, r2), (L2, l2)):
             numbers[side * NUMBERS_PER_SIDE : (side + 1) * NUMBERS_PER_SIDE] = (
@@ -40,46 +44,46 @@ class Sensed:
 
     @cached_property
     def l2(self) -> TriggerField:
-        """Field along L2."""
+        """Field for L2: onset distances along its direction, with displacement, stiffness and speeds"""
         return _trigger_field(self.numbers, L2)
 
     @cached_property
     def r2(self) -> TriggerField:
-        """Field along R2."""
+        """Field for R2: onset distances along its direction, with displacement, stiffness and speeds"""
         return _trigger_field(self.numbers, R2)
 
     def stiffness(self, side: int) -> float:
-        """s(δ) of R2 or L2, 0 to 1"""
+        """Return s(δ), 0 to 1, of one side: R2 or L2."""
         return float(self.numbers[side * NUMBERS_PER_SIDE + STIFFNESS])
 
     @property
     def speed_m_s(self) -> float:
-        """v along the direction in which R2 advances"""
+        """Tool's speed along the direction in which R2 advances; negative while it retreats"""
         return float(self.numbers[SPEED])
 
     @property
     def horizon_m(self) -> float:
-        """Distance that the fields examine"""
+        """Distance ahead that is known; both triggers' onset distances are cut to it"""
         return float(self.numbers[HORIZON])
 
     @property
     def rumble(self) -> float:
-        """Danger where the stick leads, in eighths, 0 to 1"""
+        """Rumble, 0 to 1 in eighths: the share of strengths that begin within the stopping distance along the stick"""
         return float(self.numbers[RUMBLE])
 
     @property
     def enlargement_m(self) -> float:
-        """D_incr of eq. 10 along the motion: |v| t_d + D_σ, the largest of the gripper's spheres"""
+        """D_incr of eq. 10 along the motion, |v| t_d + D_σ; for the sphere with the largest"""
         return float(self.numbers[ENLARGEMENT])
 
     @property
     def overlap_m3(self) -> float:
-        """Σ V_ij of the enlarged gripper (eq. 11-12)"""
+        """Total overlap Σ V_ij of the enlarged gripper with all objects (eq. 11-12)"""
         return float(self.numbers[OVERLAP])
 
     @property
     def tool_speed_m_s(self) -> float:
-        """|v| of the tool's point"""
+        """Speed |v| of the tool's point in any direction"""
         return float(self.numbers[TOOL_SPEED])
 
 

@@ -1,12 +1,14 @@
 """The law "swept": the gripper, inflated by D_σ, is moved along each trigger until it overlaps something (§4.2).
 
-Fields take turns, one in a tick: R2, L2, and the stick while it is deflected. In between, the tool's motion is
-subtracted from the onset distances, which is exact for a translation. The shortest of the last 0.1 s count: where the
-gripper just passes an object, encoder noise alone can flip none to full.
+Looks, evaluations of the law along one direction, take turns, about one in a tick: R2, L2, and the stick while it is
+deflected. Between looks the tool's motion is subtracted from the onset distances, which is exact for a translation.
+The shortest onset distances of the last 0.1 s count: where the gripper just passes an object, encoder noise alone can
+switch between no strength and full strength.
 
-While the gripper drifts, turns, or moves its fingers, R2 and L2 are looked along from places on its path, too. The path
-ends where a command sent now has stopped the gripper (`path`). An operator side that traces its own sticks gets a map
-around the gripper instead (`around`). An object's approach in that time shortens its contact distances.
+While the gripper drifts, turns, or moves its fingers, looks along R2 and L2 are also made from places ahead on its path
+(`path`). The path ends where a command sent now has stopped the gripper. An operator side that traces its own sticks
+gets a map of onset distances around the gripper instead (`around`). An object that approaches has its contact
+distances shortened by its motion until the gripper has stopped.
 """
 
 import math
@@ -52,7 +54,7 @@ _NO_VELOCITIES: Final[FloatArray] = np.empty((0, 3))
 
 
 class Asked(NamedTuple):
-    """Arguments of one look, for `Ahead.look`."""
+    """Arguments of one look, with which `Ahead.look` repeats it: gripper, objects' classes, direction, half gap."""
 
     pose: GripperPose
     classes: IntArray
@@ -61,7 +63,7 @@ class Asked(NamedTuple):
 
 
 class SweptLaw:
-    """The law "swept"; keeps the recent looks of each side."""
+    """The law "swept". It keeps the recent looks along each side in its memory."""
 
     def __init__(
         self,
@@ -71,7 +73,7 @@ class SweptLaw:
         motion: ToolMotionSettings,
         surroundings: Surroundings | None = None,
     ) -> None:
-        """encoder_sigma_rad (n,): eq. 3. surroundings: owner of the perceived scene; a new one by default."""
+        """encoder_sigma_rad (n,): σ_θ of eq. 3. surroundings: owner of the perceived scene; a new one by default."""
         self.surroundings = surroundings or Surroundings()
         self.encoder_sigma_rad = encoder_sigma_rad
         self._uncertainty = uncertainty
@@ -92,7 +94,10 @@ class SweptLaw:
         self._room: tuple[int, SceneTable | None] = (-1, None)
 
     def sense(self, situation: Situation, now_s: float) -> Sensed:
-        """Compute one tick; ValueError for wrong sizes and numbers that are not finite. Earlier looks then stay."""
+        """Return the fields and the rumble of one tick.
+
+        ValueError for wrong sizes and for numbers that are not finite; the memory then keeps earlier looks.
+        """
         pose, scene = situation.pose, self.surroundings.see(situation.objects)
         self._make_room(pose, scene)
         if (found := self._classes_of(situation)) is not self._classes:
@@ -118,13 +123,13 @@ class SweptLaw:
         return Sensed(self._felt[:NUMBERS].copy())
 
     def expect(self, probability: float) -> None:
-        """Set P of eq. 10; ConfigurationError outside (0, 1)."""
+        """Set the probability P of eq. 10; ConfigurationError outside (0, 1)."""
         self._uncertainty = replace(self._uncertainty, probability=probability)
         self.memory.settings["quantile"] = self._uncertainty.quantile
         self._discard_probes()
 
     def around(self, pose: GripperPose) -> Around | None:
-        """Return the map of onset distances around `pose`; None while one is unknown, or nobody asks for the map."""
+        """Return the map of onset distances around `pose`; None if the map is turned off or not valid (`is_known`)."""
         until_s, onsets_m = float(self.memory.state["until"][0]), np.empty((LISTS, PROBES))
         if self._frame is None or self._classes is None or not 0.0 < until_s <= LONGEST_S:
             return None
@@ -136,24 +141,27 @@ class SweptLaw:
 
     @property
     def fits_a_message(self) -> bool:
-        """Whether the message of a map has room for all joints"""
+        """Whether a map's message has room for all joints of this arm"""
         return len(self.encoder_sigma_rad) <= MOST_JOINTS
 
     def ask_around(self, *, asked: bool) -> None:
-        """Turn looks from probes around the gripper on or off; they are off at first."""
+        """Turn the map, and so looks from probes around the gripper, on or off. It is off at first."""
         self.memory.settings["around"] = float(asked)
 
     def forget_around(self, before_s: float) -> None:
-        """Forget the probes' looks before `before_s`: the next tick repeats all of these."""
+        """Forget the probes' looks made before `before_s`, so that the next tick makes all of them again."""
         at = self.memory.around["at"]
         at[at < before_s] = -np.inf
 
     def _discard_probes(self) -> None:
-        """Discard the probes' looks, as the objects' classes or P have changed."""
+        """Discard the probes' looks, because the objects' classes or P have changed."""
         self.memory.state["counts_since"] = np.inf
 
     def summary(self) -> dict[str, int]:
-        """Return counts of the work, done and saved, over the run."""
+        """Return counts over the run: looks (`fields`), their work (`Count`), and looks with nothing near.
+
+        `flat` counts the newest scene's primitives without volume.
+        """
         totals = self.memory.totals.tolist()
         counts = {"fields": totals[Total.LOOKS]} | {one.name.lower(): totals[one] for one in Count}
         # Primitives of the newest scene without volume: nothing can overlap them, so they are not felt.
@@ -161,7 +169,10 @@ class SweptLaw:
         return counts | {"with_nothing_near": totals[Total.WITH_NOTHING_NEAR], "flat": flat}
 
     def explain(self, trigger: Trigger, situation: Situation, sensed: Sensed) -> TriggerExplained:
-        """Explain D_σ along one trigger, and the overlaps at the robot side's δ. Call it in the ticks' thread."""
+        """Return the terms of D_σ along one trigger, and the overlaps at the robot side's δ.
+
+        Call it in the thread of the ticks, because it writes to the memory.
+        """
         felt, side = (sensed.l2, L2) if trigger == "l2" else (sensed.r2, R2)
         asked = self.asked(side, situation)
         terms, sigma_m = enlargement_terms(situation, asked.along, self.encoder_sigma_rad, felt.displacement_m)
@@ -170,7 +181,7 @@ class SweptLaw:
         return TriggerExplained(terms, found)
 
     def asked(self, side: int, situation: Situation, place: int = 0) -> Asked:
-        """Return the arguments of a look along one side, from the gripper's place or one ahead on its path."""
+        """Return the arguments of a look along one side from a place; place 0 is the present pose."""
         pose, memory, (right, up) = situation.pose, self.memory, situation.lateral
         self._make_room(pose, self.surroundings.see(situation.objects))
         by_operator, age_s = situation.compensation == "operator", situation.loop_age_s
@@ -217,9 +228,10 @@ class SweptLaw:
         self.memory.kernels[:] = [kernel.address for kernel in (find_ability, find_prospect, look, sum_overlaps)]
 
     def _classes_of(self, situation: Situation) -> tuple[object, IntArray, IntArray]:
-        """Return roles and held object, the classes (k,), and those while the fingers move, as they touch the target.
+        """Return roles with the held object, the objects' classes (k,), and the classes (k,) while the fingers move.
 
-        Equal roles and held object return the last tick's own. Only a tick stores the result, not an explanation.
+        While the fingers move the target is SKIPPED, because they shall touch it. If roles and held object are those of
+        the last tick, its very tuple is returned. Only `sense` stores the result.
         """
         roles, held = situation.objects.roles, situation.held
         if self._classes is not None and self._classes[0] == (roles, held):
@@ -235,7 +247,7 @@ class SweptLaw:
         return (roles, held), classes, np.where(classes == TARGET, SKIPPED, classes)
 
     def _refuse(self, situation: Situation, now_s: float = 0.0) -> NoReturn:
-        """Raise the ValueError that names the field that is not finite or has the wrong size."""
+        """Raise a ValueError that names the field of `situation` that is not finite or has the wrong size."""
         pose, limits_rad_s, rates = situation.pose, self._limits.velocity_rad_s, situation.joint_velocities_rad_s
         joints, spheres = len(self.encoder_sigma_rad), len(pose.sphere_radii_m)
         for name, count, valid in (
@@ -256,5 +268,8 @@ class SweptLaw:
 
 
 def _widest_m(situation: Situation) -> float:
-    """Return half the gap between the fingers, the largest inflation of their spheres towards the target (§3.4)."""
+    """Return half the gap between the fingers, to which the inflation of their spheres towards the target is limited.
+
+    See §3.4; infinite without a gap.
+    """
     return math.inf if situation.gap_m is None else 0.5 * max(situation.gap_m, 0.0)

@@ -1,1 +1,1 @@
-"""Lease of the arm, observers, and the stops."""
+"""Lease of the arm, observers, and everything that stops the arm."""

@@ -1,4 +1,4 @@
-"""Messages to operators besides stiffness: Hello, and the place of each with the lease."""
+"""Messages to operators besides stiffness: Hello, and notices that tell each operator its place with the lease."""
 
 import itertools
 import math
@@ -19,16 +19,16 @@ _ANSWER_PERIOD_S = 0.1
 
 
 class Answer(NamedTuple):
-    """A payload for `peer`."""
+    """Payload that is to be sent to `peer`."""
 
     peer: bytes
     payload: bytes
     everywhere: bool
-    """Send over every connection, as it says something new."""
+    """Whether to send over every connection, because the payload has new content"""
 
 
 class Announcements:
-    """Answers and lease notices, at a bounded rate even for many strangers."""
+    """Answers to Hellos, and lease notices, at a bounded rate even if many strangers ask."""
 
     def __init__(self, new_link: Callable[[], LinkEnd], lease: Lease, tuning: Tuning) -> None:
         self._lease = lease
@@ -42,15 +42,18 @@ class Announcements:
         self._noticed_token = 0
 
     def stamp(self, now_s: float, link: LinkEnd | None = None) -> Header:
-        """Return the next header of our epoch, in one sequence for all receivers; `link` None: no certain one."""
+        """Return the next header of our epoch, from one sequence for all receivers.
+
+        link: our end of the link to the receiver; None: for no particular receiver.
+        """
         return (link or self._link).stamp(now_s, next(self._sequence))
 
     def stamp_shown(self, now_s: float) -> Header:
-        """Return the next header for messages made between ticks; their own sequence changes no core message."""
+        """Return the next header of messages made between ticks; their sequence is separate from that of all others."""
         return self._link.stamp(now_s, next(self._shown))
 
     def answer(self, participant: Participant, now_s: float) -> None:
-        """Answer a Hello with ours and a lease notice, at a bounded rate."""
+        """Answer a Hello with our Hello and a lease notice, at a bounded rate."""
         if now_s - participant.answered_s < _ANSWER_PERIOD_S:
             return
         participant.answered_s = now_s
@@ -70,7 +73,7 @@ class Announcements:
         self._answers.append(Answer(peer, encode(notice), everywhere=True))
 
     def take(self, now_s: float) -> list[Answer]:
-        """Return the answers to send now, with notices for all when something changed or the last ones are old."""
+        """Return the answers to send now. Lease notices for all are added when one changed, and every 0.1 s."""
         standing = [(one.epoch, one.session.state, one.tuned, one.marked) for one in self._lease.present()]
         changed = standing != self._noticed or self._lease.token != self._noticed_token
         if changed or now_s - self._noticed_s >= _NOTICE_PERIOD_S:

@@ -1,4 +1,4 @@
-"""The lease of the arm: one owner with a fencing token that only grows, and a bounded number of observers."""
+"""Lease of the arm: one owner with a fencing token that only grows, and a bounded number of observers."""
 
 import math
 from collections import deque
@@ -11,29 +11,29 @@ from robot_side.operators.safety import Safety
 
 
 class Participant:
-    """Operator side in one epoch."""
+    """Operator side in one of its epochs."""
 
     def __init__(self, epoch: int, peer: bytes, link: LinkEnd, now_s: float) -> None:
         self.epoch = epoch
         self.link = link
         self.session = Session()
         self.peer = peer
-        """Connection that its newest message came over."""
+        """Connection over which its newest message came"""
         self.heard_s = now_s
         self.waiting_since_s = now_s
-        """Time since which it observes; the longest waiting is the next owner."""
+        """Time since which it observes; the observer that has waited longest is the next owner"""
         self.answered_s = -math.inf
-        """Time of the last answer to its Hello."""
+        """Time of the last answer to its Hello"""
         self.next_target_was_down = True
         self.hand_over_was_down = True
         self.told_state: MotionState | None = None
-        """State of the arm in the last stiffness sent to it."""
+        """State of the robot in the last stiffness message sent to this operator"""
         self.noticed: list[object] = []
-        """Content of the last lease notice sent to it."""
+        """Content of the last lease notice sent to this operator"""
         self.tuned = 0
-        """Number of the newest request to tune."""
+        """Number of its newest request to tune"""
         self.marked = 0, ""
-        """Number of the newest mark of an episode, and why it was refused; empty if it was accepted."""
+        """Number of its newest mark of an episode, and why that was refused; empty if it was accepted"""
 
     @property
     def state(self) -> SessionState:
@@ -43,18 +43,18 @@ class Participant:
 
 MOST_OBSERVERS = 8
 MOST_AWAY = 8
-"""Most absent operators that are remembered, the newest; this bounds the memory."""
+"""Maximum number of absent operators that are remembered, the newest; this bounds the memory."""
 _ENDED_EPOCHS = 64
 
 
 class Lease:
-    """Passes the arm from operator to operator; each new owner begins disarmed."""
+    """Lease of the arm, passed from operator to operator; each new owner begins disarmed."""
 
     def __init__(self, safety: Safety) -> None:
         self.token = 0
-        """Current or latest lease token; 0 before the first."""
+        """Current or latest lease token; 0 before the first lease"""
         self.stale = 0
-        """Late messages of operators that are forgotten now."""
+        """Number of messages that came too late, of operators that are forgotten by now"""
         self._safety = safety
         self._participants: dict[int, Participant] = {}
         self._owner: Participant | None = None
@@ -66,15 +66,15 @@ class Lease:
         return self._owner
 
     def find(self, epoch: int) -> Participant | None:
-        """Return the operator of this epoch; None if it is unknown or forgotten."""
+        """Return the operator with this epoch; None if the epoch is unknown or forgotten."""
         return self._participants.get(epoch)
 
     def has_ended(self, epoch: int) -> bool:
-        """Return whether this epoch is over; it never comes back."""
+        """Return whether this epoch has ended; an ended epoch is never admitted again."""
         return epoch in self._ended
 
     def observers(self) -> list[Participant]:
-        """Return the observers, the longest waiting first."""
+        """Return the observers; the one that has waited longest comes first."""
         waiting = [one for one in self._participants.values() if one.state is SessionState.OBSERVING]
         return sorted(waiting, key=lambda one: one.waiting_since_s)
 
@@ -87,7 +87,7 @@ class Lease:
         return iter(self._participants.values())
 
     def ask(self, participant: Participant, now_s: float) -> bool:
-        """Grant the lease if it is free, else admit as an observer; False without room for another observer."""
+        """Grant the lease if it is free, else admit the participant as an observer; False without room for another."""
         if self._owner is None:
             participant.session.handle(SessionEvent.ASKED_WHILE_FREE)
             self._own(participant, now_s)
@@ -101,7 +101,7 @@ class Lease:
         return True
 
     def hand_over(self, now_s: float) -> bool:
-        """Pass the lease to the observer that has waited longest; False and no change when nobody waits."""
+        """Pass the lease to the observer that has waited longest; return False, and change nothing, if nobody waits."""
         if self._owner is None or not self._alive(self.observers(), now_s):
             return False
         self._owner.waiting_since_s = now_s
@@ -109,12 +109,12 @@ class Lease:
         return True
 
     def end_epoch_of(self, peer: bytes, epoch: int, now_s: float) -> None:
-        """End any other epoch than `epoch` of the same connection: its process restarted."""
+        """End all epochs of the connection `peer` other than `epoch`: its process has restarted."""
         for one in [one for one in self._participants.values() if one.peer == peer and one.epoch != epoch]:
             self._forget(one, SessionEvent.NEW_EPOCH, now_s)
 
     def expire(self, now_s: float) -> None:
-        """Mark participants as away after `lease_s` of silence, and forget the oldest beyond `MOST_AWAY`."""
+        """Mark participants as away after `lease_s` of silence; forget those away but the newest `MOST_AWAY`."""
         limit_s = self._safety.settings.lease_s
         for one in self._participants.values():
             if now_s - one.heard_s >= limit_s and one.state is not SessionState.AWAY:
@@ -138,7 +138,7 @@ class Lease:
         waiting = self.observers()
         self._safety.end(event, now_s)
         self._owner = None
-        # A silent observer would only hold the lease up.
+        # A silent observer would only keep the lease from others.
         alive = self._alive(waiting, now_s)
         if alive:
             alive[0].session.handle(SessionEvent.LEASE_PASSED)

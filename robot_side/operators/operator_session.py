@@ -1,4 +1,4 @@
-"""Operators that the robot side knows, and the judgement of their messages."""
+"""Operators that the robot side knows, and decisions on their messages."""
 
 import math
 from collections.abc import Callable
@@ -21,12 +21,12 @@ from robot_side.operators.watchers import Watchers
 
 
 class Receiver(NamedTuple):
-    """Peer to send a stiffness to, and the header for it."""
+    """Peer that a stiffness message is for, and the header of that message."""
 
     peer: bytes
     header: Header
     everywhere: bool
-    """Send over every connection, as the arm's state has changed."""
+    """Whether to send over every connection, because the state of the robot has changed"""
 
 
 class OperatorSession:
@@ -46,19 +46,19 @@ class OperatorSession:
         self.episodes = episodes or Episodes()
         self.lease = Lease(safety)
         self.rejected = 0
-        """Payloads that were no valid message, or came from a peer that was not admitted."""
+        """Number of payloads that were no valid message, or came from a peer that was not admitted"""
         self.other_version = 0
-        """Rejected payloads of another version of the protocol."""
+        """Number of rejected payloads of another version of the protocol"""
         self.refused = 0
-        """Refused requests to be admitted: there was no room, or the epoch had ended."""
+        """Number of refused requests to be admitted, because there was no room or the epoch had ended"""
         self.not_owners = 0
-        """Commands not from the owner, or not under its present lease; never applied."""
+        """Number of commands that were not the owner's, or not under its present lease; none of them is applied"""
         self.motion_received = 0
-        """All motion commands, of owners and others."""
+        """Number of motion commands, of the owner and of others"""
         self.driving_delay = RunningStatistics(seed)
-        """One-way delay, in seconds, of the owner's commands while the arm is armed."""
+        """One-way delay, in seconds, of the owner's commands while the arm is armed"""
         self.applied_age = RunningStatistics(seed)
-        """Age, in seconds, of the command that moves the arm, in every tick with one."""
+        """Age, in seconds, of the command that moves the arm, in every tick that has such a command"""
         self.leases_granted = 0
         self.watchers = Watchers()
         """Views that each operator watches"""
@@ -75,22 +75,22 @@ class OperatorSession:
 
     @property
     def link(self) -> LinkEnd:
-        """Our end of the link to the owner, or else to the last one."""
+        """Our end of the link to the owner; without an owner, of the link to the last owner"""
         return self._owner_link
 
     @property
     def owner_peer(self) -> bytes | None:
-        """Connection of the owner; None while there is no owner."""
+        """Connection of the owner; None while nobody owns the lease."""
         owner = self.lease.owner
         return None if owner is None else owner.peer
 
     @property
     def stale(self) -> int:
-        """Messages of all operators that came too late to be applied"""
+        """Number of messages of all operators that came too late to be applied"""
         return self.lease.stale + sum(one.link.stale for one in self.lease.known())
 
     def receive(self, peer: bytes, payload: bytes, now_s: float) -> None:
-        """Take one control payload from `peer`; only a valid, timely one of the owner can move the arm."""
+        """Take one control payload from `peer`; only a valid and timely message of the owner can move the arm."""
         self.update(now_s)
         try:
             message = decode(payload)
@@ -128,7 +128,7 @@ class OperatorSession:
             self._follow(participant, message, now_s)
 
     def _follow(self, participant: Participant, message: Hello | Tune | Mark | Watch, now_s: float) -> None:
-        """Follow a message that is no command."""
+        """Process a message that is no motion command."""
         if isinstance(message, Watch):
             self.watchers.heard(participant.epoch, message, now_s)
         elif isinstance(message, Hello):
@@ -144,7 +144,7 @@ class OperatorSession:
                 participant.link.expect_other_delay()
 
     def update(self, now_s: float) -> None:
-        """Update the lease for participants that were silent too long; to be called in every tick."""
+        """Update the lease for participants that have been silent too long; to be called in every tick."""
         if now_s == self._updated_s:
             return  # once for all messages that arrive together
         self._updated_s = now_s
@@ -153,24 +153,24 @@ class OperatorSession:
         self._follow_owner()
 
     def owners(self, now_s: float) -> list[Receiver]:
-        """Return the receiver of the owner's stiffness now; empty while there is no owner."""
+        """Return the receiver of the owner's stiffness message; an empty list while nobody owns the lease."""
         owner = self.lease.owner
         return [] if owner is None else [self._receiver(owner, now_s)]
 
     def observers(self, now_s: float) -> list[Receiver]:
-        """Return the receivers of the observers' stiffness."""
+        """Return the receivers of the observers' stiffness messages."""
         return [self._receiver(one, now_s) for one in self.lease.observers()]
 
     def shown_header(self, now_s: float) -> Header:
-        """Return the header of pictures and of the scene, which are made between ticks."""
+        """Return a header for a picture or the scene, which are made between ticks."""
         return self._announcements.stamp_shown(now_s)
 
     def view_header(self, now_s: float) -> Header:
-        """Return the header of messages to viewers."""
+        """Return a header for a message to viewers."""
         return self._announcements.stamp(now_s)
 
     def loop_age_s(self, now_s: float) -> float | None:
-        """Return the age of our stamp that the newest accepted command echoes (eq. 8); None before the first.
+        """Return the loop age (eq. 8): age of our stamp that the newest accepted command echoes; None before the first.
 
         Of a silence, the peer's or ours, only a part counts (common/silence.py).
         """
@@ -184,7 +184,7 @@ class OperatorSession:
         return permission
 
     def take_owner_changed(self) -> bool:
-        """Return whether an operator got a new lease since the last call."""
+        """Return whether an operator became the lease's owner since the last call."""
         began, self._began = self._began, False
         return began
 
@@ -213,7 +213,7 @@ class OperatorSession:
     def _admit(
         self, peer: bytes, message: Hello | MotionCommand | Tune | Mark | Watch, now_s: float
     ) -> Participant | None:
-        """Admit a new epoch, which only a Hello can begin; None for a refused epoch."""
+        """Admit a new epoch, which only a Hello can begin; None if the epoch is refused."""
         epoch = message.header.epoch
         if self.lease.has_ended(epoch):
             self.refused += isinstance(message, Hello)
@@ -237,7 +237,7 @@ class OperatorSession:
             self.not_owners += 1
             participant.session.handle(SessionEvent.WRONG_TOKEN)
             if participant is self.lease.owner:
-                # A stop counts under any lease of this owner.
+                # A stop of this owner counts under any lease token.
                 self.safety.hear_stop(command, now_s)
             return
         if not self.safety.receive(command, arrival, now_s):
@@ -256,13 +256,13 @@ class OperatorSession:
         return participant is self.lease.owner and command.token == self.lease.token
 
     def _follow_owner(self) -> None:
-        """Forget the last owner's commands as soon as there is another lease."""
+        """Forget the last owner's commands as soon as the lease has another token."""
         owner = self.lease.owner
         if owner is None or self.lease.token == self._token:
             return
         self._token = self.lease.token
         self._owner_link = owner.link
-        # A button held while waiting is no press.
+        # A button that was held before the lease began does not count as pressed.
         owner.hand_over_was_down = owner.next_target_was_down = True
         self.leases_granted += 1
         self._began = True

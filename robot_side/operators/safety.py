@@ -1,9 +1,9 @@
-"""Check of the command that may move the arm, and until when.
+"""Decision which command may move the arm, and until when.
 
-There are two limits. *Gap*: time since the last accepted command. Within the limit the last command holds. Beyond it
-the robot side disarms, and the arm itself decelerates from its measured state, as nothing renewed `valid_until`.
-*Age*: delay of a command beyond the link's own minimum. An old command is discarded; a steady delay, however long,
-adds no age.
+There are two limits. *Gap*: time since the last accepted command. Within this limit the last command holds. Beyond it
+the robot side disarms, and the arm itself decelerates from its measured state, because `valid_until` was not renewed.
+*Age*: delay of a command beyond the link's own minimum. A command above this limit is discarded; a steady delay,
+however long, adds no age.
 """
 
 from collections import deque
@@ -18,7 +18,7 @@ from common.protocol.messages import MotionCommand, MotionState
 from common.protocol.session import Session, SessionEvent, SessionState
 
 RELEASED_TRAVEL = 0.02
-"""Largest travel, 0 to 1, that counts as released: a calibrated trigger at rest reads 0, give or take a count."""
+"""Largest travel, 0 to 1, that counts as released: a calibrated trigger at rest reads 0, apart from a count or so"""
 _REMEMBERED_STOPS = 1000
 
 _Limit = Annotated[float, Meta(gt=0.0, lt=60.0)]
@@ -27,22 +27,22 @@ _Allowance = Annotated[float, Meta(ge=0.0, lt=60.0)]
 
 @dataclass(frozen=True)
 class SafetySettings:
-    """Limits, all in seconds. None can be switched off: 0 is refused, or means no allowance."""
+    """Limits of the safety checks, all in seconds. None can be switched off: 0 is refused, or means no allowance."""
 
     gap_s: _Limit = 0.1
-    """Silence without an accepted command after which the arm stops."""
+    """Time without an accepted command after which the arm stops."""
     age_s: _Limit = 0.1
-    """Queueing age beyond which, plus `jitter_s`, a command is discarded."""
+    """A command is discarded if its queueing age is above this value plus jitter_s."""
     jitter_s: _Allowance = 0.08
-    """Jitter of the link itself, not of a queue: eight times the 10 ms of the reference link."""
+    """Jitter of the link itself, not of a queue: by default eight times the 10 ms of the reference link."""
     max_delay_s: _Limit = 2.0
     """Loop age above which the arm is disarmed."""
     healthy_s: _Allowance = 1.0
-    """Time for which commands must have come, with released triggers, before arming."""
+    """Time for which commands must have arrived, with released triggers, before the arm can be armed."""
     arm_s: _Limit = 0.1
     """Age of the arm's newest state above which the arm is lost."""
     lease_s: _Limit = 0.9
-    """Silence after which an operator loses the lease: within a second, a tick included."""
+    """Silence after which an operator loses the lease; the default keeps this within a second, a tick included."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -55,24 +55,24 @@ class Permission(NamedTuple):
 
     state: MotionState
     command: MotionCommand | None
-    """Command to follow; None: stand still."""
+    """Command to follow; None: stand still"""
     valid_until_s: float
 
 
 class Safety:
-    """Guard of the arm against broken, old or unintended commands. Only the lease's owner is heard.
+    """Guard of the arm against broken, old or unintended commands; only commands of the lease's owner are given to it.
 
-    An emergency stop is latched: it outlasts its operator, until somebody arms again.
+    An emergency stop is latched: it stays when its operator leaves, until somebody arms again.
     """
 
     def __init__(self, settings: SafetySettings) -> None:
         self.stops: deque[tuple[float, str]] = deque(maxlen=_REMEMBERED_STOPS)
-        """(time, reason) of each transition out of armed, and of each emergency stop."""
+        """(time, reason) of each transition out of armed, and of each emergency stop"""
         self.discarded_by_age = 0
         self.settings = settings
         self._stopped = False
         self._stop_followed = (-1, -1)
-        """Epoch and sequence number of the newest stop that was obeyed."""
+        """Epoch and sequence number of the newest emergency stop that was obeyed"""
         self._session: Session | None = None
         self._arm_lost = False
         self._forget()
@@ -86,7 +86,7 @@ class Safety:
 
     @property
     def state(self) -> MotionState:
-        """State of the robot, under any owner."""
+        """State of the robot, whoever owns the lease."""
         if self._session is not None and self._session.state is SessionState.ARMED:
             return "armed"
         return "stopped" if self._stopped else "disarmed"
@@ -97,20 +97,20 @@ class Safety:
         return self._command
 
     def begin(self, session: Session) -> None:
-        """Begin with another owner; forget the commands of the last one."""
+        """Begin with another owner; forget the last owner's commands."""
         self._forget()
         self._session = session
         if self._stopped:
             session.handle(SessionEvent.EMERGENCY_STOP)
 
     def end(self, event: SessionEvent, now_s: float) -> None:
-        """End with the owner, who leaves by `event`."""
+        """End with the present owner, who leaves by `event`."""
         self._handle(event, now_s)
         self._forget()
         self._session = None
 
     def receive(self, command: MotionCommand, arrival: Arrival, now_s: float) -> bool:
-        """Judge one command of the owner; True if accepted. An emergency stop counts, however late."""
+        """Judge one command of the owner; return True if it is accepted. An emergency stop is obeyed, however late."""
         self.hear_stop(command, now_s)
         if not arrival.fresh:
             return False
@@ -126,9 +126,9 @@ class Safety:
         return True
 
     def hear_stop(self, command: MotionCommand, now_s: float) -> None:
-        """Stop if `command` says so, however late; a stop that was obeyed counts only once.
+        """Stop if `command` is an emergency stop, however late; each stop is obeyed only once.
 
-        A late copy of it, over another connection, must not undo an arming since.
+        A late copy of the same stop, over another connection, must not undo an arming since.
         """
         order = command.header.epoch, command.header.sequence
         followed = self._stop_followed
@@ -137,7 +137,7 @@ class Safety:
             self.emergency_stop(now_s)
 
     def emergency_stop(self, now_s: float) -> None:
-        """Stop in any state but stopped."""
+        """Stop the arm, in any state but stopped."""
         if self._session is not None and self._session.state is not SessionState.STOPPED:
             self._handle(SessionEvent.EMERGENCY_STOP, now_s)
 
@@ -150,7 +150,7 @@ class Safety:
         return Permission(state, self._command, self._accepted_s + self.settings.gap_s)
 
     def arm_measured(self, age_s: float, now_s: float) -> None:
-        """Stop if the arm's newest state, of `age_s`, is too old; to be called in every tick."""
+        """Stop the arm if its newest state is too old (age_s); to be called in every tick."""
         self._arm_lost = age_s > self.settings.arm_s
         if self._arm_lost:
             self._handle(SessionEvent.ARM_LOST, now_s, f"arm lost: its newest state is {1e3 * age_s:.0f} ms old")
@@ -198,7 +198,7 @@ class Safety:
         return self._healthy_since_s is not None and now_s - self._healthy_since_s >= self.settings.healthy_s
 
     def _handle(self, event: SessionEvent, now_s: float, why: str | None = None) -> None:
-        """Follow the session's table; every event but HEALTHY restarts the time `healthy_s`."""
+        """Apply an event to the session's state table; every event but HEALTHY restarts the time `healthy_s`."""
         if event is not SessionEvent.HEALTHY:
             self._healthy_since_s = None
         if event is SessionEvent.EMERGENCY_STOP:

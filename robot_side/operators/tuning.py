@@ -1,4 +1,4 @@
-"""Changes that the owner may make during a run: the probability P of eq. 10, and the emulated link."""
+"""Changes that the lease's owner may make during a run: the probability P of eq. 10, and the emulated link."""
 
 from collections import deque
 from collections.abc import Callable
@@ -13,12 +13,12 @@ _NOTES: Final = 20
 
 
 class Tuning:
-    """Grants requests where the run permits it; records the granted ones with their time, and counts the refused."""
+    """Grants requests to tune if the run permits it; stores granted requests with their times, counts the refused."""
 
     def __init__(self, probability: float | None = None, expect: Callable[[float], None] | None = None) -> None:
-        """probability: P at the start. expect: called with each new P; without it, no tuning is permitted."""
+        """probability: P at the start. expect: called with each new P; None: the run permits no tuning."""
         self.probability = probability
-        """Present P."""
+        """Present probability P"""
         self.refused = 0
         self._expect = expect
         self._start_s: float | None = None
@@ -38,9 +38,9 @@ class Tuning:
             self._start_s = now_s
 
     def take(self, tune: Tune, now_s: float, *, owns: bool) -> bool:
-        """Grant a request as a whole or refuse it; return whether it was granted. owns: it is the owner's."""
+        """Grant a request as a whole, or refuse it; return whether it was granted. owns: whether the owner sent it."""
         if self._expect is None or not owns:
-            why = "only the owner may" if self.permitted else "valid with: --permit-tuning"
+            why = "only the owner may" if self.permitted else "the robot side permits it with --permit-tuning"
             return self._refuse(why)
         try:
             if tune.link is not None:
@@ -67,16 +67,16 @@ class Tuning:
         return False
 
     def take_link(self) -> str | None:
-        """Return the link granted since the last call, for the emulation of this side's messages; None for none."""
+        """Return the emulated link granted since the last call, for this side's messages; None if none was granted."""
         link, self._link = self._link, None
         return link
 
     def take_notes(self) -> list[str]:
-        """Return the notes for a person since the last call."""
+        """Return the notes made since the last call, for a person to read."""
         notes = list(self._notes)
         self._notes.clear()
         return notes
 
     def summary(self) -> dict[str, Any]:
-        """Return the granted requests, with times, and the count of refused ones."""
+        """Return the granted requests, with their times, and the number of refused requests."""
         return {"permitted": self.permitted, "granted": list(self._granted), "refused": self.refused}

@@ -1,4 +1,4 @@
-"""Views that operators watch: each Watch counts for a second after its arrival."""
+"""Views that operators watch, by their Watch messages: each counts for a second after its arrival."""
 
 import math
 
@@ -10,16 +10,16 @@ _NOBODY: frozenset[str] = frozenset()
 
 
 class Watchers:
-    """Newest Watch of each operator; the session admits only those of owner and observers."""
+    """Newest Watch message of each operator; the session passes on only those of the owner and of observers."""
 
     def __init__(self) -> None:
         self.scene_begun = 0
-        """Number of times that somebody began to watch the scene."""
+        """How many times somebody began to watch the scene"""
         self._newest_s = -math.inf
         self._watching: dict[int, tuple[Watch, float]] = {}
 
     def heard(self, epoch: int, watch: Watch, now_s: float) -> None:
-        """Take one Watch of the operator `epoch`."""
+        """Take one Watch message of the operator with this epoch."""
         self._newest_s = now_s
         before = self._watching.get(epoch)
         looked = before is not None and before[0].scene and now_s - before[1] < WATCH_S
@@ -27,7 +27,7 @@ class Watchers:
         self._watching[epoch] = watch, now_s
 
     def lacks(self, now_s: float) -> tuple[int, int] | None:
-        """Return the newest picture that a watcher lacks, for both views; None unless all of them show H.264."""
+        """Return for both views the newest picture that a watcher lacks; None unless all their watchers show H.264."""
         looking = [
             watch.lacks
             for watch, heard_s in self._watching.values()
@@ -40,7 +40,7 @@ class Watchers:
         return first, second
 
     def looked_at(self, now_s: float) -> frozenset[str]:
-        """Return the watched ones of `overview`, `first_person` and `scene`."""
+        """Return which of `overview`, `first_person` and `scene` are watched."""
         if not self._watching:
             return _NOBODY
         for epoch in [epoch for epoch, (_, heard_s) in self._watching.items() if now_s - heard_s >= WATCH_S]:
@@ -48,5 +48,5 @@ class Watchers:
         return frozenset(part for part in _PARTS for watch, _ in self._watching.values() if getattr(watch, part))
 
     def expected(self, now_s: float) -> bool:
-        """Return whether a viewer may come soon: a Watch, even one without a view, came a moment ago."""
+        """Return whether a viewer may come soon: a Watch message, even one for no view, came less than a second ago."""
         return now_s - self._newest_s < WATCH_S

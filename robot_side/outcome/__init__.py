@@ -1,1 +1,1 @@
-"""Outcome of a run: its figures, and true distances and contacts."""
+"""Outcome of a run: its figures, true distances and contacts."""

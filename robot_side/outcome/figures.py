@@ -32,20 +32,20 @@ TRUTH_PERIOD_S = 0.01
 MOVING_M_S = 0.01
 """Speed above which the tool counts as moving."""
 _CONTACT_REST_S = 0.1
-"""Time within which a repeated contact with an object, on any part of the gripper, counts as the same one, in seconds:
-a sliding touch chatters, and two fingers do not close simultaneously."""
+"""Time, in seconds, within which a repeated contact with an object counts as the same contact, on any part of the
+gripper: a sliding touch chatters, and two fingers do not close simultaneously."""
 
 
 _L2_STIFFNESS, _R2_STIFFNESS = L2 * NUMBERS_PER_SIDE + STIFFNESS, R2 * NUMBERS_PER_SIDE + STIFFNESS
 _MOST_ROWS = 8 * BLOCK
-"""Most ticks that wait to be evaluated."""
+"""Maximum number of ticks that wait to be evaluated"""
 
 
 class RunFigures(Listener):
-    """Statistics over the ticks; the control reads none of them."""
+    """Statistics over the ticks of a run; control never reads them."""
 
     def __init__(self, seed: int = 0, truth: Observer | None = None) -> None:
-        """truth: observer of the simulation; None without one."""
+        """truth: observer of the simulation; None if there is none."""
         self.ticks = 0
         self._observer = truth
         self._knows_truth = truth is not None
@@ -53,7 +53,7 @@ class RunFigures(Listener):
         self._next_truth_s = -np.inf
         self._loop_age = RunningStatistics(seed)
         self._rows: list[tuple[FloatArray, bool]] = []
-        """Numbers of `Sensed`, and whether the arm was armed, in the newest ticks"""
+        """Numbers of `Sensed` in the newest ticks, each with whether the arm was armed"""
         self._enlargement = RunningStatistics(seed)
         self._enlargement_moving = RunningStatistics(seed)
         self._overlap = RunningStatistics(seed)
@@ -88,7 +88,7 @@ class RunFigures(Listener):
             self._placing, self._held = Placing(), False
 
     def on_sent(self, now_s: float) -> None:
-        """Evaluate a block of ticks at once, which is cheaper, and observe the truth."""
+        """Evaluate the stored ticks in blocks, which is cheaper than one by one, and observe the truth."""
         self._read()
         if len(self._rows) >= BLOCK:
             self._take_in()
@@ -103,7 +103,7 @@ class RunFigures(Listener):
         return time_s - (self._start_s or 0.0)
 
     def _read(self) -> None:
-        """Take the stored ticks, without failed ones."""
+        """Take the stored ticks, except failed ticks."""
         for tick in self._unread:
             if (found := tick.found) is None:
                 continue
@@ -115,7 +115,10 @@ class RunFigures(Listener):
         self._unread.clear()
 
     def tick(self, sensed: Sensed, *, armed: bool = True) -> None:
-        """Add a tick's enlargement, overlap and stiffness; nobody feels stiffness unless the arm is armed."""
+        """Add a tick's enlargement, overlap and stiffness.
+
+        Stiffness counts as 0 unless the arm is armed, as nobody feels it.
+        """
         self._newest = sensed.numbers
         self._rows.append((sensed.numbers, armed))
         self.ticks += 1
@@ -135,7 +138,7 @@ class RunFigures(Listener):
         self._r2.extend((armed * numbers[:, _R2_STIFFNESS]).tolist())
 
     def truth(self, truth: Truth, roles: dict[str, Role], now_s: float) -> None:
-        """Add true distances and contacts from the simulation; count contact onsets."""
+        """Add true distances and contacts from the simulation; count the contacts that begin."""
         self._knows_truth = True
         self._min_distance_m = _smaller(self._min_distance_m, truth.min_distance_m)
         self._min_obstacle_distance_m = _smaller(self._min_obstacle_distance_m, truth.min_obstacle_distance_m)
@@ -150,7 +153,7 @@ class RunFigures(Listener):
 
     @property
     def touched(self) -> bool:
-        """Whether there has been a contact"""
+        """Whether there has been a contact with an object that is no support"""
         return self._first_contact is not None
 
     def first_contact(self, thing: str, closing_speed_m_s: float, now_s: float) -> None:
@@ -173,7 +176,7 @@ class RunFigures(Listener):
             self._lifted_m = max(self._lifted_m, height_m - self._rest_height_m)
 
     def summary(self) -> dict[str, Any]:
-        """Return this part of the summary, in the units that the keys name."""
+        """Return the part of the run's summary that comes from these figures, in the units that the keys name."""
         self._read()
         self._take_in()
         grasp_s = None

@@ -1,4 +1,4 @@
-"""Result of placing a lifted target: when, where, how fast, and whether it was felt before the contact."""
+"""Result of placing a lifted target: when, where, how fast, and whether a warning was felt before the contact."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from robot_side.outcome.truth import TargetTruth
 
 LIFTED_M: Final = 0.01
-"""Distance from every support at which the target counts as lifted."""
+"""Distance from every support, in m, at which the target counts as lifted."""
 STANDING_M: Final = 0.001
 UPRIGHT_RAD: Final = math.radians(10.0)
 _SAME_WARNING_S: Final = 0.5
-"""Time within which a repeated warning counts as the same one, in seconds."""
+"""Time, in seconds, within which a repeated warning counts as the same warning."""
 
 
 class Placing:
@@ -36,11 +36,11 @@ class Placing:
         self._before: TargetTruth | None = None
         self._stood_m: FloatArray | None = None
         self._warned: tuple[float, float] | None = None
-        """Start of the present warning, and the gap then"""
+        """Start of the present warning, and the distance to the support at that time"""
         self._warned_last_s = -math.inf
 
     def observe(self, target: TargetTruth, held: bool, warned: bool, now_s: float) -> None:
-        """Take the truth at `now_s`. warned: whether rumble or stiffness was above 0."""
+        """Take the target's truth at `now_s`. warned: whether rumble or a trigger's stiffness was above 0."""
         if self._stood_m is None:
             self._stood_m = target.position_m
         if now_s - self._warned_last_s > _SAME_WARNING_S:
@@ -66,7 +66,7 @@ class Placing:
         self._before = target
 
     def summary(self, began_s: float | None) -> dict[str, Any]:
-        """Return the summary's `placing`; times count from `began_s`."""
+        """Return the summary's entry `placing`; its times count from `began_s`."""
         known = None if self.placed_s is None or began_s is None else self.placed_s - began_s
         now = self._before
         moved_m = None

@@ -1,4 +1,4 @@
-"""Ground truth from the simulation, for a run's figures alone; the robot side itself never uses it."""
+"""Ground truth from the simulation, only for the figures of a run; the robot side's control never uses it."""
 
 from dataclasses import dataclass
 
@@ -12,11 +12,11 @@ class TargetTruth:
     position_m: FloatArray
     """(3,) position of the target's body, in the world frame"""
     support_gap_m: float
-    """Distance to the nearest support, negative inside it; at most 1 m"""
+    """Distance from the target to the nearest support, negative inside a support; at most 1 m"""
     sinking_m_s: float
-    """Speed downwards"""
+    """Speed of the target downwards"""
     tilt_rad: float
-    """Angle between its direction that was upwards at the start and upwards"""
+    """Angle between the vertical and the direction of the target's body that pointed upwards at the start"""
 
 
 @dataclass(frozen=True)
@@ -24,11 +24,11 @@ class Truth:
     """True distances and contacts of the gripper."""
 
     min_distance_m: float | None
-    """Distance from the true, unenlarged gripper to the nearest object that is no support, negative inside it; None
-    beyond the observer's range."""
+    """Distance from the true gripper, not enlarged, to the nearest object that is no support, negative inside the
+    object; None beyond the observer's range."""
     min_obstacle_distance_m: float | None
-    """Distance to the nearest obstacle, likewise"""
+    """Distance from the true gripper to the nearest obstacle, negative inside it; None beyond the observer's range"""
     contacts: frozenset[tuple[str, str]]
-    """(gripper geom, object) pairs now in contact, supports included"""
+    """Pairs (geom of the gripper, object) that are in contact now, supports included"""
     target: TargetTruth | None = None
-    """Truth of the target; None without one"""
+    """True pose and motion of the target; None without a target"""

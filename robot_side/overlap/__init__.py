@@ -1,7 +1,8 @@
-"""Exact overlap volumes of spheres with solids, their gradients, and `warm_up` to compile beforehand.
+"""Exact overlap volumes of spheres with solids and their gradients; `warm_up` compiles the kernels beforehand.
 
-The functions are in `volumes` and `meshes.mesh`, those for a 1 kHz tick in `kernels`. `lanes.face_angles` explains the
-method. `lanes.tetrahedron_lane` and `lanes.box_lane` use it, `precise.polyhedron` has the tiny overlaps.
+The public functions are in `volumes` and `meshes.mesh`; faster ones for a 1 kHz tick, without checks, in `kernels`.
+`lanes.face_angles` explains the method, which `lanes.tetrahedron_lane` and `lanes.box_lane` use. `precise.polyhedron`
+computes overlaps that are too small for it.
 """
 
 from importlib import import_module
@@ -27,7 +28,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Load the names for meshes on first use: a program without meshes does not compile their kernels."""
+    """Import the names for meshes on first use, so that a program without meshes does not compile their kernels."""
     if name == "MeshLibrary":
         return import_module("robot_side.overlap.meshes.mesh_library").MeshLibrary
     if name in {"Mesh", "sphere_mesh"}:

@@ -1,13 +1,14 @@
 """Overlaps of (sphere, primitive) pairs in contiguous arrays, for calls in a 1 kHz tick.
 
-The caller vouches for equal numbers of rows, and for finite values, radii >= 0, rotations that are orthonormal to
-1e-6 and normals other than 0. With `vouched=False` any other value raises `DoubtfulNumbersError`; so may a value just
-within its limits. Arrays are float64 and C-contiguous, lengths in m; any other type or layout raises TypeError.
-Each function returns (volumes (p,) in m³, gradients (p, 3) = dV/dcentre in m², areas (p,) = dV/dradius in m²) in new
-arrays. The functions of `robot_side.overlap` name the wrong argument.
+The caller guarantees equal numbers of rows, finite values, radii >= 0, rotations that are orthonormal to 1e-6, and
+normals other than 0. With `trusted=False` the values are checked, except the numbers of rows: a wrong value raises
+`DoubtfulNumbersError`, and so may a value just within its limits. Unlike the functions of `robot_side.overlap`, the
+error does not name the argument. Arrays are float64 and C-contiguous, lengths in m; any other type or layout raises
+TypeError. Each function returns new arrays (volumes (p,) in m³, gradients (p, 3) = dV/dcentre in m², areas (p,) =
+dV/dradius in m²).
 
-Boxes and tetrahedra have three methods. Bounds settle most pairs that do not cut. Vector lanes compute the others. The
-precise forms recompute the few for which doubles do not suffice (see `lane_result`).
+For boxes and tetrahedra there are three methods. Bounds settle most pairs in which the surfaces do not cut. Vectorised
+loops compute the others. The precise forms recompute the few for which doubles do not suffice (see `lane_result`).
 """
 
 import os
@@ -30,37 +31,40 @@ from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
 from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
 
 PAIRS_PER_THREAD = 8192
-"""Boxes or tetrahedra that are worth a thread: nearly a millisecond of work"""
+"""Number of pairs with boxes or tetrahedra for each thread: nearly a millisecond of work"""
 
 _RESULTS = output_array(1), output_array(2), output_array(1)
 
 
 @dataclass
 class PairCounts:
-    """Numbers of pairs of spheres with boxes or tetrahedra by method; calls add to them."""
+    """Number of pairs of a sphere with a box or tetrahedron, in all and by method; each call adds to these."""
 
     pairs: int = 0
     early: int = 0
-    """Pairs that were settled by bounds alone"""
+    """Pairs that bounds alone settled"""
     precise: int = 0
-    """Pairs that were computed by the precise forms"""
+    """Pairs that the precise forms recomputed"""
 
 
 class DoubtfulNumbersError(ValueError):
-    """Error for numbers that may be out of range or NaN."""
+    """Error with `trusted=False`: some number may be out of range or NaN."""
 
 
 def sphere_pairs(
     centers: FloatArray, radii: FloatArray, other_centers: FloatArray, other_radii: FloatArray, *, trusted: bool = True
 ) -> Overlaps:
-    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with `other_centers` (p, 3), `other_radii` (p,)."""
+    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with the spheres `other_centers`, `other_radii`."""
     return _one_by_one(_sphere_loop, (centers, radii, other_centers, other_radii), trusted)
 
 
 def half_space_pairs(
     centers: FloatArray, radii: FloatArray, normals: FloatArray, offsets: FloatArray, *, trusted: bool = True
 ) -> Overlaps:
-    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with half-spaces normals (p, 3)·x <= offsets (p,)."""
+    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with the half-spaces normal · x <= offset.
+
+    normals (p, 3), offsets (p,).
+    """
     return _one_by_one(_half_space_loop, (centers, radii, normals, offsets), trusted)
 
 
@@ -83,9 +87,10 @@ def box_pairs(
     counts: PairCounts | None = None,
     threads: int | None = None,
 ) -> Overlaps:
-    """Return overlaps with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3) to world, `box_half_sizes` (p, 3).
+    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with boxes.
 
-    `threads` None chooses the number by the number of pairs.
+    box_centers (p, 3), box_rotations (p, 3, 3) from the box's frame to the spheres', box_half_sizes (p, 3). threads:
+    their number; None chooses it by the number of pairs.
     """
     arguments = centers, radii, box_centers, box_rotations, box_half_sizes
     return _many(overlap_boxes, precise_boxes, arguments, trusted, counts, threads)
@@ -100,9 +105,10 @@ def tetrahedron_pairs(
     counts: PairCounts | None = None,
     threads: int | None = None,
 ) -> Overlaps:
-    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3), in any order.
+    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with tetrahedra.
 
-    `threads` None chooses the number by the number of pairs.
+    vertices (p, 4, 3): each tetrahedron's corners in any order. threads: their number; None chooses it by the number of
+    pairs.
     """
     return _many(overlap_tetrahedra, precise_tetrahedra, (centers, radii, vertices), trusted, counts, threads)
 
@@ -146,7 +152,7 @@ def _many(
 def _part(
     overlap: Compiled, precise: Compiled, arguments: tuple[FloatArray, ...], results: Overlaps, trusted: bool
 ) -> tuple[int, int]:
-    """Fill `results`; return the number of pairs that bounds did not settle, and of those with precise forms."""
+    """Fill `results`; return the number of pairs that bounds did not settle, and that of pairs with precise forms."""
     rows: IntArray = np.empty(len(arguments[1]) + 1, dtype=np.int64)
     unsettled = overlap(*arguments, *results, rows)
     partial = rows.item(-1)

@@ -1,22 +1,22 @@
-"""Exact overlap of spheres with simple solids (eq. 11 and 12), with arguments checked and broadcast.
+"""Exact overlap of spheres with simple solids (eq. 11 and 12); arguments are checked and broadcast.
 
-In every function `centers` (..., 3) and `radii` (...) are the spheres in m, and all leading dimensions
-broadcast: centers (m, 1, 3) with vertices (k, 4, 3) give results (m, k). The result is the volumes (...) in
-m³, or, with `gradient=True`, the tuple (volumes (...), gradients (..., 3), areas (...)):
+In every function `centers` (..., 3) and `radii` (...) in m describe the spheres, and all leading dimensions
+broadcast: centers (m, 1, 3) with vertices (k, 4, 3) give results (m, k). The functions return the volumes (...) in
+m³. With `gradient=True` they return the tuple (volumes (...), gradients (..., 3), areas (...)):
 
 - gradients, dV/dcentre in m²: the direction in which moving the sphere increases the overlap fastest;
 - areas, dV/dradius in m²: the part of the sphere's surface that lies within the solid.
 
-Where the derivative jumps (equal spheres at one place), the result is that of one side. A solid without volume and a
-radius of 0 give 0 throughout.
+Where a derivative jumps, as for equal spheres at the same place, the value of one side is returned. A solid without
+volume, or a radius of 0, gives 0 for all results.
 
-ValueError for NaN, infinity, a magnitude above 1e50, a negative radius or size, a wrong or incompatible shape:
-the text names the argument, the value and the valid range.
+ValueError for NaN, infinity, a magnitude above 1e50, a negative radius or size, a wrong or incompatible shape. Its text
+names the argument, the value and the valid range.
 
-The error is at most 1e-15 of the sphere's volume (2e-15 of the great circle and 1e-15 of the sphere's surface for the
-derivatives), for all ratios of sizes and all distances from the origin. Overlaps below a millionth of the sphere have a
-relative error of 1e-9 or less; with slivers and needles that holds down to 1e-12 of the sphere.
-docs/benchmarks.md has the figures.
+For all ratios of sizes and all distances from the origin, the error of a volume is at most 1e-15 of the sphere's
+volume. That of a gradient is at most 2e-15 of the great circle's area, and that of an area 1e-15 of the sphere's
+surface. Overlaps below a millionth of the sphere have a relative error of 1e-9 or less; for slivers and needles this
+holds down to 1e-12 of the sphere. docs/benchmarks.md has the figures.
 """
 
 from collections.abc import Callable
@@ -56,7 +56,10 @@ def sphere_sphere(
 def sphere_sphere(
     centers: Array, radii: Array, other_centers: Array, other_radii: Array, *, gradient: bool = False
 ) -> FloatArray | Overlaps:
-    """Return the overlap with the spheres `other_centers` (..., 3), `other_radii` (...) in m; see this module."""
+    """Return the overlap of spheres with the spheres `other_centers` (..., 3), `other_radii` (...) in m.
+
+    The module's docstring describes arguments and results.
+    """
     return _overlaps(_SPHERES, (centers, radii, other_centers, other_radii), gradient)
 
 
@@ -71,9 +74,10 @@ def sphere_half_space(
 def sphere_half_space(
     centers: Array, radii: Array, normals: Array, offsets: Array, *, gradient: bool = False
 ) -> FloatArray | Overlaps:
-    """Return the overlap with half-spaces `normals` (..., 3) · x <= `offsets` (...), V_c of eq. 12; see this module.
+    """Return the overlap of spheres with the half-spaces normal · x <= offset, V_c of eq. 12.
 
-    The normals need not have unit length, but must not be 0.
+    `normals` (..., 3) need not have unit length, but must not be 0; `offsets` (...). The module's docstring describes
+    arguments and results.
     """
     return _overlaps(_HALF_SPACES, (centers, radii, normals, offsets), gradient)
 
@@ -107,11 +111,11 @@ def sphere_box(
     *,
     gradient: bool = False,
 ) -> FloatArray | Overlaps:
-    """Return the overlap with the boxes {c + Q diag(half) x : |xᵢ| <= 1}; see this module.
+    """Return the overlap of spheres with the boxes {c + Q diag(half) x : |xᵢ| <= 1}.
 
-    `box_centers` c (..., 3) in m, `box_rotations` Q (..., 3, 3) from the box to the spheres' frame,
-    `box_half_sizes` half (..., 3) in m. The set is that of the given, rounded Q; ValueError for
-    ‖QᵀQ - I‖ > 1e-6 (Frobenius).
+    `box_centers` c (..., 3) in m, `box_rotations` Q (..., 3, 3) from the box's frame to the spheres',
+    `box_half_sizes` half (..., 3) in m. Q is used as given, even where rounding makes it not quite a rotation;
+    ValueError for ‖QᵀQ - I‖ > 1e-6 (Frobenius). The module's docstring describes arguments and results.
     """
     return _overlaps(_BOXES, (centers, radii, box_centers, box_rotations, box_half_sizes), gradient)
 
@@ -125,13 +129,16 @@ def sphere_tetrahedron(centers: Array, radii: Array, vertices: Array, *, gradien
 def sphere_tetrahedron(
     centers: Array, radii: Array, vertices: Array, *, gradient: bool = False
 ) -> FloatArray | Overlaps:
-    """Return the overlap with the tetrahedra of `vertices` (..., 4, 3) in m, in any order; see this module."""
+    """Return the overlap of spheres with the tetrahedra of `vertices` (..., 4, 3) in m, in any order.
+
+    The module's docstring describes arguments and results.
+    """
     return _overlaps(_TETRAHEDRA, (centers, radii, vertices), gradient)
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """Overlap function of one kind of solid, and the check, name and last dimensions of each argument."""
+    """One kind of solid: the overlap function, and for each argument its check, name and trailing dimensions."""
 
     pairs: Callable[..., Overlaps]
     arguments: tuple[tuple[Check, str, tuple[int, ...]], ...]

@@ -1,1 +1,1 @@
-"""Recording of a run: the core's inputs as entries of a file."""
+"""Recording of a run: the robot side's inputs as entries of a file."""

@@ -76,13 +76,13 @@ def unpack_state(content: bytes) -> ArmState:
 
 
 class FramePacker:
-    """Encoder of frames by their changes: most objects stand still."""
+    """Encoder of frames by their changes, as most objects stand still."""
 
     def __init__(self) -> None:
         self._last: PerceivedObjects | None = None
 
     def begin_epoch(self) -> None:
-        """Encode the next frame whole."""
+        """Encode the next frame as a whole, not by its changes."""
         self._last = None
 
     def pack(self, frame: PerceivedObjects) -> bytes:
@@ -122,15 +122,15 @@ class FrameUnpacker:
     """Decoder of frames from their changes."""
 
     def __init__(self, scene: PerceivedObjects) -> None:
-        """scene: any frame of the same scene, for the meshes' shapes, which do not change and are not recorded.
+        """scene: any frame of the same scene; it has the shapes of meshes, which do not change and are not recorded.
 
-        Frames without meshes may be of other objects.
+        Frames without meshes may have other objects.
         """
         self._scene = scene
         self._last: PerceivedObjects | None = None
 
     def unpack(self, content: bytes) -> PerceivedObjects:
-        """Decode a frame; ValueError or struct.error for invalid content, or for changes after a gap."""
+        """Decode a frame; ValueError or struct.error for invalid content, or for changes without the frame before."""
         time_s, whole = _FRAME.unpack_from(content)
         if not whole and self._last is None:
             raise ValueError("a frame of changes alone, without a frame before it")

@@ -1,6 +1,6 @@
 """Recording of the core's inputs and messages, so that a replay can compute the run again bit for bit.
 
-In a tick this costs an append; the idle time encodes the notes (common/recording/side.py).
+In a tick, recording costs only an append to a list; the notes are encoded in idle time (common/recording/side.py).
 """
 
 import struct
@@ -23,7 +23,7 @@ _HAPTICS: Final = "haptics"
 
 
 class Recorder(Listener):
-    """Listener that passes each payload and each tick to `note`."""
+    """Listener that gives each payload and each tick to the function `note`."""
 
     def __init__(self, note: Callable[[Any], None]) -> None:
         self._note = note
@@ -42,7 +42,7 @@ class Recorder(Listener):
 
 
 class RobotEncoder:
-    """Encoder of the recorder's notes to entries."""
+    """Encoder of the recorder's notes as entries of a recording."""
 
     def __init__(self) -> None:
         self._frames = FramePacker()
@@ -50,12 +50,12 @@ class RobotEncoder:
         self._frame: PerceivedObjects | None = None
 
     def begin_epoch(self) -> None:
-        """Encode state and frame whole the next time."""
+        """Encode the next state and the next frame as a whole."""
         self._frames.begin_epoch()
         self._state = self._frame = None
 
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
-        """Return a note's time and entries; telemetry goes to `views`."""
+        """Return the time of a note, and its entries; telemetry is given to `views`."""
         if not isinstance(noted, Tick):
             kind, now_s, *content = noted
             parts = [msgspec.json.encode(*content)] if kind == Kind.EPISODE else [text(content[0]), content[1]]
@@ -78,5 +78,5 @@ class RobotEncoder:
 
 
 def robot_header(settings: RobotSettings, epoch: int, clock_domain: str) -> dict[str, Any]:
-    """Return the provenance of the core; to be called once its kernels are compiled."""
+    """Return the core's provenance for the recording's header; to be called after the kernels are compiled."""
     return provenance(settings, epoch, clock_domain) | {"kernels": kernel_digests()}

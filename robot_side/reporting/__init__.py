@@ -1,1 +1,1 @@
-"""Messages to the operator side: content, time and link."""
+"""Messages to the operator side: their content, when they leave, and over which connections."""

@@ -1,4 +1,4 @@
-"""Reports of the link's figures, to the owner and for the robot side's status."""
+"""Reports of the link's figures, for the lease's owner and for the robot side's status."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -16,7 +16,7 @@ _NAMES: Final = {"video": "pictures"}
 
 
 class LinkReporter:
-    """Maker of a report every 0.5 s, while there is an owner."""
+    """Maker of a report every 0.5 s, while an operator owns the lease."""
 
     def __init__(
         self,
@@ -25,7 +25,7 @@ class LinkReporter:
         pictures: Callable[[], Mapping[str, float | int] | None],
         tcp: Callable[[bytes], TcpFigures],
     ) -> None:
-        """pictures: rate_hz, quality and size; None without cameras. tcp: the operating system's figures of a peer."""
+        """pictures: returns rate_hz, quality and size, or None without cameras. tcp: returns a peer's TCP figures."""
         self._session = session
         self._budget = budget
         self._pictures = pictures
@@ -37,7 +37,7 @@ class LinkReporter:
         self._report: LinkReport | None = None
 
     def status(self) -> dict[str, float | str | None]:
-        """Return the values of the newest report, with the present rate and queue."""
+        """Return the values of the newest report, with the present values of the budget: rate and queueing delay."""
         return ({} if self._report is None else self._report.values()) | self._budget.status()
 
     def due(self, now_s: float) -> list[Outgoing]:

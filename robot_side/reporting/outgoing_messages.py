@@ -1,4 +1,4 @@
-"""Messages of the robot side: stiffness for operators, telemetry for viewers."""
+"""Messages of the robot side: stiffness for operators, and telemetry for viewers."""
 
 import math
 from typing import Final, Literal, NamedTuple
@@ -17,37 +17,38 @@ from robot_side.operators.operator_session import Receiver
 
 OutgoingStream = Literal["haptics", "telemetry", "video", "scene"]
 TOPICS: Final[dict[OutgoingStream, bytes]] = {"telemetry": b"telemetry", "video": VIDEO_TOPIC, "scene": SCENE_TOPIC}
-"""Topics of the streams to viewers; the scene has an own stream, as its large messages would delay telemetry."""
+"""Topics of the streams to viewers. The scene has its own stream, because its large messages would delay telemetry."""
 
 SHOWN_NAME = 100
-"""Most characters of an object's name that are sent and shown; messages are limited."""
+"""Maximum number of characters of an object's name that are sent and shown, as messages are limited"""
 _AROUND_S: Final = 0.1
 _AROUND_AGAIN_S: Final = 0.4
-"""Period of an unchanged map, in seconds: a lost one is missing for no longer."""
+"""Seconds after which an unchanged map is sent again, so that a lost one is replaced"""
 _NO_HEADER = Header(0, 0, 0.0)
 _FASTEST_M_S, _LARGEST_M = 100.0, 100.0
-"""Limits of sent values: a simulation about to become unstable must still be able to report its figures."""
+"""Limits of sent values: even a simulation that is about to become unstable must be able to report its figures."""
 
 
 class Outgoing(NamedTuple):
-    """Payload to send: haptics to `peer` over the control port, other streams to all viewers."""
+    """Payload to send: of haptics to `peer` at the control port, of other streams to all viewers."""
 
     stream: OutgoingStream
     peer: bytes
     payload: bytes
     everywhere: bool = False
-    """Send over every connection of `peer`, as it must arrive soon; else over the next in turn"""
+    """Whether to send over every connection of `peer`, because the message must arrive soon; else over the next one in
+    turn"""
 
 
 class MapSchedule:
-    """Schedule of maps in messages: ten a second while the map changes, and one every 0.4 s otherwise."""
+    """Schedule of maps in stiffness messages: ten a second while the map changes, otherwise one every 0.4 s."""
 
     def __init__(self) -> None:
         self._sent: Around | None = None
         self._sent_s = self._looked_s = -math.inf
 
     def due(self, law: Law, pose: GripperPose, now_s: float) -> Around | None:
-        """Return the map if one is due."""
+        """Return the map (`Around`) if it is due, else None."""
         if now_s - self._looked_s < _AROUND_S:
             return None
         self._looked_s, around = now_s, law.around(pose)
@@ -66,9 +67,9 @@ def stiffness_message(
     stands: bool = False,
     around: Around | None = None,
 ) -> Outgoing:
-    """Return the stiffness for `receiver`. told_m_s: commanded speed along the direction in which R2 advances.
+    """Return the stiffness message for `receiver`; told_m_s: commanded speed in the direction in which R2 advances.
 
-    stands: the held object stands on something. around: the map, in messages in which it is due.
+    stands: whether the held object stands on something. around: the map, if one is due in this message.
     """
     update = StiffnessUpdate(
         receiver.header,
@@ -94,9 +95,9 @@ def telemetry(
     *,
     holding: bool,
 ) -> Telemetry:
-    """Return the telemetry for viewers, still without a header.
+    """Return the telemetry for viewers; its header is filled in later.
 
-    target: name, and centre (3,) in metres, NaN where unknown.
+    target: the target's name, and its centre (3,) in metres, NaN if unknown.
     """
     target_in_tool = None
     if target is not None and target[1] is not None and np.isfinite(target[1]).all():

@@ -1,15 +1,16 @@
-"""Perceptual deadband for stiffness and telemetry: they leave when the receiver's error would be felt, or seen.
+"""Perceptual deadband for stiffness and telemetry: a message leaves when the receiver's error would be felt or seen.
 
-The deadband has a predictor (Hinterseer, Hirche, Chaudhuri, Steinbach and Buss 2008; IEEE 1918.1.1). The receiver holds
-the onset distances of the last message and extrapolates the gripper's motion. It uses its own commands and at most the
+The deadband has a predictor (Hinterseer, Hirche, Chaudhuri, Steinbach and Buss 2008; IEEE 1918.1.1). The receiver keeps
+the onset distances of the last message, and extrapolates the gripper's motion by its own commands and at most the
 acceleration in that message (operator_side/feel/commands_under_way.py). The same model runs here, with the commands
 that have arrived.
+An error of a distance counts if it is above 1 mm and above 2 % of the distance: fingers stop an arm to a few
+millimetres.
 
-An error of a distance counts above 1 mm and 2 % of it: fingers stop an arm to a few millimetres.
-- A distance longer than the receiver believes makes triggers stiff too early. It may wait for 10 ms after the last
-  message: a controller cannot be written sooner.
-- A shorter distance makes them stiff too late. It leaves at once, from a quarter of the deadband on. With the wire's
-  resolution that is less than half a millimetre, the required repeatability of stops.
+- A true distance that is longer than the receiver's makes triggers stiff too early. The message may wait until 10 ms
+  after the last one: a controller cannot be written sooner.
+- A true distance that is shorter makes triggers stiff too late. The message leaves at once, from a quarter of the
+  deadband on. With the wire's resolution that is less than half a millimetre, the required repeatability of stops.
 """
 
 import math
@@ -41,9 +42,9 @@ from robot_side.laws.sensed import (
 _DEADBAND_M: Final = 1e-3
 _DEADBAND_SHARE: Final = 0.02
 _NEARER: Final = 0.25
-"""Share of the deadband above which a shorter distance leaves at once."""
+"""Share of the deadband above which a distance that became shorter is sent at once"""
 _HALF_A_TICK_S: Final = 0.5e-3
-"""Tolerance of a deadline, in seconds: the nearest tick counts."""
+"""Tolerance of a deadline, in seconds: half a tick, so that the nearest tick counts"""
 _EIGHTHS: Final = 8.0
 _STATES: Final[dict[MotionState, int]] = {state: number for number, state in enumerate(get_args(MotionState))}
 _ARMED: Final = _STATES["armed"]
@@ -54,26 +55,27 @@ _BELIEF: Final = np.dtype(
         *((name, np.int64) for name in ("known", "state", "obeyed")),
     ]
 )
-"""Belief of the receiver. sent, now: times (s). displacement, speed, target: motion along R2 by commands since then.
-commanded: the arm's commanded speed in the message (m/s). known: a message has been sent. state: that of motion, plus
-_STANDS if the held object stands. obeyed: sequence number of the newest command."""
+"""What the receiver computes from the last message. sent, now: times of that message and of the last update, in s.
+displacement, speed, target: motion along R2 by commands since that message, in m and m/s. commanded: the arm's
+commanded speed in the message, in m/s. known: whether a message has been sent. state: number of the state of motion,
+plus _STANDS if the held object stands. obeyed: sequence number of the newest command when the message was sent."""
 
 _follow = inlined(follow)
 
 
 class StiffnessDeadband:
-    """Deadband for one receiver, with its belief from message to message."""
+    """Deadband for the stiffness messages of one receiver, with what the receiver computes from the last message."""
 
     def __init__(self, *, full_rate: bool = False) -> None:
-        """full_rate: send a stiffness in every tick."""
+        """full_rate: send a stiffness message in every tick."""
         self._full_rate = full_rate
         self.interval_s = 0.0
-        """Least time between two stiffnesses, set by the link's rate; a change of state never waits"""
+        """Minimum time between two stiffness messages, in s, set by the link's rate; a change of state never waits."""
         self._sent: FloatArray = np.zeros(NUMBERS)
         self.forget()
 
     def forget(self) -> None:
-        """Begin with another receiver, which knows nothing yet."""
+        """Begin with another receiver, to which nothing has been sent yet."""
         self._belief: np.ndarray = np.zeros(1, dtype=_BELIEF)
 
     def due(
@@ -85,10 +87,10 @@ class StiffnessDeadband:
         command: MotionCommand | None,
         now_s: float,
     ) -> bool:
-        """Decide whether this leaves at `now_s`; then the receiver is assumed to know it.
+        """Return whether a stiffness message leaves at `now_s`; if it does, it counts as received.
 
-        told_m_s: commanded speed from this tick on, along the direction in which R2 advances, by `command`; None:
-        nothing moves. stands: the held object stands on something.
+        told_m_s: commanded speed from this tick on, in the direction in which R2 advances. command: the command from
+        which that speed follows; None if nothing moves. stands: whether the held object stands on something.
         """
         obeyed, travel, by_operator = 0, 0.0, True
         if command is not None:
@@ -109,10 +111,10 @@ def _braking_m(speed: float, acceleration: float) -> float:
 
 @inlined
 def _wrong(numbers: FloatArray, sent: FloatArray, side: int, moved: float, patient: bool) -> bool:
-    """Compare the distances with the sent ones minus `moved` (m); return whether an error counts.
+    """Compare the distances with the sent distances minus `moved` (m); return whether an error counts.
 
-    patient: longer distances do not count. A distance at the horizon is no shorter one: nothing is known beyond it, and
-    the last message still holds.
+    patient: ignore distances that became longer. A distance at the horizon never counts as shorter: nothing is known
+    beyond the horizon, and the last message still holds.
     """
     for place in range(side * NUMBERS_PER_SIDE, side * NUMBERS_PER_SIDE + DISPLACEMENT):
         onset = numbers[place]
@@ -181,7 +183,7 @@ def _due(
     full_rate: bool,
     now: float,
 ) -> bool:
-    """Decide, and update the receiver's belief; sent, numbers (NUMBERS,): those of `Sensed`."""
+    """Return whether a message leaves, and update what the receiver computes; sent, numbers (NUMBERS,): of `Sensed`."""
     belief = beliefs[0]
     if belief.known == 1:
         acceleration = sent[R2 * NUMBERS_PER_SIDE + ACCELERATION]
@@ -202,14 +204,14 @@ def _due(
 
 
 _SEEN_M: Final = 0.5e-3
-"""Visible change, in m or m/s"""
+"""Change that a viewer sees, in m or m/s"""
 _SEEN_SHARE: Final = 0.01
 _SEEN_PERIOD_S: Final = 0.02
 _SEEN_AT_LEAST_S: Final = 0.1
 
 
 class TelemetryDeadband:
-    """Deadband for the viewers, with the last telemetry."""
+    """Deadband for the telemetry to viewers; it keeps the last telemetry that left."""
 
     def __init__(self) -> None:
         self._sent: Telemetry | None = None
@@ -217,7 +219,7 @@ class TelemetryDeadband:
         self._looked_s = self._sent_s = -math.inf
 
     def may_be_due(self, words: tuple[Any, ...], now_s: float) -> bool:
-        """Return whether to make a telemetry for `due`: when its words change, and 50 times a second."""
+        """Return whether to make a telemetry for `due`: when its texts and states change, else 50 times a second."""
         changed = words != self._words
         if not changed and now_s - self._looked_s + _HALF_A_TICK_S < _SEEN_PERIOD_S:
             return False
@@ -227,7 +229,7 @@ class TelemetryDeadband:
         return True
 
     def due(self, view: Telemetry, now_s: float) -> bool:
-        """Return whether it leaves: its change is visible, or the last one left 0.1 s ago."""
+        """Return whether a telemetry leaves: its change is visible, or the last one left 0.1 s ago."""
         sent = self._sent
         if sent is not None and now_s - self._sent_s + _HALF_A_TICK_S < _SEEN_AT_LEAST_S and _alike(view, sent):
             return False

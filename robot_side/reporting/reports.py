@@ -1,4 +1,4 @@
-"""Messages of a tick: answers, stiffness for operators, telemetry for viewers."""
+"""Messages of one tick: answers, stiffness for operators, and telemetry for viewers."""
 
 from typing import Final
 
@@ -18,23 +18,23 @@ from robot_side.reporting.perceptual_deadband import StiffnessDeadband, Telemetr
 from robot_side.surroundings.surroundings import Sight
 
 OBSERVER_PERIOD_S: Final = 0.02
-"""Period of stiffness for observers, in seconds"""
+"""Period of the stiffness messages to observers, in seconds"""
 
 
 class Reports:
-    """Deadbands and schedules of the messages."""
+    """Choice of the messages that are due in a tick, by deadbands and schedules."""
 
     def __init__(self, session: OperatorSession, law: Law, *, full_rate: bool = False) -> None:
-        """full_rate: send a stiffness in every tick."""
+        """full_rate: send a stiffness message in every tick."""
         self.stiffness_sent = 0
         self.felt = StiffnessDeadband(full_rate=full_rate)
-        """Deadband that decides when a stiffness leaves"""
+        """Deadband that decides when a stiffness message to the lease's owner leaves"""
         self._session, self._law = session, law
         self._around, self._seen = MapSchedule(), TelemetryDeadband()
         self._next_observers_s = -np.inf
 
     def begin_epoch(self) -> None:
-        """Begin with another operator."""
+        """Begin with another owner of the lease, to which nothing has been sent yet."""
         self.felt.forget()
         self._around = MapSchedule()
 
@@ -47,7 +47,7 @@ class Reports:
         parts: tuple[Sight, Grip, Motion],
         now_s: float,
     ) -> list[Outgoing]:
-        """Return the messages that are due."""
+        """Return the messages that are due at `now_s`."""
         session, (sight, grip, motion) = self._session, parts
         felt = sensed, motion.told_m_s, permission.state, grip.touchdown.stands
         outgoing = [Outgoing("haptics", *answer) for answer in session.take_answers(now_s)]

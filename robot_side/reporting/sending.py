@@ -19,11 +19,11 @@ class Sockets(Protocol):
     """Sockets for sending."""
 
     def send(self, peer: bytes, payload: bytes, *, everywhere: bool) -> bool:
-        """Send to one peer."""
+        """Send a payload to one peer; everywhere: over each of its connections."""
         ...
 
     def publish(self, topic: bytes, payload: bytes) -> None:
-        """Send to all viewers."""
+        """Send a payload to all viewers, under `topic`."""
         ...
 
 
@@ -37,10 +37,10 @@ def _corrupted(leaving: _Leaving, flip: BitFlip) -> _Leaving:
 
 
 class Sending:
-    """Sender: haptics leave at once, telemetry if there is room, pictures and the scene in pieces between ticks."""
+    """Sender: haptics leave at once, telemetry if the budget permits, pictures and scene in pieces between ticks."""
 
     def __init__(self, link: LinkSpec, sockets: Sockets, first_number: int) -> None:
-        """first_number: first number of messages that leave in pieces; different in each run."""
+        """first_number: number of the first message that leaves in pieces; different in each run."""
         self.budget: Budget[OutgoingStream] = Budget(_PACED, first_number)
         self._link, self._sockets = link, sockets
         self._lines: dict[Stream, DelayLine[_Leaving]] = {
@@ -60,7 +60,10 @@ class Sending:
                 self._enter(message, TOPICS[message.stream], now_s)
 
     def send(self, queue: OutgoingQueue | None, now_s: float) -> None:
-        """Send the messages that are due. queue: of the owner's link; None while there is no owner."""
+        """Send the messages that are due.
+
+        queue: queueing delays of messages to the owner; None while nobody owns the lease.
+        """
         self.budget.hear(queue, now_s)
         for stream, payload, is_piece in self.budget.take(now_s):
             topic = TOPICS[stream] + (PIECE if is_piece else b"")
@@ -84,23 +87,23 @@ class Sending:
             line.change(self._link.profile("to_operator", stream))
 
     def next_due(self) -> float | None:
-        """Return the time at which the next message is due in the emulated link; None if it is empty."""
+        """Return the time at which the emulated link next delivers a message; None if the link is empty."""
         return min((due_s for line in self._lines.values() if (due_s := line.next_due()) is not None), default=None)
 
     @property
     def left_bit_s(self) -> float:
-        """Rate that haptics and telemetry leave, in bit/s"""
+        """Rate that haptics and telemetry leave for pictures and the scene, in bit/s"""
         return self.budget.left_bit_s
 
     @property
     def begins(self) -> bool:
-        """Whether the link has shown no limit yet"""
+        """Whether no limit of the link's rate has been noticed yet"""
         return self.budget.controller.begins
 
     def backlog_s(self, stream: OutgoingStream, now_s: float) -> float:
-        """Return the queueing delay of a new message of `stream`, in seconds, by the budget or in the emulated link."""
+        """Return how long a new message of `stream` would wait, in seconds, in the budget or in the emulated link."""
         return max(self.budget.waiting_s(stream), self._lines[stream].backlog_s(now_s))
 
     def summary(self) -> dict[str, Any]:
-        """Return the summary's `link`: figures of the emulation."""
+        """Return the summary's entry `link`: figures of the emulated link."""
         return link_summary("to_operator", {name: line for name, line in self._lines.items() if line.figures.sent})

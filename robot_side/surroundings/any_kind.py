@@ -1,4 +1,4 @@
-"""Nearest point of a primitive of any kind, and contact of a moving sphere with the primitive."""
+"""For a primitive of any kind: nearest point, and contact of a moving sphere with the primitive."""
 
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block
@@ -12,7 +12,7 @@ _nearest, _contact = by_kind([kind.nearest for kind in KINDS]), by_kind([kind.co
 
 @building_block
 def nearest(kind: int, shapes: FloatArray, row: int, point: Vector) -> Nearest:
-    """Return the nearest point of the primitive in `row`; for a mesh, of the box around it."""
+    """Return signed distance and direction from `point` to the primitive in `row`; for a mesh, to the box around it."""
     found: Nearest = _nearest(kind, shapes, row, point)
     return found
 
@@ -21,6 +21,6 @@ def nearest(kind: int, shapes: FloatArray, row: int, point: Vector) -> Nearest:
 def contact(
     kind: int, shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, reach: float
 ) -> Contact:
-    """Return the first contact of a sphere that moves along the unit vector `along`; for a mesh, with its box."""
+    """Return the first contact of a sphere moving along the unit vector `along`; for a mesh, with the box around it."""
     found: Contact = _contact(kind, shapes, row, start, radius, along, reach)
     return found

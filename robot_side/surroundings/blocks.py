@@ -1,7 +1,7 @@
-"""Bounding volume hierarchy: blocks of objects that lie together, and blocks of blocks; far ones are skipped at once.
+"""Bounding volume hierarchy: blocks of 64 neighbouring objects, and groups of 64 blocks.
 
-The order is that of a space-filling curve (Morton 1966). It needs no tree, and stays when objects move: the bounds of
-their blocks follow them. A block skips 64 objects, a block of blocks 4 096.
+A far block is skipped at once. Objects are ordered along a space-filling curve (Morton 1966), so no tree is needed. The
+order stays when objects move; only the bounds of the blocks follow them.
 """
 
 import math
@@ -14,15 +14,16 @@ from robot_side.compiled.kernel import compiled, inlined, input_array, input_ind
 from robot_side.surroundings.bounds import write_around
 
 TOGETHER: Final = 64
-"""Objects in a block, and blocks in a block of blocks."""
+"""Number of objects in a block, and of blocks in a group"""
 _CELLS: Final = 1 << 16
-"""Cells along each axis of the curve"""
+"""Number of cells along each axis, in which the curve orders the positions"""
 
 
 def in_blocks(object_bounds: FloatArray) -> IntArray:
-    """Return the order in blocks of the objects that have bounds (k, 4); infinite objects come first.
+    """Return the indices of the objects that have bounds, in the order of the blocks; infinite objects come first.
 
-    Objects that fit in one block keep their order.
+    object_bounds (k, 4): centre and radius; a negative radius means no bounds. Objects that fit in one block keep their
+    order.
     """
     there = np.flatnonzero(object_bounds[:, 3] >= 0.0)
     if len(there) <= TOGETHER:
@@ -40,7 +41,7 @@ def in_blocks(object_bounds: FloatArray) -> IntArray:
 
 
 def _spread(numbers: np.ndarray) -> np.ndarray:
-    """Return the 16 bits of each number (n,), with two zeros after each bit."""
+    """Return each 16-bit number (n,) with two zeros inserted after each bit."""
     for shift, mask in ((16, 0x0000FF0000FF), (8, 0x00F00F00F00F), (4, 0x0C30C30C30C3), (2, 0x249249249249)):
         numbers = (numbers | (numbers << np.uint64(shift))) & np.uint64(mask)
     return numbers
@@ -48,7 +49,10 @@ def _spread(numbers: np.ndarray) -> np.ndarray:
 
 @inlined
 def bound_blocks(bounds: FloatArray, which: IntArray, blocks: FloatArray, groups: FloatArray) -> None:
-    """Write the bounds of the blocks `which`, rising, and of the blocks around them. bounds (o, 4): in block order."""
+    """Write the bounds of the blocks `which` (rising indices), and of the groups that contain these blocks.
+
+    bounds (o, 4): of the objects, in the order of the blocks.
+    """
     for k in range(which.size):
         first = which[k] * TOGETHER
         write_around(bounds, first, min(first + TOGETHER, bounds.shape[0]), blocks[which[k]])
@@ -66,23 +70,23 @@ def _bound(bounds: FloatArray, which: IntArray, blocks: FloatArray, groups: Floa
 
 
 class Blocks:
-    """Order of the objects, and bounds of their blocks."""
+    """Order of a scene's objects, and bounds of their blocks."""
 
     def __init__(self, object_bounds: FloatArray, order: IntArray | None = None) -> None:
-        """object_bounds (k, 4): the objects'. order: that of earlier positions; by default a new one."""
+        """object_bounds (k, 4): centres and radii. order: as found for earlier positions; None makes a new one."""
         self.order = in_blocks(object_bounds) if order is None else order
-        """(o,) objects that have bounds"""
+        """(o,) indices of the objects that have bounds, in the order of the blocks"""
         self._object_bounds = object_bounds
         self.bounds: FloatArray = object_bounds[self.order]
-        """(o, 4) of each object, in the order"""
+        """(o, 4) centre and radius around each object, in `order`"""
         self.blocks: FloatArray = np.empty((-(-len(self.order) // TOGETHER), 4))
-        """(b, 4) around each block"""
+        """(b, 4) centre and radius around each block"""
         self.groups: FloatArray = np.empty((-(-len(self.blocks) // TOGETHER), 4))
-        """(c, 4) around each block of blocks"""
+        """(c, 4) centre and radius around each group of blocks"""
         _bound(self.bounds, np.arange(len(self.blocks)), self.blocks, self.groups)
 
     def places(self, things: IntArray) -> IntArray:
-        """Return the place of each of these objects in the order; -1 for an object without bounds."""
+        """Return the position in `order` of each of these objects; -1 for an object without bounds."""
         found = np.full(len(self._object_bounds), -1)
         found[self.order] = np.arange(len(self.order))
         return found[things]

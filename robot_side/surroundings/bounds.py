@@ -1,4 +1,4 @@
-"""Bounding spheres of primitives, objects and groups, and a test whether a swept sphere reaches one (broad phase)."""
+"""Bounding spheres of primitives, objects and blocks, and a test whether a swept sphere touches one (broad phase)."""
 
 import math
 from typing import Final
@@ -13,7 +13,7 @@ _ENLARGED: Final = 1.0 + 1e-9
 
 @inlined
 def passes(center: Vector, along: Vector, reach: float, bounds: FloatArray, row: int, radius: float) -> bool:
-    """Return whether a sphere that is swept by `reach` along the unit vector `along` touches the bounds in `row`."""
+    """Return whether a sphere swept by `reach` along the unit vector `along` touches the bounding sphere in `row`."""
     if not bounds[row, 3] >= 0.0:
         return False
     offset = subtract(load(bounds, row), center)
@@ -25,9 +25,10 @@ def passes(center: Vector, along: Vector, reach: float, bounds: FloatArray, row:
 
 @inlined
 def around(bounds: FloatArray, first: int, end: int) -> tuple[Vector, float]:
-    """Return a sphere around the bounds from `first` to `end`. Its radius is -inf for none, inf if one is infinite.
+    """Return centre and radius of a sphere around the bounding spheres in the rows `first` to `end` - 1.
 
-    bounds (n, 4): centres and radii of spheres.
+    The radius is -inf without rows, and inf if one of the bounding spheres is infinite. bounds (n, 4): centres and
+    radii.
     """
     low, high, middle = (math.inf, math.inf, math.inf), (-math.inf, -math.inf, -math.inf), (0.0, 0.0, 0.0)
     for row in range(first, end):
@@ -44,6 +45,6 @@ def around(bounds: FloatArray, first: int, end: int) -> tuple[Vector, float]:
 
 @inlined
 def write_around(bounds: FloatArray, first: int, end: int, written: FloatArray) -> None:
-    """Write the sphere of `around` (4,)."""
+    """Write the centre and radius that `around` returns into `written` (4,)."""
     middle, radius = around(bounds, first, end)
     written[0], written[1], written[2], written[3] = middle[0], middle[1], middle[2], radius

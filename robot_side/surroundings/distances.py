@@ -1,4 +1,4 @@
-"""Distances of points from the objects of a frame, by the nearest points of the compiled pass."""
+"""Distances from points and spheres to the objects of a frame, by the compiled functions for nearest points."""
 
 import numpy as np
 
@@ -12,9 +12,9 @@ from robot_side.surroundings.scene_table import SceneTable
 
 
 def nearest_points(points_m: FloatArray, scene: SceneTable, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return signed distances (p,) in m, and directions (p, 3), from points (p, 3) to the primitives `rows` (p,).
+    """Return distances (p,) in m and directions (p, 3) from points (p, 3) to the primitives `rows` (p,), pair by pair.
 
-    Positive outside. The direction is the unit vector along which the distance falls fastest.
+    Distances are positive outside. A direction is the unit vector along which the distance falls fastest.
     """
     distances, directions = np.empty(len(rows)), np.empty((len(rows), 3))
     points_m = np.ascontiguousarray(points_m)
@@ -26,7 +26,10 @@ def nearest_points(points_m: FloatArray, scene: SceneTable, rows: IntArray) -> t
 
 
 def nearest_mesh_points(points_m: FloatArray, scene: SceneTable, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Do as `nearest_points`, for rows that are all meshes. ValueError for a scene without a mesh library."""
+    """Return what `nearest_points` returns, for rows that are all meshes.
+
+    ValueError for a scene without a mesh library.
+    """
     # A scene without meshes does not load the kernels for them.
     from robot_side.overlap.meshes.mesh_library import nearest_mesh_pairs  # noqa: PLC0415
 
@@ -43,7 +46,7 @@ def nearest_mesh_points(points_m: FloatArray, scene: SceneTable, rows: IntArray)
 
 
 def object_distances(centers_m: FloatArray, radii_m: FloatArray, scene: SceneTable, reach_m: float) -> FloatArray:
-    """Return the distance (k,) from spheres (m,) to each object; infinite beyond `reach_m`."""
+    """Return each object's distance (k,) in m to the nearest of the spheres (m,); infinite beyond `reach_m`."""
     gaps: FloatArray = np.full(len(scene.objects.names), np.inf)
     spheres = np.concatenate([centers_m, radii_m[:, None]], axis=1)
     _least_gaps(spheres, scene.bounds, scene.shapes, scene.kinds, scene.object_index, reach_m, gaps)
@@ -84,7 +87,10 @@ def _least_gaps(
     reach: float,
     gaps: FloatArray,
 ) -> None:
-    """Lower `gaps` (k,) to the distances to primitives other than meshes, as far as bounds lie within `reach`."""
+    """Lower each object's gap (k,) to the least distance from the spheres to its primitives other than meshes.
+
+    Primitives whose bounds are farther away than `reach` are skipped.
+    """
     middle, size = around(spheres, 0, spheres.shape[0])
     for row in range(kinds.size):
         if kinds[row] == MESH or norm(subtract(load(bounds, row), middle)) - bounds[row, 3] - size > reach:

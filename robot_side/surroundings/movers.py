@@ -1,8 +1,8 @@
-"""Frames that differ from an earlier one by the poses of some objects: only the objects that move cost time.
+"""Frames that differ from a first frame only by the poses of some objects (movers), so that only these cost time.
 
-A camera makes one `Movers` of the objects that may move. Each new frame brings only the numbers of these. First come n
-rows of 20, one for each of their primitives (see `kinds.layout`), grouped by object and ordered by kind. Then come m
-rows, one for each object: position, rotation and velocity. The first frame has all other objects.
+A camera makes one `Movers` with the objects that may move. Each new frame has only the movers' numbers (n + m, 20).
+First come n rows, one for each primitive of the movers (see `kinds.layout`), grouped by object and ordered by kind.
+Then come m rows, one for each mover: position, rotation and velocity. All other objects are as in the first frame.
 """
 
 import math
@@ -19,16 +19,16 @@ from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.placing import numbers_of, primitives_of
 
 OF_OBJECTS: Final = {"positions_m": (3,), "rotations": (3, 3), "velocities_m_s": (3,)}
-"""Arrays of a frame with a row for each object, in the order of the object's numbers"""
+"""Arrays of a frame that have a row for each object, and the shape of a row, in the order of an object's numbers"""
 
 
 class Part(NamedTuple):
-    """Places of the values of a frame's array among the movers' numbers."""
+    """Where the values of one array of a frame are among the movers' numbers."""
 
     places: IntArray
-    """(r,) rows of the numbers"""
+    """(r,) rows of the movers' numbers"""
     rows: IntArray
-    """(r,) rows of the array"""
+    """(r,) rows of the frame's array, in the same order"""
     columns: slice
     shape: tuple[int, ...]
 
@@ -37,20 +37,22 @@ class Movers:
     """Objects of one frame that may be elsewhere in later frames."""
 
     def __init__(self, first: PerceivedObjects, things: IntArray) -> None:
-        """things (m,): indices into the names of `first`, rising. ValueError for other indices, or if `first` is
-        itself a frame of movers."""
+        """things (m,): indices of the objects in the names of `first`, rising.
+
+        ValueError for other indices, or if `first` is itself a frame of movers.
+        """
         if first.since is not None:
             raise ValueError("first is itself a frame of movers; valid: a complete frame")
         beyond = things.size > 0 and (things[0] < 0 or things[-1] >= len(first.names))
         if beyond or (np.diff(things) <= 0).any():
-            raise ValueError(f"things holds {things}; valid: rising places among {len(first.names)} objects")
+            raise ValueError(f"things holds {things}; valid: rising indices below {len(first.names)}")
         self.first = first
         self.things = things
         self.measured = first.velocities_m_s is not None
         owners, kinds, rows_of_kind = primitives_of(first)
         own = np.flatnonzero(np.isin(owners, things))
         self._own = own[np.argsort(owners[own], kind="stable")]
-        """(n,) indices into all primitives of the frame"""
+        """(n,) indices of the movers' primitives among all primitives of the frame"""
         self.first_rows = np.searchsorted(owners[self._own], np.append(things, len(first.names)))
         self.parts = self._all_parts(kinds[self._own], rows_of_kind[self._own])
         made_whole = {*self.parts, "time_s", "roles", "since"}
@@ -69,7 +71,7 @@ class Movers:
         return parts
 
     def numbers_in(self, objects: PerceivedObjects) -> FloatArray:
-        """Return the movers' numbers in a frame of the same objects; NaN for unknown poses and velocities."""
+        """Return the movers' numbers (n + m, 20) in a frame of the same objects; NaN for unknown poses, velocities."""
         of_objects = [getattr(objects, name) for name in OF_OBJECTS]
         shapes = OF_OBJECTS.values()
         count = len(self.things)
@@ -85,9 +87,9 @@ class Movers:
         return self.numbers_in(self.first)
 
     def frame(self, time_s: float, numbers: FloatArray, roles: tuple[Role, ...]) -> PerceivedObjects:
-        """Return a new frame: the movers by their numbers, all else as in the first frame.
+        """Return a new frame: the movers have these numbers (n + m, 20), all other objects are as in the first frame.
 
-        roles: of all objects. ValueError for another number of rows or roles.
+        roles: of all objects. ValueError for numbers of another shape or type, or for another number of roles.
         """
         shape = len(self._own) + len(self.things), NUMBERS
         if numbers.shape != shape or numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
@@ -98,7 +100,7 @@ class Movers:
 
 
 class _MoversFrame(PerceivedObjects):
-    """Frame of movers; each array is built on first read."""
+    """Frame that a `Movers` made; each array is built when it is first read."""
 
     def __init__(self, **said: Any) -> None:
         vars(self).update(said)

@@ -1,4 +1,4 @@
-"""Update of a scene table by a frame of movers: one call checks their numbers and writes their rows."""
+"""Update of a scene table by a frame of movers: one compiled call checks the movers' numbers and writes their rows."""
 
 import math
 from typing import Final
@@ -15,9 +15,9 @@ from robot_side.surroundings.validity import is_possible
 
 WRITTEN: Final = 0
 FLAT: Final = 1
-"""A primitive has no volume: nothing is written."""
+"""Result: a primitive has no volume, so nothing was written"""
 IMPOSSIBLE: Final = 2
-"""A primitive's numbers are invalid: nothing is written."""
+"""Result: a primitive's numbers are invalid, so nothing was written"""
 _scene = SCENE.at
 
 
@@ -65,8 +65,9 @@ def write_movers(
 ) -> int:
     """Write the primitives of the objects `things` (m,) and bound their blocks. Return WRITTEN, FLAT or IMPOSSIBLE.
 
-    numbers (n + m, 20) as in `movers`; places (m,) in the order of blocks, or -1. measured: with velocities.
-    shape (1, 20) and bound (1, 4): scratch.
+    numbers (n + m, 20) as in `movers`. places (m,): each object's position in the order of the blocks, or -1. blocks:
+    rising indices of the blocks with these objects. measured: whether the numbers include velocities. shape (1, 20),
+    bound (1, 4): scratch.
     """
     scene = _scene(bundle)
     found = _judged(scene, things, numbers, measured, shape, bound)

@@ -1,7 +1,8 @@
-"""Overlap of a sphere with one primitive of any kind (eq. 11-12): short closed forms inlined, others by address.
+"""Overlap of a sphere with one primitive of any kind (eq. 11-12).
 
-A scene compiles only the kernels of its own kinds. Boxes, tetrahedra and meshes: the lanes of `robot_side.overlap`
-without the precise forms, exact to 1e-13 of the sphere. Ellipsoids: quadrature, to some 1e-9. A strength needs 1e-3.
+Short closed forms are inlined. All other kernels are called by their addresses, so that a scene compiles only the
+kernels of its own kinds. Boxes, tetrahedra and meshes use the lanes of `robot_side.overlap` without the precise forms,
+exact to 1e-13 of the sphere. Ellipsoids use quadrature, exact to about 1e-9. Strengths need only 1e-3.
 """
 
 from collections.abc import Callable
@@ -67,9 +68,9 @@ def overlap(
     meshes: IntArray,
     overlap_gradient: FloatArray,
 ) -> float:
-    """Return V of a sphere and the primitive in `row`; fill `overlap_gradient` (3,) with dV/dcentre.
+    """Return the overlap V of a sphere and the primitive in `row`; fill `overlap_gradient` (3,) with dV/dcentre.
 
-    kernels: addresses by kind.
+    kernels: address of each kind's overlap kernel.
     """
     found: float = _overlap_by_kind(kind, kernels, shapes, row, center, radius, meshes, overlap_gradient)
     return found

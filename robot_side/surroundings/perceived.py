@@ -16,65 +16,65 @@ if TYPE_CHECKING:
 
 
 KINDS: Final = (sphere.KIND, box.KIND, tetrahedron.KIND, half_space.KIND, mesh.KIND, ellipsoid.KIND)
-"""Kinds by their numbers in `kinds.layout`; their fields are those of PerceivedObjects"""
+"""Kinds of primitives; each has the index that is its number in `kinds.layout`, and its arrays in PerceivedObjects."""
 
 
 @dataclass(frozen=True, eq=False)
 class PerceivedObjects:
     """Objects at their perceived poses, in the world frame, as contiguous arrays by kind of primitive.
 
-    An object may consist of several primitives: `*_object` (k,) holds each primitive's index into `names`.
-    Ignored objects have no primitives. Frames compare by identity.
+    An object may consist of several primitives: `*_object` (k,) holds each primitive's index into `names`. Ignored
+    objects have no primitives. Frames compare by identity. The fields' texts give the arrays' shapes.
     """
 
     time_s: float
-    """Time of the frame"""
+    """Time of the frame, in s"""
     names: tuple[str, ...]
     roles: tuple[Role, ...]
     sphere_centers_m: FloatArray
-    """(s, 3)"""
+    """(s, 3) centres of the spheres"""
     sphere_radii_m: FloatArray
-    """(s,)"""
+    """(s,) radii of the spheres"""
     sphere_object: IntArray
     box_centers_m: FloatArray
-    """(b, 3)"""
+    """(b, 3) centres of the boxes"""
     box_rotations: FloatArray
-    """(b, 3, 3) box to world"""
+    """(b, 3, 3) rotations of the boxes, box to world"""
     box_half_sizes_m: FloatArray
-    """(b, 3)"""
+    """(b, 3) half sizes of the boxes"""
     box_object: IntArray
     tetrahedron_vertices_m: FloatArray
-    """(t, 4, 3)"""
+    """(t, 4, 3) corners of the tetrahedra"""
     tetrahedron_object: IntArray
     half_space_normals: FloatArray
-    """(p, 3) unit; solid where normal·x <= offset"""
+    """(p, 3) unit normals of the half-spaces, which are solid where normal·x <= offset"""
     half_space_offsets_m: FloatArray
-    """(p,)"""
+    """(p,) offsets of the half-spaces"""
     half_space_object: IntArray
     mesh_library: "MeshLibrary | None" = None
     """Shapes of meshes, prepared once for all frames; None without meshes"""
     mesh_index: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    """(q,) into `mesh_library`"""
+    """(q,) index of each mesh's shape in `mesh_library`"""
     mesh_positions_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     """(q, 3) origins of the meshes' own frames"""
     mesh_rotations: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
-    """(q, 3, 3) mesh to world"""
+    """(q, 3, 3) rotations of the meshes, mesh to world"""
     mesh_object: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     ellipsoid_centers_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
-    """(e, 3)"""
+    """(e, 3) centres of the ellipsoids"""
     ellipsoid_rotations: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
-    """(e, 3, 3) ellipsoid to world"""
+    """(e, 3, 3) rotations of the ellipsoids, ellipsoid to world"""
     ellipsoid_half_axes_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
-    """(e, 3)"""
+    """(e, 3) half axes of the ellipsoids"""
     ellipsoid_object: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     positions_m: FloatArray | None = field(default_factory=lambda: None)
-    """(k, 3) origin of each object's own frame, that of its first primitive, in the world frame; None if unknown"""
+    """(k, 3) origin of each object's own frame (its first primitive's) in the world frame; None if unknown"""
     rotations: FloatArray | None = field(default_factory=lambda: None)
-    """(k, 3, 3) object to world, with `positions_m`"""
+    """(k, 3, 3) rotation from each object's own frame to the world frame; None if unknown"""
     velocities_m_s: FloatArray | None = field(default_factory=lambda: None)
-    """(k, 3) of the objects, in the world frame; None if not measured: the objects count as at rest"""
+    """(k, 3) velocity of each object in the world frame. None if not measured; objects then count as at rest."""
     since: "tuple[SomeObjects, FloatArray] | None" = field(default=None, init=False, repr=False)
-    """Objects that may have moved since an earlier frame, and their numbers; None: any may have"""
+    """Movers that made this frame, and their numbers; None if any object may have moved"""
 
 
 class SomeObjects(Protocol):
@@ -88,7 +88,7 @@ class SomeObjects(Protocol):
 
     @property
     def at_first(self) -> FloatArray:
-        """Numbers of the objects in `first`"""
+        """Numbers of these objects in the frame `first`"""
         ...
 
 

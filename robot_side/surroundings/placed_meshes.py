@@ -22,7 +22,7 @@ from robot_side.surroundings.perceived import PerceivedObjects
 
 
 class MeshColumns(NamedTuple):
-    """Columns of placed meshes and of their library; the fields are those of PlacedMeshes."""
+    """Columns of placed meshes and of their library, for kernels; the fields are those of PlacedMeshes."""
 
     rows: IntArray
     mesh: IntArray
@@ -50,7 +50,7 @@ _at = MESHES.at
 
 
 class PlacedMeshes:
-    """Meshes of one scene table; positions and rotations follow the movers."""
+    """Meshes of one scene table; their positions and rotations are updated with the movers."""
 
     def __init__(self, objects: PerceivedObjects, rows_of_kind: IntArray) -> None:
         """rows_of_kind (n,): for each row of the scene table, its index among the primitives of its kind."""
@@ -91,7 +91,7 @@ def overlap_one_mesh(
     bundle: IntArray,
     overlap_gradient: FloatArray,
 ) -> float:
-    """Return the overlap with a closed mesh."""
+    """Return the overlap of a sphere with the closed mesh in `row`."""
     meshes = _at(bundle)
     tables, place, center = _tables(meshes), meshes.rows[row], (x, y, z)
     mesh = meshes.mesh[place]
@@ -120,7 +120,7 @@ def contact_with_mesh(
 ) -> Contact:
     """Return the first contact of a sphere at (x, y, z) that moves along (u, v, w); û·n is 0 unless the mesh is convex.
 
-    inside: return the distance to the next triangle in front, even if they overlap.
+    inside: return the distance to the next triangle in front, even if sphere and mesh overlap.
     """
     meshes = _at(bundle)
     tables, place = _tables(meshes), meshes.rows[row]

@@ -49,12 +49,12 @@ def _place(
 
 
 class Rows(NamedTuple):
-    """Result of `placed_rows`, with the fields of SceneTable."""
+    """Result of `placed_rows`; the fields are as in SceneTable."""
 
     shapes: FloatArray
     bounds: FloatArray
     volumes: FloatArray
-    """(n,) of the primitives, in m³"""
+    """(n,) volume of each primitive, in m³"""
     object_bounds: FloatArray
     object_volumes: FloatArray
     solid: bool
@@ -62,7 +62,10 @@ class Rows(NamedTuple):
 
 
 def placed_rows(numbers: FloatArray, kinds: IntArray, first_rows: IntArray) -> Rows:
-    """Return the rows of primitives (n, 20) of these kinds; object k's begin at first_rows[k]."""
+    """Return the rows of a scene table, for primitives with these numbers (n, 20) and kinds (n,).
+
+    The primitives of object k are from first_rows[k] up to first_rows[k + 1].
+    """
     rows, objects, numbers = len(kinds), len(first_rows) - 1, numbers.copy()
     bounds, volumes = np.empty((rows, 4)), np.empty(rows)
     object_bounds, object_volumes = np.empty((objects, 4)), np.empty(objects)
@@ -72,7 +75,7 @@ def placed_rows(numbers: FloatArray, kinds: IntArray, first_rows: IntArray) -> R
 
 
 class Primitives(NamedTuple):
-    """All primitives of a frame (n), grouped by kind."""
+    """All primitives of a frame (n), grouped by kind; fields as `primitives_of` returns them."""
 
     owners: IntArray
     kinds: IntArray
@@ -80,7 +83,7 @@ class Primitives(NamedTuple):
 
 
 def primitives_of(objects: PerceivedObjects) -> Primitives:
-    """Return the object of each primitive, its kind, and its row in the kind's arrays of the frame."""
+    """Return the index of each primitive's object, its kind, and its row in the kind's arrays of the frame."""
     owners = [getattr(objects, kind.owner) for kind in KINDS]
     counts = [len(owner) for owner in owners]
     kinds = np.repeat(np.arange(len(KINDS)), counts)

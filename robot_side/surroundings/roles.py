@@ -1,4 +1,4 @@
-"""Roles of objects, from their names or chosen by a person."""
+"""Roles of objects, by their names or as a person chooses them."""
 
 from collections.abc import Iterable, Mapping
 
@@ -14,7 +14,7 @@ _ROLE_OF_PREFIX = {
 
 
 def role_from_name(name: str) -> Role:
-    """Return the role by the beginning of a name, in upper or lower case; an obstacle if it has none."""
+    """Return the role that the beginning of a name tells, in upper or lower case; OBSTACLE for any other name."""
     for prefix, role in _ROLE_OF_PREFIX.items():
         if name.lower().startswith(prefix):
             return role
@@ -22,9 +22,9 @@ def role_from_name(name: str) -> Role:
 
 
 def assign_roles(names: Iterable[str], chosen: Mapping[str, Role]) -> dict[str, Role]:
-    """Return each object's role: the chosen one, else the one by its name.
+    """Return each object's role: the chosen role, else the role that its name tells.
 
-    ConfigurationError if `chosen` names an object that is not there.
+    ConfigurationError if `chosen` names an object that does not exist.
     """
     roles = {name: role_from_name(name) for name in names}
     for name in chosen:

@@ -1,4 +1,4 @@
-"""Columns of a scene for kernels: rows of primitives, objects, and blocks of objects; contact with any of them."""
+"""Columns of a scene for kernels: primitives, objects and blocks of objects; and contact with any primitive."""
 
 from typing import Final, NamedTuple
 
@@ -14,7 +14,7 @@ from robot_side.surroundings.kinds.layout import CONTACT, MESH, MESH_CONTACT, SH
 
 
 class SceneColumns(NamedTuple):
-    """Columns of the bundle; the fields are those of SceneTable."""
+    """Columns of a scene, passed to kernels as one bundle; the fields are those of SceneTable."""
 
     bounds: FloatArray
     shapes: FloatArray
@@ -40,7 +40,7 @@ _mesh_contact = call_at_address(MESH_CONTACT, CONTACT)
 
 @inlined
 def contact_in_front(scene: SceneColumns, row: int, start: Vector, along: Vector, radius: float, reach: float) -> float:
-    """Return the distance at which a sphere next touches a triangle of a mesh in front; infinite beyond the reach."""
+    """Return the distance at which a sphere next touches a front triangle (n·û < 0) of a mesh, or infinity."""
     found, _ = _mesh_contact(scene.kernels[-1], (scene.meshes, row, *start, *along, radius, reach, True))
     return float(found)
 
@@ -49,21 +49,25 @@ def contact_in_front(scene: SceneColumns, row: int, start: Vector, along: Vector
 def contact_with(
     scene: SceneColumns, row: int, start: Vector, along: Vector, radius: float, reach: float, clear: bool
 ) -> Contact:
-    """Return the first contact of a sphere with the primitive in `row`; û·n is 0, no bound, for a mesh with dents.
+    """Return the first contact of a sphere with the primitive in `row`.
 
-    clear: the sphere is known not to overlap, so a mesh is not tested for that.
+    For a mesh that is not convex û·n is 0: no bound. clear: the sphere is known not to overlap, so a mesh is not tested
+    for an overlap.
     """
     kind = scene.kinds[row]
     found, closing = contact(kind, scene.shapes, row, start, radius, along, reach)
     if kind == MESH and found <= reach:
-        # The contact found is that with the box around the mesh.
+        # So far the contact is the one with the box around the mesh.
         found, closing = _mesh_contact(scene.kernels[-1], (scene.meshes, row, *start, *along, radius, reach, clear))
     return found, closing
 
 
 @inlined
 def next_object(scene: SceneColumns, place: int, center: Vector, along: Vector, reach: float, radius: float) -> int:
-    """Return the first place in the order, from `place` on, of an object that a swept sphere may meet (broad phase)."""
+    """Return the first index in `object_order`, from `place` on, of an object that a swept sphere may touch.
+
+    Return the number of objects in the order if there is none.
+    """
     size = scene.object_order.size
     while place < size:
         block = place // TOGETHER

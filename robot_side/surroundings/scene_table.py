@@ -1,4 +1,4 @@
-"""Table of one frame's objects for the compiled pass: a row for each primitive, grouped by object."""
+"""Table of one frame's objects for the compiled law: a row for each primitive, grouped by object."""
 
 from dataclasses import InitVar, dataclass
 from functools import cached_property
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class MoverRows:
-    """Places of the movers in a table."""
+    """Positions of the movers in a table's order of blocks, and the blocks that contain them."""
 
     def __init__(self, movers: SomeObjects, table: "SceneTable") -> None:
         self.movers = movers
@@ -28,13 +28,13 @@ class MoverRows:
         self.blocks = np.unique(self.places[self.places >= 0] // TOGETHER)
         sizes = np.diff(table.first_rows)[movers.things]
         self.solid = bool((np.diff(movers.first_rows) == sizes).all())
-        """Whether the table has all of the movers' primitives"""
+        """Whether the table has all of the movers' primitives: none was left out for want of volume"""
         self.room: tuple[FloatArray, FloatArray] = np.empty((1, NUMBERS)), np.empty((1, 4))
 
 
 @dataclass(eq=False)
 class SceneTable:
-    """Primitives (n rows) of k objects, in the order of the objects."""
+    """Table of the primitives (n rows) of k objects, in the order of the objects."""
 
     objects: PerceivedObjects
     bounds: FloatArray
@@ -42,7 +42,7 @@ class SceneTable:
     shapes: FloatArray
     """(n, 15) in the layout of each kind (`kinds`); for meshes, the boxes around them"""
     kinds: IntArray
-    """(n,)"""
+    """(n,) number of each primitive's kind"""
     rows_of_kind: IntArray
     """(n,) row of each primitive in its kind's arrays of `objects`"""
     first_rows: IntArray
@@ -50,12 +50,12 @@ class SceneTable:
     object_bounds: FloatArray
     """(k, 4) centre and radius of a sphere around each object"""
     object_volumes: FloatArray
-    """(k,) in m³"""
+    """(k,) volume of each object, in m³"""
     flat: int
-    """Number of primitives without volume: nothing can overlap them, so they are left out."""
+    """Number of primitives left out because they have no volume, so that nothing can overlap them"""
     order: InitVar[IntArray | None] = None
     moving: MoverRows | None = None
-    """Movers whose newest numbers the table holds, if any"""
+    """Movers whose newest numbers are in the table; None without such"""
 
     def __post_init__(self, order: IntArray | None) -> None:
         self.blocks = Blocks(self.object_bounds, order)
@@ -64,7 +64,7 @@ class SceneTable:
 
     @cached_property
     def kernels(self) -> IntArray:
-        """Addresses of the overlap kernels by kind, then of the contact kernel of meshes; 0 if not needed"""
+        """Address of each kind's overlap kernel, then of the meshes' contact kernel; 0 for a kernel not needed"""
         found = np.zeros(len(KINDS) + 1, dtype=np.int64)
         for number, kind in enumerate(KINDS):
             if kind.kernel is not None and (self.kinds == number).any():
@@ -75,22 +75,22 @@ class SceneTable:
 
     @cached_property
     def meshes(self) -> IntArray:
-        """Bundle of `placed`"""
+        """Bundle of the columns of `placed`, for kernels; zeros without meshes"""
         return np.zeros((1, 2), dtype=np.int64) if self.placed is None else self.placed.bundle
 
     @cached_property
     def bundle(self) -> IntArray:
-        """Bundle of this table for kernels"""
+        """Bundle of this table's columns, for kernels"""
         return SCENE.bundle(self)
 
     @cached_property
     def object_index(self) -> IntArray:
-        """(n,) into `objects.names`"""
+        """(n,) index of each primitive's object in `objects.names`"""
         return np.repeat(np.arange(len(self.first_rows) - 1), np.diff(self.first_rows))
 
     @cached_property
     def placed(self) -> "PlacedMeshes | None":
-        """Placed meshes; None without meshes"""
+        """Placed meshes of the frame; None without meshes"""
         if self.objects.mesh_library is None:
             return None
         # A scene without meshes does not load the kernels for them.
@@ -127,7 +127,7 @@ def go_to(table: SceneTable, objects: PerceivedObjects) -> bool:
 
 
 def _write_movers(table: SceneTable, moving: MoverRows, numbers: FloatArray) -> int:
-    """Write the movers by their numbers; return the result of `write_movers`."""
+    """Write the movers' numbers into the table; return the result of `write_movers`."""
     movers = moving.movers
     where = movers.things, moving.places, moving.blocks
     found = int(write_movers(numbers, *where, movers.measured, table.bundle, *moving.room))
@@ -143,7 +143,7 @@ def _owners(objects: PerceivedObjects) -> tuple[IntArray, ...]:
 
 
 def moved_table(last: SceneTable, objects: PerceivedObjects) -> SceneTable | None:
-    """Return the table of the same objects at new poses; None if the objects differ or any has no volume."""
+    """Return the table of the same objects at new poses; None if the objects differ or a primitive has no volume."""
     same = last.flat == 0 and len(last.objects.names) == len(objects.names)
     owners = zip(_owners(last.objects), _owners(objects), strict=True)
     if not (same and all(old is new or old.tobytes() == new.tobytes() for old, new in owners)):
@@ -181,7 +181,7 @@ def _table(
 
 
 def make(objects: PerceivedObjects) -> SceneTable:
-    """Return the table of a valid frame: primitives grouped by object, without those that have no volume."""
+    """Return the table of a valid frame: primitives grouped by object, without primitives that have no volume."""
     owners, kinds, rows_of_kind = primitives_of(objects)
     numbers = numbers_of(objects)
     volumes = placed_rows(numbers, kinds, np.zeros(1, dtype=np.int64)).volumes

@@ -1,4 +1,4 @@
-"""Owner of the perceived scene: tables of the newest frames, the target and its centre."""
+"""Owner of the perceived scene: tables of the newest frames, the target and the target's centre."""
 
 from typing import Final
 
@@ -25,7 +25,8 @@ class Surroundings:
     def see(self, frame: PerceivedObjects) -> SceneTable:
         """Return the table of a frame, made on first use; ValueError if `require_valid` refuses the frame.
 
-        Frames with the same first frame share one table, updated in place by each call. A refused one changes nothing.
+        Frames with the same first frame share one table, updated in place by each call. A refused frame changes
+        nothing.
         """
         first = frame if frame.since is None else frame.since[0].first
         for kept in (first, frame):

@@ -1,4 +1,4 @@
-"""Choice of the target: centres of objects, and the next target at the operator's button."""
+"""Choice of the target: centres of objects, and the next target when the operator presses the button for it."""
 
 import math
 
@@ -14,12 +14,12 @@ from robot_side.surroundings.scene_columns import SCENE
 from robot_side.surroundings.scene_table import SceneTable
 
 _OFF_AXIS_WEIGHT = 3.0
-"""Weight of a distance across the approach axis, against one along the axis, in the order of objects"""
+"""Factor by which distances across the approach axis count more than along it, when objects are ordered by nearness"""
 _scene = SCENE.at
 
 
 def object_centers(objects: PerceivedObjects) -> FloatArray:
-    """Return the mean of each object's primitives' centres (k, 3) in m; NaN for half-spaces and ignored objects.
+    """Return each object's centre (k, 3), the mean of its primitives' centres, in m; NaN if infinite or ignored.
 
     A mesh's centre is that of its bounding box in its own frame.
     """
@@ -67,8 +67,9 @@ def next_target(
 ) -> str | None:
     """Return the name of the next target when the operator asks for another one; None if there is no other.
 
-    Obstacles ahead of the tool, and the target, are ordered by nearness along the approach axis. The object after the
-    `present` target is next; the first one follows the last one, and follows a target without a centre.
+    Obstacles ahead of the tool, and the target, are ordered by the distance along the approach axis plus 3 times that
+    across it. The object after the `present` target is next. The first object follows the last one, and also a target
+    without a centre.
     centers_m (k, 3) from `object_centers`; `approach` is a unit vector (3,) in the world frame.
     """
     offsets = centers_m - tool_position_m

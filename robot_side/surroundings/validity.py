@@ -14,14 +14,14 @@ from robot_side.surroundings.placing import numbers_of, primitives_of
 
 _UNIT_TOLERANCE = 1e-6
 _FIELDS: Final = tuple((kind.owner, *array) for kind in KINDS for array in kind.arrays)
-"""Arrays, each with the field that has one entry for each of its rows"""
+"""For each array: the name of its kind's `*_object` field, then name, shape of a row, and check"""
 _CHECKED: Final = tuple(array for kind in KINDS for array in kind.arrays if array.check is not Check.INDEX)
 
 
 def require_valid(objects: PerceivedObjects) -> None:
     """Raise a ValueError that names the field of `objects` whose numbers, type or shape are invalid.
 
-    NaN would compare as far away and silently give no warning, and kernels do not check the ends of arrays.
+    A NaN would count as far away and silently give no warning. Kernels do not check the bounds of arrays.
     """
     for owner, name, row, check in _FIELDS:
         indices, values = getattr(objects, owner), getattr(objects, name)
@@ -53,7 +53,7 @@ def require_valid(objects: PerceivedObjects) -> None:
 
 
 def _require_known_meshes(objects: PerceivedObjects) -> None:
-    """Raise a ValueError unless the library has each mesh."""
+    """Raise a ValueError unless the frame's mesh library has each mesh."""
     indices = objects.mesh_index
     if indices.size == 0:
         return
@@ -90,7 +90,10 @@ _ANY, _FINITE, _LEAST_0, _UNIT, _ORTHONORMAL = range(5)
 
 
 def _codes(kind: Kind) -> list[int]:
-    """Return the checks of each of a primitive's numbers."""
+    """Return the code of the check of each of a primitive's 20 numbers.
+
+    The check of a vector or a matrix is at the first of its numbers.
+    """
     codes = [_ANY] * NUMBERS
     for array in kind.arrays:
         if array.name in kind.parts:
@@ -119,7 +122,7 @@ def _are_unit(numbers: FloatArray, row: int, start: int, columns: int) -> bool:
 
 @building_block
 def is_possible(kind: int, numbers: FloatArray, row: int) -> bool:
-    """Return whether the numbers (n, 20) in this row are valid for a primitive of this kind."""
+    """Return whether the numbers (n, 20) in `row` are valid for a primitive of this kind."""
     for place in range(NUMBERS):
         code = _CODES[kind, place]
         if code != _ANY:

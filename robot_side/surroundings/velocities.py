@@ -8,11 +8,11 @@ from common.arrays import FloatArray
 from robot_side.compiled.kernel import FLOAT64, INT64, compiled, input_array, output_array
 
 WINDOW_S = 0.2
-"""Time over which a velocity is measured: the result is a tenth of a second late, and a frame's noise counts little."""
+"""Time in s over which a velocity is measured. The result is late by half of it, and a frame's noise counts little."""
 
 
 _FRAMES: Final = 8
-"""Initial capacity in frames"""
+"""Number of frames for which memory is reserved at first"""
 
 
 class ObjectVelocities:
@@ -28,9 +28,9 @@ class ObjectVelocities:
         self._kept = 0
 
     def see(self, time_s: float, positions_m: FloatArray) -> FloatArray:
-        """Add a frame, no older than the last one. Return velocities (k, 3) in m/s of the objects, 0 for the first.
+        """Add a frame, no older than the last one. Return the objects' velocities (k, 3) in m/s; 0 for the first frame.
 
-        positions_m (k, 3): of one point of each object. ValueError for another number of objects than before.
+        positions_m (k, 3): position of one point of each object. ValueError for another number of objects than before.
         """
         if self._kept and positions_m.size != self._positions_m.shape[1]:
             raise ValueError(

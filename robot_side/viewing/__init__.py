@@ -1,1 +1,1 @@
-"""Views of the scene: pictures, rendered in a separate process, and shapes."""
+"""Views of the scene: pictures that a separate process renders, and shapes."""

@@ -1,6 +1,6 @@
-"""Rendering process: `python -m robot_side.viewing.companion FD [TROUBLE ...]`, started by `Cameras`.
+"""Process that renders pictures, started by `Cameras`: `python -m robot_side.viewing.companion FD [TROUBLE ...]`.
 
-TROUBLE: fault of each rendering backend that was tried before.
+TROUBLE: fault of a rendering backend that was tried before, one argument for each.
 """
 
 import contextlib
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from robot_side.viewing.rendering import Renderer
 
 _LATER = 5
-"""Niceness added to that of the ticking process."""
+"""Niceness added to the niceness of the process that ticks"""
 
 
 def main() -> None:
-    """Serve until the robot side is gone."""
+    """Serve orders until the robot side's process has ended."""
     channel, troubles = companion_channel(sys.argv[1:])
     _step_back()
     if (trouble := trouble_with(BACKENDS[len(troubles)])) is not None:
@@ -41,13 +41,13 @@ def main() -> None:
     try:
         import simplejpeg  # noqa: F401, PLC0415  # may be missing
     except ImportError as error:
-        _refuse(channel, f"{error}; to mend it: pip install '.[robot]' in the clone")
+        _refuse(channel, f"{error}; install it in the clone: pip install '.[robot]'")
         return
     _serve(channel)
 
 
 def _step_back() -> None:
-    """Give up the inherited real-time scheduling and priority: rendering does not need them."""
+    """Give up the inherited real-time scheduling and priority, which rendering does not need."""
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     with contextlib.suppress(OSError):
@@ -92,7 +92,7 @@ class _Drawing:
         self.ready = _tried() if setup.h264 else Ready(h264=False)
 
     def picture(self, order: Order) -> tuple[tuple[int, ...], bytes, int, bool]:
-        """Render a picture; return its shape, bytes, number (0 for JPEG), and whether it is a whole one."""
+        """Render a picture; return its shape, bytes, number (0 for JPEG), and whether it can be shown by itself."""
         import simplejpeg  # noqa: PLC0415  # may be missing, which `main` reports
 
         from robot_side.viewing.rendering import halved  # noqa: PLC0415  # after the choice of a backend
@@ -113,7 +113,7 @@ class _Drawing:
 
 
 def _tried() -> Ready:
-    """Try to encode H.264, which also imports PyAV before the first order."""
+    """Try to encode H.264; this also imports PyAV before the first order."""
     if importlib.util.find_spec("av") is None:
         return Ready(h264=False)
     try:

@@ -14,7 +14,7 @@ Triple = tuple[float, float, float]
 
 
 class Viewpoint(msgspec.Struct, frozen=True):
-    """Viewpoint of a view: a camera of the model, or else a pose in the frame of a body."""
+    """Viewpoint of a view: a camera of the model; without one, a pose in the frame of a body."""
 
     camera: int | None = None
     body: int = 0
@@ -24,11 +24,11 @@ class Viewpoint(msgspec.Struct, frozen=True):
     up: Triple = (0.0, 0.0, 1.0)
     """Unit vector, orthogonal to `forward`"""
     fovy_deg: float = 45.0
-    """Angle from the picture's lower edge to its upper one"""
+    """Vertical field of view: angle from the picture's lower edge to its upper edge"""
 
 
 class Setup(msgspec.Struct, frozen=True, tag=True):
-    """First message: model, size and viewpoints."""
+    """First message to the companion: model, picture size and viewpoints."""
 
     model: bytes
     """Model in MuJoCo's binary format"""
@@ -40,26 +40,26 @@ class Setup(msgspec.Struct, frozen=True, tag=True):
 
 
 class Order(msgspec.Struct, frozen=True, tag=True):
-    """Order of one picture of this state."""
+    """Order of one picture of the given state."""
 
     view: ViewName
     captured_s: float
     positions: bytes
-    """qpos, float64"""
+    """MuJoCo's qpos, as float64"""
     mocap_poses: bytes
-    """(b, 7) float64: positions and quaternions of mocap bodies"""
+    """(b, 7) float64: position and quaternion of each mocap body"""
     quality: int
-    """Quality as of JPEG, 1 to 100"""
+    """Quality on JPEG's scale, 1 to 100"""
     halved: bool = False
-    """Half the width and height"""
+    """Whether the picture has half the width and height"""
     h264: bool = False
-    """H.264 instead of JPEG"""
+    """Whether the picture is H.264; else JPEG"""
     whole: bool = False
-    """Make a whole picture: a viewer lacks the picture before this one"""
+    """Whether to make a picture that needs no other, because a viewer lacks the picture before this one"""
 
 
 class Ready(msgspec.Struct, frozen=True, tag=True):
-    """Answer to Setup: orders are served from now on."""
+    """Answer to Setup: from now on orders are served."""
 
     h264: bool
     trouble: str = ""
@@ -67,24 +67,24 @@ class Ready(msgspec.Struct, frozen=True, tag=True):
 
 
 class Picture(msgspec.Struct, frozen=True, tag=True):
-    """Ordered picture."""
+    """Picture that was ordered."""
 
     view: ViewName
     captured_s: float
-    """Time of the order's state"""
+    """Time of the state that the picture shows"""
     width: int
     height: int
     content: bytes
     took_s: float
-    """Time from reading the order to the finished picture"""
+    """Time from reading the order to the finished picture, in seconds"""
     number: int = 0
     """Number of an H.264 picture, growing by one in each view; 0 for JPEG"""
     whole: bool = True
-    """Whether it can be shown without another"""
+    """Whether the picture can be shown without another picture"""
 
 
 class Refusal(msgspec.Struct, frozen=True, tag=True):
-    """Refusal of all orders, with the reason and a remedy."""
+    """Refusal of all orders, with the reason and what to do about it."""
 
     reason: str
 

@@ -1,4 +1,4 @@
-"""Pictures in H.264 (ITU-T H.264, by x264 through PyAV): a whole one, then the changes from one to the next."""
+"""Pictures in H.264 (ITU-T H.264, by x264 through PyAV): a complete picture, then the changes from each to the next."""
 
 from fractions import Fraction
 from typing import Final
@@ -15,24 +15,25 @@ _ENDLESS: Final = 1 << 30
 
 
 class H264:
-    """Encoder of one view. It uses only the picture before, no later one, so that it adds no delay in pictures."""
+    """Encoder of one view. It uses only the previous picture, never a later one, so it delays no picture."""
 
     def __init__(self, preset: str = "superfast", refresh: int = _ENDLESS) -> None:
-        """preset: of x264. refresh: pictures in which a column of intra refresh sweeps over the view.
+        """preset: of x264. refresh: number of pictures in which a column of intra refresh sweeps over the view.
 
-        av.FFmpegError, ValueError: if this FFmpeg has no x264.
+        av.FFmpegError or ValueError if this FFmpeg has no x264.
         """
         self._preset, self._refresh = preset, refresh
         self._reformatter = VideoReformatter()
         self._kind: tuple[int, int, int] | None = None
         self._encoder: VideoCodecContext = CodecContext.create("libx264", "w")
         self.number = 0
-        """Number of the newest picture, from 1"""
+        """Number of the newest picture; the first is 1"""
 
     def encode(self, rgb: npt.NDArray[np.uint8], quality: int, *, whole: bool = False) -> tuple[bytes, bool]:
-        """Encode the next picture, RGB (height, width, 3), even sizes; return the bytes, and whether it is a whole one.
+        """Encode the next picture, RGB (height, width, 3) of even sizes; return bytes, and whether it needs no other.
 
-        quality: as of JPEG, 1 to 100. Another quality or size makes this picture a whole one.
+        quality: on JPEG's scale, 1 to 100. whole: make a picture that needs no other; another quality or size also does
+        so.
         """
         height, width, _ = rgb.shape
         if self._kind != (kind := (width, height, constant_rate_factor(quality))):
@@ -55,12 +56,15 @@ class H264:
             "crf": str(factor),
             "forced-idr": "1",
             "intra-refresh": str(int(self._refresh < _ENDLESS)),
-            # Without detection of cuts, which would make whole pictures unasked.
+            # Without detection of cuts, which would make whole pictures that nobody ordered.
             "sc_threshold": "0",
         }
         return encoder
 
 
 def constant_rate_factor(quality: int) -> int:
-    """Return x264's constant rate factor with at least the SSIM of JPEG's `quality`: 26 for 75; less is better."""
+    """Return x264's constant rate factor that has at least the SSIM of JPEG's `quality`; 26 for a quality of 75.
+
+    A smaller factor is better.
+    """
     return round(45.0 - 0.25 * quality)

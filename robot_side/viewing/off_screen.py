@@ -1,6 +1,6 @@
 """Choice of MuJoCo's off-screen rendering backend on this machine.
 
-MuJoCo and PyOpenGL fix the backend at import, so that another one needs another process.
+MuJoCo and PyOpenGL fix the backend when they are imported, so another backend needs another process.
 """
 
 import contextlib
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 BACKENDS: Final = ("egl", "osmesa") if sys.platform == "linux" else ("",)
-"""Backends in the order of trial; the empty name is MuJoCo's default."""
+"""Backends in the order in which they are tried; the empty name is MuJoCo's default."""
 REMEDY: Final = "sudo apt-get install libegl1 libgl1-mesa-dri (or: libosmesa6)"
 
 
@@ -25,7 +25,7 @@ def choose(backend: str) -> None:
 
 
 def trouble_with(backend: str) -> str | None:
-    """Return the fault of `backend`, in one line; None if it works. To be called in a separate process."""
+    """Return the fault of `backend`, in one line; None if it works. To be called in its own process."""
     choose(backend)
     try:
         with silenced():
@@ -42,7 +42,7 @@ def trouble_with(backend: str) -> str | None:
 
 @contextlib.contextmanager
 def silenced() -> Iterator[None]:
-    """Discard standard error, where graphics drivers write directly."""
+    """Discard standard error meanwhile, because graphics drivers write to it directly."""
     sys.stderr.flush()
     kept = os.dup(2)
     with Path(os.devnull).open("wb") as nowhere:

@@ -1,4 +1,4 @@
-"""Shapes of objects from a perception process, for drawing; they change from frame to frame."""
+"""Shapes of a perception process's objects, for drawing; they may change from frame to frame."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -16,7 +16,7 @@ _CORNERS: Final = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]], dtype="
 
 
 class PerceivedModel(SceneModel):
-    """Links of a scene's robot, and the objects of the newest frame."""
+    """Links of a scene's robot, and objects of the newest frame."""
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
@@ -24,7 +24,7 @@ class PerceivedModel(SceneModel):
         self._known: tuple[object, ...] = ()
 
     def follow(self, objects: PerceivedObjects) -> bool:
-        """Take a frame's objects; return whether objects or shapes are different now."""
+        """Take a frame's objects; return whether the objects or their shapes differ from the last frame's."""
         if objects is self._frame:
             return False
         arrays = [*(kind.owner for kind in KINDS), *_SIZES.values()]
@@ -37,7 +37,7 @@ class PerceivedModel(SceneModel):
         return True
 
     def object_shapes(self, index: int) -> Iterator[Shape]:
-        """Yield the shapes of one object, in its frame."""
+        """Yield the shapes of one object, in the object's frame."""
         frame = self._frame
         if frame is None or frame.positions_m is None or frame.rotations is None:
             return

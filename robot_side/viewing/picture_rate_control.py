@@ -8,35 +8,36 @@ _LEAST_QUALITY: Final = 30
 _QUALITY_STEP: Final = 15
 _RATE_STEP: Final = 0.75
 _HALF_COST: Final = 0.4
-"""Bytes of a picture of half the width and height, as a share"""
+"""Bytes of a picture of half the width and height, as a share of the full picture's"""
 _ROOM: Final = 0.8
-"""Share of the remaining rate that the next better step may take at most: hysteresis."""
+"""Maximum share of the rate left for pictures that the next better step may need: hysteresis"""
 _PATIENCE_S: Final = 1.0
 _EAGER_S: Final = 0.15
-"""Wait before a better step, in seconds, while the link has not shown a limit."""
+"""Time, in seconds, before a better step is taken while the link has shown no limit; afterwards `_PATIENCE_S`"""
 _FIRST_BYTES: Final = {False: 20_000.0, True: 1_500.0}
-"""Assumed bytes of a picture of quality 75 and full size, H.264 or not, before the first one is known."""
+"""Bytes of a picture of quality 75 and full size that are assumed before the first picture; the key tells whether it is
+H.264"""
 
 
 class Step(NamedTuple):
-    """Rate, quality and size of pictures."""
+    """Step of the pictures' rate, quality and size."""
 
     rate_hz: float
     quality: int
     halved: bool
-    """Half the width and height"""
+    """Whether pictures have half the width and height"""
 
     def bytes_share(self, *, h264: bool = False) -> float:
-        """Return the bytes of a picture as a share of quality 75 and full size; measured on rendered scenes.
+        """Return the bytes of a picture as a share of those at quality 75 and full size; measured on rendered scenes.
 
-        h264: for a picture that follows another.
+        h264: for an H.264 picture that contains the changes since another.
         """
         of_quality = math.exp(0.032 * (self.quality - 75)) if h264 else 0.13 + 0.0116 * self.quality
         return of_quality * (_HALF_COST if self.halved else 1.0)
 
 
 def steps(rate_hz: float, quality: int) -> tuple[Step, ...]:
-    """Return all steps, from the asked one down to the least."""
+    """Return all steps, from the rate and quality given down to the least ones."""
     made = [Step(rate_hz, quality, halved=False)]
     while (rate := made[-1].rate_hz) > _LEAST_RATE_HZ:
         made.append(made[-1]._replace(rate_hz=max(_LEAST_RATE_HZ, _RATE_STEP * rate)))
@@ -46,14 +47,14 @@ def steps(rate_hz: float, quality: int) -> tuple[Step, ...]:
 
 
 class PictureRateControl:
-    """Controller of the step of all views: down at once, up by one step after a second with room for it."""
+    """Controller of the step of all views: down at once, up by one step after a second in which the link has room."""
 
     def __init__(self, rate_hz: float, quality: int) -> None:
         self._steps = steps(rate_hz, quality)
         self._at = 0
         self._h264 = False
         self._full_bytes: dict[bool, float] = {}
-        """Bytes of a picture of quality 75 and full size, H.264 or not"""
+        """Bytes of a picture of quality 75 and full size; the key tells whether it is H.264"""
         self._crowded_s = -math.inf
 
     @property
@@ -62,15 +63,15 @@ class PictureRateControl:
         return self._steps[self._at]
 
     def made(self, size_bytes: int, step: Step, *, h264: bool = False) -> None:
-        """Update the known size by a picture that was made in `step`."""
+        """Update the known size of pictures by a picture that was made in `step`."""
         full_bytes = size_bytes / step.bytes_share(h264=h264)
         known_bytes = self._full_bytes.get(h264, full_bytes)
         self._full_bytes[h264] = known_bytes + 0.1 * (full_bytes - known_bytes)
 
     def update(self, left_bit_s: float, views: int, now_s: float, *, eager: bool = False, h264: bool = False) -> Step:
-        """Choose the step for `views` watched views and the rate left for pictures, in bit/s.
+        """Choose the step for `views` watched views, with `left_bit_s` left for pictures, in bit/s.
 
-        eager: the link has not shown a limit yet. h264: pictures are H.264.
+        eager: whether the link has shown no limit yet. h264: whether pictures are H.264.
         """
         if h264 != self._h264:
             self._h264, self._at = h264, 0

@@ -1,4 +1,4 @@
-"""Robot side's end of rendering: orders pictures from a companion process and takes them, without ever waiting."""
+"""Robot side's end of rendering: it orders pictures from a companion process and takes them, and never waits."""
 
 import math
 import threading
@@ -20,18 +20,19 @@ from robot_side.viewing.viewpoints import viewpoints
 
 MODULE: Final = "robot_side.viewing.companion"
 IDLE_S: Final = 60.0
-"""Time without use after which a companion is ended, in seconds."""
+"""Time without use, in seconds, after which a companion is ended"""
 RETRY_S: Final = 5.0
-"""Time before a failed companion is started again, in seconds."""
+"""Time, in seconds, before a failed companion is started again"""
 _SILENT_S: Final = 30.0
-"""Time without an answer to an order after which the companion hangs, in seconds: slow machines start slowly."""
+"""Time, in seconds, without an answer to an order, after which the companion is taken to hang: slow machines start
+slowly."""
 _ENDING_S: Final = 5.0
 _WHOLE_S: Final = 0.5
-"""Least period of whole H.264 pictures, in seconds: a viewer that asks for many takes the share of others."""
+"""Minimum period of whole H.264 pictures, in seconds: a viewer that asks for many would take the rate of others"""
 _SETUP: Final = "setup"
-"""Name of the setup among the orders, as it is answered like one"""
+"""Name of the setup among the orders, because it is answered like an order"""
 _NEVER_BEGAN: Final = 2
-"""Starts in a row without any picture, after which no further one follows"""
+"""Number of starts in a row without any picture, after which the companion is not started again"""
 
 
 def saved_model(scene: Scene) -> bytes:
@@ -42,7 +43,7 @@ def saved_model(scene: Scene) -> bytes:
 
 
 class Renders(Protocol):
-    """Interface of a `Companion` that is used here."""
+    """Part of the interface of a `Companion` that this module uses."""
 
     channel: Channel
 
@@ -57,7 +58,8 @@ class Renders(Protocol):
 
 
 Start = Callable[[Callable[[Renders | str], None]], None]
-"""Function that starts a companion and passes it, or the reason of a failure, to its argument, at once or later"""
+"""Function that starts a companion. It passes the companion, or the reason of a failure, to its argument, at once or
+later."""
 
 
 def start_beside(done: Callable[[Renders | str], None]) -> None:
@@ -73,7 +75,7 @@ def start_beside(done: Callable[[Renders | str], None]) -> None:
 
 
 class Cameras:
-    """Keeps one order of each wanted view under way; starts the companion when a viewer is there or expected."""
+    """Keeper of one order of each wanted view; starts the companion process when a viewer is there or expected."""
 
     def __init__(
         self,
@@ -82,18 +84,18 @@ class Cameras:
         note: Callable[[str], None],
         start: Start = start_beside,
     ) -> None:
-        """note: called with one line for each fault, with a remedy."""
+        """note: called for each fault with one line, which includes what to do about it."""
         self._h264 = settings.codec == "auto"
-        """Whether the companion makes H.264; assumed until it denies"""
+        """Whether the companion makes H.264; taken to be so until it says otherwise"""
         shape = settings.width, settings.height
         self._setup = encode(Setup(saved_model(scene), *shape, viewpoints(scene), self._h264))
         self.picture_rate_control = PictureRateControl(settings.rate_hz, settings.quality)
         """Controller of the pictures' rate, quality and size"""
         self.starts = 0
         self.took_s: list[float] = []
-        """Companion's times for the newest pictures, in seconds, at most a thousand"""
+        """Times that the companion took for the newest pictures, in seconds; at most a thousand"""
         self._whole: dict[ViewName, tuple[int, float]] = {}
-        """Number and arrival time of the newest whole H.264 picture"""
+        """Number and arrival time of each view's newest whole H.264 picture"""
         self._data = scene.data
         self._note = note
         self._start = start
@@ -101,7 +103,7 @@ class Cameras:
         self._handed_over: list[Renders | str] = []
         self._companion: Renders | None = None
         self._ended: list[tuple[Renders, float]] = []
-        """Ended companions, with the time until which they may exit by themselves"""
+        """Companions that were ended, each with the time until which it may exit by itself"""
         self._ordered_s: dict[str, float] = {}
         self._ordered_as: dict[ViewName, Step] = {}
         self._wanted_s = -math.inf
@@ -114,12 +116,12 @@ class Cameras:
 
     @property
     def works(self) -> bool:
-        """Whether pictures can be rendered, as far as known, and are wanted by the settings"""
+        """Whether pictures are wanted by the settings and, as far as known, can be rendered"""
         return not self._hopeless
 
     @property
     def process(self) -> Renders | None:
-        """Companion, while there is one"""
+        """Companion process; None while there is none"""
         return self._companion
 
     def busy(self, view: ViewName) -> bool:
@@ -127,11 +129,14 @@ class Cameras:
         return view in self._ordered_s
 
     def makes_h264(self, lacks: tuple[int, int] | None) -> bool:
-        """Return whether pictures are H.264 for viewers that lack `lacks`, as in `Watch`; None: they show only JPEG."""
+        """Return whether pictures are H.264 for viewers that lack the pictures `lacks` (see `Watch`).
+
+        None means that they show only JPEG.
+        """
         return self._h264 and lacks is not None
 
     def message(self, picture: Picture, header: Header) -> VideoFrame | VideoStep:
-        """Return the published message of a picture."""
+        """Return the message to be published for a picture."""
         place = header, picture.view, picture.captured_s, picture.width, picture.height
         if picture.number == 0:
             return VideoFrame(*place, picture.content)
@@ -146,11 +151,11 @@ class Cameras:
         *,
         expected: bool = False,
     ) -> list[Picture]:
-        """Order `wanted` views that are not under way, of the present state; return the finished pictures.
+        """Order the `wanted` views that have no order under way; return the finished pictures.
 
-        lacks: as for `makes_h264`, the newest of all viewers. captured_s: time of the state. expected: a viewer may
-        come soon, and the companion starts without an order. To be called in every turn while `wanted` is not empty,
-        and sometimes otherwise.
+        lacks: newest pictures that a viewer lacks, as for `makes_h264`. captured_s: time of the present state, which is
+        ordered. expected: whether a viewer may come soon; the companion then starts even without an order. To be called
+        in every turn while `wanted` is not empty, and sometimes otherwise.
         """
         expected = expected or bool(wanted)
         if expected:
@@ -177,7 +182,7 @@ class Cameras:
         return pictures
 
     def close(self) -> None:
-        """End the companion, within a short time."""
+        """End the companion; this takes a short time."""
         self._hopeless = True
         if self._companion is not None:
             self._end(self._companion, -math.inf)
@@ -254,7 +259,7 @@ class Cameras:
     def _failed(self, now_s: float, why: str) -> None:
         self._failures += 1
         if self._failures >= _NEVER_BEGAN and not self._has_worked:
-            self._give_up(f"{why}, {self._failures} times in a row; what is missing says: feelahead doctor")
+            self._give_up(f"{why}, {self._failures} times in a row; feelahead doctor tells what is missing")
         else:
             self._not_before_s = now_s + RETRY_S
             self._note(f"cameras: {why}; it is started again in {RETRY_S:g} s, the arm goes on")
@@ -271,6 +276,6 @@ class Cameras:
         self._whole.clear()
 
     def _follow_ends(self, now_s: float) -> None:
-        """Follow ended companions until they exit; kill one that does not."""
+        """Forget ended companions that have exited; kill one that does not exit in time."""
         if self._ended and (not self._ended[0][0].running or now_s >= self._ended[0][1]):
             self._ended.pop(0)[0].close(0.0)

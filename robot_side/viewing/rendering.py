@@ -1,4 +1,4 @@
-"""Off-screen rendering of a MuJoCo model; imported only where rendering works (see `off_screen`)."""
+"""Off-screen rendering of a MuJoCo model; imported only if rendering works here (see `off_screen`)."""
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
@@ -10,11 +10,11 @@ from robot_side.viewing.exchange import Setup, Viewpoint
 
 _MODEL = "model.mjb"
 _BESIDE_GEOMS = 1000
-"""Capacity of a picture for elements other than geoms: sites, tendons, skins."""
+"""Capacity of a rendered scene for elements other than geoms: sites, tendons, skins"""
 
 
 class Renderer:
-    """Renderer of one model from its viewpoints."""
+    """Renderer of one model, seen from its viewpoints."""
 
     def __init__(self, setup: Setup) -> None:
         model = mujoco.MjModel.from_binary_path(_MODEL, {_MODEL: setup.model})
@@ -29,7 +29,7 @@ class Renderer:
             self._renderer.scene.flags[flag] = 0
 
     def picture(self, view: ViewName, positions: bytes, mocap_poses: bytes = b"") -> npt.NDArray[np.uint8]:
-        """Return RGB (height, width, 3) of the state with qpos `positions`; ValueError for another length."""
+        """Return a picture, RGB (height, width, 3), of the state with qpos `positions`; ValueError for a bad length."""
         model, data = self._model, self._data
         data.qpos[:] = np.frombuffer(positions)
         mocap = np.frombuffer(mocap_poses).reshape(-1, 7)
@@ -63,7 +63,10 @@ class Renderer:
 
 
 def halved(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    """Return the means of two by two pixels, (2h, 2w, 3) to (h, w, 3); an odd last row or column is left out."""
+    """Return a picture of half the size, from the means of two by two pixels: (2h, 2w, 3) to (h, w, 3).
+
+    An odd last row or column is left out.
+    """
     height, width = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2
     rows = picture[0:height:2].astype(np.uint16) + picture[1:height:2]
     half: npt.NDArray[np.uint8] = ((rows[:, 0:width:2] + rows[:, 1:width:2] + 2) >> 2).astype(np.uint8)
@@ -71,7 +74,7 @@ def halved(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
 
 
 def placed(viewpoint: Viewpoint, data: mujoco.MjData) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return position, forward and up of a viewpoint without a camera: (3,) each, in the world frame."""
+    """Return position, forward and up of a viewpoint that is no camera of the model: (3,) each, in the world frame."""
     rotation = data.xmat[viewpoint.body].reshape(3, 3)
     position_m: FloatArray = data.xpos[viewpoint.body] + rotation @ viewpoint.position_m
     return position_m, rotation @ viewpoint.forward, rotation @ viewpoint.up

@@ -1,4 +1,4 @@
-"""Messages of the perceived scene for viewers: shapes, poses and the law's results."""
+"""Messages with the perceived scene for viewers: shapes, poses and the law's results."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -21,17 +21,17 @@ from robot_side.viewing.shapes import SceneModel, bytes_of
 
 _TRIGGERS: Final[tuple[Trigger, Trigger]] = ("l2", "r2")
 _FEW: Final = 64
-"""Most objects for which every SceneState has all poses, even of objects at rest."""
+"""Maximum number of objects for which every SceneState has all poses, even those of objects at rest"""
 _STANDS_M: Final = 1e-6
 _MOST_SHAPES_BYTES: Final = VIEW_MAXIMUM_BYTES - 65536
 _ENTRY_BYTES: Final = 40
-"""Bytes of an object besides its name and its shapes"""
+"""Bytes of an object in a message, besides its name and its shapes"""
 _SHAPES_AT_ONCE: Final = 4
 
 
 @dataclass
 class TickFigures:
-    """Durations of the latest ticks, and the count of skipped ones."""
+    """Durations of the latest ticks, and the number of skipped ticks."""
 
     p50_us: float = 0.0
     p99_us: float = 0.0
@@ -40,7 +40,7 @@ class TickFigures:
 
 @dataclass(frozen=True)
 class _Begun:
-    """SceneState in progress."""
+    """Content of a SceneState that is being made."""
 
     sensed: Sensed
     situation: Situation
@@ -53,12 +53,12 @@ class _Begun:
 
 
 class SceneView:
-    """Maker of SceneShapes and SceneState. Shapes stay the same until `begin_shapes` is called."""
+    """Maker of the messages SceneShapes and SceneState. Shapes stay the same until `begin_shapes` is called."""
 
     def __init__(self, model: SceneModel, kinematics: MujocoKinematics, law: Explains) -> None:
         self.version = 0
         self.shapes: Prepared | None = None
-        """SceneShapes, once finished by `work_on_shapes`"""
+        """Newest finished SceneShapes message; None before `work_on_shapes` has finished the first"""
         self.shapes_bytes = 0
         self.left_out = 0
         self._model = model
@@ -66,25 +66,25 @@ class SceneView:
         self._law = law
         self._links: tuple[tuple[Shape, ...], int] | None = None
         self._base: PerceivedObjects | None = None
-        """Objects at the time of the shapes"""
+        """Objects as they were when the shapes were made"""
         self._making: Iterator[None] | None = None
         self._begun: _Begun | None = None
 
     @property
     def complete(self) -> bool:
-        """Whether there are shapes, of all objects"""
+        """Whether the shapes are finished and include all objects"""
         return self.shapes is not None and self.left_out == 0
 
     def outdated(self, objects: PerceivedObjects) -> bool:
-        """Return whether this frame has other objects or shapes than before."""
+        """Return whether this frame has other objects or shapes than the frame before."""
         return self._model.follow(objects)
 
     def begin_shapes(self, header: Header, situation: Situation) -> None:
-        """Begin to make SceneShapes again, the objects nearest to the tool first."""
+        """Begin to make SceneShapes anew, with the objects nearest to the tool first."""
         self._making = self._make_shapes(header, situation.objects, situation.pose.tool_position_m)
 
     def work_on_shapes(self) -> bool:
-        """Continue the shapes for a fraction of a millisecond; return whether they are finished."""
+        """Continue to make the shapes for a fraction of a millisecond; return whether they are finished."""
         if self._making is None:
             return self.shapes is not None
         for _ in range(_SHAPES_AT_ONCE):
@@ -94,14 +94,14 @@ class SceneView:
         return False
 
     def begin_state(self, sensed: Sensed, situation: Situation, taken_s: float) -> None:
-        """Begin a SceneState of the newest tick at `taken_s`, with its `sensed` and `situation`."""
+        """Begin a SceneState of the newest tick, which was at `taken_s` with the results `sensed` and `situation`."""
         links = _row_bytes(self._kinematics.body_poses(self._model.bodies))
         index = self._moved(situation.objects)
         poses = object_poses(situation.objects, index)
         self._begun = _Begun(sensed, situation, taken_s, self.version, links, index, _row_bytes(poses))
 
     def work_on_state(self, header: Callable[[], Header], ticks: TickFigures) -> SceneState | None:
-        """Continue the state for some 200 us: an explanation, or at last the message under a new header."""
+        """Continue to make the SceneState for about 200 µs: return None after each explanation, at last the message."""
         begun = self._begun
         if begun is None:
             return None
@@ -137,7 +137,7 @@ class SceneView:
         )
 
     def _moved(self, objects: PerceivedObjects) -> IntArray:
-        """Return the indices of objects whose poses must be sent."""
+        """Return the indices of the objects whose poses must be sent."""
         if len(objects.names) <= _FEW:
             return np.arange(len(objects.names))
         if self._base is None:
@@ -181,9 +181,9 @@ class SceneView:
 
 
 def object_poses(objects: PerceivedObjects, index: IntArray) -> FloatArray:
-    """Return the perceived poses (n, 7) of the objects `index` (n,): positions and quaternions, w first.
+    """Return the perceived poses (n, 7) of the objects `index` (n,): positions, then quaternions, w first.
 
-    ValueError without known poses.
+    ValueError if the frame has no poses.
     """
     positions_m, rotations = _frames(objects)
     if index.size == 0:

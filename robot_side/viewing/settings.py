@@ -1,4 +1,4 @@
-"""Settings of pictures."""
+"""Settings of the pictures of both views."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -13,19 +13,20 @@ _Pixels = Annotated[int, Meta(ge=16, le=4096)]
 
 @dataclass(frozen=True)
 class CamerasSettings:
-    """The two views, rendered in a separate process while somebody watches them."""
+    """Pictures of the two views, rendered in a separate process while somebody watches them."""
 
     on: Annotated[bool, tyro.conf.arg(name="cameras", prefix_name=False)] = True
-    """Render the watched views; without pictures the arm is felt and driven all the same."""
+    """Render the watched views. Without pictures the arm can be felt and driven all the same."""
     width: _Pixels = 640
     """Width of each picture, in pixels."""
     height: _Pixels = 480
     rate_hz: Annotated[float, Meta(ge=0.1, le=120.0)] = 30.0
-    """Pictures of each view a second."""
+    """Number of pictures of each view in a second."""
     quality: Annotated[int, Meta(ge=1, le=100)] = 75
-    """Quality, 1 to 100: a picture of 75 takes 20 kB as JPEG (above 90 three times that), 1 to 2 kB as H.264."""
+    """Quality of pictures, 1 to 100. At 75 a picture takes 20 kB as JPEG, or 1 to 2 kB as H.264; above 90, three times
+    as much as JPEG."""
     codec: Literal["auto", "jpeg"] = "auto"
-    """auto: H.264 if PyAV is installed here and by all viewers, and nothing is recorded here; else JPEG."""
+    """Codec of pictures. auto: H.264 if PyAV is here and at all viewers, and nothing is recorded here; else JPEG."""
 
     def __post_init__(self) -> None:
         check_limits(self)

@@ -1,4 +1,4 @@
-"""Shapes of a scene's links and objects, for drawing, from MuJoCo's geoms."""
+"""Shapes of a scene's links and objects, from MuJoCo's geoms, for drawing."""
 
 from collections.abc import Iterator
 from typing import Any, Final
@@ -22,13 +22,13 @@ _KINDS: Final[dict[GeomKind, ShapeKind]] = {
     GeomKind.BOX: "box",
 }
 _SHOWN_GROUPS: Final = 3
-"""Count of geom groups that MuJoCo's viewers show; collision shapes below visual ones are in later groups."""
+"""How many geom groups MuJoCo's viewers show; collision shapes that visual ones hide are in later groups."""
 _SIZES: Final = {"sphere": 1, "capsule": 2, "cylinder": 2, "plane": 2, "box": 3, "ellipsoid": 3}
-"""Count of a geom's three sizes that its kind uses"""
+"""How many of a geom's three sizes its kind uses"""
 
 
 class SceneModel:
-    """Links and objects of a scene, and their shapes in their frames."""
+    """Links and objects of a scene, and their shapes in their own frames."""
 
     def __init__(self, scene: Scene) -> None:
         model, robot = scene.model, scene.robot
@@ -36,32 +36,32 @@ class SceneModel:
         shown = of_robot[model.geom_group[of_robot] < _SHOWN_GROUPS]
         self._link_geoms = shown if shown.size else of_robot
         self.bodies: IntArray = np.unique(model.geom_bodyid[self._link_geoms]).astype(np.int64)
-        """(n,) bodies of the links"""
+        """(n,) bodies of the robot's links"""
         self.links = tuple(model.body(int(body)).name or f"body{body}" for body in self.bodies)
         self.objects = tuple(thing.name for thing in scene.objects)
         fixed = scene.fixed
         self.may_move: IntArray = np.array(
             [index for index, name in enumerate(self.objects) if name not in fixed], dtype=np.int64
         )
-        """Indices of the objects that a joint or mocap can move"""
+        """Indices of the objects that a joint or a mocap body can move"""
         self._model = model
         self._geoms = [thing.geoms for thing in scene.objects]
         self._start = scene.data.geom_xpos.copy(), scene.data.geom_xmat.reshape(-1, 3, 3).copy()
 
     def follow(self, objects: PerceivedObjects) -> bool:
-        """Return whether a frame has other objects: never, as a scene's stay the same."""
+        """Return whether a frame has other objects than before: never, because a scene's objects stay the same."""
         del objects
         return False
 
     def link_shapes(self) -> Iterator[Shape]:
-        """Yield the robot's shapes, in the frames of the bodies."""
+        """Yield the shapes of the robot, each in the frame of its body."""
         model, owners = self._model, {int(body): index for index, body in enumerate(self.bodies)}
         for geom in self._link_geoms:
             owner = owners[int(model.geom_bodyid[geom])]
             yield self._shape(int(geom), owner, True, model.geom_pos[geom], model.geom_quat[geom])
 
     def object_shapes(self, index: int) -> Iterator[Shape]:
-        """Yield the shapes of one object, in the first geom's frame; inner joints keep their start positions."""
+        """Yield the shapes of one object, in the frame of its first geom; joints inside keep their start positions."""
         positions_m, rotations = self._start
         first = self._geoms[index][0]
         yield self._shape(first, index, False, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
@@ -94,7 +94,7 @@ class SceneModel:
 
 
 def bytes_of(shape: Shape) -> int:
-    """Return an upper bound of a shape's bytes in a message."""
+    """Return an upper bound of the bytes that a shape takes in a message."""
     return len(shape.vertices_m) + len(shape.triangles) + 160
 
 

@@ -1,4 +1,4 @@
-"""Views made between ticks, while somebody watches: pictures and the scene's state."""
+"""Views that are made between ticks while somebody watches them: pictures, and the scene's state."""
 
 import math
 from collections import deque
@@ -17,9 +17,9 @@ SCENE_PERIOD_S: Final = 1.0 / 30.0
 SHAPES_PERIOD_S: Final = 3.0
 _SHAPES_BYTES_PER_S: Final = 400_000.0
 _SHAPES_SHARE: Final = 0.1
-"""Most of a link that repeated shapes take, in bytes a second and as a share: large ones are repeated less often."""
+"""Maximum of a link for repeated shapes, in bytes a second and as a share: large shapes are repeated less often"""
 _BACKLOG_S: Final = 0.03
-"""Queueing delay, in seconds, above which nothing is made: the wait would age it."""
+"""Queueing delay, in seconds, above which no view is made, because it would be old on arrival"""
 _SEEN_TO_S: Final = 0.1
 _FIGURES_S: Final = 1.0
 
@@ -34,7 +34,7 @@ class Room(Protocol):
 
     @property
     def begins(self) -> bool:
-        """Whether the link has shown no limit yet"""
+        """Whether no limit of the link has been noticed yet"""
         ...
 
     def backlog_s(self, stream: OutgoingStream, now_s: float) -> float:
@@ -43,7 +43,7 @@ class Room(Protocol):
 
 
 class ViewScheduler:
-    """Scheduler of the views in each turn: each at most at its rate, and only while it is watched."""
+    """Scheduler of the views in each turn: makes each view at most at its rate, and only while it is watched."""
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class ViewScheduler:
         always: Collection[str] = (),
         seed: int = 0,
     ) -> None:
-        """always: those of `overview`, `first_person` and `scene` that are made unwatched, for the recording."""
+        """always: which of `overview`, `first_person` and `scene` are made even if unwatched, for the recording."""
         self._core = core
         self._scene_view = scene_view
         self._cameras = cameras
@@ -73,12 +73,12 @@ class ViewScheduler:
         self._frame_age = RunningStatistics(seed)
 
     def ticked(self, took_s: float, overruns: int) -> None:
-        """Count a tick, for SceneState."""
+        """Count a tick's duration, for SceneState."""
         self._ticks_s.append(took_s)
         self._ticks.overruns = overruns
 
     def idle(self, now_s: float, taken_s: float) -> list[Outgoing]:
-        """Return the messages to send now. taken_s: time of the newest tick, whose state is shown."""
+        """Return the messages with views to send now. taken_s: time of the newest tick, whose state they show."""
         looked_at = self._core.session.watchers.looked_at(now_s) | self._always
         if not looked_at and now_s < self._next_look_s:
             return []
@@ -96,7 +96,7 @@ class ViewScheduler:
         return outgoing
 
     def summary(self) -> dict[str, Any]:
-        """Return the summary's `looked_at`: sent and unsent counts of each view and of the scene, with reasons."""
+        """Return the summary's entry `looked_at`: for each view and the scene, how many were sent, or why not."""
         cameras, counts = self._cameras, {name: dict(counts) for name, counts in self._counts.items()}
         counts["scene"]["shapes"] = self._shapes_sent
         took_s = sorted(cameras.took_s) if cameras is not None else []
@@ -107,19 +107,19 @@ class ViewScheduler:
 
     @property
     def pictures(self) -> dict[str, float | int] | None:
-        """Present `rate_hz`, `quality` and `size` (share of the width) of pictures; None without cameras"""
+        """Present `rate_hz`, `quality` and `size` (share of the full width) of pictures; None without cameras"""
         if self._cameras is None:
             return None
         step = self._cameras.picture_rate_control.step
         return {"rate_hz": step.rate_hz, "quality": step.quality, "size": 0.5 if step.halved else 1.0}
 
     def close(self) -> None:
-        """End the companion."""
+        """End the companion process that renders."""
         if self._cameras is not None:
             self._cameras.close()
 
     def _turns(self, name: str, now_s: float) -> int:
-        """Return how often `name` has become due since the last call."""
+        """Return how many times the view `name` has become due since the last call."""
         rate_hz = None if name == "scene" or self._cameras is None else self._cameras.picture_rate_control.step.rate_hz
         period_s = SCENE_PERIOD_S if rate_hz is None else 1.0 / rate_hz
         # The views alternate, so that neither waits for the other.

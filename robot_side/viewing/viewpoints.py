@@ -1,4 +1,4 @@
-"""Viewpoints of the two views of §4.3: the model's cameras, or poses that every arm has."""
+"""Viewpoints of the two views of §4.3: cameras of the model, or else poses that exist for every arm."""
 
 import numpy as np
 
@@ -9,16 +9,17 @@ from robot_side.viewing.exchange import Triple, Viewpoint
 
 _OVERVIEW = "overview"
 _DOWN_DEG, _ASIDE_DEG = 55.0, 20.0
-"""Angles of the overview, which looks down over the arm's shoulder: ahead is up and the arm hides little."""
+"""Angles of the overview, in degrees. It looks down over the arm's shoulder: ahead is up in the picture, and the arm
+hides little."""
 _SHORTEST_REACH_M = 0.3
 _LEAST_ALONG = 0.5
-"""Cosine of the largest angle, 60°, between the approach and a camera that shows it."""
+"""Cosine of the largest angle, 60°, between the approach axis and the line of sight of a camera that shows it"""
 _CLEARANCE_M = 0.05
 _WIDE_DEG = 70.0
 
 
 def viewpoints(scene: Scene) -> dict[ViewName, Viewpoint]:
-    """Return both viewpoints, for a scene at its start."""
+    """Return the viewpoints of both views, for a scene at its start."""
     return {"overview": _overview(scene), "first_person": _first_person(scene)}
 
 
@@ -78,7 +79,7 @@ def _first_person(scene: Scene) -> Viewpoint:
 
 
 def _extent(scene: Scene, tool_m: FloatArray, tool: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the lowest and highest corner (3,) of a box around the gripper's geoms, in the tool frame."""
+    """Return the lowest and the highest corner (3,) of a box around the gripper's geoms, in the tool frame."""
     model, data, geoms = scene.model, scene.data, scene.robot.gripper_geoms
     if geoms.size == 0:
         return np.full(3, -0.05), np.full(3, 0.05)

@@ -103,8 +103,8 @@ ARROWS = """
         operator_side/dualsense/simulated operator_side/hands
     operator_side/core.py: common common/protocol common/status operator_side/controller operator_side/events.py
         operator_side/feel operator_side/hands operator_side/robot_link
-    operator_side/settings.py: common common/command common/protocol common/sockets operator_side/feel
-        operator_side/hands operator_side/people
+    operator_side/settings.py: common common/command common/protocol common/sockets operator_side/controller
+        operator_side/feel operator_side/hands operator_side/people
     operator_side/viewing/facts.py: common/protocol common/status
     operator_side/viewing/terminal: common common/command common/companion common/status operator_side/controller
         operator_side/viewing/facts.py

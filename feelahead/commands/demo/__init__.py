@@ -1,1 +1,1 @@
-"""`feelahead demo`: settings, one run of both sides, and the page that outlives it."""
+"""`feelahead demo`: its settings, one run of both sides, and the console's page, which outlives a run."""

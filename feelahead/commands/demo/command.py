@@ -31,7 +31,7 @@ _ELSEWHERE = "; each side's keys have a separate file: --robot-config FILE.toml,
 
 
 def demo(arguments: Sequence[str]) -> int:
-    """Run the demo; exit code 0 also after Ctrl-C, 1 if a side failed during the run."""
+    """Run the demo; return 1 if a side failed during the run, else 0, also after Ctrl-C."""
     settings = parse_settings(DemoSettings, "feelahead demo", arguments, _ELSEWHERE)
     if (complaint := too_slow(settings)) is not None:
         raise ConfigurationError(complaint)
@@ -52,7 +52,7 @@ def demo(arguments: Sequence[str]) -> int:
                 merged = merge_summaries(read_summary(summaries["robot"]), read_summary(summaries["operator"]), errors)
                 if recorder is not None:
                     merged["recording"] = merged.get("recording", {}) | recorder.finish()
-            # Before the report, which waits for a reader.
+            # Before the report, whose output may block until somebody reads it.
             if settings.summary is not None:
                 write_json("--summary", settings.summary, merged)
         for line in [*_report(merged), *report_lines(merged.get("link", {}))]:
@@ -64,7 +64,7 @@ def demo(arguments: Sequence[str]) -> int:
 
 
 def _report(summary: dict[str, Any]) -> list[str]:
-    """Return a few lines on the run for people."""
+    """Return the lines that report the run to the person at the terminal."""
     if not summary.get("ticks"):
         return ["nothing to report: the robot side left no figures"]
     delays = summary.get("delay_ms", {})
@@ -89,7 +89,7 @@ def _report(summary: dict[str, Any]) -> list[str]:
 
 
 def _placed(placing: Mapping[str, Any]) -> str:
-    """Describe how the target was set down."""
+    """Describe in words how the target was set down."""
     if not placing["placed"]:
         return "not placed"
     felt = "not felt before it was touched"

@@ -1,4 +1,4 @@
-"""The demo's page: how long it keeps the run alive, and how it outlives a restart of both sides."""
+"""The console's page in the demo: how long an open page prolongs the run, and how it survives a restart."""
 
 import secrets
 import socket
@@ -10,16 +10,16 @@ from urllib.parse import urlsplit
 FIRST_PAGE_S: Final = 60.0
 """Time for which a run waits for its first page, in seconds"""
 AFTER_PAGES_S: Final = 5.0
-"""Time for which a run goes on after its last page was closed, in seconds: a reload closes it for a moment"""
+"""Time for which a run continues after its last page was closed, in seconds: a reload closes the page for a moment"""
 PERSON_WAITS_S: Final = 10.0
-"""Longest time that the scripted person waits for the first picture on a page, in seconds"""
+"""Maximum time for which the scripted person waits until a page shows its first picture, in seconds"""
 
 
 class Lifetime:
-    """End of a run: by its duration, or by its pages; `now_s` is the present time."""
+    """Decides when a run ends: after a duration, or some time after its last page was closed."""
 
     def __init__(self, duration_s: float | None) -> None:
-        """duration_s: None if the pages decide."""
+        """duration_s: duration once the link is up; None: the run lasts as long as a page is open."""
         self._duration_s = duration_s
         self._limit_s = FIRST_PAGE_S if duration_s is None else duration_s
         self._since_s: float | None = None
@@ -27,15 +27,15 @@ class Lifetime:
 
     @property
     def has_begun(self) -> bool:
-        """Whether the link has been up."""
+        """Whether the link has come up, from which the time counts."""
         return self._since_s is not None
 
     def begin(self, now_s: float) -> None:
-        """Note that the link is up."""
+        """Note that the link is up at `now_s`."""
         self._since_s = now_s
 
     def why_over(self, pages: int, now_s: float) -> str | None:
-        """Return why the run ends now, as a sentence for people; None to go on. pages: number of open ones."""
+        """Return in words why the run ends at `now_s`; None if it continues. pages: number of open pages."""
         if self._since_s is None:
             return None
         if self._duration_s is None and pages > 0:
@@ -50,10 +50,10 @@ class Lifetime:
 
 
 class KeptPage:
-    """Console address that both runs share when a page wishes to run again."""
+    """Address of the console that consecutive runs share, so that an open page connects again after a restart."""
 
     def __init__(self, folder: Path) -> None:
-        """Write the token of the address to a file in `folder`."""
+        """Write the secret token of the address to a file in `folder`."""
         self._token = folder / "console_token"
         self._token.touch(mode=0o600)
         self._token.write_text(secrets.token_urlsafe(24))
@@ -61,24 +61,24 @@ class KeptPage:
         self.wants_again = False
 
     def flags(self) -> list[str]:
-        """Return the operator side's flags."""
+        """Return the operator side's flags for the console's token and port."""
         port = None if self._address is None else urlsplit(self._address).port
         kept = [] if port is None else [f"--console-port={port}"]
         return [f"--console-token={self._token}", f"--person-waits={PERSON_WAITS_S:g}", *kept]
 
     def is_new(self, address: str) -> bool:
-        """Keep the address; return whether it is another one than before."""
+        """Store the console's address; return whether it differs from that of the last run."""
         before, self._address = self._address, address
         return before != address
 
     def take_again(self) -> bool:
-        """Return whether a page wished to run again since the last call."""
+        """Return whether a page has asked for another run since the last call."""
         wanted, self.wants_again = self.wants_again, False
         return wanted
 
 
 def free_ports(count: int) -> list[int]:
-    """Return ports of 127.0.0.1 that are free now; both sides can then start at once."""
+    """Return `count` ports that are free on 127.0.0.1 now. As they are known in advance, both sides start at once."""
     with ExitStack() as stack:
         probes = [stack.enter_context(socket.socket()) for _ in range(count)]
         for probe in probes:

@@ -21,12 +21,12 @@ from feelahead.commands.open_browser import show_address
 from operator_side.viewing.facts import OperatorFacts
 
 _START_TIMEOUT_S = 600.0
-"""Time limit of a start, in seconds: the first one compiles kernels, which takes minutes on a busy machine."""
+"""Time limit for a side to start, in seconds: the first start compiles kernels, for minutes on a busy machine."""
 _LINK_TIMEOUT_S = 30.0
 _WITHOUT_PAGES_S = 30.0
-"""Duration of a run that nobody watches in a page, in seconds"""
+"""Duration of a run without pages, in seconds, unless --duration is given"""
 _SHARED = ("link", "link_model", "asymmetry", "full_rate", "seed", "realtime")
-"""Flags of both sides."""
+"""Flags that the demo passes to both sides."""
 
 
 def run_both(
@@ -37,7 +37,10 @@ def run_both(
     page: KeptPage | None,
     status: Status,
 ) -> list[str]:
-    """Start both sides, watch them, and end them; return the errors. page: receives a page's wish to run again."""
+    """Start both sides, show their status until the run is over, and end them; return the errors.
+
+    page: notes whether a page asks for another run.
+    """
     status.note("starting both sides")
     listening = dict(zip(("control", "view"), map("tcp://127.0.0.1:{}".format, free_ports(2)), strict=True))
     with SideProcess("robot_side", "robot", robot_arguments(settings, given, summaries["robot"], listening)) as robot:
@@ -48,7 +51,7 @@ def run_both(
             errors: list[str] = []
             with contextlib.suppress(BrokenPipeError):  # the reader of our status has ended
                 errors = _watch(settings, robot, operator, stop, status, page)
-            # Both at once: neither must take the other's end for a link fault.
+            # Interrupt both at once, so that neither reports the other's end as a fault of the link.
             operator.interrupt()
             robot.interrupt()
             operator.stop()
@@ -63,7 +66,7 @@ def run_both(
 
 
 def too_slow(settings: DemoSettings) -> str | None:
-    """Return why the sides cannot find each other in time over the given link; None if they can."""
+    """Return an error text if the delay of the given link is too long for the sides to connect in time, else None."""
     link = settings.link_spec()
     there_s, back_s = (link.profile(direction).mean_delay_s() for direction in ("to_robot", "to_operator"))
     if there_s + back_s < _LINK_TIMEOUT_S:
@@ -77,8 +80,8 @@ def too_slow(settings: DemoSettings) -> str | None:
 def robot_arguments(
     settings: DemoSettings, given: Collection[str], summary: Path, listening: Mapping[str, str]
 ) -> list[str]:
-    """Return the robot side's flags; only given ones override its own file."""
-    # A file decides by itself.
+    """Return the robot side's flags; of the demo's flags only those that the user gave: they override its file."""
+    # With a file of settings, the file decides whether tuning is permitted.
     config = "--permit-tuning" if settings.robot_config is None else f"--config={settings.robot_config}"
     own = _flags(settings, given, *_SHARED, "scene", "model", "site", "probability", "assist", "law")
     ports = f"--bind={listening['control']}", f"--view-bind={listening['view']}"
@@ -92,7 +95,7 @@ def operator_arguments(
     listening: Mapping[str, str],
     page: KeptPage | None = None,
 ) -> list[str]:
-    """Return the operator side's flags; only given ones override its own file."""
+    """Return the operator side's flags; of the demo's flags only those that the user gave: they override its file."""
     arguments = [*_files(settings, summary), "--device=simulated"]
     if settings.operator_config is not None:
         arguments.append(f"--config={settings.operator_config}")
@@ -105,13 +108,13 @@ def operator_arguments(
 
 
 def _files(settings: DemoSettings, summary: Path) -> list[str]:
-    """Return the flags of a side's output files; one recorder listens to both."""
+    """Return the flags for a side's output files; both sides' events go to one recorder."""
     recorded = [] if settings.record is None else [f"--record={summary.with_name('recorder')}"]
     return [*recorded, f"--summary={summary}"]
 
 
 def _flags(settings: DemoSettings, given: Collection[str], *names: str) -> Iterator[str]:
-    """Yield the given flags; for all others the sides' files count."""
+    """Yield flags for those of `names` that the user gave; for all others the sides' configuration files decide."""
     for name in names:
         if name in given:
             flag, value = name.replace("_", "-"), getattr(settings, name)
@@ -127,7 +130,10 @@ def _watch(
     status: Status,
     page: KeptPage | None = None,
 ) -> list[str]:
-    """Show both sides' status until the time is over, Ctrl-C, or a side's end; return the errors."""
+    """Show both sides' status until the run is over; return the errors.
+
+    The run is over when its time is up, Ctrl-C comes, a side ends, or a page asks for another run.
+    """
     starting_s, waiting_since_s = time.monotonic(), None
     said, lifetime = _Said(), Lifetime(_duration_s(settings))
     while not stop.is_set:
@@ -143,7 +149,7 @@ def _watch(
         if page is not None and page.wants_again:
             break
         if not lifetime.has_begun:
-            # A busy machine may start a process slowly, which is no fault of the link.
+            # Count the link's time from when both sides report: a slow start of a process is no fault of the link.
             if said.operator is not None and said.operator.link is LinkState.UP:
                 lifetime.begin(now_s)
             elif said.listens and said.operator is not None:
@@ -165,7 +171,7 @@ def _watch(
 
 
 def _duration_s(settings: DemoSettings) -> float | None:
-    """Return the time limit; None if the pages decide."""
+    """Return the run's duration in seconds; None if it lasts as long as a page is open."""
     if settings.duration is not None:
         return settings.duration
     return None if settings.has_pages and sys.stdout.isatty() else _WITHOUT_PAGES_S
@@ -173,18 +179,18 @@ def _duration_s(settings: DemoSettings) -> float | None:
 
 @dataclass
 class _Said:
-    """Newest status of each side."""
+    """What the two sides have reported until now: newest status, and more."""
 
     robot: RobotStatus | None = None
     operator: OperatorStatus | None = None
     listens: bool = False
-    """Whether the robot side listens"""
+    """Whether the robot side listens for an operator side"""
     pages: int = 0
-    """Number of open pages"""
+    """Number of open pages of the console"""
 
 
 def _take_events(side: SideProcess, said: _Said, status: Status, page: KeptPage | None) -> None:
-    """Keep the newest status of `side`, and show its notes."""
+    """Store in `said` and `page` what `side` has reported since the last call, and show its notes."""
     for event in side.events():
         if event["event"] == "status" and side.name == "robot":
             said.robot = msgspec.convert(event, RobotStatus)
@@ -194,7 +200,7 @@ def _take_events(side: SideProcess, said: _Said, status: Status, page: KeptPage 
             facts = msgspec.convert(event["facts"], OperatorFacts)
             status.show_facts(msgspec.structs.replace(facts, robot=said.robot))
         elif event["event"] == "console":
-            # A page that is kept open connects again by itself.
+            # A page that stays open during a restart connects again by itself.
             if page is None or page.is_new(str(event["address"])):
                 show_address(str(event["address"]), status)
         elif event["event"] == "listening":

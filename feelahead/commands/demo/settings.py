@@ -18,54 +18,58 @@ class DemoSettings(RunOptions):
     """Both sides on this machine: a simulated arm, a simulated DualSense, and a scripted person.
 
     The person arms the arm and pulls R2 to advance towards the target. They feel the trigger stiffen near objects.
-    Then they grasp the target, lift it, and set it down again. Nothing is needed but this machine.
+    Then they grasp the target, lift it, and set it down again. Neither a robot nor a controller is needed.
 
-    Try: feelahead demo --link "delay 50ms 10ms distribution normal", and the same with --no-haptics.
+    Try: feelahead demo --link "delay 50ms 10ms distribution normal", then the same with --no-haptics.
     """
 
     scene: Literal["table", "wall", "slot", "shelf"] | None = None
-    """Objects around the built-in arm's target. table: a cluttered table (default). wall: a wall 10 to 60 mm behind it.
-    slot: two posts in front of it, 15 to 40 mm to spare on each side. shelf: a shelf with a raised front edge to reach
-    over. The last three are drawn from the seed."""
+    """Objects around the built-in arm's target. table: a cluttered table (default). wall: a wall 10 to 60 mm behind the
+    target. slot: two posts in front of the target, with 15 to 40 mm to spare on each side. shelf: the target stands on
+    a shelf with a raised front edge. The exact sizes of the last three are drawn from the seed."""
     duration: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
-    """Duration of the run with the link up. Default: until 5 s after the last page of the console was closed, 60 s if
-    none was opened. Without a page (--no-console, --tui, or not from a terminal): 30 s."""
+    """Duration of the run, counted from when the link is up. Unless given, the run ends 5 s after the last page of the
+    console was closed, or after 60 s without a page. Where no page can open (--no-console, --tui, or output that is no
+    terminal) it ends after 30 s."""
     probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
-    """Share of contacts that a warning must precede, between 0 and 1 (eq. 10)."""
+    """Share of approaches in which the warning must come before the contact, between 0 and 1 (eq. 10)."""
     assist: Literal["none", "speed"] = "none"
     """speed: the robot side caps the speed along the triggers, so that the arm stops where full strength begins."""
     law: LawName = "swept"
-    """Law of the stiffness. swept: early enough to release, along each trigger; paper: the paper's plain law."""
+    """Law of the stiffness. swept: along each trigger, early enough to release it in time. paper: the paper's plain
+    law, for comparison."""
     compensation: Compensation = "operator"
-    """Side that compensates the delay: operator, by the commands under way; robot, by v t_d (eq. 8)."""
+    """Side that compensates the delay. operator: by the commands still under way. robot: by speed times loop age
+    (v t_d, eq. 8)."""
     haptics: bool = True
-    """Whether the triggers are stiffened; without, the same person only sees."""
+    """Whether the triggers are stiffened; with --no-haptics the same person only sees."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
     """MJCF arm with actuators, instead of the built-in one."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Site of the model between the fingertips, with the z axis along the approach."""
     realtime: bool = False
-    """Real-time scheduling and locked memory for both sides, if permitted."""
+    """Ask for real-time scheduling and locked memory for both sides; without the permission they run without."""
     console: bool = True
-    """Browser console, at an address that is shown; from a terminal with a display it opens by itself."""
+    """Serve the console, a page for the browser, at an address that is shown. From a terminal on a machine with a
+    display the page opens by itself."""
     console_port: Annotated[int, Meta(ge=0, le=65535), tyro.conf.arg(metavar="PORT")] = 0
-    """Port of the console's page on this machine; 0: any free one."""
+    """Port of the console's page on this machine; 0: any free port."""
     tui: bool = False
-    """Full-screen terminal instead of a line, for machines without a browser."""
+    """Show the state on the full terminal instead of in one line; for machines without a browser."""
     robot_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """More settings for the robot side: see feelahead-robot --help."""
+    """File with more settings for the robot side; feelahead-robot --help lists them."""
     operator_config: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """More settings for the operator side: see feelahead-operator --help."""
+    """File with more settings for the operator side; feelahead-operator --help lists them."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_limits(self)
         if self.tui and self.status != "line":
-            raise ValueError(f"--tui with --status {self.status}; valid: one of them")
+            raise ValueError(f"--tui with --status {self.status}; valid: only one of them")
         if self.scene is not None and self.model is not None:
-            raise ValueError(f"--scene {self.scene} with --model: valid: one of them; a model brings its own scene")
+            raise ValueError(f"--scene {self.scene} with --model; valid: one of them, as a model has its own scene")
 
     @property
     def has_pages(self) -> bool:
-        """Whether pages of the console can be opened."""
+        """Whether the console is served, so that pages can be opened."""
         return self.console and not self.tui

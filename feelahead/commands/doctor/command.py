@@ -30,31 +30,32 @@ _WIDTH_WITHOUT_TERMINAL: Final = 120
 class DoctorSettings:
     """Report what is missing on this machine, and the command that mends it.
 
-    Ends with code 0 if all that `feelahead demo` needs is present, else with 1. "note": optional, works without.
-    "missing": does not work as it is.
+    The exit code is 0 if this machine can run the robot side (and so the demo) or the operator side, else 1. "note"
+    marks something optional, "missing" something that does not work.
 
-    With --connect: check the path to a robot side instead. Code 1: the first fault and its remedy. Code 0: the round
-    trip, and whether somebody has the arm. Then the path is measured for five seconds: delay, queue, losses, and what
-    will work on it (the arm, one view, both). For that the doctor observes, or holds a free arm, disarmed. The person
-    who drives notices nothing. Wall clocks do not matter.
+    With --connect: check the path to a robot side instead. With exit code 1 the first fault and its remedy are
+    reported; with 0, the round trip and whether another operator has the arm. Then the path is measured for five
+    seconds: delay, queue, losses, and what the path is good enough for (the arm, one view, both views). Meanwhile the
+    doctor holds the arm, disarmed, if it is free, and otherwise observes. An operator who drives notices nothing. The
+    machines' wall clocks need not agree.
 
-    With --compile: compile the kernels of all scenes for this machine's processor, instead of at the first start: about
-    half a minute on two processors. They are kept in $NUMBA_CACHE_DIR, else ~/.cache/feelahead/kernels; existing ones
-    stay. Code 1 if they cannot be kept.
+    With --compile: compile the kernels of all scenes for this machine's processor now, instead of at the first start.
+    This takes about half a minute on two processors. The machine code is kept in $NUMBA_CACHE_DIR, else in
+    ~/.cache/feelahead/kernels; kernels that are already there stay. Exit code 1 if the folder cannot be written.
     """
 
     json: bool = False
-    """One JSON object for programs."""
+    """Print the result as one JSON object, for programs."""
     compile: bool = False
     """Compile the robot side's kernels now."""
     connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Check the path to a robot side at this address."""
     path: bool = True
-    """With --connect: measure the path for five seconds, too."""
+    """With --connect: also measure the path for five seconds."""
     view_connect: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
-    """View port of the robot side; by default the port after the control port."""
+    """Address of the robot side's view port; unless given, the port after the control port."""
     keys: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """Folder with the operator's key, like feelahead-operator's."""
+    """Folder with the operator's key, as for feelahead-operator."""
     robot_key: Annotated[str | None, tyro.conf.arg(metavar="KEY|FILE")] = None
     """Public key of the robot side; needs --keys."""
 
@@ -63,13 +64,13 @@ class DoctorSettings:
             if getattr(self, name) is not None and self.connect is None:
                 raise ValueError(f"--{name.replace('_', '-')} without --connect; valid: both")
         if self.compile and self.connect is not None:
-            raise ValueError("--compile with --connect; valid: one of them")
+            raise ValueError("--compile with --connect; valid: only one of them")
         if self.robot_key is not None and self.keys is None:
             raise ValueError("--robot-key without --keys; valid: both")
 
 
 def doctor(arguments: Sequence[str]) -> int:
-    """Run the checks and print the result."""
+    """Run the checks that the arguments ask for, and print the result; return the exit code."""
     settings = parse_settings(DoctorSettings, "feelahead doctor", arguments)
     if settings.connect is not None:
         return _look_along(settings, settings.connect)
@@ -101,7 +102,7 @@ def _look_along(settings: DoctorSettings, connect: str) -> int:
 
 
 def examine() -> list[Finding]:
-    """Run every check of this machine, in the order of the table."""
+    """Run every check of this machine; return the findings in the order in which they are shown."""
     seen = controllers.controllers_seen()
     absent = machine.failed_imports("robot")
     rules, is_root = controllers.udev_rules(), hasattr(os, "geteuid") and os.geteuid() == 0
@@ -117,7 +118,7 @@ def examine() -> list[Finding]:
 
 
 def show(findings: list[Finding], console: Console) -> None:
-    """Print a table, and below it the remedies, unwrapped so that they can be copied."""
+    """Print a table of the findings, and below it the remedies, without line breaks so that they can be copied."""
     table = Table(title="feelahead doctor")
     table.add_column("what")
     table.add_column("")

@@ -1,4 +1,4 @@
-"""Checks of a real controller: hidapi, permission, connection."""
+"""Checks whether a real controller can be used: hidapi, permission to open it, its reports."""
 
 import contextlib
 import os
@@ -12,6 +12,7 @@ from common.errors import DeviceError, NoDriverError, RemoteProtocolError
 from feelahead.commands.doctor.finding import Finding, Verdict
 from operator_side.dualsense.hid.device import HidBackend, HidDualSense, load_backend
 from operator_side.dualsense.hid.finding import sightings
+from operator_side.dualsense.hid.second_writer import PROC, REMEDY, writers_of
 from operator_side.dualsense.hid.udev import RULE_FILE, RULE_FOLDERS, installing_command
 from operator_side.dualsense.reports.input_report import parse_input_report
 from operator_side.dualsense.reports.models import PRODUCT_IDS, SONY_VENDOR_ID
@@ -20,11 +21,14 @@ _NAME: Final = "controller"
 
 
 def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Sequence[Finding]) -> Finding:
-    """Check whether a controller may be opened: by trial, or by udev's rules (`rules`: file -> text)."""
+    """Check whether a controller may be opened: by the findings of opened `controllers`, else by udev's rules.
+
+    rules: text of each file of rules.
+    """
     name = "udev rule"
     if sys.platform != "linux":
         return Finding(name, Verdict.OK, f"not needed on {sys.platform}")
-    if all(seen.verdict is Verdict.OK for seen in controllers):
+    if all(seen.verdict is Verdict.OK for seen in controllers if seen.name == _NAME):
         return Finding(name, Verdict.OK, "the controller can be opened")
     if not (missing := missing_grants(rules)):
         return Finding(name, Verdict.OK, "there, for USB and Bluetooth")
@@ -38,7 +42,7 @@ def check_permission(*, is_root: bool, rules: Mapping[str, str], controllers: Se
 
 
 def missing_grants(rules: Mapping[str, str]) -> list[str]:
-    """Return the models and transports that no rule in these files opens to the person at the machine."""
+    """Return the models and transports, as "a DualSense on USB", that no rule in these files lets a user open."""
     lines = [line for text in rules.values() for line in text.splitlines() if not line.lstrip().startswith("#")]
     granting = "\n".join(line for line in lines if "hidraw" in line and re.search(r'uaccess|MODE\s*:?=\s*"066', line))
     wanted = {
@@ -53,7 +57,7 @@ def missing_grants(rules: Mapping[str, str]) -> list[str]:
 
 
 def controllers_seen() -> list[Finding]:
-    """Open each connected controller for a moment; return a finding each, or why there is none."""
+    """Open each connected controller for a moment; return a finding for each, or one that says why none is found."""
     try:
         backend = load_backend()
     except NoDriverError as error:
@@ -61,13 +65,20 @@ def controllers_seen() -> list[Finding]:
         return [Finding(_NAME, Verdict.NOTE, f"cannot be looked for: {said}", remedy)]
     how = "connect one by USB, or pair one by Bluetooth: hold Create and PS until its light flashes"
     none = Finding(_NAME, Verdict.NOTE, "none is connected (the demo simulates one)", how)
-    return [_look_at(backend, seen.path, seen.model) for seen in sightings(backend)] or [none]
+    found = sightings(backend)
+    looks = [_look_at(backend, seen.path, seen.model) for seen in found] or [none]
+    return looks + [_other_writer(name, seen.path) for seen in found for name in writers_of(seen.path, PROC)]
 
 
 def udev_rules() -> dict[str, str]:
-    """Read the readable files of udev's rules: text by path."""
+    """Return the text of each readable file of udev's rules, by its path."""
     paths = [path for folder in RULE_FOLDERS for path in sorted(Path(folder).glob("*.rules"))]
     return {str(path): path.read_text(encoding="utf-8", errors="replace") for path in paths if os.access(path, os.R_OK)}
+
+
+def _other_writer(name: str, path: bytes) -> Finding:
+    said = f"{name} holds {os.fsdecode(path)} open for writing"
+    return Finding("second writer", Verdict.NOTE, said, REMEDY)
 
 
 def _look_at(backend: HidBackend, path: bytes, model: str) -> Finding:

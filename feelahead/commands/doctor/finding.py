@@ -1,17 +1,17 @@
-"""Outcome of a check."""
+"""Finding of one check, and its verdict."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class Verdict(StrEnum):
-    """Verdict of a check."""
+    """Verdict of a check: works, could be better, or does not work."""
 
     OK = "ok"
     NOTE = "note"
-    """Optional: something is better, or possible, with it."""
+    """The checked thing is optional: with it, something works better or becomes possible"""
     MISSING = "missing"
-    """The checked thing does not work."""
+    """The checked thing does not work"""
 
 
 @dataclass(frozen=True)
@@ -21,11 +21,11 @@ class Finding:
     name: str
     verdict: Verdict
     said: str
-    """Finding in one line."""
+    """What was found, in one line"""
     remedy: str | None = None
-    """Command or change that mends it; None if nothing is to do."""
+    """Command or change that mends the fault; None if there is nothing to do"""
 
 
 def can_be(side: str, findings: list[Finding]) -> bool:
-    """Return whether this machine can be this side: it needs the extra of that name. The demo needs the robot side."""
+    """Return whether this machine can run `side` ("robot" or "operator"), which needs the extra of that name."""
     return any(finding.name == f"extra {side}" and finding.verdict is Verdict.OK for finding in findings)

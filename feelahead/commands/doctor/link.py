@@ -1,7 +1,7 @@
 """Check of the path to a robot side, up to the first fault.
 
-Harmless to the person who drives: two connections to each port, one after the other, and questions that the robot side
-answers without admitting anybody. A Hello would request the arm, so that none is sent.
+The check does not disturb an operator who drives. It makes two connections to each port, one after the other, and
+sends questions that the robot side answers without admitting the sender. No Hello is sent, as it would request the arm.
 """
 
 import secrets
@@ -28,34 +28,34 @@ from feelahead.commands.doctor.port import (
 
 _ROUND_TRIPS: Final = 20
 _MEASURE_S: Final = 5.0
-"""Time limit for the round trips, in seconds: a long path allows fewer."""
+"""Time limit for measuring round trips, in seconds; on a path with a long delay fewer are measured."""
 _PAUSE_S: Final = 0.11
-"""Pause between questions, in seconds: the robot side answers strangers ten times a second."""
+"""Pause between questions, in seconds: the robot side answers programs without a Hello ten times a second at most."""
 _TELEMETRY_LIMIT_S: Final = 2.0
 _ANSWER_LIMIT_S: Final = 2.5
 _HANDSHAKE_LIMIT_S: Final = 4.0
-"""Time limit of a handshake, in seconds: below the 5 s after which a robot side hangs up, an end is a refusal."""
+"""Time limit of a handshake, in seconds. A robot side hangs up after 5 s of silence, so an earlier end is a refusal."""
 _STEP_S: Final = 0.05
 _LARGE: Final = bytes(4000)
-"""Payload that is no message; three packets of full size."""
+"""Payload that is no valid message; it fills three packets of full size, to test whether the path carries these."""
 _LARGE_LIMIT_S: Final = 2.5
 _MOST_LOST: Final = 2
-"""Number of answers that may be lost, because of an emulated link or of other strangers."""
+"""Number of missing answers that end the measurement; an emulated link or other askers may cost some."""
 
 
 @dataclass(frozen=True)
 class Talk:
-    """Answers of the robot side; no round trips without an answer."""
+    """What the robot side's answers told; without an answer `round_trips_s` is empty."""
 
     round_trips_s: tuple[float, ...] = ()
     place: int = 0
-    """Place that we would get: 0 owns the arm."""
+    """Place that this machine would get as an operator: 0 owns the arm, 1 and more observe"""
     waiting: int = 0
-    """Number of observers."""
+    """Number of operators that observe"""
 
 
 def check_path(way: RobotAddress) -> tuple[Talk, PathError | None]:
-    """Check everything up to the first fault; return the answers and the fault."""
+    """Check the path up to the first fault; return what the robot side answered, and the fault if there is one."""
     clock, talk = MonotonicClock(), Talk()
     try:
         to_control, to_view = resolved(way.control, "--connect"), resolved(way.view, "--view-connect")
@@ -74,7 +74,7 @@ def check_path(way: RobotAddress) -> tuple[Talk, PathError | None]:
 
 
 def as_json(way: RobotAddress, talk: Talk, error: PathError | None) -> dict[str, object]:
-    """Return the findings for programs."""
+    """Return the result of the check as a JSON object, for programs."""
     trips_s = talk.round_trips_s
     return {
         "connect": host_and_port(way.control),
@@ -92,7 +92,7 @@ def as_json(way: RobotAddress, talk: Talk, error: PathError | None) -> dict[str,
 
 
 def reached(talk: Talk) -> str:
-    """Return the line for a path without fault."""
+    """Return the line that reports a path without fault."""
     trips_s = talk.round_trips_s
     arm = "the arm is free (you would own it)"
     if talk.place:
@@ -102,7 +102,7 @@ def reached(talk: Talk) -> str:
 
 
 class _Questions:
-    """Questions that the robot side answers to anybody, and a check for telemetry."""
+    """Questions that the robot side answers even to programs without a Hello, and checks of what else arrives."""
 
     def __init__(self, sockets: OperatorSockets, way: RobotAddress, clock: MonotonicClock, round_trip_s: float) -> None:
         self._sockets = sockets
@@ -110,13 +110,13 @@ class _Questions:
         self._clock = clock
         self._round_trip_s = round_trip_s
         self._epoch = secrets.randbits(53)
-        """Epoch that no Hello opens."""
+        """Epoch of the questions; as no Hello has this epoch, the robot side opens no session"""
         self._sequence = 0
         self._notices: list[LeaseNotice] = []
         self._telemetry = False
 
     def talk(self) -> Talk:
-        """Ask until the best round trip is known."""
+        """Ask until enough round trips are measured; raise PathError if no answer comes."""
         end_s = self._clock.now() + _HANDSHAKE_LIMIT_S + self._round_trip_s
         while not self._ask():
             self._until(_STEP_S)
@@ -141,18 +141,19 @@ class _Questions:
         return Talk(tuple(trips_s), self._notices[-1].place, self._notices[-1].waiting)
 
     def expect_telemetry(self) -> None:
-        """Raise PathError unless telemetry arrives."""
+        """Raise PathError unless telemetry arrives at the view connection."""
         if not self._until(_TELEMETRY_LIMIT_S + 2.0 * self._round_trip_s, lambda: self._telemetry):
             place = host_and_port(self._way.view)
             said = f"{place} is no view port of a robot side, or not of this one: it sends no telemetry"
             raise PathError("view port", f"the control port works, but {said}", VIEW_CONNECT)
 
     def expect_large(self) -> None:
-        """Raise PathError unless a question passes behind packets of full size."""
+        """Raise PathError unless a question is answered that was sent behind packets of full size."""
         self._until(_PAUSE_S)
         if not self._sockets.send(_LARGE):
             return
-        # The robot side would hang up after 3 s without a heartbeat, and the next connection would be clear.
+        # Both questions fit in 2.5 s: after 3 s without a heartbeat the robot side would hang up, and a new connection
+        # would have no large packet in its way.
         if not any(self._ask() and self._answered(_LARGE_LIMIT_S / 2) for _ in range(2)):
             said = f"small packets reach {self._place}, large ones do not: the path drops too long packets"
             remedy = "a smaller MTU here, such as: sudo ip link set DEVICE mtu 1280 (VPNs and tunnels need that)"
@@ -177,7 +178,10 @@ class _Questions:
         return PathError("no answer", f"{said} port, or another program", remedy)
 
     def _ask(self) -> bool:
-        """Send a command without lease, of an epoch without Hello: it is answered, and moves nothing."""
+        """Send a command without lease and session, which the robot side answers but never applies.
+
+        Return whether it could be sent.
+        """
         self._sequence += 1
         header = Header(epoch=self._epoch, sequence=self._sequence, sent_s=self._clock.now())
         return self._sockets.send(encode(MotionCommand(header, l2=0.0, r2=0.0)))
@@ -187,7 +191,7 @@ class _Questions:
         return self._until(limit_s, lambda: len(self._notices) > before)
 
     def _until(self, limit_s: float, done: Callable[[], bool] = lambda: False) -> bool:
-        """Process messages until `done`; return False if the time is over first."""
+        """Process messages until `done()` is true; return False if `limit_s` is over first."""
         end_s = self._clock.now() + limit_s
         while not done():
             if (left_s := end_s - self._clock.now()) <= 0.0:

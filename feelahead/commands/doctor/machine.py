@@ -1,4 +1,4 @@
-"""Checks of this machine: packages, compiled kernels, rendering, priority."""
+"""Checks of this machine: installed packages, compiled kernels, rendering of pictures, real-time priority."""
 
 import importlib
 import json
@@ -28,7 +28,7 @@ EXTRAS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
     "record": ("recording runs", ("foxglove", "mcap")),
     "experiments": ("sweeps over many runs", ("matplotlib", "pyarrow", "distributed")),
 }
-"""Purpose and modules of each extra."""
+"""Purpose and imported modules of each extra of the package, by its name"""
 COMPILE: Final = "feelahead doctor --compile"
 _LIMIT_S: Final = 60.0
 _RENDER: Final = """
@@ -41,17 +41,20 @@ _REALTIME: Final = "import json; from common.realtime.priority import make_realt
 
 @dataclass(frozen=True)
 class KernelFacts:
-    """Numbers of kernels, and of those not compiled."""
+    """Number of kernels, how many of them have no stored machine code, and where it is stored."""
 
     kernels: int
     missing: int
     folder: str
-    """Folder of their machine code."""
+    """Folder of the kernels' machine code"""
     writable: bool
 
 
 def check_extra(extra: str, failures: Mapping[str, str]) -> Finding:
-    """Check that every module of an extra can be imported; `failures`: Python's error by failed module."""
+    """Check that every module of an extra can be imported.
+
+    failures: Python's error for each module that cannot be imported.
+    """
     (purpose, modules), name = EXTRAS[extra], f"extra {extra}"
     if not failures:
         return Finding(name, Verdict.OK, f"{', '.join(modules)}: {purpose}")
@@ -64,7 +67,10 @@ def check_extra(extra: str, failures: Mapping[str, str]) -> Finding:
 
 
 def check_kernels(facts: KernelFacts | None) -> list[Finding]:
-    """Check whether a start compiles; `facts`: None without Numba, which another check reports."""
+    """Check whether the next start has to compile kernels.
+
+    facts: None if Numba is missing, which another check reports.
+    """
     if facts is None:
         return []
     if not facts.missing:
@@ -78,7 +84,10 @@ def check_kernels(facts: KernelFacts | None) -> list[Finding]:
 
 
 def check_rendering(troubles: Mapping[str, str | None]) -> Finding:
-    """Check that the cameras' pictures can be rendered; `troubles`: backend -> why not, None if it works."""
+    """Check that the cameras' pictures can be rendered.
+
+    troubles: for each off-screen backend, why it fails; None if it works.
+    """
     working = [name for name, trouble in troubles.items() if trouble is None]
     if working:
         return Finding("cameras", Verdict.OK, f"rendered without a screen by {working[0].upper() or 'OpenGL'}")
@@ -88,7 +97,7 @@ def check_rendering(troubles: Mapping[str, str | None]) -> Finding:
 
 
 def check_realtime(notes: Sequence[str]) -> list[Finding]:
-    """Check that `--realtime` would be granted; `notes`: those of `--realtime`, one for each refusal."""
+    """Check whether the system would grant `--realtime`; `notes` has a line for each refused part."""
     if sys.platform != "linux":
         return [Finding("--realtime", Verdict.NOTE, "Linux alone has it; the sides run without")]
     findings = []
@@ -99,7 +108,7 @@ def check_realtime(notes: Sequence[str]) -> list[Finding]:
 
 
 def failed_imports(extra: str) -> dict[str, str]:
-    """Return the modules of an extra that cannot be imported, with the reasons."""
+    """Return the reason for each module of an extra that cannot be imported."""
     failures = {}
     for module in EXTRAS[extra][1]:
         try:
@@ -111,7 +120,7 @@ def failed_imports(extra: str) -> dict[str, str]:
 
 
 def kernel_facts() -> KernelFacts | None:
-    """Count the compiled kernels; None if none can be compiled."""
+    """Count the kernels and the missing ones; None if Numba or another import is missing."""
     try:
         from robot_side.compiled.warm_up import import_kernels  # noqa: PLC0415
     except ImportError:
@@ -127,20 +136,20 @@ def _facts(kernels: Sequence["Compiled"]) -> KernelFacts:
 
 
 def rendering_troubles() -> dict[str, str | None]:
-    """Return for each off-screen backend why it fails, None if it works; each is tried in a separate process."""
+    """Try each off-screen backend in a separate process; return why it fails, or None if it works."""
     outputs = {backend: _output_of(_RENDER, backend) for backend in BACKENDS}
     ended = "trying it ends Python, or takes too long"
     return {backend: ended if said is None else json.loads(said) for backend, said in outputs.items()}
 
 
 def realtime_notes() -> list[str]:
-    """Return the notes of `--realtime`, tried in a separate process."""
+    """Try `--realtime` in a separate process; return a line for each refused part."""
     notes: list[str] = json.loads((sys.platform == "linux" and _output_of(_REALTIME)) or "[]")
     return notes
 
 
 def _output_of(program: str, *arguments: str) -> str | None:
-    """Return the last line that a Python process writes; None if it fails."""
+    """Run `program` in a separate Python process; return the last line that it prints, None if it fails."""
     command = [sys.executable, "-P", "-c", program, *arguments]
     try:
         done = subprocess.run(
@@ -152,13 +161,13 @@ def _output_of(program: str, *arguments: str) -> str | None:
 
 
 def compile_kernels(*, as_json: bool) -> int:
-    """Compile the missing kernels and print the result; return 1 if they are not kept for the next start."""
+    """Compile the missing kernels and print the result; return 1 if their machine code could not be stored, else 0."""
     try:
         from robot_side.compiled.warm_up import import_kernels, warm_up  # noqa: PLC0415
 
         kernels = import_kernels()
     except ImportError as error:
-        raise ConfigurationError(f"--compile: {error}; to install it: pip install '.[robot]' in the clone") from error
+        raise ConfigurationError(f"--compile: {error}; install it in the clone: pip install '.[robot]'") from error
     missing = {kernel.name for kernel in kernels if not kernel.is_kept}
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("compiling", total=max(len(missing), 1))

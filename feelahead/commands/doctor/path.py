@@ -1,7 +1,8 @@
 """Measurement of the path to a robot side for five seconds, with the traffic of a resting operator.
 
-The doctor rests its hands, and asks for both views. If the arm is free it holds the lease meanwhile, disarmed; if
-somebody drives it observes. The robot side's rate control then fits the pictures to the path.
+The doctor acts as an operator who touches nothing, and asks for both views. If the arm is free, the doctor holds the
+lease during the measurement, disarmed. If another operator has the arm, the doctor observes. The robot side's rate
+control adapts the pictures to the path.
 """
 
 import importlib.util
@@ -24,17 +25,17 @@ from operator_side.dualsense.simulated.controller import SimulatedDualSense
 
 MEASURE_S: Final = 5.0
 _SETTLE_S: Final = 2.0
-"""Time before the measurement, in seconds: for the handshakes, the clock offset, and the pictures' rate."""
+"""Time before the measurement, in seconds, until handshakes, clock offset and the pictures' rate have settled."""
 _STEP_S: Final = 0.004
 _WATCH_PERIOD_S: Final = 0.25
 _GAP_MS: Final = 100.0
-"""Silence of commands beyond which the robot side stops the arm, in milliseconds."""
+"""Silence of commands after which the robot side stops the arm, in milliseconds."""
 _LEAST_PICTURES_HZ: Final = 4.0
 _OLDEST_PICTURE_MS: Final = 500.0
 
 
 def measure_path_along(way: RobotAddress) -> dict[str, Any]:
-    """Measure the path to a robot side that answers; return figures by name, None for missing ones."""
+    """Measure the path to a robot side that answers; return the figures by name, None for a figure without a value."""
     topics = (b"telemetry", VIDEO_TOPIC)
     with OperatorSockets(way.control.address, way.view.address, topics=topics, keys=way.keys) as sockets:
         return _measured(sockets, (way.control.port, way.view.port), MonotonicClock())
@@ -47,8 +48,8 @@ def _measured(sockets: OperatorSockets, ports: tuple[int, int], clock: Monotonic
     end_s, watch_s, settled, before = begin_s + MEASURE_S, 0.0, False, TcpFigures()
     times_s, arrived_bytes = [begin_s], 0
     pictures: dict[str, list[tuple[float, float]]] = defaultdict(list)
-    """(received, captured) of each view's pictures, on both sides' clocks"""
-    # Request the same format as the console.
+    """For each view, (time received, time captured) of each picture; each time is on its own side's clock"""
+    # Request pictures in the format that the console would request.
     lacks = (0, 0) if importlib.util.find_spec("av") is not None else None
     while True:
         received, seen = sockets.receive(), sockets.receive_view()
@@ -95,7 +96,10 @@ def _measured(sockets: OperatorSockets, ports: tuple[int, int], clock: Monotonic
 
 
 def judged(figures: dict[str, Any], *, linked: bool) -> dict[str, Any]:
-    """Add what works. linked: the robot side has answered."""
+    """Return the figures, and with them whether the arm would work on this path and how many views.
+
+    linked: whether the robot side has answered.
+    """
     views = figures["views"].values()
     return figures | {
         "arm_works": linked and figures["longest_silence_ms"] < _GAP_MS,
@@ -122,7 +126,7 @@ def _quantile_ms(values_s: list[float], share: float) -> float | None:
 
 
 def path_line(path: dict[str, Any]) -> str:
-    """Return a line with the figures, and with what will work on the path."""
+    """Return a line with the figures, and with what the path is good enough for."""
     trip_ms = path["round_trip_ms"]
     if trip_ms["p50"] is None:
         return "path: nothing measured, as the robot side stopped answering"

@@ -1,4 +1,4 @@
-"""Connection to a port where a robot side should listen, and diagnosis of the answer."""
+"""Open a port where a robot side should listen, and diagnose the answer."""
 
 import errno
 import os
@@ -13,14 +13,14 @@ from common.sockets.endpoints import Endpoint, following, resolve, split_connect
 from common.sockets.greeting import GREETING_BYTES, KNOCK, mechanism_of
 
 _CONNECT_LIMIT_S: Final = 4.0
-"""Time limit of a connection, in seconds: one more than Linux needs to find that an address is unused."""
+"""Time limit of a connection, in seconds: 1 s more than Linux needs to find that nobody has an address."""
 _GREETING_LIMIT_S: Final = 3.0
 _STEPS: Final = "feelahead keys --help has the steps on both machines"
 VIEW_CONNECT: Final = "say --view-connect tcp://HOST:PORT with the port that the robot side names at its start"
 
 
 class PathError(Exception):
-    """First fault of the path; `wrong` is the kind in a word or two."""
+    """First fault of the path; `wrong` names its kind in a word or two."""
 
     def __init__(self, wrong: str, said: str, remedy: str) -> None:
         super().__init__(f"{wrong}: {said}; to mend it: {remedy}")
@@ -37,7 +37,7 @@ class RobotAddress:
 
     @classmethod
     def to(cls, connect: str, view_connect: str | None = None, keys: OperatorKeys | None = None) -> "RobotAddress":
-        """Read the addresses without resolving them; raises ConfigurationError for invalid ones."""
+        """Read the addresses, without looking their names up; raises ConfigurationError for an invalid address."""
         control = Endpoint(*split_connect(connect, "--connect"), ipv6=False)
         if view_connect is None:
             return cls(control, following(control, connect, "--view-connect"), keys)
@@ -46,10 +46,10 @@ class RobotAddress:
 
 @dataclass(frozen=True)
 class Opening:
-    """Answer of a port to a TCP connection, and its first bytes."""
+    """Answer of a port to a TCP connection, and the first bytes that it sends."""
 
     error: int | None = None
-    """Errno of a failed connection, ETIMEDOUT without answer; None for an established one."""
+    """Errno of a failed connection, ETIMEDOUT if no answer came; None if the connection was established"""
     said: bytes = b""
     hung_up: bool = False
     """Whether the port ended the connection by itself."""
@@ -58,7 +58,7 @@ class Opening:
 
 
 def judge_port(way: RobotAddress, port: Endpoint, opening: Opening, *, loopback: bool = False) -> None:
-    """Raise PathError if it is no robot side's port. loopback: it is on this machine."""
+    """Raise PathError if `opening` shows that `port` is no robot side's. loopback: the port is on this machine."""
     place = host_and_port(port)
     if opening.error is not None:
         raise _no_connection(way, port, opening.error, loopback=loopback)
@@ -87,7 +87,7 @@ def judge_port(way: RobotAddress, port: Endpoint, opening: Opening, *, loopback:
 
 
 def judge_view(way: RobotAddress, opening: Opening, *, loopback: bool = False) -> None:
-    """Raise PathError like `judge_port`, for a view port whose control port works."""
+    """Raise PathError if the view port is no robot side's, after the control port was found to work."""
     try:
         judge_port(way, way.view, opening, loopback=loopback)
     except PathError as error:
@@ -120,7 +120,7 @@ def _no_connection(way: RobotAddress, port: Endpoint, error: int, *, loopback: b
 
 
 def resolved(port: Endpoint, flag: str) -> Endpoint:
-    """Replace the host by its first address; raises PathError if it cannot be resolved."""
+    """Return `port` with the host's name replaced by its first address; raises PathError if the name has none."""
     try:
         return replace(port, host=resolve(port.host, port.address, flag)[0])
     except ConfigurationError as error:
@@ -134,7 +134,7 @@ def host_and_port(port: Endpoint) -> str:
 
 
 def knock(port: Endpoint, clock: MonotonicClock) -> Opening:
-    """Connect, and read the first bytes."""
+    """Connect to the port by TCP, and read the first bytes that it sends."""
     began_s = clock.now()
     try:
         connection = socket.create_connection((port.host, port.port), _CONNECT_LIMIT_S)

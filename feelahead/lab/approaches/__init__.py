@@ -1,1 +1,1 @@
-"""Approaches for several questions: a hand that pulls, runs of both sides, recordings and their judgement."""
+"""Approaches of the gripper to objects, for several questions: pulls of a hand, runs of both sides, and judgements."""

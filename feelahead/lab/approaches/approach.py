@@ -1,4 +1,4 @@
-"""One approach: a finger of constant force pulls R2, both sides and the link in virtual time. Does it hit?"""
+"""Run one approach: a finger pulls R2 with constant force, and both sides and the link run in virtual time."""
 
 import math
 from collections.abc import Iterator
@@ -29,15 +29,15 @@ _FULL: Final = Feel(l2=(MAX_STRENGTH,) * ZONE_COUNT, r2=(MAX_STRENGTH,) * ZONE_C
 
 
 class FullDualSense(SimulatedDualSense):
-    """Controller that resists with full strength from its first state on."""
+    """Simulated controller whose triggers always resist with full strength, for the law `full`."""
 
     def write(self, feel: Feel, now_s: float) -> None:
-        """Write full strength, whatever the command."""
+        """Write full strength, whatever is commanded."""
         del feel
         super().write(_FULL, now_s)
 
     def read(self, now_s: float) -> ControllerState | None:
-        """Read the state; free triggers resist with full strength from then on."""
+        """Return the state; if the triggers are free, set them to full strength."""
         if self.released:
             super().write(_FULL, now_s)
         return super().read(now_s)
@@ -45,40 +45,40 @@ class FullDualSense(SimulatedDualSense):
 
 @dataclass(frozen=True)
 class Approach:
-    """The settings of one approach; the seed draws the camera's, the encoders' and the link's errors."""
+    """Settings of one approach. From the seed the errors of camera and encoders and the link's delays are drawn."""
 
     model: Path
     force_n: float
     site: str = "tool"
     strongest_n: float = 2.0
-    """The force that the strongest effect adds (an assumption: no trigger has been measured)."""
+    """Force in newtons with which the strongest effect resists (assumed: no trigger has been measured)."""
     link: str = ""
     link_model: LinkModel = "datagram"
     law: Law = "swept"
     probability: float = 0.99
     duration_s: float = 8.0
-    """Time from the beginning of the pull to the end of the run, in seconds."""
+    """Time from the beginning of the pull to the end of the run."""
     seed: int = 0
     grip: bool = False
     stick: Vector2 = (0.0, 0.0)
-    """Deflection (2,) of the left stick, beyond its dead zone: moves across."""
+    """Deflection (right, up) of the left stick, which moves the tool across; its dead zone is subtracted already."""
     turn: Vector2 = (0.0, 0.0)
-    """Deflection (2,) of the right stick, beyond its dead zone: turns."""
+    """Deflection (right, up) of the right stick, which turns the tool; its dead zone is subtracted already."""
     assist: Assist = "none"
     full_rate: bool = False
-    """Whether both sides send every message (RunOptions.full_rate)."""
+    """Whether both sides send every message, as with `--full-rate`."""
     camera_sd_m: float | None = None
-    """σ_c, in metres; None: the settings' default."""
+    """Standard deviation σ_c of the camera's error, in metres; None: the default of the settings."""
 
 
 class PullRun(Listener):
-    """Both sides, their link and a hand that pulls, run step by step."""
+    """Both sides, their link and a hand that pulls R2; the run can be advanced in steps."""
 
     def __init__(self, approach: Approach, pull: Pull | None = None) -> None:
-        """Build both sides in the scene; `pull` replaces the constant force."""
+        """Build both sides in the scene. pull: motion of the hand, instead of the constant force."""
         self.approach = approach
         self.onset: ContactOnset | None = None
-        """The first contact since the pull began."""
+        """First contact since the pull began; None before it."""
         self.samples = Samples()
         robot = robot_settings(approach)
         operator = OperatorSettings(
@@ -114,26 +114,26 @@ class PullRun(Listener):
 
     @property
     def disarmed_because(self) -> str | None:
-        """The reason why the robot side stopped the arm; None while it has not."""
+        """Reason for which the robot side stopped the arm; None while it has not stopped the arm."""
         safety = self.loopback.robot.session.safety
         return None if safety.state == "armed" or not safety.stops else safety.stops[-1][1]
 
     def arm(self) -> float:
-        """Run until the pull begins, and return that time; FeelaheadError if the robot is not armed in time."""
+        """Run until the pull begins, and return the time of that; FeelaheadError if the robot is not armed in time."""
         began_s = wait_for_pull(self.loopback, self.hands, self.approach.link)
         if self.truth.touched:
             raise FeelaheadError(f"the gripper touches {', '.join(sorted(self.truth.touched))} before the pull begins")
         return began_s
 
     def go_on(self, until_s: float) -> Iterator[float]:
-        """Run until a contact, a stop or `until_s`; yield the time every 10 ms."""
+        """Run until a contact, a stop of the arm, or `until_s`; yield the time every 10 ms."""
         clock = self.loopback.clock
         while self.onset is None and self.disarmed_because is None and clock.now() < until_s:
             self.loopback.run_until(min(clock.now() + SAMPLE_S, until_s))
             yield clock.now()
 
     def on_sent(self, now_s: float) -> None:
-        """Sample the true contact, the speed and the zones."""
+        """Sample the true contacts, and every 10 ms speed, gap, travel and R2's zones."""
         if self.onset is not None:
             return
         run, hands = self.loopback, self.hands
@@ -149,12 +149,12 @@ class PullRun(Listener):
 
 
 def compile_kernels() -> None:
-    """Compile every missing kernel, so that parallel workers do not compile the same ones."""
+    """Compile all missing kernels once, so that parallel workers do not each compile them."""
     warm_up(kernels=import_kernels())
 
 
 def robot_settings(approach: Approach) -> RobotSettings:
-    """Make the robot side's settings; ConfigurationError for an unusable model or link."""
+    """Return the robot side's settings for the approach; ConfigurationError if model or link cannot be used."""
     return RobotSettings(
         model=approach.model,
         site=approach.site,
@@ -170,10 +170,10 @@ def robot_settings(approach: Approach) -> RobotSettings:
 
 
 def run_approach(approach: Approach) -> Outcome:
-    """Run one approach to its contact or end. The same settings give the same outcome.
+    """Run one approach until a contact or its end. The same settings give the same outcome.
 
-    Raises ConfigurationError for an unusable model or link. The outcome is `failed` if the robot is not armed in time
-    or touches before the pull.
+    Raises ConfigurationError if model or link cannot be used. The outcome is `failed` if the robot is not armed in time
+    or touches something before the pull.
     """
     run = PullRun(approach)
     try:

@@ -1,4 +1,4 @@
-"""Arming: the time from the start of both sides until the hand pulls."""
+"""Run both sides from their start until the arm is armed and the hand begins to pull."""
 
 from common.errors import FeelaheadError
 from feelahead.both_sides.loopback import Loopback
@@ -9,7 +9,7 @@ _LOOK_S = 0.01
 
 
 def wait_for_pull(run: Loopback, hands: PullingHands, link: str) -> float:
-    """Run until the pull begins, and return that time; FeelaheadError if the robot is not armed in time."""
+    """Run until the pull begins, and return the time of that; FeelaheadError if the robot is not armed in time."""
     while hands.pull_began_s is None:
         run.run_until(run.clock.now() + _LOOK_S)
         if run.clock.now() > LONGEST_ARMING_S:

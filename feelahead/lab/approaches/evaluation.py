@@ -1,6 +1,7 @@
-"""Coverage and false alarms of one motion: recorded once, and judged for every cell, law and P.
+"""Coverage and false alarms of one motion, which is recorded once and then judged for every cell, law and P.
 
-Covered: 0.25 s before the last release that avoids the contact, full strength was in the farthest zone reached by then.
+An approach is covered if full strength came in time: 0.25 s before the last release that avoids the contact, the
+farthest zone that the trigger had reached by then was at full strength.
 """
 
 import math
@@ -38,57 +39,57 @@ LINKS: Final = {
     "400 ms": "delay 400ms 10ms distribution normal",
     "200 ms, 5 % lost": "delay 200ms 10ms distribution normal loss 5%",
 }
-"""Links by name; each holds in both directions."""
+"""Links by name; the same words hold in both directions."""
 _RESAMPLED: Final = 2000
 _LEAST_APPROACHES: Final = 10
-"""Least number of approaches for `holds`: a bootstrap over two that agree has an interval of width 0."""
+"""Minimum number of approaches for the figure `holds`; over two equal ones the bootstrap's interval has width 0."""
 
 
 @dataclass(frozen=True)
 class Placement:
-    """One cell: a scene, the errors of camera and encoders, and the objects' speed."""
+    """One cell of the grid: a scene, the errors of camera and encoders, and the objects' speed."""
 
     scene: str
     camera_mm: float = 3.0
     encoder_factor: float = 1.0
-    """Factor on the encoder errors of the settings."""
+    """Factor by which the encoder errors of the settings are multiplied."""
     speed_m_s: float = 0.0
     """Speed of the objects along the approach, in m/s; below 0 they come nearer."""
 
     @property
     def shown(self) -> str:
-        """Name of the scene and its motion."""
+        """Name of the scene, and how its objects move, as it is printed."""
         if self.speed_m_s == 0.0:
             return self.scene
         return f"{self.scene} {'fleeing' if self.speed_m_s > 0.0 else 'coming'} {1e3 * abs(self.speed_m_s):g} mm/s"
 
     def key(self, pull: str, link: str) -> str:
-        """Name the cell for --only."""
+        """Return the cell's name, which --only searches."""
         drawn = f"camera {self.camera_mm:g} mm", f"encoders x{self.encoder_factor:g}"
         return "/".join((self.shown, pull, link, *drawn))
 
 
 @dataclass(frozen=True)
 class Pulls:
-    """One motion, recorded several times, with its cells."""
+    """One kind of motion over one link, which is recorded several times, and the cells for which it is judged."""
 
     pull: PullKind
     link: str
-    """A key of LINKS."""
+    """Name of the link, a key of LINKS."""
     home: str
-    """Scene whose home pose starts the approaches."""
+    """Scene in whose home pose the approaches start."""
     cells: tuple[Placement, ...]
     sizes: tuple[int, int]
     """Number of approaches, and of object placements for each."""
     probabilities: tuple[float, ...]
     laws: tuple[Law, ...]
     judged_s: float = 60.0
-    """Least judged time of R2 pulled, in seconds, for the false alarms of each cell."""
+    """Minimum time with R2 pulled, in seconds, that is judged for the false alarms of each cell."""
 
 
 @dataclass
 class _Counts:
-    """Counts of one law at one P; `hits` and `draws` hold an entry for each approach."""
+    """Counts of one law at one P. `hits` (covered draws) and `draws` have one entry for each approach."""
 
     hits: list[int] = field(default_factory=list)
     draws: list[int] = field(default_factory=list)
@@ -101,28 +102,31 @@ class _Counts:
 
 @dataclass(frozen=True)
 class _Staged:
-    """One approach in one cell, with every placement of the objects."""
+    """One recorded approach in one cell, with all placements of the objects that are tried."""
 
     replay: Replay
     posed: PosedScene
     collisions: tuple[Collision, ...]
-    """Collisions found; empty where nothing collides, and the objects stay where the scene has them."""
+    """Placements in which the approach collides; empty if none does, and then the objects stay as in the scene."""
     sought: int
-    """Number of placements that were tried."""
+    """Number of placements that were tried"""
 
     @property
     def avoidable(self) -> tuple[tuple[Collision, float], ...]:
-        """Collisions that a release can avoid, each with the last moment for it."""
+        """Collisions that a release can avoid, each with the time of the last release that does."""
         return tuple((one, one.last_release_s) for one in self.collisions if one.last_release_s is not None)
 
     @property
     def knowable(self) -> tuple[tuple[Collision, float], ...]:
-        """Avoidable collisions whose sticks stay between judgement and last release; others cannot be predicted."""
+        """Avoidable collisions in which the sticks do not change between judgement and last release.
+
+        If they change, the collision cannot be predicted.
+        """
         moves = self.replay.moves_sticks
         return tuple((one, last_s) for one, last_s in self.avoidable if not moves(last_s - REACTION_S, last_s))
 
     def draw(self, shift_m: FloatArray, cell: Placement, number: int) -> Draw:
-        """Move the objects by shift_m (3,), perceived with the camera's `number`-th error."""
+        """Return the approach to objects moved by shift_m (3,), perceived with the camera's `number`-th error."""
         record, names = self.replay.record, tuple(thing.name for thing in self.posed.scene.objects)
         sd_m = 1e-3 * cell.camera_mm
         errors_m = CameraError(names, 0.0, sd_m, 0.0, seed_of(record.seed, number)).next_frame()
@@ -131,7 +135,7 @@ class _Staged:
 
 
 def evaluate(pulls: Pulls, seed: int) -> Iterator[Row]:
-    """Yield a row for each cell, law and P; the same seed gives the same rows."""
+    """Record the motion, and yield a row for each cell, law and P; the same seed gives the same rows."""
     approaches, places = pulls.sizes
     records = [
         record_approach(pulls.pull, LINKS[pulls.link], seed_of(seed, number), scene_name=pulls.home)
@@ -157,7 +161,7 @@ def _scene(name: str) -> Scene:
 
 
 def seed_of(*numbers: int) -> int:
-    """Derive one seed from several numbers."""
+    """Return one seed that is derived from several numbers."""
     return int(np.random.SeedSequence(numbers).generate_state(1)[0] >> 1)
 
 
@@ -171,7 +175,7 @@ def _stage(cell: Placement, replay: Replay, places: int) -> _Staged:
 
 
 def _count_covered(counts: _Counts, law: Judged, cell: Placement, staged: Sequence[_Staged]) -> None:
-    """Judge at least 10 / (1 - P) draws, the same number for each approach that has a contact to avoid."""
+    """Count how many draws are covered: at least 10 / (1 - P) draws, equally many for each approach with a contact."""
     useful = [one for one in staged if one.knowable]
     least = math.ceil(draws_needed(law.probability) / max(1, len(useful)))
     for one in useful:
@@ -191,7 +195,7 @@ def _count_covered(counts: _Counts, law: Judged, cell: Placement, staged: Sequen
 
 
 def _count_alarms(counts: _Counts, law: Judged, cell: Placement, staged: Sequence[_Staged], least_s: float) -> None:
-    """Judge a draw of each approach in turn, then of each in its next placement, until `least_s` are judged."""
+    """Count false alarms until `least_s` seconds are judged: one draw of each approach, then its next placement."""
     places = [(one, found) for one in staged if (found := _places(cell, one))]
     for number in count():
         before_s = counts.judged_s
@@ -207,7 +211,7 @@ def _count_alarms(counts: _Counts, law: Judged, cell: Placement, staged: Sequenc
 
 
 def _places(cell: Placement, one: _Staged) -> list[tuple[FloatArray, float]]:
-    """Return each placement's shift (3,), and the time of contact or the end of the approach."""
+    """Return for each placement the objects' shift (3,), and the time of the contact or else of the approach's end."""
     if cell.scene not in PASSED:
         return [(at.shift_m, at.touch_s) for at in one.collisions]
     # A drift or a turn may touch objects that a straight approach passes.
@@ -216,12 +220,15 @@ def _places(cell: Placement, one: _Staged) -> list[tuple[FloatArray, float]]:
 
 
 def draws_needed(probability: float) -> int:
-    """Return the least n >= 10 / (1 - P), so that ten failures are expected."""
+    """Return the smallest n >= 10 / (1 - P), for which ten uncovered draws are expected."""
     return int(np.ceil(10.0 / (1.0 - probability) - 1e-9))
 
 
 def interval(hits: Sequence[int], draws: Sequence[int]) -> tuple[float, float]:
-    """Bootstrap the 95 % interval of hits / draws over approaches: draws of one approach are not independent."""
+    """Return the 95 % interval of hits / draws, by a bootstrap over approaches.
+
+    Whole approaches are resampled, as the draws of one approach are not independent.
+    """
     counts = np.asarray(hits, dtype=np.float64), np.asarray(draws, dtype=np.float64)
     if len(hits) < 2:
         return hits[0] / draws[0], hits[0] / draws[0]
@@ -238,10 +245,12 @@ def interval(hits: Sequence[int], draws: Sequence[int]) -> tuple[float, float]:
 def _figures(counts: _Counts, staged: Sequence[_Staged], probability: float) -> Row:
     """Compute the figures from the counts; coverage is None if nothing collides or no release avoids it.
 
-    holds: the interval's lower end is at least P - 0.1 (1 - P), over 10 approaches or more.
-    reported: draws whose drift or turn, if any, is in the operator side's newest report 0.25 s before the last moment.
-    reported_coverage: coverage of these draws. unavoidable: placements in which no release avoids the contact.
-    unknowable: placements whose sticks move after judgement. alarm_share: share of judged_s, in which R2 was pulled.
+    holds: true if the interval's lower end is at least P - 0.1 (1 - P), over 10 approaches or more.
+    reported: number of draws whose drift or turn, if any, was known to the operator side when it was judged, 0.25 s
+    before the last release that avoids the contact. reported_coverage: coverage of these draws.
+    unavoidable: number of placements in which no release avoids the contact.
+    unknowable: number of placements in which the sticks change between judgement and last release.
+    judged_s: judged time with R2 pulled. alarm_share: share of it with a false alarm.
     """
     draws, covered = sum(counts.draws), len(counts.hits) > 0
     low, high = interval(counts.hits, counts.draws) if covered else (None, None)

@@ -1,4 +1,4 @@
-"""Strengths that each law puts on the triggers' zones at given moments of a recorded approach."""
+"""Compute the strengths that a law gives to the triggers' zones at given times of a recorded approach."""
 
 import math
 from dataclasses import dataclass, replace
@@ -33,18 +33,18 @@ _FRAME_S: Final = 1.0 / 30.0
 
 @dataclass(frozen=True)
 class Draw:
-    """One approach to objects, perceived with one draw of the camera's error."""
+    """One recorded approach to objects that are perceived with one draw of the camera's error."""
 
     replay: Replay
     objects: PerceivedObjects
-    """Perceived objects when the pull begins."""
+    """Objects as perceived when the pull begins."""
     camera_sd_m: float
-    """σ_c that the robot side assumes, in metres; equal to the true one here."""
+    """Standard deviation σ_c that the robot side assumes, in metres; it equals the true one here."""
     speed_m_s: float = 0.0
     """Speed of the objects along the approach axis at the pull's beginning, in m/s."""
 
     def objects_at(self, time_s: float) -> PerceivedObjects:
-        """Return the newest camera frame at `time_s`; the same one for objects at rest."""
+        """Return the newest camera frame at `time_s`; objects at rest have the same frame at all times."""
         if self.speed_m_s == 0.0:
             return self.objects
         since_s = math.floor(max(time_s - self.replay.record.began_s, 0.0) / _FRAME_S) * _FRAME_S
@@ -52,7 +52,7 @@ class Draw:
 
 
 def _moved(objects: PerceivedObjects, velocity_m_s: FloatArray, after_s: float) -> PerceivedObjects:
-    """Move all objects with this velocity (3,); the camera reports it."""
+    """Return the frame after all objects moved with `velocity_m_s` (3,) for `after_s`; it contains this velocity."""
     displacement_m = velocity_m_s * after_s
     return replace(
         objects,
@@ -68,17 +68,17 @@ def _moved(objects: PerceivedObjects, velocity_m_s: FloatArray, after_s: float) 
 
 @dataclass(frozen=True)
 class Judged:
-    """One law at one P in the shipped pipeline, except that each message brings a map, of average age.
+    """One law at one P, computed as both sides do, except that each message has a map, whose age is the average one.
 
-    The field uses the pose before the message left; the zones use the time at which they are felt. Nothing is rendered
-    in between, so a strength falls from one of these times to the next.
+    The field is of the pose before the message left; the zones are of the time at which they are felt. Nothing is
+    rendered between the given times, so a strength falls by several steps at once from one time to the next.
     """
 
     law: Law
     probability: float
 
     def felt(self, draw: Draw, times_s: FloatArray) -> IntArray:
-        """Compute the strengths (t, 2, 10), 0 to 8, of L2's and R2's zones at increasing operator-side times (t,)."""
+        """Return the strengths (t, 2, 10), 0 to 8, of L2's and R2's zones at the operator side's rising times (t,)."""
         always = MAX_STRENGTH if self.law == "full" else 0
         strengths = np.full((len(times_s), 2, ZONE_COUNT), always, dtype=np.int64)
         if self.law in ("none", "full"):
@@ -103,7 +103,7 @@ class Judged:
         return strengths
 
     def _look_around(self, law: SweptLaw, draw: Draw, now_s: float) -> None:
-        """Refresh the map from around if it is older than the period; it gets the average age, half the period."""
+        """Compute the map of the surroundings anew if it is older than its period; its age counts as half of that."""
         row = draw.replay.record.pose_row(now_s - 0.5 * PERIOD_S)
         law.forget_around(now_s - PERIOD_S)
         if np.isneginf(law.memory.around["at"]).any():
@@ -137,7 +137,7 @@ class Judged:
     def _under_way(
         self, replay: Replay, law: RobotLaw, sensed: Sensed, row: int, now_s: float
     ) -> tuple[Displacement | None, CourseOnMap | None]:
-        """Predict trigger's and sticks' displacement since the pose in `row`; None if the robot side compensates."""
+        """Predict the motion by trigger and sticks after the pose in `row`; None if the robot side compensates."""
         if compensation_of(self.law) == "robot":
             return None, None
         record, then_s = replay.record, float(replay.record.pose_time_s[row])

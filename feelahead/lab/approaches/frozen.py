@@ -1,4 +1,4 @@
-"""Scenes, forces and limits that must not change, so that figures of two laws stay comparable.
+"""Frozen scenes, forces and limits: they must not change, so that figures of different laws can be compared.
 
 The scenes are in tests/data. The simulated finger's forces and the arm's limits are those of commit 92ca53a.
 """
@@ -31,16 +31,17 @@ AHEAD: Final = (
     *("wall_45", "slot", "shelf_edge", "moving", "fleeing", "place_held", "u_mesh", "mug"),
     "terrain_ahead",
 )
-"""Scenes in which a continued pull ends in a contact."""
+"""Scenes in which a pull that goes on ends in a contact."""
 PASSED: Final = (
     *("wall_beside", "table_1_box", "table_2_boxes", "table_12_tetrahedra", "table_mesh"),
     *("cluttered", "terrain", "empty"),
 )
-"""Scenes in which a straight pull touches nothing: any strength is a false alarm."""
+"""Scenes in which a straight pull touches nothing, so that any strength is a false alarm."""
 ASIDE: Final[dict[str, tuple[Vector2, Vector2]]] = {"edge": ((1.0, 0.0), (0.0, 0.0)), "turn": ((0.0, 0.0), (1.0, 0.0))}
-"""Scenes that a straight pull passes, with the deflections across and turning that end in a contact."""
+"""Scenes in which a straight pull touches nothing, with the deflections of both sticks that end in a contact:
+(stick that moves across, stick that turns)."""
 GRIPPED: Final = ("place_held",)
-"""Scenes in which the gripper grips an object before the pull."""
+"""Scenes in which the gripper holds an object before the pull begins."""
 _HASH_DIGITS = 12
 
 
@@ -54,14 +55,14 @@ def frozen_scene(name: str) -> Path:
 
 
 def scene_names(models: Iterable[Path]) -> dict[Path, str]:
-    """Name each scene by its file's stem; by the whole path if several files share the stem."""
+    """Return a name for each scene's file: its stem, or the whole path if several files have the same stem."""
     known = list(dict.fromkeys(models))
     stems = [model.stem for model in known]
     return {model: model.stem if stems.count(model.stem) == 1 else str(model) for model in known}
 
 
 def frozen_values() -> dict[str, Any]:
-    """Collect the simulated finger's forces and the limits of finger and arm from the code."""
+    """Return the simulated finger's forces, and the limits of finger and arm, as the code has them."""
     return {
         "finger": {
             "preload_n": SPRING_PRELOAD_N,
@@ -81,7 +82,7 @@ def frozen_values() -> dict[str, Any]:
 
 
 def frozen_hash(others: Sequence[Path] = ()) -> str:
-    """Hash all frozen scenes and values, and those of `others` that are not frozen scenes."""
+    """Return a hash of all frozen scenes and values, and of those files in `others` that are no frozen scenes."""
     digest = hashlib.sha256(json.dumps(frozen_values(), sort_keys=True).encode())
     foreign = sorted(path for path in others if path.parent.resolve() != SCENES)
     for path in [*sorted(SCENES.glob("*.xml")), *foreign]:

@@ -1,4 +1,4 @@
-"""Criteria of coverage: full strength in time, and false alarms."""
+"""Judge whether full strength came in time, and which strengths are false alarms."""
 
 import math
 from collections.abc import Iterator
@@ -21,16 +21,16 @@ from robot_side.enlargement.kinematic_error import directional_variance, positio
 
 ALARM_STRENGTH: Final = 4
 CLEAR_M: Final = 0.015
-"""Clearance beyond D_σ, in metres, from which strength is a false alarm."""
+"""Distance in metres, beyond D_σ, that a path must keep from all objects for a strength to be a false alarm."""
 ALARM_STEP_S: Final = 0.02
 _R2 = 1
 _TRAVEL = TriggerTravel()
 
 
 def strength_before_release(law: Judged, draw: Draw, last_release_s: float) -> int:
-    """Return the strength, 0 to 8, in the farthest zone reached before the last release, 0.25 s before that release.
+    """Return the strength, 0 to 8, of the farthest zone that the trigger had reached 0.25 s before the last release.
 
-    Full strength covers the draw.
+    The draw counts as covered if this is full strength.
     """
     at_s = last_release_s - REACTION_S
     record = draw.replay.record
@@ -39,26 +39,26 @@ def strength_before_release(law: Judged, draw: Draw, last_release_s: float) -> i
 
 
 def zone_speed_m_s(zone: int) -> float:
-    """Compute the speed that a zone's middle commands: calibrated travel times full speed."""
+    """Return the speed that a pull to a zone's middle commands: calibrated travel times full speed."""
     raw = min((zone + 0.5) / ZONE_COUNT / SENSED_TRAVEL, 1.0)
     return _TRAVEL.travel(raw) * ToolMotionSettings().trigger_speed_m_s
 
 
 class Alarms(NamedTuple):
-    """Strengths of 4 or more under the finger without a cause."""
+    """False alarms: strengths of 4 or more under the finger although the path is clear."""
 
     number: int
-    """Number of unbroken stretches."""
+    """Number of false alarms; one that lasts counts once."""
     alarm_s: float
     judged_s: float
-    """Time for which R2 was pulled, in seconds."""
+    """Judged time, in which R2 was pulled, in seconds."""
 
 
 def false_alarms(law: Judged, draw: Draw, posed: PosedScene, shift_m: FloatArray, until_s: float) -> Alarms:
-    """Judge every 20 ms from the pull's beginning until `until_s`, or the end of the record.
+    """Count false alarms, judged every 20 ms from the pull's beginning until `until_s` or the end of the record.
 
-    An alarm is false if the zone's stopping path from the true pose stays D_σ(P) + 15 mm clear. The path must be clear
-    for commanded sticks and moving objects that continue, continue by half, or end.
+    An alarm is false if the gripper, pulled to this zone and then stopped, would keep D_σ(P) + 15 mm from all objects.
+    It must keep them in three cases: sticks and objects go on moving, at half speed, or not at all.
     """
     replay = draw.replay
     record = replay.record
@@ -83,7 +83,7 @@ def false_alarms(law: Judged, draw: Draw, posed: PosedScene, shift_m: FloatArray
 
 
 def _paths(draw: Draw, time_s: float, zone: int) -> Iterator[ToolPath]:
-    """Yield the stopping paths in the objects' frame, for motion aside that ends, continues by half, or continues."""
+    """Yield three stopping paths relative to the objects: motion aside ends, continues by half, or continues."""
     replay = draw.replay
     moves = draw.speed_m_s != 0.0 or replay.sticks_at(time_s).any()
     for share in (0.0, 0.5, 1.0) if moves else (0.0,):
@@ -94,7 +94,7 @@ def _paths(draw: Draw, time_s: float, zone: int) -> Iterator[ToolPath]:
 
 
 def statistical_distance_m(draw: Draw, time_s: float, probability: float) -> float:
-    """Compute D_σ(P) = max(0, Φ⁻¹(P) √(ûᵀΣû + σ_c²)) (eq. 9-10 without the delay), the largest of all spheres."""
+    """Return the largest D_σ(P) of all spheres: max(0, Φ⁻¹(P) √(ûᵀΣû + σ_c²)), eq. 9-10 without the delay."""
     replay = draw.replay
     pose = replay.estimated[replay.record.pose_row(time_s)]
     covariances = position_covariance(pose.sphere_jacobians, replay.encoder_sigma_rad)

@@ -1,4 +1,4 @@
-"""Laws that are compared: from the situation to the strengths that the fingers feel."""
+"""Laws that are compared, each a way from the situation to the strengths that the fingers feel."""
 
 from typing import Final, Literal, get_args
 
@@ -14,17 +14,17 @@ LAWS: Final[tuple[Law, ...]] = get_args(Law)
 
 
 def with_compensation(law: Law, compensation: Compensation) -> Law:
-    """Choose the side that compensates the delay; only swept leaves the choice."""
+    """Return the law with this side compensating the delay; it makes a difference for `swept` only."""
     return "swept_robot" if law == "swept" and compensation == "robot" else law
 
 
 def without_compensation(law: Law) -> str:
-    """Return the law's name in --law."""
+    """Return the name that `--law` has for this law."""
     return "swept" if law == "swept_robot" else law
 
 
 def in_words(law: Law) -> str:
-    """Return the law's name for people."""
+    """Return the law's name as it is printed."""
     return "swept, delay by the robot" if law == "swept_robot" else law
 
 
@@ -34,5 +34,5 @@ def compensation_of(law: Law) -> Compensation:
 
 
 def law_of_robot(law: Law) -> LawName:
-    """Return the law for the robot side's settings."""
+    """Return the law that the robot side's settings must name."""
     return "paper" if law == "paper" else "swept"

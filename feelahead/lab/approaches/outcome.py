@@ -1,4 +1,4 @@
-"""Course and outcome of an approach, and their criteria."""
+"""Course of an approach over time, its outcome, and the criteria for it."""
 
 import math
 from collections.abc import Sequence
@@ -12,18 +12,19 @@ from common.arrays import FloatArray, IntArray
 SAMPLE_S = 0.01
 """Sampling period of speed, gap and zones, in seconds."""
 STANDS_M_S = 0.001
-"""Speed below which, for the last second, the gripper has stopped."""
+"""Speed in m/s; a gripper that was slower for the last second has stopped."""
 SWING_M_S = 0.015
-"""Least change of speed that counts as a reversal."""
+"""Minimum change of speed, in m/s, that counts as a reversal."""
 _LAST_S = 1.0
 
 End = Literal["contact", "stopped", "undecided", "disarmed", "failed"]
-"""disarmed: the robot side stopped the arm, whatever was felt. failed: never armed, or touching from the start."""
+"""How an approach ended. disarmed: the robot side stopped the arm, whatever was felt. failed: the arm was never armed,
+or touched something from the start."""
 
 
 @dataclass(frozen=True)
 class Trace:
-    """Course from the beginning of the pull, a row each 10 ms."""
+    """Course of an approach from the beginning of the pull, with a row every 10 ms."""
 
     time_s: FloatArray
     """(k,) time since the pull began"""
@@ -39,7 +40,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class Outcome:
-    """End of an approach."""
+    """How an approach ended, and its figures."""
 
     end: End
     contact_speed_mm_s: float | None
@@ -50,18 +51,18 @@ class Outcome:
     stops_at_mm: float | None
     """True gap at the end if the gripper was slower than 1 mm/s for the last second; else None."""
     way_left_mm: float | None
-    """Contact distance left along the approach axis from there."""
+    """Distance that the gripper could still go along its approach axis before a contact, at that time."""
     reversals: int
-    """Number of reversals of the speed by more than 15 mm/s."""
+    """How often the speed turned from rising to falling, or back, by more than 15 mm/s."""
     ended_s: float
-    """Time since the pull began."""
+    """Time of the end, since the pull began."""
     trace: Trace = field(repr=False)
     why: str | None = None
-    """Reason of an end that does not judge the law."""
+    """Reason for an end that says nothing about the law; None for other ends."""
 
 
 class Samples:
-    """Rows of a growing trace: time, speed, gap, travel and strengths."""
+    """Collects the rows of a trace: time, speed, gap, travel and strengths."""
 
     def __init__(self) -> None:
         self.rows: list[tuple[float, float, float, float, tuple[int, ...]]] = []
@@ -81,9 +82,10 @@ def stands(trace: Trace) -> bool:
 
 
 def reversals(speeds_m_s: Sequence[float], swing_m_s: float = SWING_M_S) -> int:
-    """Count the reversals of the speed between rising and falling by more than `swing_m_s`.
+    """Count how often the speed turns from rising to falling, or back, by more than `swing_m_s`.
 
-    The speed rises first: a continued approach has 0 reversals, one that slows down once has 1, a limit cycle many.
+    The speed rises first. So an approach that goes on has 0 reversals, one that slows down once has 1, and a limit
+    cycle has many.
     """
     count, sign, extreme = 0, 1.0, -math.inf
     for speed in speeds_m_s:

@@ -1,4 +1,4 @@
-"""Placements of the objects in which a recorded approach collides, and the last release that avoids the contact."""
+"""Find placements of objects in which a recorded approach collides, and the last release that avoids the contact."""
 
 from dataclasses import dataclass
 
@@ -9,31 +9,31 @@ from feelahead.lab.approaches.replay import Replay
 from robot_side.drivers.mujoco.posed_scene import PosedScene
 
 _FASTEST_M_S = 0.45
-"""Upper bound on the speed of any part of the gripper: 0.25 m/s ahead, 0.1 across, 0.5 rad/s at 0.16 m."""
+"""Upper bound on the speed of any part of the gripper, in m/s: 0.25 ahead, 0.1 across, and 0.5 rad/s at 0.16 m."""
 _LEAST_STEP_S = 0.002
 _LEAST_START_GAP_M = 0.015
 _ACROSS_M = 0.01
 """Largest shift of the objects across the approach, in metres, to each side and up or down."""
 _FARTHEST_M = 1.0
 _ALONG_M = 0.1
-"""Largest shift along the approach, in metres, where nothing is straight ahead."""
+"""Largest shift of the objects along the approach, in metres, where nothing is straight ahead."""
 _TRIES = 40
 
 
 @dataclass(frozen=True)
 class Collision:
-    """One placement of the objects, and its contact."""
+    """One placement of the objects in which the approach collides, and the contact."""
 
     shift_m: FloatArray
-    """(3,) shift from the scene's placement when the pull begins"""
+    """(3,) shift of the objects from their places in the scene, when the pull begins"""
     touch_s: float
-    """Time at which the true gripper touches if the pull continues"""
+    """Time at which the true gripper touches something if the pull continues"""
     last_release_s: float | None
-    """Last operator-side time at which a release avoids the contact; None if no release does."""
+    """Latest time, at the operator side, of a release that avoids the contact; None if no release does."""
 
 
 def shifted(shift_m: FloatArray, replay: Replay, speed_m_s: float, time_s: float) -> FloatArray:
-    """Add to `shift_m` (3,) the displacement of objects of that speed since the pull began."""
+    """Return the shift (3,) of objects at `time_s`: `shift_m`, and their way since the pull began at `speed_m_s`."""
     moved: FloatArray = shift_m + speed_m_s * max(time_s - replay.record.began_s, 0.0) * replay.axis
     return moved
 
@@ -41,10 +41,10 @@ def shifted(shift_m: FloatArray, replay: Replay, speed_m_s: float, time_s: float
 def place(
     replay: Replay, posed: PosedScene, generator: np.random.Generator, speed_m_s: float = 0.0
 ) -> Collision | None:
-    """Draw a placement of the objects in which the approach collides, uniformly over its length.
+    """Draw a placement of the objects in which the approach collides; None if 40 draws find none or the pull is short.
 
-    The placement lies on the tool's path, drift and turning included. speed_m_s: speed of the objects along the
-    approach axis as the pull begins; below 0 they come nearer. None if 40 draws found none, or for too short a pull.
+    The place of the contact is uniform over the length of the tool's path, with its drift and turning. speed_m_s: speed
+    of the objects along the approach axis as the pull begins; below 0 they come nearer.
     """
     record = replay.record
     posed.set_pose(*_pose(replay, record.began_s), np.zeros(3))
@@ -72,7 +72,7 @@ def place(
 
 
 def first_touch_s(replay: Replay, posed: PosedScene, shift_m: FloatArray, speed_m_s: float = 0.0) -> float | None:
-    """Find when the true gripper first touches the objects moved by `shift_m` (3,); None if never in the record."""
+    """Return when the true gripper first touches the objects moved by `shift_m` (3,); None if it never does."""
     time_s = replay.record.began_s
     while time_s <= replay.end_s:
         posed.set_pose(*_pose(replay, time_s), shifted(shift_m, replay, speed_m_s, time_s))
@@ -86,9 +86,9 @@ def first_touch_s(replay: Replay, posed: PosedScene, shift_m: FloatArray, speed_
 def last_release_s(
     replay: Replay, posed: PosedScene, shift_m: FloatArray, touch_s: float, speed_m_s: float = 0.0
 ) -> float | None:
-    """Find the last release that avoids the contact, to 2 ms; None if no release since the pull began does.
+    """Return the time of the last release that avoids the contact, to 2 ms; None if no release since the pull does.
 
-    Bisection: a later release never stops the arm earlier, as no pull here moves back.
+    The time is found by bisection: no pull here moves back, so a later release never stops the arm earlier.
     """
     early_s, late_s = replay.record.began_s, touch_s
     if not avoids(replay, posed, shift_m, touch_s, early_s, speed_m_s):
@@ -105,7 +105,7 @@ def last_release_s(
 def avoids(
     replay: Replay, posed: PosedScene, shift_m: FloatArray, touch_s: float, released_s: float, speed_m_s: float = 0.0
 ) -> bool:
-    """Return whether a release at `released_s` leaves a gap when the arm rests."""
+    """Return whether the arm, stopped by a release at `released_s`, comes to rest before the objects."""
     stopped = replay.stopped_joints(released_s)
     if stopped is None or stopped[0] >= touch_s:
         return False

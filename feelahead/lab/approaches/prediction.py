@@ -1,4 +1,4 @@
-"""Displacement of the gripper until a command takes effect: predicted and true (eq. 8 and the commands under way)."""
+"""Compare the gripper's predicted with its true displacement until a command takes effect (eq. 8 and ours)."""
 
 import math
 from collections.abc import Callable
@@ -27,14 +27,14 @@ AGE_BINS_S: Final = tuple(pairwise((0.0, 0.02, 0.06, 0.13, 0.28, 0.58, 1.2)))
 """Bins of the loop age in seconds; approaches are pooled by the median of theirs. A moment's own age does not choose:
 where it is short by chance, the next command takes longer than the last, which would look like an error."""
 PoseAt = Callable[[FloatArray], GripperPose]
-"""Pose of the gripper for joints (n,)."""
+"""Function from joint positions (n,) to the gripper's pose."""
 
 
 class ToolPath:
-    """Position of the tool over time, interpolated between the recorded poses, in the world frame."""
+    """Position of the tool over time in the world frame, interpolated between the recorded poses."""
 
     def __init__(self, record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_speed_m_s: float) -> None:
-        """Follow `record` by the true joints; `limits` and v_max decide on reach."""
+        """record: its true joints are followed. limits, full_speed_m_s: decide what is within the arm's reach."""
         poses = [pose_at(joints) for joints in record.joint_positions_rad]
         able = [along_approach(pose, limits.of_joints(pose.tool_jacobian.shape[1]), full_speed_m_s) for pose in poses]
         self.time_s = record.pose_time_s
@@ -48,11 +48,11 @@ class ToolPath:
             (speed, one.full_speed_m_s, one.acceleration_m_s2) for speed, one in zip(speeds_m_s, able, strict=True)
         ]
         self.ability = make_interp_spline(self.time_s, ability, k=1)
-        """At times (k,): speed along the approach axis, v_max and least acceleration (k, 3)."""
+        """Function from times (k,) to speed along the approach axis, v_max and least acceleration (k, 3)."""
         self._within_reach: BoolArray = np.array([one.within_reach for one in able])
 
     def within_reach(self, from_s: FloatArray, to_s: FloatArray) -> BoolArray:
-        """Return whether (k,) full speed was within the arm's reach throughout each interval."""
+        """Return for each interval (k,) whether the arm could reach full speed throughout."""
         outside = np.concatenate([[0], np.cumsum(~self._within_reach)])
         first = np.maximum(np.searchsorted(self.time_s, from_s, side="right") - 1, 0)
         behind = np.minimum(np.searchsorted(self.time_s, to_s, side="left") + 1, len(self.time_s))
@@ -60,7 +60,7 @@ class ToolPath:
         return clear
 
     def onsets_m(self, from_s: FloatArray, to_s: FloatArray) -> FloatArray:
-        """Return the tool's displacements (k,) along its approach axis at each beginning."""
+        """Return the tool's displacement in each interval (k,), along its approach axis at the interval's beginning."""
         axes = self._axes(from_s)
         axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), _LEAST_SPEED)
         displacements_m: FloatArray = np.einsum("ki,ki->k", self._positions_m(to_s) - self._positions_m(from_s), axes)
@@ -69,7 +69,7 @@ class ToolPath:
 
 @dataclass(frozen=True)
 class Moments:
-    """Knowledge of the operator side at moments of one approach, and the arrivals of its commands."""
+    """What the operator side knew at several times of one approach, and when its commands arrived."""
 
     now_s: FloatArray
     """(k,) when the command was sent for which the prediction is made"""
@@ -89,12 +89,15 @@ class Moments:
 
     @property
     def loop_age_s(self) -> FloatArray:
-        """(k,) age of the newest command that the report knew of."""
+        """(k,) age of the newest command that had reached the robot side when it sent the report."""
         return self.now_s - self.echo_sent_s
 
 
 def moments(record: RecordedApproach) -> Moments:
-    """Take the newest command every 10 ms of the pull, if the robot was heard and the command arrived."""
+    """Return the times at which predictions are judged: every 10 ms of the pull, with the newest command sent.
+
+    Left out are times before the first report, and commands that never arrived.
+    """
     rows = []
     # Times beyond the recorded poses cannot be compared.
     last_s = min(record.tick_time_s[-1], record.pose_time_s[-1])
@@ -124,7 +127,10 @@ def predicted(
     full_speeds_m_s: FloatArray,
     accelerations_m_s2: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Predict δ and w (k,) from the operator side's commands and the reports' v, v_max and a (k,); NaN for none."""
+    """Predict δ and w (k,) from the operator side's commands and the reports' v, v_max and a (k,).
+
+    NaN where no prediction is possible.
+    """
     commands, sent = CommandsUnderWay(), 0
     onsets_m, speeds = np.full(len(at), np.nan), np.full(len(at), np.nan)
     for row, now_s in enumerate(at.now_s):
@@ -139,9 +145,9 @@ def predicted(
 
 
 def judge(record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_speed_m_s: float) -> Row:
-    """Compare every prediction with the arm's true displacement; full_speed_m_s is the v_max of the settings.
+    """Compare every prediction with the arm's true displacement. full_speed_m_s: v_max of the settings.
 
-    Return lists (k,) with an entry for each moment: `loop_age_s`, `within_reach`, `displacement_m` and the errors.
+    Return lists (k,), an entry for each judged time: `loop_age_s`, `within_reach`, `displacement_m` and the errors.
     within_reach: False at the edge of the arm's reach, where it cannot follow the command. displacement_m: true
     displacement along the direction in which R2 advances. Errors: truth less prediction, by COMPENSATIONS; NaN without
     a prediction.
@@ -163,7 +169,7 @@ def judge(record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_
 
 
 class Spread(NamedTuple):
-    """Distribution of errors; 99 % quantile and maximum are of the magnitudes."""
+    """Distribution of prediction errors; 99 % quantile and maximum are those of the errors' magnitudes."""
 
     moments: int
     loop_age_ms: float
@@ -174,9 +180,10 @@ class Spread(NamedTuple):
 
 
 def over(judged: Table, name: str, ages_s: tuple[float, float] = (0.0, np.inf), *, within_reach: bool = True) -> Spread:
-    """Pool the errors called `name` of approaches with loop ages from the first to below the second.
+    """Pool the errors in column `name` of all approaches whose loop age is within `ages_s`: from the first to below the
+    second.
 
-    within_reach: take the moments in which the arm could follow the command; else the others.
+    within_reach: take the times at which the arm could follow the command; if False, the other times.
     """
     errors_mm, ages_ms = [np.empty(0)], [np.empty(0)]
     for row in judged:
@@ -194,7 +201,7 @@ def over(judged: Table, name: str, ages_s: tuple[float, float] = (0.0, np.inf), 
 
 
 def error_table(judged: Table, arm: str, frozen: str, full_speed_m_s: float) -> str:
-    """Write μ_δ and σ_δ of eq. 10 over loop age and kind of compensation as TOML; empty bins are left out.
+    """Return a TOML table with μ_δ and σ_δ of eq. 10 for each kind of compensation and bin of loop age with errors.
 
     arm: fingerprint of the measured arm.
     """

@@ -1,6 +1,6 @@
-"""Motions of a hand on triggers and sticks over time: forces in newtons, seeded.
+"""Motions of a hand on triggers and sticks over time, drawn from a seed; forces are in newtons.
 
-A pull is open loop: it does not depend on the objects ahead.
+A pull is open loop: it does not depend on what is felt or on the objects ahead.
 """
 
 import math
@@ -56,7 +56,7 @@ def make_pull(kind: PullKind, seed: int) -> Pull:
 
 
 def _bells(generator: np.random.Generator) -> Pull:
-    """Speeds of an aiming hand: v(t) = peak · 16 x² (1 - x)², x from 0 to 1 (Flash and Hogan 1985)."""
+    """Draw pulls with the speed of an aiming hand: v(t) = peak · 16 x² (1 - x)², x from 0 to 1 (Flash, Hogan 1985)."""
     bells, end_s = [], 0.0
     while end_s < _LONGEST_S:
         duration_s = float(generator.uniform(0.7, 1.4))
@@ -99,7 +99,7 @@ def _swerving(generator: np.random.Generator) -> Pull:
 
 
 def _wandering(generator: np.random.Generator) -> Pull:
-    """Travel of mean 0.5 and standard deviation 0.35, correlated over 0.4 s, within 0 and 1."""
+    """Draw a random travel with mean 0.5 and standard deviation 0.35, correlated over 0.4 s and cut to 0 to 1."""
     keep = math.exp(-_NOISE_STEP_S / 0.4)
     value, travels = float(generator.standard_normal()), []
     for _ in range(round(_LONGEST_S / _NOISE_STEP_S) + 2):

@@ -1,4 +1,4 @@
-"""Time that a law costs: to a goal in free space, in closed loop, over the time without haptics."""
+"""Measure how much a law slows down: time to a goal in free space, divided by the time without haptics."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -13,7 +13,7 @@ from feelahead.lab.approaches.pulls import make_pull
 from feelahead.lab.table import Row
 
 RACED: Final = ("empty", "cluttered")
-"""Scenes with a free corridor to the goal."""
+"""Scenes with a free way to the goal."""
 _GOAL_M: Final = 0.25
 _LIMIT_S: Final = 15.0
 _LINK: Final = "200 ms"
@@ -23,7 +23,7 @@ _PROBABILITY: Final = 0.99
 def race(scene: str, law: Law, seeds: Sequence[int]) -> Row:
     """Return the ratio of the times to a goal with the law and without haptics, for the same hands and seeds.
 
-    The ratio is the median over the seeds, half with bells and half with steady pulls; None if at most half arrive.
+    The ratio is the median over the seeds; half of them pull in bells, half steadily. None if no more than half arrive.
     """
     ratios = []
     for seed in seeds:
@@ -37,7 +37,7 @@ def race(scene: str, law: Law, seeds: Sequence[int]) -> Row:
 
 @cache
 def _time_s(scene: str, law: Law, seed: int) -> float | None:
-    """Return the time until the tool reaches the goal; None if it touches or is late."""
+    """Return the time until the tool reaches the goal; None if it touches something or takes too long."""
     approach = Approach(
         model=frozen_scene(scene),
         force_n=0.0,

@@ -1,7 +1,7 @@
-"""Recorded pull in free space, open loop and without haptics, for every law, P, scene and camera draw.
+"""Record a pull in free space without haptics, which can then be judged with any law, P, scene and camera error.
 
-The whole loopback runs, so that jitter, loss and the arm's limits are in it. Commands leave at full rate: releases are
-examined later, at any time, and a command for a release would leave at once.
+Both sides and the link run in the loopback, so the record has the effects of jitter, losses and the arm's limits.
+Commands are sent at full rate, as a release at any time is examined later, and its command would be sent at once.
 """
 
 import math
@@ -28,17 +28,17 @@ from robot_side.settings import RobotSettings
 POSE_S = 0.01
 """Sampling period of the true pose, in seconds."""
 TICK_S = 0.001
-"""Sampling period of both sides' newest messages, in seconds."""
+"""Period, in seconds, at which it is recorded which messages each side had last received."""
 
 
 @dataclass(frozen=True)
 class RecordedApproach:
-    """One pull on both sides, on their shared virtual clock; it begins at `began_s`."""
+    """Record of one pull, from both sides, on their shared virtual clock; the pull begins at `began_s`."""
 
     seed: int
     began_s: float
     pose_time_s: FloatArray
-    """(k,) every 10 ms, from a second before the pull"""
+    """(k,) times of the poses: every 10 ms, from a second before the pull"""
     joint_positions_rad: FloatArray
     """(k, n) true"""
     joint_velocities_rad_s: FloatArray
@@ -48,7 +48,7 @@ class RecordedApproach:
     loop_age_s: FloatArray
     """(k,) t_d of eq. 8 at the robot side"""
     tick_time_s: FloatArray
-    """(l,) every millisecond"""
+    """(l,) times of the ticks: every millisecond"""
     applied_sent_s: FloatArray
     """(l,) when the operator side sent the command that the arm follows; NaN for none"""
     applied_at_s: FloatArray
@@ -67,11 +67,11 @@ class RecordedApproach:
     """(c, 2) stick that turns"""
 
     def pose_row(self, time_s: float) -> int:
-        """Return the newest row of the poses at `time_s`; the first row before that."""
+        """Return the newest row of the poses until `time_s`; the first row if there is none."""
         return int(np.clip(np.searchsorted(self.pose_time_s, time_s + 1e-9) - 1, 0, len(self.pose_time_s) - 1))
 
     def tick_row(self, time_s: float) -> int:
-        """Return the newest row of the ticks at `time_s`; the first row before that."""
+        """Return the newest row of the ticks until `time_s`; the first row if there is none."""
         return int(np.clip(np.searchsorted(self.tick_time_s, time_s + 1e-9) - 1, 0, len(self.tick_time_s) - 1))
 
     def arrives_s(self, sent_s: float) -> float:
@@ -116,7 +116,7 @@ def record_approach(
 
 
 class _Notes(Listener):
-    """Samples after each turn of the robot side: rows by the names of the record's columns."""
+    """Listener that samples the record's columns after each tick of the robot side."""
 
     def __init__(self, scene: Scene) -> None:
         self.run: Loopback | None = None
@@ -127,7 +127,7 @@ class _Notes(Listener):
         self._applied = (math.nan, math.nan)
 
     def on_sent(self, now_s: float) -> None:
-        """Sample one turn."""
+        """Sample one tick."""
         if (run := self.run) is None:
             return
         data, robot = self._scene.data, self._scene.robot
@@ -150,7 +150,7 @@ class _Notes(Listener):
             self._poses.append(row | {"finger_positions": data.qpos[robot.finger_positions].copy()})
 
     def record(self, seed: int, began_s: float) -> RecordedApproach:
-        """Return the record from a second before the pull; commands from the start."""
+        """Return the record: poses and ticks from a second before the pull, commands from the start of both sides."""
         from_s = began_s - 1.0
         poses = [row for row in self._poses if row["pose_time_s"] >= from_s]
         ticks = [row for row in self._ticks if row["tick_time_s"] >= from_s]

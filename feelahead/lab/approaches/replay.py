@@ -1,4 +1,4 @@
-"""Recorded approach as both sides saw it: true motion, estimated poses, and where a release would have stopped it."""
+"""A recorded approach as both sides knew it: true motion, estimated poses, and where a release would stop the arm."""
 
 import math
 from functools import cached_property
@@ -22,23 +22,23 @@ from robot_side.drivers.mujoco.scene import Scene
 from robot_side.settings import EncoderSettings
 
 _WHOLE_S = 1000.0
-"""Window of the commands, in seconds: longer than any record."""
+"""Time for which commands are remembered, in seconds: longer than any record."""
 _ASKED_M_S = 0.05
 _STALLED_ROWS = 25
 """Number of rows, 0.25 s, below half of the commanded speed after which the arm is at its limits."""
 _TRAVEL = TriggerTravel()
 _LONGEST_RETURN = 4.0
-"""Upper bound of the finger's return in its time constants; from full travel to the dead zone takes 3."""
+"""Upper bound on the time of the finger's return, in its time constants; from full travel to the dead zone takes 3."""
 _COASTING_STEPS = 100
 _LOOKED_S = 0.04
-"""Time in seconds until contact distances from every place aside are computed: each at least every 30 ms."""
+"""Time in seconds after which a look was made from every place aside: each place has one at least every 30 ms."""
 
 
 class Replay:
-    """One record with new errors of the encoders, on the one virtual clock."""
+    """One recorded approach with newly drawn errors of the encoders, on the record's virtual clock."""
 
     def __init__(self, record: RecordedApproach, scene: Scene, encoder: EncoderSettings, seed: int) -> None:
-        """Take the kinematics from `scene`: any scene with the recorded arm."""
+        """scene: any scene with the recorded arm, which gives its kinematics. seed: draws the encoders' errors."""
         self.record = record
         self.encoder = encoder
         self._kinematics = MujocoKinematics(scene)
@@ -63,7 +63,7 @@ class Replay:
         self.true = true
         """True gripper, for each row of the poses"""
         self.end_s = self._end_s()
-        """End of the record, or the time at which the arm reaches the edge of its reach."""
+        """Time at which the record ends, or at which the arm comes to the edge of its reach"""
 
     @property
     def joints(self) -> int:
@@ -72,7 +72,7 @@ class Replay:
 
     @cached_property
     def commands(self) -> CommandsUnderWay:
-        """Memory of all commands of the record, as the operator side has it."""
+        """All commands of the record, as the operator side remembers them."""
         commands = CommandsUnderWay(window_s=_WHOLE_S)
         sticks = np.hstack([self.record.lateral, self.record.turning]).tolist()
         for time_s, travel, stick in zip(self.record.command_time_s, self.record.command, sticks, strict=True):
@@ -87,7 +87,7 @@ class Replay:
 
     @cached_property
     def estimated(self) -> list[GripperPose]:
-        """Gripper estimated from noisy encoders, read every millisecond, for each row of the poses."""
+        """Gripper for each row of the poses, as estimated from noisy encoders that are read every millisecond."""
         encoder = Encoder(self.encoder.sigma_rad, self.encoder.resolution_rad, self._seed)
         estimate, found = JointEstimate(), []
         for row, until_s in enumerate(self.record.pose_time_s.tolist()):
@@ -114,7 +114,7 @@ class Replay:
         )
 
     def joints_at(self, time_s: float) -> tuple[FloatArray, FloatArray]:
-        """Interpolate the true joint positions and velocities (n,) at `time_s`."""
+        """Return the true joint positions and velocities (n,) at `time_s`, interpolated."""
         record = self.record
         row = min(record.pose_row(time_s), len(record.pose_time_s) - 2)
         step_s = record.pose_time_s[row + 1] - record.pose_time_s[row]
@@ -126,10 +126,10 @@ class Replay:
         )
 
     def stopped_joints(self, released_s: float) -> tuple[float, float, FloatArray] | None:
-        """Compute how the arm stops after a release at `released_s` on the operator side.
+        """Compute how the arm stops after a release of the trigger at `released_s`, at the operator side.
 
-        Return the time at which the release reaches the arm, the time at which the arm rests and its joints (n,) there;
-        None beyond the record. All joints slow down in proportion (`JointReference`), along their present velocity.
+        Return the time at which the release reaches the arm, the time at which the arm is at rest, and its joint
+        positions (n,) then. None if the record ends before. All joints slow down in proportion (`JointReference`).
         """
         arrives_s = self.record.arrives_s(released_s)
         if arrives_s > self.end_s:
@@ -148,13 +148,13 @@ class Replay:
         return twist[:3] - (twist[:3] @ axis) * axis, twist[3:]
 
     def knows_aside(self, time_s: float) -> bool:
-        """Return whether the operator side's newest report at `time_s` knows of a motion aside, if there is one."""
+        """Return whether a motion aside, if there is one, is in the operator side's newest report at `time_s`."""
         seen_s = float(self.record.seen_sent_s[self.record.tick_row(time_s)])
         return seen_s >= self._aside_seen_s
 
     @cached_property
     def _aside_seen_s(self) -> float:
-        """Time at which the tool first moved aside at half of full speed, and all places aside were computed."""
+        """Time from which a motion aside is known: the tool moved at half of full speed, and all places had a look."""
         motion = self.motion
         for time_s in self.record.pose_time_s[self.record.pose_row(self.record.began_s) :].tolist():
             across, turning = (float(np.linalg.norm(part)) for part in self.aside(time_s))

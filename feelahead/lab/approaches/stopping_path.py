@@ -1,4 +1,4 @@
-"""Path of the true gripper until it stops, if the finger stays in a zone for a horizon and then releases."""
+"""Path of the true gripper until it stops, if the finger stays in a zone for a reaction and then releases."""
 
 import math
 from typing import Final
@@ -48,6 +48,6 @@ def stopping_path(replay: Replay, time_s: float, speed_m_s: float, share: float 
 
 
 def _changing_s(jacobian: FloatArray, change: FloatArray) -> float:
-    """Return the time in seconds in which the joints change the tool's twist by `change` (6,), all in proportion."""
+    """Return the time in seconds that the joints, all in proportion, need to change the tool's twist by `change`."""
     unlimited = np.full(jacobian.shape[1], np.inf)
     return float(np.abs(joint_velocities(jacobian, change, unlimited)).max()) / MotionLimits().acceleration_rad_s2

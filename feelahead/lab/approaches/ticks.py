@@ -1,4 +1,4 @@
-"""Ticks of real runs, recorded once in virtual time: the law's inputs, to ask any law the same."""
+"""Ticks of runs of both sides, recorded once in virtual time, so that any law can be given the same inputs."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -27,12 +27,12 @@ FORCE_N: Final = 2.0
 _STRONGEST_N: Final = 2.0
 _STRAIGHT: Final[tuple[Vector2, Vector2]] = (0.0, 0.0), (0.0, 0.0)
 _BEFORE_S: Final = 0.5
-"""Time before the pull that is kept, in seconds."""
+"""Time before the pull from which on ticks are kept, in seconds."""
 
 
 @dataclass(frozen=True)
 class Tick:
-    """Input of the law in one tick, and the arm's state of its pose."""
+    """Input of the law in one tick, and the arm's state from which the pose was computed."""
 
     now_s: float
     situation: Situation
@@ -48,7 +48,7 @@ class Recorded:
     settings: RobotSettings
 
     def new_law(self) -> SweptLaw:
-        """Make the run's law as it was at its start."""
+        """Return a new law with the settings of the run, as it was at the run's start."""
         law = robot_parts(self.settings, scene_of(self.name)).law
         if not isinstance(law, SweptLaw):
             raise TypeError(f"a {type(law).__name__}; valid: SweptLaw")
@@ -58,21 +58,21 @@ class Recorded:
 
 
 class _Noting(Listener):
-    """Listener that keeps the law's inputs and the state behind them."""
+    """Listener that stores the law's inputs, and the arm's state, in each tick."""
 
     def __init__(self) -> None:
         self.ticks: list[Tick] = []
 
     def on_tick(self, tick: events.Tick) -> None:
-        """Keep one tick."""
+        """Store one tick."""
         if tick.found is not None:
             self.ticks.append(Tick(tick.now_s, tick.found.situation, tick.found.state))
 
 
 def record(name: str, duration_s: float, seed: int = 0, sticks: tuple[Vector2, Vector2] | None = None) -> Recorded:
-    """Run the demo, or a pull of 2 N in the frozen scene of this name, for `duration_s`; the same for the same seed.
+    """Run the demo, or a pull of 2 N in the frozen scene called `name`, for `duration_s`; the seed decides all of it.
 
-    sticks: deflections of the stick that moves across and the one that turns; None: those of the scene.
+    sticks: deflections of the stick that moves across and of the stick that turns; None: those of the scene.
     """
     model = None if name == DEMO else frozen_scene(name)
     robot = RobotSettings(model=model, site=None if model is None else SITE, seed=seed, full_rate=True)
@@ -92,12 +92,12 @@ def record(name: str, duration_s: float, seed: int = 0, sticks: tuple[Vector2, V
 
 
 def scene_of(name: str) -> Scene:
-    """Load the scene of the run of this name, at its start."""
+    """Load the scene of the run called `name`, as it is at the start."""
     return load_scene(None) if name == DEMO else load_scene(frozen_scene(name), SITE)
 
 
 def with_cover(recorded: Recorded, cover_m: float) -> tuple[Tick, ...]:
-    """Return the ticks with the gripper covered by spheres that stand out by `cover_m`; held objects keep theirs."""
+    """Return the ticks with spheres that protrude from the gripper by up to `cover_m`; held objects keep theirs."""
     scene = scene_of(recorded.name)
     own, other = MujocoKinematics(scene), MujocoKinematics(scene, cover_m)
     first = len(own.cover.radii_m)
@@ -105,7 +105,7 @@ def with_cover(recorded: Recorded, cover_m: float) -> tuple[Tick, ...]:
 
 
 def _covered(tick: Tick, kinematics: MujocoKinematics, first: int) -> Tick:
-    """Cover one tick; after the `first` spheres follow those of the held object."""
+    """Replace the gripper's spheres in one tick, which are the `first` ones; the held object's spheres follow them."""
     before, pose = tick.situation.pose, kinematics.pose(tick.state)
 
     def joined(name: str) -> Any:

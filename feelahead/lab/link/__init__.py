@@ -1,1 +1,1 @@
-"""Parts of `bench link`: samples of delays, sockets and ends of real processes, traffic between two clocks."""
+"""Parts of `feelahead bench link`: samples of delays, and ends of a link in two real processes."""

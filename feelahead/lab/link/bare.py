@@ -1,4 +1,4 @@
-"""End with bare ZeroMQ sockets, which shows the cost of waking and of Python alone."""
+"""End of a link with bare ZeroMQ sockets only: it shows how much waking up and Python cost by themselves."""
 
 import math
 import select
@@ -10,7 +10,7 @@ from common.clock import MonotonicClock
 
 
 class BareEnd:
-    """ROUTER that binds over TCP on loopback, or DEALER that connects to `address`."""
+    """ROUTER socket that binds a TCP port on loopback, or DEALER socket that connects to `address`."""
 
     def __init__(self, size_bytes: int, address: str | None = None) -> None:
         self.sent = 0
@@ -32,7 +32,7 @@ class BareEnd:
         self._context.destroy(linger=0)
 
     def run(self, start_s: float, end_s: float, period_s: float) -> Iterator[float]:
-        """Send at start_s + k period_s and receive until `end_s`; yield the time of each turn."""
+        """Send every `period_s` from `start_s` on, and receive, until `end_s`; yield the time of each turn."""
         clock, due_s = MonotonicClock(), start_s
         while (now_s := clock.now()) < end_s:
             yield now_s
@@ -52,7 +52,7 @@ class BareEnd:
             self._socket.recv(zmq.NOBLOCK)
 
     def _send(self) -> bool:
-        """Send at once; False if the send would block or the peer is unknown."""
+        """Send without waiting; return False if the socket cannot take the message or no peer is known yet."""
         try:
             if self._routes:
                 if self._peer is None:

@@ -1,6 +1,7 @@
-"""The two sides between law and controller, as ends of a link in real time.
+"""Both sides' parts between law and controller, as the two ends of a link in real time.
 
-Sockets, admission, session, permission, loop age, codec and a delay line without delay; nothing is felt or rendered.
+These are sockets, admission, session, permission, loop age, codec, and a delay line without delay. Law, arm, rendering
+and controller are left out.
 """
 
 import secrets
@@ -27,13 +28,13 @@ from robot_side.operators.safety import Safety, SafetySettings
 from robot_side.reporting.outgoing_messages import Outgoing, stiffness_message
 
 BYTES: Final = (169, 138)
-"""Sizes in bytes of a stiffness update and of a motion command: bare ends send the same, the robot's first."""
+"""Sizes in bytes of a stiffness update and of a motion command; bare ends send messages of these sizes."""
 _REPORT_PERIOD_S: Final = 0.05
-"""Reading period of a controller at rest, in seconds; commands use the newest reading."""
+"""Period in seconds at which a simulated controller at rest reports; commands use the newest report."""
 
 
 class _Side(ABC):
-    """One of the two sides: it receives, ticks, and sends through a delay line."""
+    """One of the two ends, which receives, ticks, and sends through a delay line."""
 
     def __init__(self, sockets: RobotSockets | OperatorSockets, direction: Direction) -> None:
         self.sent = 0
@@ -41,7 +42,7 @@ class _Side(ABC):
         self._line: DelayLine[Any] = DelayLine(LinkSpec().profile(direction))
 
     def run(self, start_s: float, end_s: float, period_s: float) -> Iterator[float]:
-        """Receive, tick each `period_s` and send, until `end_s`; yield the time of each turn."""
+        """Receive, tick every `period_s` and send, until `end_s`; yield the time of each turn."""
         line, clock, pacer = self._line, MonotonicClock(), Pacer(period_s, start_s)
         while True:
             received = self._received()
@@ -71,7 +72,7 @@ class _Side(ABC):
 
 
 class RobotEnd(_Side):
-    """Robot side without arm, law and scene."""
+    """End of the robot side, without arm, law and scene."""
 
     def __init__(self, sockets: RobotSockets) -> None:
         super().__init__(sockets, "to_operator")
@@ -107,7 +108,7 @@ class RobotEnd(_Side):
 
 
 class OperatorEnd(_Side):
-    """Operator side without a controller and without viewers."""
+    """End of the operator side, without a controller and without viewers."""
 
     def __init__(self, sockets: OperatorSockets) -> None:
         super().__init__(sockets, "to_robot")

@@ -1,4 +1,4 @@
-"""Two processes on this machine that send to each other in turns, and each end's share of a core."""
+"""Two processes on this machine that send to each other, and how much of a processor core each takes."""
 
 import multiprocessing
 import signal
@@ -18,15 +18,16 @@ from feelahead.lab.link.ends import BYTES, OperatorEnd, RobotEnd
 
 Kind = Literal["whole ends", "bare ZeroMQ"]
 Take = Callable[[float, float], list[dict[str, float]]]
-"""Run both ends for a turn of this length and period (s); return the robot's figures, then the operator's."""
+"""Function that runs both ends for a turn, given its length and period in seconds. It returns the figures of the
+robot's end, then those of the operator's."""
 _SETTLING_S: Final = 0.4
-"""Time in seconds in which idle sessions resume; a turn is measured from then on."""
+"""Time in seconds at a turn's beginning, in which idle sessions resume, and which is not measured."""
 _PATIENCE_S: Final = 120.0
 
 
 @contextmanager
 def pair(kind: Kind) -> Iterator[Take]:
-    """Start both processes; yield the function that runs a turn. FeelaheadError if an end does not report."""
+    """Start both processes, and yield the function that runs a turn; FeelaheadError if an end does not answer."""
     context = multiprocessing.get_context("spawn")
     with ExitStack() as stack:
         pipes: list[Connection] = []
@@ -59,7 +60,7 @@ def _heard(pipe: Connection, expected_s: float) -> Any:
 
 
 def _serve(kind: Kind, place: int, address: Any, orders: Connection) -> None:
-    """Run one end's process: a turn for each order, until the orders end."""
+    """Run the process of one end: run a turn for each order that comes, until the connection is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the caller ends this process
     raise_priority()  # before there are sockets, whose threads inherit it
     with ExitStack() as stack:
@@ -83,7 +84,7 @@ def _serve(kind: Kind, place: int, address: Any, orders: Connection) -> None:
 
 
 def _turn(end: BareEnd | RobotEnd | OperatorEnd, start_s: float, seconds: float, period_s: float) -> dict[str, float]:
-    """Run from `start_s`; measure after settling."""
+    """Run the end from `start_s`, and return its figures, measured after `_SETTLING_S`."""
     began: tuple[float, float, int] | None = None
     now_s = start_s
     for now_s in end.run(start_s, start_s + _SETTLING_S + seconds, period_s):

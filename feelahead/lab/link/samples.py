@@ -1,4 +1,4 @@
-"""Delays of a link as arrays, from the model in virtual time or a recording, and the difference of two."""
+"""Delays of a link's messages as arrays, from the model in virtual time or from a recording, and their comparison."""
 
 import dataclasses
 import math
@@ -19,7 +19,7 @@ from feelahead.lab.goals import Goal
 from feelahead.lab.table import Row
 
 STALL_S = 1e-3
-"""Excess in seconds over the model's greatest delay, above which the host and not the link caused it."""
+"""Excess over the model's greatest delay, in seconds; a longer delay was caused by the host, not by the link."""
 LARGEST_DISTANCE = 0.03
 LARGEST_MOMENT_ERROR_MS = 0.3
 LARGEST_LATE_ERROR = 0.02
@@ -29,12 +29,12 @@ _FIRST_SEED_OF_BAND = 1000
 
 @dataclass(frozen=True)
 class LinkSample:
-    """Messages in order of sending."""
+    """Delays of a link's messages, in the order of sending."""
 
     sent_s: FloatArray
-    """(n,) when each was sent"""
+    """(n,) when each message was sent"""
     delay_s: FloatArray
-    """(n,) delay of its first copy; NaN: lost"""
+    """(n,) delay of each message's first copy; NaN for a lost message"""
 
     @property
     def arrived_s(self) -> FloatArray:
@@ -48,12 +48,12 @@ class LinkSample:
 
     @property
     def sd_s(self) -> float:
-        """Standard deviation of these delays."""
+        """Standard deviation of the delays of the messages that arrived."""
         return float(self.arrived_s.std())
 
     @property
     def loss_share(self) -> float:
-        """Share of messages lost."""
+        """Share of the messages that were lost."""
         return float(np.isnan(self.delay_s).mean())
 
     @property
@@ -71,13 +71,13 @@ class LinkSample:
         return float(np.mean(order < np.maximum.accumulate(order))) if order.size else 0.0
 
     def without_stalls(self, profile: LinkProfile) -> tuple["LinkSample", int]:
-        """Leave out the delays above the model's greatest; also return their number."""
+        """Return the sample without delays that the host caused (see STALL_S), and their number."""
         stalled = self.delay_s > greatest_delay_s(profile) + STALL_S
         return LinkSample(self.sent_s[~stalled], self.delay_s[~stalled]), int(stalled.sum())
 
 
 def greatest_delay_s(profile: LinkProfile) -> float:
-    """Return the longest delay of a datagram; infinity if it is unlimited or unknown."""
+    """Return the longest delay that the model gives to a datagram; infinity if there is no limit or it is unknown."""
     if profile.model == "stream":
         return math.inf
     if profile.trace is not None:
@@ -97,7 +97,10 @@ def read_link_sample(path: Path, flag: str) -> LinkSample:
 
 
 def play(profile: LinkProfile, sent_s: Sequence[float], size_bytes: int) -> tuple[LinkSample, DelayLine[int]]:
-    """Run the model once in virtual time: each message is released exactly when it is due."""
+    """Run the model of a link once in virtual time, where each message is released exactly when it is due.
+
+    Return the delays, and the delay line with its counts.
+    """
     line: DelayLine[int] = DelayLine(profile)
     delay_s = np.full(len(sent_s), math.nan)
 
@@ -116,7 +119,7 @@ def play(profile: LinkProfile, sent_s: Sequence[float], size_bytes: int) -> tupl
 
 
 def distance(one: LinkSample, other: LinkSample) -> float:
-    """Return the Kolmogorov-Smirnov statistic D of their delays; 1 if nothing arrives of one of them."""
+    """Return the Kolmogorov-Smirnov statistic D between the delays of two samples; 1 if one has no arrivals."""
     if one.arrived_s.size == 0 or other.arrived_s.size == 0:
         return 1.0
     return float(stats.ks_2samp(one.arrived_s, other.arrived_s, method="asymp").statistic)
@@ -124,13 +127,13 @@ def distance(one: LinkSample, other: LinkSample) -> float:
 
 @dataclass(frozen=True)
 class Band:
-    """Range in which the model's own runs differ."""
+    """Range in which runs of the model itself, with different seeds, differ."""
 
     pairs: int
     distance: float
-    """D below which 99 % of pairs of runs are."""
+    """Value below which D is for 99 % of all pairs of runs"""
     figures: dict[str, tuple[float, float]]
-    """Range of 99 % of runs, by figure."""
+    """Range in which 99 % of all runs are, by figure"""
 
 
 FIGURES: dict[str, Callable[[LinkSample], float]] = {
@@ -142,20 +145,23 @@ FIGURES: dict[str, Callable[[LinkSample], float]] = {
 
 
 def independent_delays(profile: LinkProfile) -> bool:
-    """Return whether each delay is drawn by itself, so that a run has the model's distribution.
+    """Return whether each delay is drawn independently, so that the delays of a run have the model's distribution.
 
-    netem's correlation of delays does not count: it leaves them independent.
+    netem's correlation of delays is no exception, as it leaves delays independent.
     """
     return profile.model == "datagram" and profile.jitter_s > 0.0 and profile.rate is None and profile.trace is None
 
 
 def needs_band(profile: LinkProfile) -> bool:
-    """Return whether delays or losses depend on the past: then only the model's own band can judge a recording."""
+    """Return whether delays or losses depend on earlier ones; a recording is then judged by the model's own band."""
     return profile.loss is not None or not independent_delays(profile)
 
 
 def compare_one(profile: LinkProfile, reference: LinkSample, seed: int, size_bytes: int) -> Row:
-    """Run the model with the recording's send times and this seed; distance: D, None without variation."""
+    """Run the model with the recording's times of sending and this seed; return its figures as a row.
+
+    distance: D between model and recording; None if delays do not vary.
+    """
     run = _run(profile, reference, seed, size_bytes)
     varies = profile.jitter_s > 0.0 or profile.trace is not None
     return {
@@ -171,21 +177,21 @@ def compare_one(profile: LinkProfile, reference: LinkSample, seed: int, size_byt
 def pair_of_runs(
     profile: LinkProfile, reference: LinkSample, pair: int, size_bytes: int
 ) -> tuple[float, list[list[float]]]:
-    """Run the model twice, with the pair's own seeds; return D between the runs, and the figures of each."""
+    """Run the model twice, with the two seeds of `pair`; return D between both runs, and the figures of each."""
     first = _FIRST_SEED_OF_BAND + 2 * pair
     runs = [_run(profile, reference, seed, size_bytes) for seed in (first, first + 1)]
     return distance(*runs), [[measure(run) for measure in FIGURES.values()] for run in runs]
 
 
 def band_of(pairs: Sequence[tuple[float, Sequence[Sequence[float]]]]) -> Band:
-    """Compute the band from many pairs of runs."""
+    """Return the band that many pairs of runs give."""
     low, high = np.quantile([figures for _, both in pairs for figures in both], _BAND, axis=0)
     ranges = {name: (float(low[place]), float(high[place])) for place, name in enumerate(FIGURES)}
     return Band(len(pairs), float(np.quantile([apart for apart, _ in pairs], 0.99)), ranges)
 
 
 def judge(profile: LinkProfile, reference: LinkSample, results: Sequence[Row], band: Band | None) -> list[Goal]:
-    """Judge independent delays by fixed limits, and those that depend on the past by the model's own band.
+    """Return the goals for a recording: fixed limits for independent delays, else limits by the model's own band.
 
     results: rows of `compare_one`.
     """

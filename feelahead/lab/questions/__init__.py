@@ -1,1 +1,1 @@
-"""One question a file: the cells to try, the run of one cell, and the tables, figures and goals."""
+"""The questions, one in each file: its cells, how to run one cell, its tables, figures and goals."""

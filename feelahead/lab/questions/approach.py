@@ -1,4 +1,4 @@
-"""Does a finger of constant force hit the objects ahead, and how fast; or where does the gripper stop?
+"""Does a finger that pulls with constant force hit the objects ahead, how fast, or where does the gripper stop?
 
 feelahead try approach --model tests/data/wall.xml --force 2 3 --law swept none --link "" "delay 200ms"
 """
@@ -33,9 +33,9 @@ from robot_side.settings import Assist
 
 _QUICK: Final = ("wall", "edge")
 _FARTHEST_MM: Final = 1000.0
-"""Largest distance that is measured, in mm."""
+"""Distance up to which gaps are measured, in mm."""
 _APART_MS: Final = 6.0
-"""Offset between the laws in the figure, so that no line hides another."""
+"""Offset between the laws' points in the figure, so that no line hides another, in ms."""
 _MARKS: Final = ("o", "s", "^", "D", "v", "P", "X")
 _Force = Annotated[float, Meta(ge=0.0, le=20.0)]
 
@@ -46,45 +46,46 @@ class ApproachSettings(Sweep):
 
     Both sides run in virtual time with the real messages, link, trigger effects and physics. Without --model, every
     frozen scene of tests/data that ends in a contact is tried; with --quick two of them. Options with several values
-    are combined with each other; of a single run, --summary holds the run's figures.
+    are combined with each other. --summary has the figures of a single run, or of all runs.
     """
 
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
-    """MJCF scenes with an arm; it may hit the objects ahead of the tool."""
+    """MJCF files, each with an arm and objects ahead of its tool. Unless given: the frozen scenes."""
     site: Annotated[str, tyro.conf.arg(metavar="NAME")] = SITE
-    """Site between the fingertips, z along the approach."""
+    """Name of the site between the fingertips, whose z axis is the approach."""
     force: Annotated[tuple[_Force, ...], tyro.conf.arg(metavar="N...")] = (3.0,)
     """Force on R2 in newtons, 0 to 20: 2 is a light pull, 3.7 a normal one."""
     strongest_effect: Annotated[tuple[_Force, ...], tyro.conf.arg(metavar="N...")] = (2.0,)
-    """Newtons that the strongest effect adds (never measured): 1.5, 2 and 3 span the likely range."""
+    """Force in newtons with which the strongest effect resists. It was never measured; 1.5, 2 and 3 span the likely
+    range."""
     link: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SPEC...")] = ("",)
     """Emulated links, in both directions, in netem's syntax: "delay 200ms 10ms distribution normal"."""
     link_model: LinkModel = "datagram"
-    """datagram lets jitter reorder messages, stream keeps them in order."""
+    """datagram: messages may be lost and reordered. stream: messages stay in order and losses delay them."""
     law: tuple[Literal["swept", "paper", "none", "full"], ...] = ("swept",)
-    """Law that is felt: the objects ahead along the trigger, the paper's printed law, nothing, or always the
-    strongest effect. Several are compared."""
+    """Laws to compare. swept: objects ahead along the trigger. paper: the paper's printed law. none: no haptics. full:
+    always the strongest effect."""
     compensation: tuple[Compensation, ...] = ("operator",)
-    """Side that compensates the delay: the operator side by the commands under way, or the robot side by v t_d
-    (eq. 8). The paper's law always uses eq. 8."""
+    """Side that compensates the delay. operator: by the commands under way. robot: by speed times loop age (v t_d,
+    eq. 8), as the law `paper` always does."""
     haptics: bool = True
-    """--no-haptics: the same as --law none."""
+    """Whether the law is felt; --no-haptics is the same as --law none."""
     probability: Annotated[float, Meta(gt=0.0, lt=1.0), tyro.conf.arg(metavar="P")] = 0.99
-    """P of the laws (eq. 10)."""
+    """Probability P of the laws (eq. 10)."""
     duration: Annotated[float, Meta(ge=0.05, le=1000.0), tyro.conf.arg(metavar="SECONDS")] = 8.0
     """Duration from the beginning of the pull, in virtual time; a contact ends the run."""
     grip: bool = False
-    """Grip the object between the fingers first."""
+    """Before the pull, grip the object between the fingers."""
     stick: Annotated[tuple[float, float], tyro.conf.arg(metavar="RIGHT UP")] = (0.0, 0.0)
-    """Deflection, at most 1 long, of the stick that moves across, for the first 1.5 s: up to 0.1 m/s."""
+    """Deflection of the stick that moves across, during the first 1.5 s; its length is at most 1, which is 0.1 m/s."""
     turn: Annotated[tuple[float, float], tyro.conf.arg(metavar="RIGHT UP")] = (0.0, 0.0)
-    """Deflection, at most 1 long, of the stick that turns, for the first 1.5 s: up to 0.5 rad/s."""
+    """Deflection of the stick that turns, during the first 1.5 s; its length is at most 1, which is 0.5 rad/s."""
     assist: Assist = "none"
-    """speed: the robot side also limits the speed along the triggers."""
+    """speed: the robot side also limits the speed along the triggers. none: it does not."""
     full_rate: bool = False
-    """Send every message on both sides, even if its change cannot be felt."""
+    """Let both sides send every message, even if its change cannot be felt."""
     camera_mm: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MM")] = 3.0
-    """Standard deviation of the camera's error; the law knows it."""
+    """Standard deviation of the camera's error; the law uses the same value."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -100,18 +101,21 @@ class ApproachSettings(Sweep):
             require_input_file("--model", model, "an MJCF file")
 
     def models(self) -> tuple[Path, ...]:
-        """Return the scenes to try; ConfigurationError if the frozen ones are missing."""
+        """Return the files of the scenes to try; ConfigurationError if the frozen scenes are missing."""
         return self.model or tuple(frozen_scene(name) for name in (_QUICK if self.quick else (*AHEAD, *ASIDE)))
 
     def laws(self) -> tuple[Law, ...]:
-        """Return the compared laws, each once."""
+        """Return the laws to compare, each once."""
         if not self.haptics:
             return ("none",)
         return tuple(dict.fromkeys(with_compensation(law, side) for law in self.law for side in self.compensation))
 
 
 def cells(settings: ApproachSettings) -> Iterator[Approach]:
-    """Combine all values; frozen scenes that a straight pull passes have their sticks deflected."""
+    """Yield a cell for each combination of the values.
+
+    In frozen scenes where a straight pull touches nothing, the sticks are deflected.
+    """
     for model, link, force_n, strongest_n, law in product(
         settings.models(), settings.link, settings.force, settings.strongest_effect, settings.laws()
     ):
@@ -138,12 +142,12 @@ def cells(settings: ApproachSettings) -> Iterator[Approach]:
 
 
 def run(cell: Approach, seed: int) -> Iterator[Row]:
-    """Run one approach."""
+    """Run one approach; yield its figures as a row."""
     yield figures(cell, run_approach(replace(cell, seed=seed)))
 
 
 def figures(approach: Approach, outcome: Outcome) -> Row:
-    """Return an outcome as a row; the trace goes to --summary alone."""
+    """Return an outcome as a row; its trace, as lists, goes only to --summary."""
     gap_mm = outcome.least_gap_mm
     return {
         "law": without_compensation(approach.law),
@@ -158,7 +162,7 @@ def figures(approach: Approach, outcome: Outcome) -> Row:
 
 
 def show(_: ApproachSettings, table: Table) -> Iterator[RenderableType]:
-    """Show one run as a sentence, several as a table."""
+    """Yield a sentence for a single run, or a table for several."""
     yield Text(sentence(table.rows[0])) if len(table) == 1 else comparison(table)
 
 
@@ -178,7 +182,7 @@ def sentence(row: Row) -> str:
 
 
 def comparison(table: Table) -> Shown:
-    """Return a row for each scene, link and force, and a column for each law; each entry is over the seeds."""
+    """Return a table with a row for each scene, link and force, and a column for each law, over all seeds."""
     laws = list(dict.fromkeys(_law(row) for row in table))
     names = scene_names(map(Path, table.values("model")))
     entries = [
@@ -193,7 +197,7 @@ def comparison(table: Table) -> Shown:
 
 
 def draw(settings: ApproachSettings, table: Table, path: Path) -> None:
-    """Draw zones, travel, speed and gap over time (one run), or contact speed against delay (several)."""
+    """Draw zones, travel, speed and gap over time for a single run, or contact speed against delay for several."""
     (_draw_run if len(table) == 1 else _draw_comparison)(table, frozen_hash(settings.models()), path)
 
 

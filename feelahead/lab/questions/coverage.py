@@ -1,4 +1,4 @@
-"""How often is full strength there in time, and how often needlessly, for each law?
+"""How often does full strength come in time, and how often without need, for each law?
 
 feelahead bench coverage --quick --laws swept none
 """
@@ -26,38 +26,39 @@ from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 
 HOMES: Final = {"u_mesh": "mug", "mug": "mug"}
-"""Scenes with another home pose than `empty`, by the scene in which their approaches are recorded."""
+"""Scenes whose home pose differs from that of `empty`, with the scene in which their approaches are recorded."""
 _NOT_STILL: Final = ("moving", "fleeing", "place_held", "terrain_ahead")
-"""Scenes left to `try approach`: objects that move by themselves or with the gripper, and a hill."""
+"""Scenes that only `try approach` uses: objects that move by themselves or with the gripper, and a hill."""
 QUICK_SIZES: Final = (10, 4)
-"""Approaches of each motion, and placements of the objects for each."""
+"""Number of approaches of each motion, and of placements of the objects for each, with --quick."""
 QUICK_JUDGED_S, JUDGED_S = 60.0, 600.0
-"""Least time judged for false alarms, in seconds, over all cells of one kind of motion."""
+"""Minimum time judged for false alarms, in seconds, over all cells of one kind of motion."""
 _MARKS: Final = ("o", "s", "^", "D")
 _CELL: Final = ("scene", "pull", "link", "camera_mm", "encoder_factor", "probability")
 _Probability = Annotated[float, Meta(gt=0.0, le=0.9999)]
-"""P; the greatest takes 100 000 draws a cell."""
+"""Probability P; the greatest takes 100 000 draws for each cell."""
 
 
 @dataclass(frozen=True)
 class CoverageSettings(Sweep):
     """Measure the share of approaches with full strength in time, and false alarms, for each law.
 
-    Covered: 0.25 s before the last release that avoids the contact, full strength was in the farthest zone reached by
-    then. False alarm: strength of 4 or more under the finger, while that zone's stopping path from the true pose stays
-    D_σ(P) + 15 mm clear, whether sticks continue or end. Slowdown: time to a goal in free space over that without
-    haptics. Pulls are recorded open loop over the emulated link, and judged for every scene, camera draw, law and P.
+    Covered: full strength came in time. That is, 0.25 s before the last release that avoids the contact, the farthest
+    zone that the trigger had reached by then was at full strength. False alarm: strength of 4 or more under the
+    finger, although the gripper, pulled to this zone and then stopped, would keep D_σ(P) + 15 mm from all objects,
+    whether the sticks continue or end. Slowdown: time to a goal in free space, divided by the time without haptics.
+    Pulls are recorded over the emulated link without haptics, and judged for every scene, camera error, law and P.
     --quick: a few cells in three minutes, instead of all in two hours.
     """
 
     laws: tuple[Law, ...] = LAWS
-    """Laws that are compared."""
+    """Laws to compare."""
     probabilities: Annotated[tuple[_Probability, ...], tyro.conf.arg(metavar="P...")] = ()
-    """Only these P, instead of the plan's own; n >= 10/(1 - P) draws a cell each."""
+    """Judge only these P, instead of those planned for each cell; each takes n >= 10/(1 - P) draws for each cell."""
     raced: Annotated[Annotated[int, Meta(ge=0)] | None, tyro.conf.arg(metavar="N")] = None
-    """Number of seeds for the time to a goal; 10 unless given, 2 with --quick; 0 leaves it out."""
+    """Number of seeds for measuring the slowdown; 10 unless given, 2 with --quick; 0 leaves it out."""
     only: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TEXT...")] = ()
-    """Only cells whose name contains one of these, as in 'wall/bell/200 ms'."""
+    """Judge only cells whose name, such as 'wall/bell/200 ms', contains one of these texts."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -67,7 +68,7 @@ class CoverageSettings(Sweep):
             raise ValueError(f"--only {' '.join(self.only)}: no cell's name contains it; valid: as wall/bell/200 ms")
 
     def pulls(self) -> list[Pulls]:
-        """Return the motions with their chosen cells, most cells first."""
+        """Return the motions with their chosen cells; motions with the most cells come first."""
         found: dict[tuple[PullKind, str, str], list[Placement]] = {}
         for pull, link, cell in quick_cells() if self.quick else full_cells():
             if not self.only or any(text in cell.key(pull, link) for text in self.only):
@@ -90,7 +91,7 @@ class CoverageSettings(Sweep):
 
 @dataclass(frozen=True)
 class Race:
-    """Time to a goal in one scene under one law."""
+    """Cell that measures the time to a goal in one scene with one law."""
 
     scene: str
     law: Law
@@ -98,16 +99,16 @@ class Race:
 
 
 def cells(settings: CoverageSettings) -> Iterator[Pulls | Race]:
-    """Yield motions and races."""
+    """Yield the cells: motions to record and judge, and races to a goal."""
     yield from settings.pulls()
     if count := settings.raced if settings.raced is not None else (2 if settings.quick else 10):
         yield from (Race(scene, law, count) for scene in RACED for law in settings.laws)
 
 
 def full_cells() -> Iterator[tuple[PullKind, str, Placement]]:
-    """Yield every scene with a steady pull over four links, every pull over two, then one factor at a time.
+    """Yield all cells: every scene with a steady pull over four links, every pull over two links, then single changes.
 
-    Drift and turning come in more scenes, and objects come nearer or go away.
+    The single changes are drifts and turns in more scenes, and objects that come nearer or go away.
     """
     yield from (("steady", link, Placement("wall")) for link in LINKS)
     still = [name for name in (*AHEAD, *PASSED) if name not in _NOT_STILL]
@@ -127,14 +128,14 @@ def full_cells() -> Iterator[tuple[PullKind, str, Placement]]:
 
 
 def quick_cells() -> Iterator[tuple[PullKind, str, Placement]]:
-    """Yield a few cells, to see whether anything is wrong."""
+    """Yield the few cells of --quick, which show whether anything is wrong."""
     for name in ("wall", "rod_5mm", "wall_beside", "table_1_box"):
         yield "steady", "50 ms", Placement(name)
         yield "bell", "200 ms", Placement(name)
 
 
 def run(cell: Pulls | Race, seed: int) -> Iterator[Row]:
-    """Record one motion and judge its cells, or race."""
+    """Record one motion and judge its cells, or run one race."""
     if isinstance(cell, Pulls):
         yield from evaluate(cell, seed)
     else:
@@ -157,7 +158,7 @@ def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
 
 
 def judged(table: Table) -> Table:
-    """Return the rows of cells, sorted by cell."""
+    """Return the rows of judged cells, without races, sorted by cell."""
     return Table(sorted((row for row in table if "cell" in row), key=lambda row: row["cell"]))
 
 
@@ -187,7 +188,7 @@ def _alarms(row: Row) -> str:
 
 
 def by_pull(found: Table, law: str) -> Shown:
-    """Return a row for each pull, link and P, over scenes, cameras and encoders; Markdown, for docs/feel.md."""
+    """Return a table in Markdown, for docs/feel.md: a row for each pull, link and P, over all scenes and errors."""
     order = PULL_KINDS.index, list(LINKS).index
     mine = sorted(found.where(law=law), key=lambda row: (order[0](row["pull"]), order[1](row["link"])))
     entries = []
@@ -208,7 +209,7 @@ def _where(rows: Table, name: str, value: float, form: str) -> str:
 
 
 def by_law(table: Table, laws: Sequence[str]) -> Shown:
-    """Return a row for each law and P, over all cells, with the slowdown."""
+    """Return a table with a row for each law and P, over all cells, and the slowdown."""
     found, raced = judged(table), Table(row for row in table if "slowdown" in row)
     entries = [
         (
@@ -231,19 +232,19 @@ def _slowdown(row: Row) -> str:
 
 
 def mean(rows: Table, name: str, form: str = ".3f") -> str:
-    """Return the mean of the figures in a column; empty without any."""
+    """Return the mean of the figures in a column as text; an empty text without figures."""
     values = rows.values(name)
     return format(sum(values) / len(values), form) if values else ""
 
 
 def pooled_alarms(rows: Table) -> tuple[str, str]:
-    """Return false alarms a minute, and their share of the judged time; empty without any."""
+    """Return false alarms a minute and their share of the judged time, as texts; empty texts if nothing was judged."""
     number, alarm_s, judged_s = (sum(rows.values(name)) for name in ("alarms", "alarm_s", "judged_s"))
     return (f"{60.0 * number / judged_s:.2f}", f"{alarm_s / judged_s:.2%}") if judged_s else ("", "")
 
 
 def draw(settings: CoverageSettings, table: Table, path: Path) -> None:
-    """Draw coverage against false alarms: a point for each law and P, means over the cells."""
+    """Draw coverage against false alarms: a point for each law and P, at the means over the cells."""
     table = judged(table)
     marks = dict(zip(sorted(set(table.values("probability"))), _MARKS, strict=False))
     with figure(path, figsize=(7.2, 4.6)) as (_, axes):

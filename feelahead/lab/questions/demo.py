@@ -1,4 +1,4 @@
-"""Does the demo's person grasp, lift and place, and feel the place before the object touches it?
+"""Does the demo's person grasp, lift and place the target, and feel the surface before the target touches it?
 
 feelahead try demo --seeds 10 --link "" "delay 200ms 10ms distribution normal"
 """
@@ -32,23 +32,23 @@ _COLUMNS: Final = {
     "hits": ("hits", 0),
     "finished_s": ("finished, s", 1),
 }
-"""Figures with their headings and digits."""
+"""Figures that are shown, with their headings and number of digits."""
 
 
 @dataclass(frozen=True)
 class DemoSettings(Sweep):
-    """Run the demo, seed by seed: both sides and the person in virtual time, judged by the true end."""
+    """Run the demo with each seed in virtual time, and judge each run by the simulation's true positions."""
 
     seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 10
     """Number of seeds."""
     scene: SceneName = "table"
-    """One of the demo's scenes."""
+    """Scene of the demo: table, wall, slot or shelf."""
     link: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SPEC...")] = ("", "delay 200ms 10ms distribution normal")
     """Emulated links, in both directions, in netem's syntax."""
     link_model: LinkModel = "datagram"
-    """datagram lets jitter reorder messages, stream keeps them in order."""
+    """datagram: messages may be lost and reordered. stream: messages stay in order and losses delay them."""
     duration: Annotated[float, Meta(gt=0.0, lt=1e4), tyro.conf.arg(metavar="SECONDS")] = 40.0
-    """Limit of each run, in virtual time."""
+    """Maximum duration of each run, in virtual time."""
     person: PersonSettings = field(default_factory=PersonSettings)
 
     def __post_init__(self) -> None:
@@ -68,7 +68,7 @@ def cells(settings: DemoSettings) -> Iterator[Trial]:
 
 
 def run(cell: Trial, seed: int) -> Iterator[Row]:
-    """Run the person's whole task once."""
+    """Run the person's whole task once; yield its figures."""
     yield run_trial(cell, seed)
 
 

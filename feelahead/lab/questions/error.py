@@ -1,4 +1,4 @@
-"""How large are the errors of the error propagation and of the predicted displacement, and what does each cost?
+"""How exact are the error propagation (eq. 5) and the predicted displacement (eq. 8), and what time do they take?
 
 feelahead bench error --quick
 """
@@ -39,7 +39,7 @@ from robot_side.drivers.mujoco.joint_reference import MotionLimits
 from robot_side.drivers.mujoco.scene import load_scene
 
 DELAYS_MS: Final = (0, 25, 50, 100, 200, 400)
-"""Delays in each direction."""
+"""Delays in each direction, in milliseconds."""
 QUICK_DELAYS_MS: Final = (0, 50, 200, 400)
 QUICK_PULLS: Final[tuple[PullKind, ...]] = ("bell", "on_off", "random")
 QUICK_TURNS: Final = 4
@@ -51,7 +51,7 @@ _KINDS: Final[dict[Compensation, tuple[str, str]]] = {
 }
 _COLOURS: Final = {"linear": "#0072b2", "unscented": "#d55e00"}
 _LEAST_MM: Final = 0.01
-"""Lower end of a logarithmic axis."""
+"""Lower end of the figure's logarithmic axis, in mm."""
 _Draws = Annotated[int, Meta(ge=100 * BATCHES, le=10_000_000)]
 
 
@@ -59,20 +59,22 @@ _Draws = Annotated[int, Meta(ge=100 * BATCHES, le=10_000_000)]
 class ErrorSettings(Sweep):
     """Measure run time and error of the error propagation (eq. 5), and the error of the predicted displacement.
 
-    First: the joints of the built-in arm are off by 1e-5 to 1e-1 rad. The gripper's error is estimated by eq. 5 in each
-    configuration, once for all as in the paper, and by the unscented transform; Monte Carlo is the truth. Second: hands
-    pull R2 over links of 0 to 400 ms in each direction, in virtual time. The gripper's displacement from the robot's
-    newest report until a command sent now takes effect is predicted by the commands under way, and as v t_d (eq. 8).
-    --table writes mean and standard deviation of the errors, for eq. 10. A seed always gives the same figures, except
-    run times. Five minutes on a free core. --quick: a minute; fewer draws, configurations, pulls and links; one seed.
+    Error propagation: the joints of the built-in arm have errors of 1e-5 to 1e-1 rad. The gripper's error is estimated
+    by eq. 5 in each configuration, by the paper's single estimate for all configurations, and by the unscented
+    transform. A Monte Carlo simulation counts as the truth. Displacement: simulated hands pull R2 over links of 0 to
+    400 ms in each direction. The gripper's displacement, from the robot's newest report until a command sent now takes
+    effect, is predicted by the commands under way, and as v t_d (eq. 8). --table writes mean and standard deviation of
+    the prediction errors, for eq. 10. A seed always gives the same figures, except run times. It takes five minutes on
+    a free core; with --quick a minute, with fewer draws, configurations, pulls and links, and one seed.
     """
 
     seeds: Annotated[int, Meta(ge=1, le=10_000), tyro.conf.arg(metavar="N")] = 3
-    """Number of seeds of each pull over each link."""
+    """Number of seeds for each pull over each link."""
     draws: Annotated[_Draws | None, tyro.conf.arg(metavar="N")] = None
-    """Draws of the Monte Carlo in each configuration, in twenties; 400000 unless given, 100000 with --quick."""
+    """Number of draws of the Monte Carlo in each configuration, a multiple of 20; 400000 unless given, 100000 with
+    --quick."""
     table: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """Write mean and standard deviation of the prediction errors, by loop age and kind of compensation."""
+    """Write mean and standard deviation of the prediction errors to this file, by loop age and kind of compensation."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -83,7 +85,7 @@ class ErrorSettings(Sweep):
 
 @dataclass(frozen=True)
 class Propagation:
-    """One configuration of the arm, by its number among `configurations` + 2."""
+    """Cell of the error propagation: one configuration of the arm, by its number among `configurations` + 2."""
 
     number: int
     configurations: int
@@ -93,7 +95,7 @@ class Propagation:
 
 @dataclass(frozen=True)
 class RunTimes:
-    """Run times of one call of each method."""
+    """Cell that measures the run time of one call of each method."""
 
     turns: int
     before_seed: int
@@ -101,7 +103,7 @@ class RunTimes:
 
 @dataclass(frozen=True)
 class Prediction:
-    """One pull over one link."""
+    """Cell of the predicted displacement: one pull over one link."""
 
     pull: PullKind
     link: str
@@ -113,13 +115,13 @@ Cell = Propagation | RunTimes | Prediction
 
 
 def link_spec(delay_ms: int) -> str:
-    """Return a link with this delay each way, and normal jitter of 10 ms or a quarter of the delay if less."""
+    """Return a link with this delay each way and normal jitter: 10 ms, or a quarter of the delay if that is less."""
     jitter_ms = min(10, delay_ms // 4)
     return f"delay {delay_ms}ms {jitter_ms}ms distribution normal" if jitter_ms > 0 else ""
 
 
 def cells(settings: ErrorSettings) -> Iterator[Cell]:
-    """Yield configurations, the run times, and each pull over each link; only pulls have several seeds."""
+    """Yield the cells: configurations, run times, and each pull over each link; only pulls have several seeds."""
     quick, second = settings.quick, settings.seed + 1
     configurations = 4 if quick else 12
     draws = settings.draws or (100_000 if quick else 400_000)
@@ -161,7 +163,7 @@ def _gripper() -> PosedGripper:
 
 
 def write_table(settings: ErrorSettings, table: Table) -> None:
-    """Write the table of --table, if given."""
+    """Write the table of prediction errors to the file of --table, if it is given."""
     if settings.table is not None:
         arm, speed_m_s = load_scene().robot.fingerprint, ToolMotionSettings().trigger_speed_m_s
         with output_file("--table", settings.table) as file:
@@ -182,7 +184,7 @@ def show(_: ErrorSettings, table: Table) -> Iterator[RenderableType]:
 
 
 def _by_noise(propagated: Table) -> Shown:
-    """Show median and worst error over all configurations except the singular one, then the worst in that one."""
+    """Show median and worst error over all configurations but the singular one, then the worst error in that one."""
     rows = []
     for noise_rad in NOISE_RAD:
         here = propagated.where(noise_rad=noise_rad)
@@ -207,7 +209,7 @@ def _spreads(judged: Table, names: Sequence[str], *, within_reach: bool) -> Iter
 
 
 def cell_of(found: Spread) -> str:
-    """Return mean, standard deviation, 99 % quantile and maximum as text, in mm."""
+    """Return mean, standard deviation, 99 % quantile and maximum of errors as text, in mm."""
     return "-" if not found.moments else f"{found.mean_mm:+.2f} {found.sd_mm:.2f} {found.p99_mm:.2f} {found.max_mm:.2f}"
 
 

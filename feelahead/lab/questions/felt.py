@@ -1,4 +1,4 @@
-"""What does a look ahead cost, and how exact is it, by the number of the gripper's spheres?
+"""How long does one evaluation of the law (look) take, and how exact is it, by the number of the gripper's spheres?
 
 feelahead bench felt --quick --picture felt.png
 feelahead bench felt --definition
@@ -39,26 +39,27 @@ _LEAST_MM: Final = 1e-3
 
 @dataclass(frozen=True)
 class FeltSweep(Sweep):
-    """Measure run time and error of the law's contact distances, by the number of spheres that cover the gripper.
+    """Measure run time and errors of the law's onset distances, for fewer and more spheres that cover the gripper.
 
-    Each cover gets the same recorded ticks, in turns, and is compared with the finest.
+    All covers get the same recorded ticks, in turns, and are compared with the finest cover.
     """
 
     definition: bool = False
-    """Instead: compare the contact distances of looks in the demo and in all frozen scenes with their definition."""
+    """Do this instead: compare the onset distances of looks in the demo and in all frozen scenes with their
+    definition."""
     cover: bool = False
-    """Instead: measure how closely spheres cover grippers: the built-in one, and those of --model."""
+    """Do this instead: measure how closely spheres cover grippers, of the built-in arm and of --model."""
     field: bool = False
-    """Instead: measure how far before objects R2's strengths begin, without camera error. The frozen scenes with one
-    convex object ahead, or those of --model, are moved along the approach."""
+    """Do this instead: measure how far before objects R2's strengths begin, without camera error. The objects of the
+    frozen scenes with one convex object ahead, or of --model, are moved along the approach."""
     model: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE.xml...")] = ()
-    """--cover, --field: MJCF files with an arm."""
+    """For --cover and --field: MJCF files, each with an arm."""
     site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """--cover, --field: site between the fingertips, z along the approach."""
+    """For --cover and --field: name of the site between the fingertips, whose z axis is the approach."""
     points: Annotated[int, Meta(ge=100, le=10_000_000), tyro.conf.arg(metavar="N")] = 200_000
-    """--cover: points of either surface, shared among a gripper's links."""
+    """For --cover: number of points sampled on each of both surfaces, shared among a gripper's links."""
     step_mm: Annotated[float, Meta(ge=1.0, le=150.0), tyro.conf.arg(metavar="MM")] = 10.0
-    """--field: step of the free distances, 0 to 150 mm."""
+    """For --field: step between the tried distances from gripper to object, 0 to 150 mm."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -75,34 +76,34 @@ class FeltSweep(Sweep):
             require_input_file("--model", model, "an MJCF file")
 
     def scenes(self) -> dict[Path, str]:
-        """Return the names of --field's scenes."""
+        """Return the names of the scenes of --field, by file."""
         frozen = CONVEX[:_QUICK_SCENES] if self.quick else CONVEX
         return scene_names(self.model or tuple(frozen_scene(name) for name in frozen))
 
 
 @dataclass(frozen=True)
 class Run:
-    """One recorded run: the demo, or a pull of 2 N in a frozen scene."""
+    """Cell with one recorded run: the demo, or a pull of 2 N in a frozen scene."""
 
     run: str
     duration_s: float
     times: int = 2
-    """Number of passes over the ticks; the least time counts."""
+    """Number of passes over the ticks; the least time of each tick counts."""
 
 
 @dataclass(frozen=True)
 class Looked:
-    """Looks of a recorded run, to compare with the definition."""
+    """Cell whose recorded looks are compared with the definition."""
 
     scene: str
     duration_s: float
     most: int
     sticks_of: str = ""
-    """Scene whose deflected sticks are used instead of its own."""
+    """Scene whose stick deflections are used, instead of those of the run's own scene."""
 
 
 def cells(settings: FeltSweep) -> Iterator[Run | Looked | Gripper | Facing]:
-    """Yield the recorded runs, the grippers, or the scenes."""
+    """Yield the cells that the flags choose: recorded runs, looks, grippers, or scenes."""
     if settings.cover:
         points = min(settings.points, _QUICK_POINTS) if settings.quick else settings.points
         yield Gripper("built-in", None, None, points)
@@ -124,7 +125,7 @@ def cells(settings: FeltSweep) -> Iterator[Run | Looked | Gripper | Facing]:
 
 
 def run(cell: Run | Looked | Gripper | Facing, seed: int) -> Iterator[Row]:
-    """Yield a row for each cover in one recorded run; or rows of a cover, of looks ahead, or of the definition."""
+    """Run one cell: yield a row for each cover in a recorded run, or the rows of the part that the flags choose."""
     if isinstance(cell, Looked):
         asked, encoder_sigma_rad = looks_of(
             record(cell.scene, cell.duration_s, seed, ASIDE.get(cell.sticks_of)), cell.most
@@ -143,7 +144,7 @@ def run(cell: Run | Looked | Gripper | Facing, seed: int) -> Iterator[Row]:
 
 
 def show(settings: FeltSweep, table: Table) -> Iterator[Shown]:
-    """Yield a table of covers for each run; or one of differences from the definition, of links, or of scenes."""
+    """Yield a table of covers for each run; or with --definition, --cover or --field, the table of that."""
     if settings.cover:
         measures = ("geoms", "spheres", "sticks_out_mm", *STANDS_OUT, "gap_mm", "gap_kept_mm", "made_s")
         links = ((f"{row['gripper']}: {row['part']}", *map(row.get, measures)) for row in table)
@@ -173,7 +174,7 @@ def _apart(row: Row, kind: str) -> str | None:
 
 
 def goals(settings: FeltSweep, table: Table) -> Iterator[Goal]:
-    """Yield the limits of contact distances beside their definition, and of spheres beside their geoms."""
+    """Yield the goals: how exact onset distances must be, and how closely spheres must cover their geoms."""
     for (name,), rows in table.groups("gripper") if settings.cover else ():
         yield Goal(f"{name}: sticks out of its spheres, mm", max(rows.values("sticks_out_mm")), 0.0)
         yield Goal(f"{name}: spheres stand out, mm", max(rows.values("stands_out_mm")), _LIMIT_COVER_MM)
@@ -184,7 +185,7 @@ def goals(settings: FeltSweep, table: Table) -> Iterator[Goal]:
 
 
 def draw(settings: FeltSweep, table: Table, path: Path) -> None:
-    """Draw run time against error of full strength, a line for each run; or grippers, or where strengths begin."""
+    """Draw run time against error of full strength, a line for each run; or the figure of --cover or --field."""
     if settings.cover or settings.field:
         draw_cover(table, path) if settings.cover else draw_field(table, frozen(settings), path)
         return
@@ -201,7 +202,7 @@ def draw(settings: FeltSweep, table: Table, path: Path) -> None:
 
 
 def frozen(settings: FeltSweep) -> str:
-    """Hash the frozen scenes of --definition and --field."""
+    """Return a hash of the frozen scenes that --definition and --field use; an empty text without them."""
     if settings.definition:
         return frozen_hash()
     return frozen_hash(tuple(settings.scenes())) if settings.field else ""

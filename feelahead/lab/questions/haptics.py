@@ -33,30 +33,32 @@ _Delay = Annotated[float, Meta(ge=0.0, lt=1000.0)]
 
 @dataclass(frozen=True)
 class HapticsSettings(Sweep):
-    """Compare trials without haptics, with haptics, and with haptics and a reacting person, who misjudges distances.
+    """Compare a simulated person's trials without haptics, with ignored haptics, and with haptics they react to.
 
-    The person sees no obstacle. They reach for the target in single moves, grasp it, lift it and set it down again.
-    Trials with the same seed have the same scene, errors of camera and link, and misjudged distances.
+    The person misjudges distances and sees no obstacle. They reach for the target in single moves, grasp it, lift it
+    and set it down again. Trials with the same seed have the same scene, camera errors, link and misjudged distances.
     """
 
     seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 30
-    """Number of pairs."""
+    """Number of seeds; each gives one trial for each condition."""
     scenes: tuple[SceneName, ...] = ("wall", "slot", "shelf")
-    """wall: behind the target. slot: between two posts. shelf: over an edge. table: clutter beside the path."""
+    """Scenes. wall: a wall behind the target. slot: two posts on the way. shelf: a raised edge on the way. table:
+    clutter beside the way."""
     delays: Annotated[tuple[_Delay, ...], tyro.conf.arg(metavar="MS...")] = (0.0, 100.0, 200.0, 400.0)
     """Delays in each direction, in milliseconds."""
     jitter: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MS")] = 10.0
-    """Standard deviation of each delay above 0, in milliseconds."""
+    """Standard deviation (jitter) of all delays but 0, in milliseconds."""
     camera_mm: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MM")] = 3.0
-    """Standard deviation of the camera's error along each axis; the law knows it."""
+    """Standard deviation of the camera's error along each axis; the law uses the same value."""
     probability: Annotated[float, Meta(gt=0.0, lt=1.0), tyro.conf.arg(metavar="P")] = 0.99
-    """P of the robot side (eq. 10)."""
+    """Probability P of the law (eq. 10)."""
     link_model: LinkModel = "datagram"
-    """datagram lets jitter reorder messages, stream keeps them in order."""
+    """datagram: messages may be lost and reordered. stream: messages stay in order and losses delay them."""
     duration: Annotated[float, Meta(gt=0.0, lt=1e4), tyro.conf.arg(metavar="SECONDS")] = 45.0
-    """Limit of each trial, in virtual time."""
+    """Maximum duration of each trial, in virtual time."""
     tick: Annotated[float, Meta(ge=1.0, le=10.0), tyro.conf.arg(metavar="MS")] = 4.0
-    """Period of the robot side's ticks, in milliseconds; 1 is the real one, and takes more than twice the time."""
+    """Period of the robot side's ticks, in milliseconds. 1 is that of the real robot side, and makes trials take more
+    than twice the time."""
     person: PersonSettings = field(
         default_factory=lambda: PersonSettings(aiming="move-and-wait", depth_error_sd_m=0.030, depth_error_mean_m=0.010)
     )
@@ -73,7 +75,7 @@ class HapticsSettings(Sweep):
 
 @dataclass(frozen=True)
 class Cell:
-    """One arm of one scene and delay."""
+    """One condition (arm of the experiment) in one scene with one delay."""
 
     scene: SceneName
     delay_ms: float
@@ -82,7 +84,7 @@ class Cell:
 
 
 def cells(settings: HapticsSettings) -> Iterator[Cell]:
-    """Yield each combination of scene, delay and arm."""
+    """Yield each combination of scene, delay and condition."""
     few = 1 if settings.quick else None
     for scene, delay_ms, arm in product(settings.scenes[:few], settings.delays[:few], _ARMS):
         yield Cell(
@@ -109,7 +111,7 @@ def run(cell: Cell, seed: int) -> Iterator[Row]:
 
 
 def show(settings: HapticsSettings, table: Table) -> Iterator[Shown]:
-    """Yield a table for each scene and delay, with a row for each arm."""
+    """Yield a table for each scene and delay, with a row for each condition."""
     for (scene, delay_ms), pairs in table.groups("scene", "delay_ms"):
         title = f"{scene}, {delay_ms:g} ms each way, {settings.seeds} pairs"
         hits = "trials with a hit [95 %]", "p", "hits", "mm/s, median (most)", "grasped", "placed"
@@ -120,7 +122,7 @@ def show(settings: HapticsSettings, table: Table) -> Iterator[Shown]:
 
 
 def _figures(pairs: Table, arm: Arm, limit_s: float) -> list[str]:
-    """Compare one arm with the same seeds' trials without haptics."""
+    """Return the entries of one condition's row, compared with the trials of the same seeds without haptics."""
     off = {row["seed"]: row for row in pairs.where(arm="off")}
     those = [row for row in pairs.where(arm=arm) if row["seed"] in off]
     if not those:
@@ -152,7 +154,7 @@ def _figures(pairs: Table, arm: Arm, limit_s: float) -> list[str]:
 
 
 def restricted(times_s: Sequence[float | None], limit_s: float) -> list[float]:
-    """Cap the times at the limit, also used for missing times: their mean is the restricted mean."""
+    """Return the times, with the limit for longer and for missing ones; their mean is the restricted mean."""
     return [limit_s if time_s is None else min(time_s, limit_s) for time_s in times_s]
 
 

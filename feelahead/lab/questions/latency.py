@@ -1,4 +1,4 @@
-"""What do realistic links do to a finger of constant force, and do the emulations of a link agree?
+"""How do realistic links change what a finger of constant force hits, and do the emulations of a link agree?
 
 feelahead try latency --links lan wifi lte --seeds 5 --csv latency.csv --picture latency.png
 """
@@ -41,37 +41,37 @@ Medium = Literal["virtual", "loopback", "containers"]
 _DIRECTIONS: Final = ("to_robot", "to_operator")
 _LOOK_S: Final = 0.01
 _COMPARED: Final = (("mean_ms", "mean", "ms", 2.0), ("sd_ms", "sd", "ms", 1.0), ("lost_percent", "lost", "%", 0.1))
-"""Figures in which the media should agree, each with name, unit and margin."""
+"""Figures in which the media should agree: column, name, unit and permitted difference of each."""
 _COLOURS: Final[Mapping[str, str]] = {"virtual": "#0072b2", "loopback": "#d55e00", "containers": "#009e73"}
 _WIDE: Final = 0.7
-"""Share of a link's width in the figure for its media."""
+"""Share of a link's width in the figure that its media take up."""
 
 
 @dataclass(frozen=True)
 class LatencySettings(Sweep):
-    """Pull R2 with a constant force towards a wall, over realistic links: the effect of the delay.
+    """Pull R2 with a constant force towards a wall over realistic links, and show the effect of the delay.
 
-    Each link runs with and without haptics, over the same seeds, in several media: virtual time, two processes that
-    delay their own messages, and containers with the kernel's netem between them. A second table shows whether the
-    media agree on the link's figures. Trials in real time take turns.
+    Each link is run with and without haptics, with the same seeds, in several media. These are virtual time, two
+    processes that delay their own messages, and containers with the kernel's netem between them. A second table shows
+    whether the media agree in delays and losses. Trials in real time run one by one.
     """
 
     seeds: Annotated[int, Meta(ge=1), tyro.conf.arg(metavar="N")] = 5
-    """Number of trials of each kind."""
+    """Number of seeds, each with one trial for each link, medium, and with or without haptics."""
     links: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME|SPEC...")] = tuple(NAMED_LINKS)
-    """Links by name, or in netem's syntax, in both directions."""
+    """Links, each by its name or in netem's syntax for both directions."""
     haptics: tuple[Literal["on", "off"], ...] = ("on", "off")
     """Whether the triggers resist."""
     media: tuple[Literal["virtual", "loopback"], ...] = ("virtual", "loopback")
     """virtual: in this process, as fast as possible. loopback: two processes on 127.0.0.1, in real time."""
     compose: bool = False
-    """Also run in containers, with the kernel's netem between them."""
+    """Also run the trials in containers, with the kernel's netem between them."""
     model: LinkModel = "stream"
-    """stream keeps the order and loses nothing, as TCP does; datagram loses and reorders."""
+    """stream: messages stay in order and losses delay them, as by TCP. datagram: messages may be lost and reordered."""
     force: Annotated[float, Meta(ge=0.0, le=20.0), tyro.conf.arg(metavar="N")] = 3.0
     """Force on R2 in newtons: 2 is a light pull, 3.7 a normal one."""
     duration: Annotated[float, Meta(ge=2.0, le=1000.0), tyro.conf.arg(metavar="SECONDS")] = 8.0
-    """Length of each trial once the link is up; the pull begins after 1.3 s and a round trip or two."""
+    """Duration of each trial from when the link is up; the pull begins after 1.3 s and one or two round trips."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -103,7 +103,7 @@ def cells(settings: LatencySettings) -> Iterator[Cell]:
 
 
 def run(cell: Cell, seed: int) -> Iterator[Row]:
-    """Run one trial; delays in milliseconds, losses in per cent."""
+    """Run one trial; yield its figures, with delays in milliseconds and losses in per cent."""
     yield _MEDIA[cell.medium](replace(cell.trial, seed=seed))
 
 
@@ -131,7 +131,7 @@ def on_loopback(trial: Trial) -> Row:
 
 @functools.cache
 def _containers() -> ContainerMedium:
-    """Open the containers once, and remove them at the end of the process."""
+    """Return the medium of containers; it is made once, and removed when this process ends."""
     stack = ExitStack()
     atexit.register(stack.close)
     return ContainerMedium(stack, os.getpid())
@@ -145,7 +145,7 @@ _MEDIA: Final[Mapping[Medium, Callable[[Trial], Row]]] = {
 
 
 def show(_: LatencySettings, table: Table) -> Iterator[Shown]:
-    """Yield a table of figures, and one of the media's agreement."""
+    """Yield a table of the figures, and a table of whether the media agree."""
     headings = (
         *("link", "haptics", "medium", "trials", "to robot, ms", "sd", "p50", "p99", "lost, %"),
         *("to operator, ms", "sd", "p50", "p99", "lost, %"),
@@ -178,7 +178,7 @@ def _mean(numbers: list[float], digits: int) -> str:
 
 
 def agreement(table: Table) -> Shown:
-    """Compare each pair of media: two one-sided tests, by Welch's interval over seeds, against a margin."""
+    """Return a table that compares each pair of media: Welch's interval of the difference against the permitted one."""
     margins = ", ".join(f"{name} within ±{margin:g} {unit}" for _, name, unit, margin in _COMPARED)
     title = f"do the media agree? {margins}: the whole 95 % interval (Welch, over seeds) has to lie within"
     lines = []
@@ -200,13 +200,13 @@ def agreement(table: Table) -> Shown:
 
 
 def by_seed(group: Table, name: str) -> list[float]:
-    """Return each seed's mean with and without haptics: an emulated link draws the same in both."""
+    """Return each seed's mean over trials with and without haptics, as an emulated link draws the same in both."""
     found = (trials.values(name) for _, trials in group.groups("seed"))
     return [fmean(values) for values in found if values]
 
 
 def verdict(first: list[float], second: list[float], margin: float, unit: str) -> str:
-    """Describe whether two media are equivalent within a margin, different beyond it, or undecided."""
+    """Say in words whether two media are equivalent within `margin`, differ by more, or have too few trials to tell."""
     if not first or not second:
         return "-"
     interval = welch_interval(first, second)
@@ -222,7 +222,7 @@ def verdict(first: list[float], second: list[float], margin: float, unit: str) -
 
 
 def draw(_: LatencySettings, table: Table, path: Path) -> None:
-    """Draw the delay in each direction, a dot a seed with mean and 95 %, and contact speeds."""
+    """Draw the delays in each direction (a dot for each seed, mean and 95 % interval), and contact speeds."""
     links, media = (list(dict.fromkeys(row[name] for row in table)) for name in ("link", "medium"))
     with figure(path, 1, 3, figsize=(13.0, 4.2)) as (_, panels):
         for (link, medium), group in table.groups("link", "medium"):

@@ -1,4 +1,4 @@
-"""How close is the emulated link to the kernel's netem, and what do both ends cost?
+"""How close is the emulated link to the kernel's netem, and how much processor time do both ends take?
 
 feelahead bench link
 feelahead bench link --virtual --against tests/data/netem/normal.csv.gz --seeds 20
@@ -32,7 +32,7 @@ _BARE_LIMIT: Final = 1.3
 _KINDS: Final[tuple[Kind, ...]] = ("whole ends", "bare ZeroMQ")
 _TURNS: Final = 7
 _PAIRS: Final = 10
-"""Number of pairs of the model's own runs, for each seed."""
+"""Number of pairs of runs of the model that are compared with each other, for each seed."""
 _COMPARED: Final = (
     *("seed", "distance", "mean_error_ms", "sd_error_ms"),
     *("late_share", "loss_share", "mean_burst", "stalls"),
@@ -41,32 +41,33 @@ _COMPARED: Final = (
 
 @dataclass(frozen=True)
 class Played:
-    """One link in virtual time."""
+    """Cell that runs the model of one link in virtual time."""
 
     link: Annotated[str, tyro.conf.arg(metavar="SPEC")] = "delay 50ms 10ms distribution normal"
-    """With --virtual: the link, in netem's syntax; of two directions the one to the operator."""
+    """With --virtual: the link, in netem's syntax. If it has two directions, the one to the operator is used."""
     link_model: LinkModel = "datagram"
-    """datagram loses and reorders, stream keeps the order and turns loss into delay."""
+    """datagram: messages may be lost and reordered. stream: messages stay in order and losses delay them."""
     rate: Annotated[float, Meta(ge=1.0, le=1e5), tyro.conf.arg(metavar="HZ")] = 1000.0
-    """Messages a second."""
+    """Number of messages a second."""
     count: Annotated[int, Meta(ge=2, le=1_000_000), tyro.conf.arg(metavar="N")] = 6000
     """Number of messages."""
     bytes: Annotated[int, Meta(ge=1, le=60_000), tyro.conf.arg(metavar="N")] = 142
-    """Size of a message, which `rate` in the link counts: 100 bytes with their UDP, IPv4 and Ethernet headers."""
+    """Size of a message, which the link's `rate` counts; 142 are 100 bytes and their UDP, IPv4 and Ethernet headers."""
     against: Annotated[Path | None, tyro.conf.arg(metavar="FILE.csv")] = None
-    """With --virtual: a recording to compare with (seq, sent_ns, delay_ns); its send times replace --rate and
-    --count."""
+    """With --virtual: a recording of netem to compare with, with the columns seq, sent_ns, delay_ns. Its times of
+    sending are used instead of --rate and --count."""
 
     def profile(self, seed: int) -> LinkProfile:
-        """Parse the link."""
+        """Return the profile of the link, with this seed."""
         return LinkSpec.parse(self.link, seed, self.link_model).profile("to_operator")
 
 
 @dataclass(frozen=True)
 class LinkSweep(Played, Sweep):
-    """Measure both ends at 1 kHz each, between law and controller, beside bare ZeroMQ, in turns.
+    """Measure the processor time of both sides' ends of the link at 1 kHz, in turns with bare ZeroMQ sockets.
 
-    With --virtual: the model of the link beside its specification, and beside a recording of the kernel's netem.
+    The ends have all work between law and controller. With --virtual: compare the model of a link with its
+    specification, and with a recording of the kernel's netem.
     """
 
     virtual: bool = False
@@ -81,14 +82,14 @@ class LinkSweep(Played, Sweep):
 
 @dataclass(frozen=True)
 class Turns:
-    """Both kinds of ends, in turns."""
+    """Cell that measures our ends and bare ZeroMQ's in turns."""
 
     rate: float
     turns: int
 
 
 def cells(settings: LinkSweep) -> Iterator[Turns | Played]:
-    """Yield the cell that the flags choose."""
+    """Yield the one cell that the flags choose."""
     yield cell_of(Played, settings) if settings.virtual else Turns(settings.rate, 2 if settings.quick else _TURNS)
 
 
@@ -148,13 +149,16 @@ def show(settings: LinkSweep, table: Table) -> Iterator[RenderableType]:
 
 
 def ratio(turns: Table) -> float:
-    """Return the median over turns of both ends' share over bare ZeroMQ's in the same turn: machine speed varies."""
+    """Return how many times more processor time our ends take than bare ZeroMQ's: the median over all turns.
+
+    Both are compared within a turn, as the machine's speed varies.
+    """
     ours, bare = ([row["robot"] + row["operator"] for row in turns.where(kind=kind)] for kind in _KINDS)
     return float(np.median(np.divide(ours, bare)))
 
 
 def goals(settings: LinkSweep, table: Table) -> Iterator[Goal]:
-    """Yield the limits of the figures."""
+    """Yield the goals: the figures with their limits."""
     if settings.against is not None:
         profile = settings.profile(0)
         reference, _ = read_link_sample(settings.against, "--against").without_stalls(profile)

@@ -1,4 +1,4 @@
-"""How fast and how exact are the overlaps, compared with the methods used in their place?
+"""How fast and how exact are the overlaps, compared with other methods?
 
 feelahead bench overlap --quick --peer-header overlap-0.2.0/include/overlap/overlap.hpp
 """
@@ -49,9 +49,9 @@ _COUNTS = ("pairs", "undefined", "negative", "false_zeros", "false_positives")
 class OverlapSweep(Sweep):
     """Measure run time and error of the overlaps and of their alternatives, on the same pairs in the same run.
 
-    The alternatives: the published package `overlap` 0.2.0 from Python and in C++, 29 satellite points and Monte Carlo.
-    Alternatives missing on this machine are named: pip install '.[bench]' brings the package; the C++ row needs
-    a compiler, Eigen (apt-get install libeigen3-dev) and the package's header:
+    The alternatives are the published package `overlap` 0.2.0 from Python and in C++, 29 satellite points, Monte Carlo
+    and more. Those that this machine lacks are named. The package comes with: pip install '.[bench]' in the clone. The
+    C++ row needs a compiler, Eigen (apt-get install libeigen3-dev) and the package's header:
 
         pip download --no-deps --no-binary overlap overlap==0.2.0 && tar xzf overlap-0.2.0.tar.gz
     """
@@ -73,7 +73,7 @@ class OverlapSweep(Sweep):
 
 @dataclass(frozen=True)
 class Piece:
-    """One class of pairs, one set of timed pairs, or one radius of mesh queries."""
+    """Cell: one class of pairs, one set of timed pairs, or one radius of mesh queries."""
 
     part: Literal["speed", "accuracy", "adversarial", "tradeoff", "mesh"]
     solid: str
@@ -85,7 +85,7 @@ class Piece:
 
 
 def cells(settings: OverlapSweep) -> Iterator[Piece]:
-    """Yield the timed pieces first, then errors and counts by class."""
+    """Yield the cells: first those that measure time, then errors and counts for each class."""
     turns, timed = (5 if settings.quick else 20), settings.timed
     header = None if settings.peer_header is None else str(settings.peer_header)
     truths = settings.truths or (6 if settings.quick else 40)
@@ -103,7 +103,7 @@ def cells(settings: OverlapSweep) -> Iterator[Piece]:
 
 
 def run(cell: Piece, seed: int) -> Iterator[Row]:
-    """Measure one piece: a row for each method."""
+    """Measure one cell; yield a row for each method."""
     parts = {"speed": _speed, "accuracy": _accuracy, "adversarial": _failures, "tradeoff": _tradeoff, "mesh": _mesh}
     yield from parts[cell.part](cell, seed)
 
@@ -129,7 +129,7 @@ def _checked(pairs: Pairs) -> object:
 
 
 def _speed(cell: Piece, seed: int) -> Iterator[Row]:
-    """Run all methods in turns on the same pairs; the least time of each batch counts."""
+    """Measure all methods in turns on the same pairs; the least time of each batch counts."""
     clock = MonotonicClock()
     pairs = errors.partial_pairs(cell.solid, cell.count, seed + 1) if cell.case == "random" else _pairs(cell, seed + 1)
     batches = [pairs[slice(first, first + _BATCH)] for first in range(0, len(pairs), _BATCH)]
@@ -173,7 +173,7 @@ def _failures(cell: Piece, seed: int) -> Iterator[Row]:
 
 
 def _tradeoff(cell: Piece, seed: int) -> Iterator[Row]:
-    """Measure time and worst error of every method; slow ones get a few pairs that intersect."""
+    """Measure time and worst error of every method; slow methods get only a few pairs, all of which intersect."""
     clock, pairs = MonotonicClock(), _pairs(cell, seed)
     truths = true_overlaps(pairs)
     methods: dict[str, tuple[Callable[[Pairs], FloatArray], int]]
@@ -195,7 +195,7 @@ def _tradeoff(cell: Piece, seed: int) -> Iterator[Row]:
 
 
 def _mesh(cell: Piece, seed: int) -> Iterator[Row]:
-    """Time queries of a torus of 10 000 triangles by spheres around its surface."""
+    """Measure the time of overlaps of spheres with a torus of 10 000 triangles, around whose surface they lie."""
     clock, radius, rng = MonotonicClock(), float(cell.case), np.random.default_rng([seed, 5])
     mesh, spheres = Mesh(*torus(100, 50)), (around_torus(rng, cell.count, radius), radius)
     query = functools.partial(mesh.overlap, *spheres)
@@ -253,7 +253,7 @@ def _most(rows: Table, name: str) -> float | None:
 
 
 def goals(_: OverlapSweep, table: Table) -> Iterator[Goal]:
-    """Yield the limits of the kernels' figures."""
+    """Yield the goals for the kernels' time and errors."""
     ours = table.where(method="ours")
     accuracy, counted, meshes = (ours.where(part=part) for part in ("accuracy", "adversarial", "mesh"))
     deep = Table(row for row in accuracy if not row["case"].endswith("1e-9"))
@@ -281,7 +281,7 @@ def goals(_: OverlapSweep, table: Table) -> Iterator[Goal]:
 
 
 def draw(_: OverlapSweep, table: Table, path: Path) -> None:
-    """Draw run time against error, and the cost of a mesh query by its triangles."""
+    """Draw run time against error, and the time of a mesh query against the number of triangles that it visits."""
     with figure(path, 1, 2, figsize=(13.0, 4.6)) as (_, (left, right)):
         for number, ((method,), rows) in enumerate(table.where(part="tradeoff").groups("method")):
             errors = np.maximum(rows.values("volume"), 1e-18)

@@ -1,4 +1,4 @@
-"""What does a tick of the robot side cost in the real process, stage by stage and by the number of objects?
+"""How much processor time does a tick of the robot side take, by stage and by number of objects?
 
 feelahead bench tick --quick
 """
@@ -40,21 +40,22 @@ _LOOK: Final = "look to message"
 class TickSweep(Sweep):
     """Measure the robot side's processor time, with both sides as in the demo and a scripted person.
 
-    Each figure is shown with its ratio to "mixed", a fixed workload in turns with the ticks (feelahead/lab/tick):
-    p50 to p50, p99 to p99. look to message: from the arm's readings to the sent messages, without physics. without
-    physics: the same with the camera frame, which is read in afterwards. whole look: the law in ticks that looked
-    ahead.
+    Each figure is shown with its ratio to "mixed", a fixed workload that takes turns with the ticks
+    (feelahead/lab/tick); p50 is compared with p50, and p99 with p99. "look to message": from the arm's readings to the
+    sent messages, without physics. "without physics": the same, and reading the camera frame, which comes afterwards.
+    "whole look": the law, in those ticks in which it evaluated a trigger.
     """
 
     seconds: Annotated[float, Meta(ge=3.0, le=600.0)] = 10.0
-    """Length of each case."""
+    """Duration of each case, in seconds."""
     objects: tuple[Annotated[int, Meta(ge=1, le=1_000_000)], ...] = (10, 1_000, 10_000, 100_000)
-    """Numbers of objects around the table, perceived besides the demo's. --quick: the first and the last alone."""
+    """Numbers of objects around the table that are perceived in addition to the demo's, one case for each number; with
+    --quick only the first and the last."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One run: with stages timed or not, further objects, and the scene's own objects or none."""
+    """Cell with one run of both sides: stages timed or not, additional objects, and the scene's own objects or none."""
 
     case: str
     seconds: float
@@ -65,14 +66,14 @@ class Case:
 
 @dataclass(frozen=True)
 class Concave:
-    """Looks at the concave object of a frozen scene."""
+    """Cell that measures looks at the concave object of a frozen scene."""
 
     case: str
     seconds: float
 
 
 def cells(settings: TickSweep) -> Iterator[Case | Concave]:
-    """Yield the demo, an empty scene, the numbers of objects, and the concave objects."""
+    """Yield the cells: the demo, an empty scene, each number of objects, and the concave objects."""
     seconds = _QUICK_S if settings.quick else settings.seconds
     yield Case("demo, each stage timed", seconds, stages=True)
     yield Case("demo", seconds)
@@ -85,7 +86,7 @@ def cells(settings: TickSweep) -> Iterator[Case | Concave]:
 
 
 def run(cell: Case | Concave, seed: int) -> Iterator[Row]:
-    """Run one case: a row for each stage, and for the sums."""
+    """Run one cell; yield a row for each stage, and for each sum of stages."""
     if isinstance(cell, Concave):
         looks_s, mixed_s = time_looks(frozen_scene(cell.case), cell.seconds)
         for stage, spent_s in ((f"field of {cell.case}", looks_s), ("mixed", mixed_s)):
@@ -106,7 +107,7 @@ def run(cell: Case | Concave, seed: int) -> Iterator[Row]:
 
 
 def rows(turns: FloatArray, stages: bool, overruns: int | None) -> Iterator[Row]:
-    """Yield quantiles of the processor time of stages, their sums and "mixed", and of the tick's wall time."""
+    """Yield rows with quantiles of the processor time of stages, of their sums and of "mixed", and of wall time."""
     of_mixed = turns[:, COLUMNS.index("run")] % 2 == 1
     ticks, mixed_s = turns[~of_mixed], turns[of_mixed, COLUMNS.index("spent_s")]
     spent = dict(zip(COLUMNS, ticks.T, strict=True))
@@ -143,7 +144,7 @@ def show(_: TickSweep, table: Table) -> Iterator[RenderableType]:
 
 
 def goals(_: TickSweep, table: Table) -> Iterator[Goal]:
-    """Yield the limits of the ratios."""
+    """Yield the goals: limits of the ratios to "mixed"."""
 
     def figure(name: str, **where: str) -> float | None:
         found = table.where(**where).values(name)

@@ -1,1 +1,1 @@
-"""References for comparison: exact overlaps, classes on which algorithms fail, contact distances by definition."""
+"""References for comparison: exact overlaps, pairs on which algorithms fail, onset distances by their definition."""

@@ -1,7 +1,7 @@
-"""Common approximations of exact overlaps: the share of the ball's points within the solid.
+"""Common approximations of an overlap: the share of points of the ball that lie within the solid.
 
-Each takes `Pairs` of tetrahedra or boxes and returns volumes (p,) in m³. All get the solid as the half-spaces of its
-faces.
+Each method takes `Pairs` of tetrahedra or boxes and returns volumes (p,) in m³. A solid is given by the half-spaces of
+its faces.
 """
 
 import math
@@ -15,7 +15,7 @@ from common.arrays import FloatArray
 from feelahead.lab.reference.pairs import BOX_QUADRILATERALS, TETRAHEDRON_TRIANGLES, Pairs
 
 _CHUNK = 1 << 16
-"""Number of points at a time, so that they stay in the processor's cache."""
+"""Number of points that are handled at a time, so that they fit in the processor's cache."""
 
 
 def satellite_points() -> FloatArray:
@@ -48,13 +48,13 @@ def monte_carlo(pairs: Pairs, points: int) -> FloatArray:
 SLOW: dict[str, Callable[[Pairs], FloatArray]] = {
     f"Monte Carlo 1e{power}": partial(monte_carlo, points=10**power) for power in (3, 4, 5)
 }
-"""Slow methods, by name."""
+"""Methods that take long, by name"""
 
 
 def _face_planes(pairs: Pairs) -> tuple[FloatArray, FloatArray]:
     """Return outward normals (p, f, 3) and heights (p, f) of the face planes above the sphere's centre, in m.
 
-    Nothing is below the planes of a solid without volume: their heights are -inf.
+    For a solid without volume the heights are -inf, so that no point counts as within it.
     """
     faces = TETRAHEDRON_TRIANGLES if pairs.solid == "tetrahedron" else BOX_QUADRILATERALS
     corners = pairs.corners - pairs.centers[:, None]

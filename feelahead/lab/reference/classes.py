@@ -1,7 +1,7 @@
-"""Frozen, seeded classes of pairs on which overlap algorithms are known to fail.
+"""Frozen classes of pairs, drawn from a seed, on which overlap algorithms are known to fail.
 
-Each class comes twice: general doubles, and grid-aligned ones whose every coordinate is a short binary number,
-so that contacts are exact. The same seed and count give the same pairs.
+Each class comes in two kinds: with general doubles, and on a grid where every coordinate is a short binary number, so
+that contacts are exact. The same seed and count give the same pairs.
 """
 
 import zlib
@@ -23,17 +23,17 @@ from feelahead.lab.reference.features import (
 from feelahead.lab.reference.pairs import Pairs
 
 Maker = Callable[[Rng, int, bool], Pairs]
-"""Function (generator, count, whether grid-aligned) -> pairs."""
+"""Function that makes pairs of one class, from (random generator, count, whether on the grid)."""
 
 DEPTHS = {"1e-3": 2.0**-10, "1e-6": 2.0**-20, "1e-9": 2.0**-30}
-"""Depths of tiny overlaps in radii, as powers of two so that the grid holds them exactly."""
+"""Depths of tiny overlaps, in radii; they are powers of two, which are exact on the grid."""
 THIN = {"1e-3": 2.0**-10, "1e-8": 2.0**-27, "1e-14": 2.0**-46}
-"""Thicknesses of flat and needle-like solids."""
+"""Thicknesses of flat and needle-like solids, relative to their size."""
 RATIOS = {f"1e{power}": 2.0 ** round(power * np.log2(10.0)) for power in (-6, -4, -2, -1, 1, 2, 4, 6)}
 """Sphere radii in units of the solid's size."""
 SOLIDS = ("tetrahedron", "box", "half-space", "sphere")
 FAR = 2.0**20
-"""Offset of the whole pair from the origin, about 1e6 m."""
+"""Offset of both sphere and solid from the origin, about 1e6 m."""
 
 
 _FAMILIES = {
@@ -56,7 +56,7 @@ _FAMILIES = {
 
 
 def family(name: str) -> str:
-    """Return the group in which a class is shown, from its name in `frozen_classes`."""
+    """Return the group in which results of a class are shown. name: the class's full name in `frozen_classes`."""
     return next((shown for part, shown in _FAMILIES.items() if part in name), "random")
 
 
@@ -67,7 +67,7 @@ def frozen_class(solid: str, name: str, count: int, *, grid: bool = False, seed:
 
 
 def frozen_classes(count: int, seed: int = 0, solids: Iterable[str] = SOLIDS) -> dict[str, Pairs]:
-    """Make `count` pairs of each class of these solids, by full name."""
+    """Make `count` pairs of each class of these solids; return them by the classes' full names."""
     return dict(
         frozen_class(solid, name, count, grid=grid, seed=seed)
         for solid in solids
@@ -81,9 +81,9 @@ def _tetrahedron(centers: FloatArray, sizes: FloatArray, vertices: FloatArray) -
 
 
 def touching(solid: str, feature: str, depth: float, *, swell: float = 1.0) -> Maker:
-    """Make spheres that reach `depth` radii into a face, edge or vertex; `swell` scales their radii.
+    """Return a maker of spheres that reach `depth` radii into a solid at a face, edge or vertex. swell: scales radii.
 
-    A depth of 1 puts the centre on the feature, 2 the whole sphere on its inner side.
+    A depth of 1 puts the sphere's centre on the feature, a depth of 2 puts the whole sphere on its inner side.
     """
 
     def make(rng: Rng, count: int, grid: bool) -> Pairs:
@@ -99,7 +99,7 @@ def touching(solid: str, feature: str, depth: float, *, swell: float = 1.0) -> M
 
 
 def _large_or_small(solid: str, ratio: float) -> Maker:
-    """Make radii of `ratio` times the solid's size, with the surface within the smaller size of a feature."""
+    """Return a maker of spheres with `ratio` times the solid's size, whose surfaces pass close to a feature."""
 
     def make(rng: Rng, count: int, grid: bool) -> Pairs:
         feature = str(rng.choice(list(FEATURES)))
@@ -149,7 +149,7 @@ def _flat(thickness: float) -> Maker:
 
 
 def _sliver(ratio: float) -> Maker:
-    """Make small spheres at slivers: tetrahedra whose faces and edges are much longer than their distances."""
+    """Return a maker of small spheres at slivers: tetrahedra whose faces and edges lie close to each other."""
 
     def make(rng: Rng, count: int, grid: bool) -> Pairs:
         thin = 2.0 ** -rng.integers(0, 14, count)
@@ -164,7 +164,7 @@ def _sliver(ratio: float) -> Maker:
 
 
 def _needle(thickness: float, *, spike: bool = False) -> Maker:
-    """Put all vertices within `thickness` of a line; a `spike` has three of them near one end."""
+    """Return a maker of needles: all vertices within `thickness` of a line; a `spike` has three near one end."""
 
     def make(rng: Rng, count: int, grid: bool) -> Pairs:
         start, along = points(rng, count, grid=grid), points(rng, count, grid=grid)
@@ -178,7 +178,7 @@ def _needle(thickness: float, *, spike: bool = False) -> Maker:
 
 
 def _without_volume(rng: Rng, count: int, grid: bool) -> Pairs:
-    """Make tetrahedra with a repeated vertex, or on the grid with four vertices in a plane."""
+    """Make tetrahedra without volume: one vertex occurs twice, or on the grid all four lie in a plane."""
     pairs = _random_tetrahedra(rng, count, grid)
     vertices = pairs.parameters[0]
     if grid:
@@ -189,7 +189,7 @@ def _without_volume(rng: Rng, count: int, grid: bool) -> Pairs:
 
 
 def shifted(make: Maker) -> Maker:
-    """Shift pairs far from the origin, where the doubles are 1e-10 m apart."""
+    """Return a maker that shifts pairs far from the origin, where neighbouring doubles are 1e-10 m apart."""
 
     def made(rng: Rng, count: int, grid: bool) -> Pairs:
         pairs = make(rng, count, grid)
@@ -222,7 +222,7 @@ def _thin_boxes(thickness: float, axes: int) -> Maker:
 
 
 def half_spaces(depth: float | None) -> Maker:
-    """Make spheres that reach `depth` radii into the half-space, or a random depth."""
+    """Return a maker of spheres that reach `depth` radii into a half-space; None: random depths."""
 
     def make(rng: Rng, count: int, grid: bool) -> Pairs:
         sizes, offsets = radii(rng, count, grid=grid), points(rng, count, grid=grid)[:, 0]
@@ -235,7 +235,7 @@ def half_spaces(depth: float | None) -> Maker:
 
 
 def spheres(depth: float | None, ratio: float = 1.0) -> Maker:
-    """Make spheres that reach `depth` radii (random if None) into spheres of 1 / `ratio` of their size."""
+    """Return a maker of spheres that reach `depth` radii (None: random) into spheres of 1 / `ratio` of their size."""
 
     def make(rng: Rng, count: int, grid: bool) -> Pairs:
         sizes = ratio * radii(rng, count, grid=grid)

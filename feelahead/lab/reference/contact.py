@@ -1,9 +1,9 @@
-"""Decide exactly whether an open ball meets a solid's interior, in whole numbers.
+"""Decide exactly, by whole numbers, whether a ball overlaps a solid; merely touching is no overlap.
 
-Doubles are whole multiples of powers of two. Every coordinate of a pair becomes a Python integer once a common power
-of two is divided out, so no sign below is rounded. A ball meets the interior of a convex solid if the solid is nearer
-to the centre than the radius. Then the centre is inside, or a vertex, or the perpendicular's foot on an edge or a face,
-is nearer than the radius.
+Each double is a whole multiple of a power of two. So all coordinates of a pair become Python integers once a common
+power of two is divided out, and no sign below depends on rounding. A ball overlaps a convex solid if the solid is
+nearer to the centre than the radius. Then the centre is inside, or one of these points is nearer than the radius: a
+vertex, or the foot of the perpendicular on an edge or a face.
 """
 
 from fractions import Fraction
@@ -16,7 +16,7 @@ from common.arrays import BoolArray
 from feelahead.lab.reference.pairs import BOX_QUADRILATERALS, BOX_SIGNS, TETRAHEDRON_TRIANGLES, Pairs
 
 Point = tuple[Any, Any, Any]
-"""Point of whole numbers here, and of mpmath's in the oracle."""
+"""Point (x, y, z): of whole numbers here, of mpmath's numbers in the oracle."""
 
 
 def contacts(pairs: Pairs) -> BoolArray:
@@ -102,7 +102,7 @@ def _face_within(ring: list[Point], normal: Point, reach_2: int) -> bool:
 
 
 def minus(a: Point, b: Point) -> Point:
-    """Return a - b, exact if the numbers are."""
+    """Return a - b, without rounding if the numbers are whole."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 

@@ -1,4 +1,4 @@
-"""Errors of overlaps against the truth, and counts of forbidden results."""
+"""Errors of computed overlaps against the truth, and counts of impossible results."""
 
 from dataclasses import dataclass
 
@@ -14,10 +14,10 @@ from robot_side.overlap import kernels
 Overlaps = tuple[FloatArray, FloatArray, FloatArray]
 
 LEAST_SHARE = 1e-12
-"""Least share of the sphere with a limit of its relative error, unless a class is made shallower."""
+"""Smallest overlap, as a share of the sphere, whose relative error has a limit, unless a class is made shallower."""
 _SLOPE = 1e-2
 _EXAMINED = 5
-"""Number of false zeros of a class, roughly, whose true volumes are computed."""
+"""About how many false zeros of a class get their true volumes computed."""
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,9 @@ class Errors:
     gradient: FloatArray
     area: FloatArray
     relative: FloatArray
-    """The volume's error over the true volume; 0 where both are 0, infinite where only the truth is."""
+    """Error of the volume, divided by the true volume; 0 where both are 0, infinite where only the true volume is 0."""
     direction: FloatArray
-    """Error of the gradient's direction in radians; 0 unless the ball just reaches in."""
+    """Error of the gradient's direction in radians; taken only where the ball just reaches into the solid, else 0."""
     shares: FloatArray
     """True volume as a share of the sphere's."""
 
@@ -71,7 +71,7 @@ def relative_errors(truths: list[Truth], volumes: FloatArray) -> FloatArray:
 
 
 def kernel_overlaps(pairs: Pairs, counts: kernels.PairCounts | None = None) -> Overlaps:
-    """Compute volumes, gradients and areas by the unchecked kernels of a tick, in one thread."""
+    """Return volumes, gradients and areas by the unchecked kernels that a tick uses, in one thread."""
     if pairs.solid == "tetrahedron":
         return kernels.tetrahedron_pairs(*pairs.arguments, threads=1, counts=counts)
     if pairs.solid == "box":
@@ -80,7 +80,7 @@ def kernel_overlaps(pairs: Pairs, counts: kernels.PairCounts | None = None) -> O
 
 
 def kernel_volumes(pairs: Pairs) -> FloatArray:
-    """Compute the kernels' volumes; if a class raises, pair by pair, with NaN for the pairs that raise."""
+    """Return the kernels' volumes; NaN for pairs with which a kernel raises an exception."""
     try:
         return kernel_overlaps(pairs)[0]
     except (ArithmeticError, ValueError, RuntimeError):
@@ -90,7 +90,7 @@ def kernel_volumes(pairs: Pairs) -> FloatArray:
 
 
 def partial_pairs(solid: str, count: int, seed: int) -> Pairs:
-    """Draw random pairs that overlap in part: neither nothing nor the whole sphere or solid."""
+    """Draw random pairs that overlap in part: neither is apart from the other or contains the other."""
     pairs = MAKERS[solid]["random"](np.random.default_rng(seed), 4 * count + 100, False)
     most, volumes = np.minimum(pairs.sphere_volumes, pairs.solid_volumes), kernel_volumes(pairs)
     return pairs[np.flatnonzero((volumes > 1e-6 * most) & (volumes < (1.0 - 1e-6) * most))[:count]]
@@ -102,19 +102,19 @@ class Failures:
 
     pairs: int
     undefined: int
-    """Number of NaN and exceptions."""
+    """Number of pairs that gave NaN or raised an exception"""
     negative: int
     false_zeros: int
     largest_missed: float
-    """Largest true share among the examined false zeros."""
+    """Largest true overlap among the examined false zeros"""
     false_positives: int
     largest_false_positive: float
     excess: float
-    """Largest excess over the smaller volume of sphere and solid."""
+    """Largest amount by which a volume exceeds the smaller volume of sphere and solid"""
 
 
 def count_failures(pairs: Pairs, volumes: FloatArray, touching: BoolArray | None = None) -> Failures:
-    """Count the failures; `touching` (p,): whether the pairs overlap, decided exactly unless given."""
+    """Count the failures. touching (p,): whether each pair overlaps; if None, this is decided exactly."""
     touching = contacts(pairs) if touching is None else touching
     spheres = np.where(pairs.sphere_volumes > 0.0, pairs.sphere_volumes, 1.0)
     missed, false = touching & (volumes == 0.0), ~touching & (volumes > 0.0)
@@ -134,7 +134,7 @@ def count_failures(pairs: Pairs, volumes: FloatArray, touching: BoolArray | None
 
 
 def asymmetry(pairs: Pairs, volumes: FloatArray) -> float:
-    """Return the largest difference of our volumes under relabelling, as a share of the sphere's volume."""
+    """Return the largest change of our volumes between descriptions of a pair, as a share of the sphere's volume."""
     return max(
         (_most(np.abs(kernel_volumes(other) - volumes) / pairs.sphere_volumes) for other in relabelled(pairs)),
         default=0.0,
@@ -142,7 +142,7 @@ def asymmetry(pairs: Pairs, volumes: FloatArray) -> float:
 
 
 def shrinking(pairs: Pairs, volumes: FloatArray) -> float:
-    """Return our largest loss of volume as the radius grows by a last digit, or by 1e-15, 1e-9 or 1e-3 of itself."""
+    """Return the largest decrease of our volumes as the radius grows: by its last digit, 1e-15, 1e-9 or 1e-3 of it."""
     worst = 0.0
     for radii in (np.nextafter(pairs.radii, np.inf), *(pairs.radii * (1.0 + step) for step in (1e-15, 1e-9, 1e-3))):
         grown = kernel_volumes(Pairs(pairs.solid, pairs.centers, radii, pairs.parameters))
@@ -151,7 +151,7 @@ def shrinking(pairs: Pairs, volumes: FloatArray) -> float:
 
 
 def relabelled(pairs: Pairs) -> list[Pairs]:
-    """Return the same sets in other descriptions: vertices in another order, a box's axes permuted and turned round."""
+    """Return the same pairs in other descriptions: vertices in another order, a box's axes permuted or reversed."""
     if pairs.solid == "tetrahedron":
         orders = ([1, 0, 2, 3], [3, 2, 1, 0], [2, 0, 3, 1], [1, 2, 3, 0])
         return [Pairs(pairs.solid, pairs.centers, pairs.radii, (pairs.parameters[0][:, order],)) for order in orders]

@@ -1,4 +1,4 @@
-"""Looks of recorded runs: their inputs, and the errors of the field's contact distances against the definition."""
+"""Looks of recorded runs: their inputs, and the errors of their onset distances against the definition."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ LATE_M = 1e-4
 
 
 def looks_of(recorded: Recorded, most: int) -> tuple[list[tuple[Asked, PerceivedObjects]], FloatArray]:
-    """Run the law over the ticks of a run; return up to `most` of its looks, and the encoders' errors (n,)."""
+    """Run the law over the ticks of a run; return up to `most` of its looks, and the encoders' sigmas (n,)."""
     law, asked = recorded.new_law(), list[tuple[Asked, PerceivedObjects]]()
     for tick in recorded.ticks:
         law.sense(tick.situation, tick.now_s)
@@ -29,7 +29,7 @@ def looks_of(recorded: Recorded, most: int) -> tuple[list[tuple[Asked, Perceived
 
 @dataclass(frozen=True)
 class LookErrors:
-    """Errors of the contact distances (n,) of looks."""
+    """Errors of the onset distances (n,) of several looks."""
 
     looks: int
     off_m: FloatArray
@@ -39,7 +39,7 @@ class LookErrors:
     """Largest error of a look's largest D_σ"""
 
     def row(self) -> dict[str, float]:
-        """Return the errors as a row: outside grazes, and within them the distance out of the band."""
+        """Return the largest errors as a row: those outside grazes, and for grazes the distance out of the band."""
         plain_m, graze_m = (np.append(self.off_m[which], 0.0) for which in (~self.grazes, self.grazes))
         return {
             "looks": self.looks,

@@ -1,11 +1,11 @@
-"""Closed mesh that is not convex, to time the mesh kernels."""
+"""A closed mesh that is not convex (a torus), with which the mesh kernels' run time is measured."""
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
 
 TORUS = (1.0, 0.35)
-"""Radii (m) of a torus: the ring's and the tube's."""
+"""Radii of the torus, of its ring and of its tube, in m."""
 
 
 def torus(around: int, across: int) -> tuple[FloatArray, IntArray]:

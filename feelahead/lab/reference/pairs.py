@@ -1,4 +1,4 @@
-"""Spheres with one solid each, in the arrays that every method of the overlap benchmark gets."""
+"""Pairs of a sphere and a solid, in the arrays that every method of the overlap benchmark gets."""
 
 from dataclasses import dataclass
 from itertools import product

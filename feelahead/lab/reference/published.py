@@ -1,4 +1,4 @@
-"""The published package `overlap` 0.2.0 on the same pairs: from Python, and the C++ header alone.
+"""Run the published package `overlap` 0.2.0 on the same pairs: from Python, and its C++ header alone.
 
 Both are optional: `missing` names the missing part and how to get it. The package takes one pair a call, has another
 order of corners, and returns volumes only.
@@ -20,13 +20,13 @@ from feelahead.lab.reference.pairs import Pairs
 SDIST = "pip download --no-deps --no-binary overlap overlap==0.2.0"
 _EIGEN = (Path("/usr/include/eigen3"), Path("/usr/local/include/eigen3"), Path("/opt/homebrew/include/eigen3"))
 _HEXAHEDRON = (0, 4, 6, 2, 1, 5, 7, 3)
-"""Corners of `pairs.BOX_SIGNS` round the bottom and then the top: the package's order."""
+"""Order of corners in the package: indices into `pairs.BOX_SIGNS`, around the bottom, then around the top."""
 _TIMEOUT_S = 180.0
 _REPEATS = "2"
 
 
 def package_corners(pairs: Pairs, *, mend: bool = True) -> FloatArray:
-    """Return the corners (p, 4 or 8, 3) in the package's order; `mend` turns inverted tetrahedra round."""
+    """Return the corners (p, 4 or 8, 3) in the package's order. mend: reorder those of inverted tetrahedra."""
     corners = pairs.corners
     if pairs.solid == "box":
         # A rotation that mirrors turns the box inside out: the package would compute a negative volume.
@@ -46,10 +46,10 @@ class PythonPackage:
 
     def __init__(self) -> None:
         found = importlib.util.find_spec("overlap") is not None
-        self.missing = "" if found else "not installed: pip install '.[bench]' in the clone"
+        self.missing = "" if found else "not installed; in the clone: pip install '.[bench]'"
 
     def volumes(self, pairs: Pairs, *, mend: bool = True) -> FloatArray:
-        """Return volumes (p,) with NaN for an exception."""
+        """Return volumes (p,); NaN for pairs with which the package raises an exception."""
         package: Any = importlib.import_module("overlap")
         volumes = np.full(len(pairs), np.nan)
         element = package.Tetrahedron if pairs.solid == "tetrahedron" else package.Hexahedron
@@ -85,7 +85,7 @@ class CompiledHeader:
             self.missing = f"does not compile: {(errors or ['unknown error'])[0][:200]}" if said.returncode else ""
 
     def turn(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
-        """Compute all pairs twice in another process: the least ns (parts,), and the volumes (p,)."""
+        """Compute all pairs twice in another process; return the least times in ns (parts,), and the volumes (p,)."""
         corners = package_corners(pairs)
         rows = np.concatenate([pairs.centers, pairs.radii[:, None], corners.reshape(len(pairs), -1)], axis=1)
         given, found = (self._driver.with_name(name) for name in ("pairs", "volumes"))

@@ -1,4 +1,4 @@
-"""Objects of a frame by public functions alone: their overlaps with spheres, and their distances."""
+"""Overlaps of spheres with a frame's objects, and distances to them, computed by public functions only."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _ROUNDING_M: Final = 1e-6
 
 @dataclass(frozen=True)
 class _Kind:
-    """All primitives of one kind, sorted by object."""
+    """All primitives of one kind in a frame, sorted by object."""
 
     owner: IntArray
     columns: tuple[FloatArray | IntArray, ...]

@@ -1,1 +1,1 @@
-"""Parts of `bench tick`: a robot side that times its ticks, and many more objects than a scene has."""
+"""Parts of `feelahead bench tick`: a robot side that measures its ticks, and frames with many objects."""

@@ -1,4 +1,4 @@
-"""Whole looks at concave objects, in turns with "mixed"; each begins a millisecond after the last, or later."""
+"""Measure looks at concave objects in turns with "mixed"; calls begin at least a millisecond apart, as ticks do."""
 
 import itertools
 import math
@@ -21,7 +21,7 @@ _PERIOD_S: Final = 1e-3
 
 
 def time_looks(model: Path, seconds: float) -> tuple[FloatArray, FloatArray]:
-    """Return the processor times of looks at the object of `model`, in chunks, and of "mixed" in between; seconds."""
+    """Measure looks at the object of `model` in chunks, with "mixed" in between; return processor times of both (s)."""
     looks, mixed = itertools.cycle(list(looks_before(Facing(model.stem, model, SITE, 5.0), _FREE_MM))), Mixed()
     looks_s, mixed_s = list[float](), list[float]()
     for _ in _FREE_MM:
@@ -34,7 +34,7 @@ def time_looks(model: Path, seconds: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _chunk(works: Iterator[Callable[[], object]]) -> list[float]:
-    """Time a chunk of calls, paced; the first, after other work, does not count."""
+    """Return the processor times of a chunk of calls; the first call, which comes after other work, does not count."""
     spent_s = []
     for work in itertools.islice(works, _CHUNK):
         # Sleep, then spin to the next millisecond.

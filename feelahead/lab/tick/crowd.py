@@ -1,4 +1,4 @@
-"""Many perceived objects without physics: around the table, out of the gripper's reach."""
+"""Many perceived objects without physics, placed around the table, out of the gripper's reach."""
 
 from dataclasses import replace
 from typing import Any, Final
@@ -16,7 +16,7 @@ _SIZES_M: Final = (0.005, 0.03)
 
 
 def crowd(count: int, time_s: float, seed: int = 1) -> PerceivedObjects:
-    """Return a frame of random objects of one primitive each, evenly in directions and distances."""
+    """Return a frame of `count` random objects, each of one primitive, spread evenly over directions and distances."""
     generator = np.random.default_rng(seed)
     away = generator.normal(size=(count, 3))
     away /= np.linalg.norm(away, axis=1)[:, None]
@@ -45,10 +45,10 @@ def crowd(count: int, time_s: float, seed: int = 1) -> PerceivedObjects:
 
 
 class CrowdedCamera:
-    """ObjectSource that adds a crowd of objects at rest."""
+    """ObjectSource that adds a crowd of objects at rest to those of a camera."""
 
     def __init__(self, camera: ObjectSource, count: int, *, only: bool = False) -> None:
-        """only: perceive the crowd alone."""
+        """only: leave out the camera's own objects."""
         self._camera, self._count, self._only = camera, count, only
         self._own: PerceivedObjects | None = None
         self._shown: PerceivedObjects | None = None
@@ -57,7 +57,7 @@ class CrowdedCamera:
         self._roles: tuple[tuple[Role, ...], tuple[Role, ...]] = ((), ())
 
     def perceive(self, now_s: float) -> PerceivedObjects:
-        """Return the camera's newest frame with the crowd; the same object until a newer frame."""
+        """Return the camera's newest frame with the crowd; the identical frame until the camera has a newer one."""
         own = self._camera.perceive(now_s)
         if self._shown is None or own is not self._own:
             before, self._own = self._own, own
@@ -86,7 +86,7 @@ class CrowdedCamera:
 
 
 def joined(one: PerceivedObjects, other: PerceivedObjects) -> PerceivedObjects:
-    """Join the objects of both in a frame of `one`'s time, speeds unknown, with the meshes of `one` alone."""
+    """Return a frame with the objects of both, at the time of `one`, without speeds; only `one` may have meshes."""
     arrays: dict[str, Any] = {}
     for kind in KINDS:
         arrays[kind.owner] = np.concatenate([getattr(one, kind.owner), len(one.names) + getattr(other, kind.owner)])

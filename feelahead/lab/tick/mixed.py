@@ -1,4 +1,4 @@
-"""Processor time of a fixed workload like a tick, on this machine; other figures are ratios to it."""
+"""Fixed workload ("mixed") that resembles a tick. Ratios to its time depend less on the machine than times do."""
 
 from typing import Final
 
@@ -8,12 +8,12 @@ from common.arrays import FloatArray
 from robot_side.drivers.mujoco.scene import load_scene
 
 _SETTLING_STEPS: Final = 3000
-"""Number of steps after which the objects on the table rest or sleep."""
+"""Number of physics steps after which the objects on the table are at rest or asleep."""
 _LOOP_TURNS: Final = 600
 
 
 class Mixed:
-    """A step of the demo's physics in a separate scene, a Python loop of 600 turns, and six NumPy calls."""
+    """The workload: a step of the demo's physics in its own scene, a Python loop of 600 turns, six NumPy calls."""
 
     def __init__(self) -> None:
         self._scene = load_scene()
@@ -36,7 +36,7 @@ class Mixed:
 
 
 def as_ratios(spent_s: FloatArray, mixed_s: FloatArray) -> dict[str, float]:
-    """Return p50 and p99 in us, and the ratios p50 to p50 and p99 to p99 of "mixed" in the same run."""
+    """Return p50 and p99 of `spent_s` in us, and their ratios to p50 and p99 of "mixed" in the same run."""
     (p50, p99), (p50_mixed, p99_mixed) = (np.quantile(one, (0.5, 0.99)).tolist() for one in (spent_s, mixed_s))
     ratios = {"p50_of_mixed": p50 / p50_mixed, "p99_of_mixed": p99 / p99_mixed}
     return {"p50_us": 1e6 * p50, "p99_us": 1e6 * p99, **ratios}

@@ -1,11 +1,11 @@
-"""Robot side that logs the cost of each tick: `python -m ... --log=FILE.npy` and the robot side's flags.
+"""Robot side that logs the processor time of each tick: `python -m ... --log=FILE.npy` and the robot side's flags.
 
---objects=N adds N perceived objects without physics; --only removes the scene's own.
+--objects=N adds N perceived objects without physics; --only removes the scene's own objects.
 
-The reference "mixed" (see `Mixed`) is measured here, too, at the start of 4 ticks of each 17; these ticks do not
-count. It is as cold as a tick: both begin after the loop's sleep. After a tick's messages it was 10 % faster, as
-MuJoCo's code was still warm. The first of the 4 does not count, nor do the 2 ticks after them. 17 is prime to the
-periods of looks and frames.
+The reference "mixed" (see `Mixed`) is measured in the same process, at the start of 4 of every 17 ticks; these ticks do
+not count. "mixed" and a tick both begin after the loop's sleep, with cold caches. (After a tick's messages "mixed" was
+10 % faster, as MuJoCo's code was still in the cache.) The first of the 4 does not count, nor do the 2 ticks after them.
+17 has no divisor in common with the periods of looks and frames.
 """
 
 import itertools
@@ -29,7 +29,7 @@ from robot_side.laws.law import Law
 PROGRAM: Final = "feelahead.lab.tick.timed_robot"
 STAGES: Final = ("physics", "look", "frame", "law", "motion", "figures", "message")
 OUTSIDE: Final = ("physics", "frame")
-"""Stages outside look to message: a real arm has no physics, and frames are read in after the messages."""
+"""Stages that "look to message" leaves out: a real arm has no physics, and frames are read after the messages."""
 _OF_STEPS: Final[dict[Step, str]] = {
     "arm": "physics",
     "pose": "look",
@@ -40,8 +40,9 @@ _OF_STEPS: Final[dict[Step, str]] = {
     "messages": "message",
 }
 COLUMNS: Final = ("now_s", "run", "spent_s", "thread_s", "wall_s", "looks", *STAGES)
-"""Columns of the log: time; the run of turns that count (even: ticks, odd: "mixed"); processor time of the tick or of
-"mixed"; the thread's at its end; wall time; number of looks that the tick began; each stage's processor time."""
+"""Columns of the log: time; number of the run of consecutive counted turns (even: ticks, odd: "mixed"); processor time
+of the tick or of "mixed"; the thread's processor time at its end; wall time; number of looks in the tick; processor
+time of each stage."""
 _TURNS: Final = 17
 _MIXED: Final = 4
 _UNCOUNTED: Final = (0, _MIXED, _MIXED + 1)
@@ -49,23 +50,23 @@ _UNCOUNTED: Final = (0, _MIXED, _MIXED + 1)
 
 @dataclass(frozen=True)
 class TimedSettings:
-    """Flags besides the robot side's."""
+    """Flags in addition to the robot side's."""
 
     log: Path = Path("ticks.npy")
-    """File for the figures: a row a tick, see COLUMNS."""
+    """File for the log, with a row for each counted tick, see COLUMNS."""
     objects: int = 0
     """Number of additional objects."""
     stages: tyro.conf.FlagConversionOff[bool] = True
-    """Time each stage, which itself takes some microseconds; else only the stages outside look to message."""
+    """Measure each stage, which itself takes some microseconds; if False, only the stages outside "look to message"."""
     only: tyro.conf.FlagConversionOff[bool] = False
-    """Leave out the scene's own objects."""
+    """Leave out the scene's own objects, and perceive only the additional ones."""
 
 
 class TimedTicks(Listener):
-    """Listener that times ticks and stages, runs "mixed" before some ticks, and keeps a row for each counted turn."""
+    """Listener that measures ticks and stages, runs "mixed" before some ticks, and stores rows of the counted ones."""
 
     def __init__(self, law: Law, rows: list[tuple[float, ...]], *, all_stages: bool) -> None:
-        """rows: filled, see COLUMNS. all_stages: False for only the stages outside look to message."""
+        """rows: list to fill, see COLUMNS. all_stages: if False, measure only the stages outside "look to message"."""
         self.steps = get_args(Step) if all_stages else ("arm", "pose", "frame", "end")
         self._rows, self._law, self._mixed, self._turns = rows, law, Mixed(), itertools.count()
         self._stages_s = np.zeros(len(STAGES))
@@ -79,11 +80,11 @@ class TimedTicks(Listener):
         self._now_s = 0.0
 
     def on_tick(self, tick: Tick) -> None:
-        """Note the beginning."""
+        """Note the time of the tick that begins."""
         self._now_s = tick.now_s
 
     def on_step(self, step: Step) -> None:
-        """End the last stage, and begin the step's; a tick is from `arm` to the first `end`."""
+        """End the previous stage and begin that of `step`; a tick reaches from the step `arm` to the first `end`."""
         if step == "arm":
             self._begin()
         place = self._places.get(step)
@@ -124,7 +125,7 @@ class TimedTicks(Listener):
 
 
 def command(arguments: Sequence[str]) -> int:
-    """Run the robot side's command with a timed core."""
+    """Run the robot side's command with a core whose ticks are measured."""
     ours = tuple(f"--{one.name}=" for one in fields(TimedSettings))
     mine = [argument for argument in arguments if argument.startswith(ours)]
     settings = parse_settings(TimedSettings, PROGRAM, mine)

@@ -37,12 +37,15 @@ def sightings(backend: HidBackend) -> list[Sighting]:
 class Finder:
     """Searches for the previously used controller; takes another one only if several searches do not find it."""
 
-    def __init__(self, backend: HidBackend) -> None:
-        self._backend = backend
+    def __init__(self, backend: HidBackend, only: str | None = None) -> None:
+        """only: address of the controller to take, and no other; None for any."""
+        self._backend, self._only = backend, only
         self._looks = 0
 
     def __call__(self, preferred: str | None) -> OpenController:
         """Search once by `find_controller`; accept only `preferred` until LOOKS_FOR_THE_SAME searches have failed."""
+        if self._only is not None:
+            return find_controller(self._backend, self._only, others=False)
         self._looks += 1
         found = find_controller(self._backend, preferred, others=self._looks > LOOKS_FOR_THE_SAME)
         self._looks = 0
@@ -81,9 +84,8 @@ def find_controller(backend: HidBackend, preferred: str | None = None, *, others
         if left_alone or other is not chosen:
             other.close()
     if left_alone:
-        raise failure or NoDeviceError(
-            f"the controller {preferred} is not there, only another: {chosen.identity.address}"
-        )
+        there = dict.fromkeys(one.identity.address or "one without an address" for _, one in opened)
+        raise failure or NoDeviceError(f"the controller {preferred} is not there, only: {', '.join(there)}")
     transport, address = chosen.identity.transport, chosen.identity.address
     name = f"{sighting.model} on {transport.value}{'' if address is None else f' ({address})'}"
     return OpenController(chosen, name, address, sighting.path, build_output_report(RELEASED, transport))

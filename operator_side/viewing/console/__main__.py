@@ -47,7 +47,7 @@ _NICENESS: Final = 5
 _FRAME: Final = struct.Struct("<Bd")
 """Header of a picture: number of its view, and its capture time on the robot side's clock"""
 _MOST_LISTED: Final = 6
-_LAST_WORDS_S: Final = 0.1
+_LAST_WORDS_S: Final = 0.3
 """Seconds that pages have to receive the last message before the process ends"""
 _SLOW_PERIOD_S: Final = 0.25
 """Seconds between scene updates if a browser draws without a graphics processor"""
@@ -78,7 +78,7 @@ class _Process:
             from operator_side.viewing.console.server import Server  # noqa: PLC0415
         except ModuleNotFoundError as error:
             missing = (error.name or "").partition(".")[0]
-            self._give_up(f"{missing} is not installed on this machine; valid: pip install '.[operator]' in the clone")
+            self._give_up(f"{missing} is not installed; install it in the clone: pip install '.[operator]'")
             return
         part = socket.socket()
         part.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -16,7 +16,7 @@ _FACTS_WAIT_BYTES: Final = 1 << 20
 """Number of waiting bytes above which facts are skipped"""
 _MOST_HEARD: Final = 256
 """Maximum number of pages' messages that wait for the caller"""
-_END_LIMIT_S: Final = 0.3
+_END_LIMIT_S: Final = 1.0
 """Seconds to wait for the console process to end before it is killed: it has nothing to save"""
 
 

@@ -55,7 +55,7 @@ class Gate:
 
         viser's page is one file that unpacks itself and starts a WebAssembly worker, so its policy permits more. Our
         page embeds it under the other of our two host names (127.0.0.1, localhost), so that the browser treats it as
-        another site: it runs in a process of its own, without access to our page.
+        another site: it runs in its own process, without access to our page.
         """
         sockets = " ".join(f"ws://{host}" for host in self._hosts)
         sites = " ".join(f"http://{host}" for host in self._hosts)

@@ -1,1 +1,1 @@
-"""Simulated world behind the ports of arm and camera; only this package and the cameras use MuJoCo."""
+"""Simulated world behind the ports of arm and camera; only this package and `viewing` use MuJoCo."""

@@ -1,4 +1,4 @@
-"""Simulated arm: physics on its own clock, commands that expire, and sensors."""
+"""Simulated arm: its physics has its own clock, its commands expire, and it measures with sensors' errors."""
 
 import math
 from typing import Final, NamedTuple
@@ -19,23 +19,23 @@ from robot_side.drivers.mujoco.scene import Scene
 
 _LONGEST_ADVANCE_S = 2.0
 LONGEST_TURN_S: Final = 0.02
-"""Longest time, in seconds, for which slow physics may delay messages, stops and leases."""
+"""Longest time, in seconds, for which slow physics may delay messages, stops and leases"""
 _LIMIT_MARGIN_RAD = 0.005
 # Bad positions, velocities and accelerations, which are neighbours among MuJoCo's warnings.
 _UNSTABLE = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
 
 
 class Stand(NamedTuple):
-    """Properties of the arm at its start, with the gripper open."""
+    """What is known of the arm at its start, with the gripper open."""
 
     travel: GripperTravel | None
-    """Travel of the gripper; None without one"""
+    """Travel of the gripper; None without a gripper"""
     ends_rad: tuple[FloatArray, FloatArray]
-    """Lower and upper ends of the joints, (n,) each"""
+    """Lower and upper ends of the joints' ranges, (n,) each"""
 
 
 def stand(scene: Scene) -> Stand:
-    """Open the gripper at the scene's start; ConfigurationError if its inputs' range is not known."""
+    """Open the gripper at the scene's start; ConfigurationError if the range of its inputs is not known."""
     robot, data, travel = scene.robot, scene.data, measure_gripper(scene)
     if travel is not None:
         data.qpos[robot.finger_positions] = travel.open_fingers
@@ -48,7 +48,7 @@ def stand(scene: Scene) -> Stand:
 class MujocoArm:
     """Arm in MuJoCo: it moves, decelerates and stops by its own physics clock, with or without ticks.
 
-    It advances the scene's only live state, so a scene has one arm.
+    It advances the only live state of the scene, so a scene has one arm.
     """
 
     def __init__(
@@ -58,9 +58,9 @@ class MujocoArm:
         limits: MotionLimits | None = None,
         gripper_stroke_time_s: float = 0.6,
     ) -> None:
-        """Stand at the scene's start, with the gripper open.
+        """Begin at the scene's start, with the gripper open.
 
-        ConfigurationError for a gripper actuator without a known range of inputs.
+        ConfigurationError for a gripper actuator whose range of inputs is not known.
         """
         self._model, self._data, self._robot = scene.model, scene.data, scene.robot
         self._encoder = encoder
@@ -121,15 +121,15 @@ class MujocoArm:
     def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
         """Follow `joint_velocity_rad_s` (n,) until `valid_until_s`, then decelerate from the measured state.
 
-        All velocities are scaled by one factor to the arm's limit. ValueError for a wrong shape or a value that is not
-        finite; then nothing is applied.
+        If one is above the arm's limit, all velocities are scaled by the same factor. ValueError for a wrong shape or a
+        value that is not finite; nothing of such a command is applied.
         """
         self._reference.command(joint_velocity_rad_s, valid_until_s)
 
     def command_gripper(self, closing: float, valid_until_s: float) -> None:
-        """Close (+1), hold (0) or open (-1) at that share of the gripper's speed until `valid_until_s`.
+        """Move the gripper until `valid_until_s`; closing: share of its full speed, +1 closes, 0 holds, -1 opens.
 
-        An arm without a gripper ignores it. ValueError for a value outside [-1, 1] or a time that is not finite.
+        An arm without a gripper ignores the call. ValueError for a value outside [-1, 1] or a time that is not finite.
         """
         if self._gripper is not None:
             self._gripper.command(closing, valid_until_s)
@@ -147,16 +147,16 @@ class MujocoArm:
         self._state = None
 
     def give_way(self, clock: Clock) -> None:
-        """Limit each `state` from now on to LONGEST_TURN_S and one step, by `clock`.
+        """Limit each later call of `state` to LONGEST_TURN_S and one step, by `clock`.
 
-        Further due steps are skipped: the simulation falls behind real time.
+        Further steps that are due are skipped: the simulation falls behind real time.
         """
         self._clock = clock
 
     def state(self, now_s: float) -> ArmState:
         """Advance the physics to `now_s` and return the measured state; the first call synchronises the clocks.
 
-        At most 2 s are simulated at once: after a longer gap the rest is skipped, as if the world had paused.
+        At most 2 s are simulated at once. After a longer gap the rest is skipped, as if the world had paused.
         FeelaheadError if the simulation has become unstable or MuJoCo fails.
         """
         if self._origin_s is None:
@@ -174,17 +174,17 @@ class MujocoArm:
 
     @property
     def share_of_real_time(self) -> float:
-        """Simulated share of the time since the first `state`: 1 unless the physics is too slow."""
+        """Simulated time since the first `state`, as a share of real time: 1 unless the physics is too slow."""
         return _share(self._steps, self._skipped)
 
     def take_share_of_real_time(self) -> float:
-        """Return the simulated share of the time since the last call."""
+        """Return the simulated time since the last call, as a share of real time."""
         (steps, skipped), self._taken = self._taken, (self._steps, self._skipped)
         return _share(self._steps - steps, self._skipped - skipped)
 
     @property
     def _time_s(self) -> float:
-        """Present time of the physics on the caller's clock."""
+        """Present time of the physics, on the caller's clock."""
         return (self._origin_s or 0.0) + self._steps * self._step_s
 
     def _advance(self, due: int) -> int:

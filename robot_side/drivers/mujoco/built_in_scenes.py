@@ -1,4 +1,4 @@
-"""Scenes of the built-in arm: objects around the target, some of them drawn from the seed."""
+"""Scenes of the built-in arm: objects around the target, with some dimensions drawn from the seed."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Final, Literal
@@ -8,7 +8,8 @@ import numpy as np
 SceneName = Literal["table", "wall", "slot", "shelf"]
 
 _TIPS_BEYOND_TARGET_M: Final = 0.035
-"""Distance from the target's centre to the fingertips at a grasp: the centre is 20 mm behind the tool's point."""
+"""Distance, in m, from the target's centre forward to the fingertips at a grasp: the centre is 20 mm behind the tool's
+point"""
 _HALF_WIDTH_M: Final = 0.0565
 """Half width of the open gripper, from its axis to the outside of a finger"""
 _HALF_HEIGHT_M: Final = 0.032
@@ -23,18 +24,18 @@ def furnish(spec: Any, name: SceneName, seed: int) -> None:
 
 
 def _table(spec: Any, generator: np.random.Generator) -> None:
-    """Change nothing."""
+    """Draw nothing: the table's dimensions are fixed."""
 
 
 def _wall(spec: Any, generator: np.random.Generator) -> None:
-    """Put the wall's face 10 to 60 mm beyond the fingertips at the grasp."""
+    """Put the wall's face 10 to 60 mm beyond the place of the fingertips at a grasp."""
     wall = spec.geom("wall")
     face_m = spec.body("target").pos[0] + _TIPS_BEYOND_TARGET_M + generator.uniform(0.010, 0.060)
     wall.pos = [face_m + wall.size[0], *wall.pos[1:]]
 
 
 def _slot(spec: Any, generator: np.random.Generator) -> None:
-    """Shift the target up to 80 mm sideways; leave 15 to 40 mm between the gripper on its line and each post."""
+    """Shift the target sideways by up to 80 mm; leave 15 to 40 mm between gripper and posts on the way to it."""
     target = spec.body("target")
     across_m = generator.uniform(-0.08, 0.08)
     target.pos = [target.pos[0], across_m, target.pos[2]]
@@ -45,7 +46,7 @@ def _slot(spec: Any, generator: np.random.Generator) -> None:
 
 
 def _shelf(spec: Any, generator: np.random.Generator) -> None:
-    """Put the board 30 to 90 mm above the table, and its edge 8 to 25 mm below the palm at the grasp."""
+    """Make the board 30 to 90 mm high above the table; put the edge's top 8 to 25 mm below the palm at a grasp."""
     target, board, edge = spec.body("target"), spec.geom("shelf"), spec.geom("edge")
     board_m = generator.uniform(0.030, 0.090)
     edge_m = board_m + _HALF_TARGET_M - _HALF_HEIGHT_M - generator.uniform(0.008, 0.025)

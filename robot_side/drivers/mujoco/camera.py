@@ -1,4 +1,4 @@
-"""Simulated camera of the scene's objects, with its error (eq. 1-2)."""
+"""Simulated camera that perceives the scene's objects with an error (eq. 1-2)."""
 
 import math
 import zlib
@@ -20,10 +20,11 @@ _FRAME_PERIOD_S = 1.0 / 30.0
 
 
 class CameraError:
-    """Error e_c ~ N(μ_c, σ_c²) per axis of each object's position (eq. 1-2), world frame: perceived = true - e_c.
+    """Error e_c ~ N(μ_c, σ_c²) of each object's position, per axis, world frame: perceived = true - e_c (eq. 1-2).
 
-    One part lasts for the whole run, like a calibration or segmentation error. An optional part with mean 0 is drawn
-    in each frame. An object's error depends only on the seed and its name, so that other objects do not change it.
+    One part lasts for the whole run, like an error of calibration or segmentation. An optional part with mean 0 is
+    drawn anew in each frame. An object's error depends only on the seed and its name, so that other objects do not
+    change it.
     """
 
     def __init__(
@@ -34,11 +35,11 @@ class CameraError:
         frame_standard_deviation_m: float = 0.0,
         seed: int = 0,
     ) -> None:
-        """Draw the lasting part for `names` (k); mean_m: one value for all axes, or one for each."""
+        """Draw the lasting part for the objects `names` (k); mean_m: one value for all axes, or one for each."""
         self.mean_m: FloatArray = np.broadcast_to(np.asarray(mean_m, dtype=np.float64), (3,)).copy()
         """(3,) mean error μ_c"""
         self.variance_m2 = standard_deviation_m**2 + frame_standard_deviation_m**2
-        """σ_c² of eq. 2 for a single frame, of both parts together"""
+        """Variance σ_c² of eq. 2 for a single frame, of both parts together"""
         self._frame_standard_deviation_m = frame_standard_deviation_m
         generators = [np.random.default_rng([seed, zlib.crc32(name.encode())]) for name in names]
         self._lasting = self.mean_m + standard_deviation_m * _draw(generators)
@@ -51,7 +52,7 @@ class CameraError:
         return self._frame_standard_deviation_m == 0.0
 
     def next_frame(self) -> FloatArray:
-        """Return the offsets -e_c (k, 3), in metres, to add to the true positions in the next frame, by `names`."""
+        """Return the offsets -e_c (k, 3) in m, by `names`, to be added to the true positions in the next frame."""
         if self.lasts:
             return self._offsets
         offsets: FloatArray = -(self._lasting + self._frame_standard_deviation_m * _draw(self._generators))
@@ -64,10 +65,10 @@ def _draw(generators: Sequence[np.random.Generator]) -> FloatArray:
 
 
 class MujocoCamera:
-    """ObjectSource of the simulated objects, as a camera with segmentation reports them, frame by frame."""
+    """Source of perceived objects: the simulated objects as a camera with segmentation reports them, frame by frame."""
 
     def __init__(self, scene: Scene, error: CameraError | None = None) -> None:
-        """Observe `scene` with `error`, drawn for its objects' names in their order; None: no error."""
+        """Observe `scene` with `error`, which was drawn for the names of its objects in their order; None: no error."""
         self._scene = scene
         self._error = error or CameraError(tuple(thing.name for thing in scene.objects))
         self._origin_s: float | None = None
@@ -76,13 +77,13 @@ class MujocoCamera:
         self._velocities = ObjectVelocities()
         fixed = scene.fixed if self._error.lasts else frozenset()
         self._things = np.array([k for k, thing in enumerate(scene.objects) if thing.name not in fixed], dtype=np.int64)
-        """Indices of objects that may have moved in the next frame"""
+        """Indices of the objects whose perceived poses may differ in the next frame"""
         self._first_geoms = np.array([thing.geoms[0] for thing in scene.objects], dtype=np.int64)
         self._moving: tuple[Movers, MovingPrimitives] | None = None
         self._roles: tuple[Role, ...] = ()
 
     def perceive(self, now_s: float) -> PerceivedObjects:
-        """Return the newest frame at `now_s`; the same object until there is a newer frame."""
+        """Return the newest frame at `now_s`: the same object until there is a newer frame."""
         if self._origin_s is None:
             self._origin_s = now_s
         # Frames are due on the first one's time grid, so that the tick's period does not reduce the rate.
@@ -107,7 +108,7 @@ class MujocoCamera:
         return movers.frame(now_s, numbers, self._roles)
 
     def _whole(self, now_s: float, offsets_m: FloatArray) -> PerceivedObjects:
-        """Return a frame of all objects; later frames update only the movable ones."""
+        """Return a complete frame of all objects; later frames update only the objects that may move."""
         scene, data, things = self._scene, self._scene.data, self._things
         positions_m = data.geom_xpos[self._first_geoms] + offsets_m
         velocities_m_s: FloatArray = np.zeros((len(scene.objects), 3))
@@ -123,7 +124,7 @@ class MujocoCamera:
         return whole
 
     def set_role(self, name: str, role: Role) -> None:
-        """Change the role of the object `name` from the next frame on. ValueError for an unknown name."""
+        """Change the role of the object `name` from the next frame on; ValueError for an unknown name."""
         roles = self._scene.roles
         if name not in roles:
             raise ValueError(f"name = {name!r} is no object; valid: {', '.join(roles)}")

@@ -1,6 +1,6 @@
 """Closed meshes for the geoms that no simpler primitive describes, made once when a scene is loaded.
 
-Only a scene that needs them imports this module, which compiles the mesh kernels.
+Only a scene that needs meshes imports this module, because it compiles their kernels.
 """
 
 import math
@@ -22,39 +22,40 @@ from robot_side.overlap.meshes.mesh_shapes import (
 )
 
 _LARGEST_VOLUME_ERROR = 0.01
-"""Largest share by which a mesh around a round shape may be larger."""
+"""Largest share by which the volume of a mesh around a round shape may exceed the shape's"""
 _STANDS_OUT_M = 5e-4
-"""Largest distance by which the mesh may stand out, unless the finest one of those below stands out more."""
+"""Largest distance, in m, by which such a mesh may protrude; the finest mesh is used even if it protrudes more"""
 _SEGMENTS = range(8, 129, 4)
 _SUBDIVISIONS = range(4, 25)
 _BY_NUMBER = {GeomKind.MESH, GeomKind.HFIELD}
-"""Kinds whose shapes the model lists, so that geoms of the same number have the same shape."""
+"""Kinds whose shapes the model lists by number, so that geoms with the same number have the same shape."""
 
 
 @dataclass(frozen=True)
 class GeomMesh:
-    """Mesh in the frame of the geoms with this shape."""
+    """Mesh of a shape, in the frame of every geom with this shape."""
 
     mesh: Mesh
     volume_error: float
-    """Share of the shape's volume by which the mesh's is greater; infinite for a shape that encloses none"""
+    """Volume by which the mesh exceeds the shape, as a share of the shape's; infinite for a shape that encloses none"""
     stands_out_m: float
-    """Distance by which the mesh extends beyond the shape; infinite for a shape that encloses nothing"""
+    """Distance, in m, by which the mesh protrudes from the shape; infinite for a shape that encloses nothing"""
 
 
 class GeomMeshes:
-    """Meshes of a model's geoms; geoms of the same shape share one."""
+    """Meshes of a model's geoms; geoms of the same shape share one mesh."""
 
     def __init__(self, model: Any) -> None:
-        """Start without meshes. model: a compiled MuJoCo model."""
+        """Begin without meshes. model: a compiled MuJoCo model."""
         self._model = model
         self._shapes: dict[tuple[Any, ...], tuple[int, GeomMesh] | None] = {}
 
     def add(self, geom: int) -> tuple[int, GeomMesh] | None:
-        """Return the index into `mesh_library` and the geom's mesh; None if no mesh can be made.
+        """Return the index of the geom's mesh in `mesh_library`, and the mesh; None if no mesh can be made.
 
-        A round shape gets a mesh around it. A height field is exact. A mesh geom is exact if its surface is closed and
-        each part is oriented consistently; otherwise it gets its convex hull, as in the simulation's contacts.
+        A round shape gets a mesh that contains it. A height field is exact. A mesh geom is exact if its surface is
+        closed and each part is oriented consistently; otherwise it gets its convex hull, as in the simulation's
+        contacts.
         """
         kind = GeomKind(self._model.geom_type[geom])
         size = tuple(self._model.geom_size[geom].tolist())
@@ -71,13 +72,13 @@ class GeomMeshes:
         return _mesh_geom(self._model, geom) if kind is GeomKind.MESH else _round_geom(kind, size)
 
     def mesh_library(self) -> MeshLibrary | None:
-        """Return the library of all meshes so far; None without meshes."""
+        """Return the library of all meshes made so far; None without meshes."""
         meshes = [shape[1].mesh for shape in self._shapes.values() if shape is not None]
         return MeshLibrary(meshes) if meshes else None
 
 
 def _round_geom(kind: GeomKind, size: tuple[float, ...]) -> GeomMesh | None:
-    """Return the coarsest mesh around the shape within the limits of size, or else the finest one."""
+    """Return the coarsest mesh around the shape that is within both limits of excess, else the finest mesh."""
     finenesses = _SEGMENTS if kind is GeomKind.CYLINDER else _SUBDIVISIONS
     for fineness in finenesses:
         if (made := _around(kind, size, fineness)) is None:

@@ -1,4 +1,4 @@
-"""Spheres that cover a simulated gripper's colliding geoms, in the frames of their links."""
+"""Cover of a simulated gripper: spheres that contain its colliding geoms, in the frames of its links."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from robot_side.gripper.surface_cover import cover_surface
 
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _WITH_ROWS = (GeomKind.SPHERE, GeomKind.CAPSULE, GeomKind.BOX)
-"""Kinds whose cover is computed directly, with the fewest spheres; other kinds need a search."""
+"""Kinds of geoms whose cover is computed directly, with the fewest spheres; other kinds need a search."""
 
 
 @dataclass(frozen=True)
@@ -27,25 +27,25 @@ class GripperCover:
     """Spheres that contain the surface of every geom, except parts within another geom of the same link."""
 
     centers_m: FloatArray
-    """(m, 3) in the frame of the sphere's link"""
+    """(m, 3) centres, each in the frame of the sphere's link"""
     radii_m: FloatArray
-    """(m,)"""
+    """(m,) radii of the spheres"""
     bodies: IntArray
-    """(m,) link of each sphere"""
+    """(m,) body of each sphere's link"""
     stand_out_m: float
-    """Largest distance by which the spheres stand out of the geoms"""
+    """Largest distance, in m, by which the spheres protrude from the geoms"""
 
 
 @dataclass(frozen=True)
 class _Part:
-    """Geom in the frame of the link's first geom; hashable, so that links of the same shape share one cover."""
+    """Geom in the frame of its link's first geom; hashable, so that links of the same shape share one cover."""
 
     kind: int
     size: tuple[float, ...]
     position_m: tuple[float, ...]
     quaternion: tuple[float, ...]
     points: bytes
-    """A mesh's vertices (v, 3)"""
+    """Vertices (v, 3) of a mesh, or corners of another geom's bounding box"""
 
 
 def cover_gripper(
@@ -53,7 +53,7 @@ def cover_gripper(
 ) -> GripperCover:
     """Cover the colliding geoms `geoms` (k,) of a compiled MuJoCo model.
 
-    A mesh counts as its convex hull, which is the colliding shape. No sphere stands out of the link's geoms by more
+    A mesh counts as its convex hull, which is the colliding shape. No sphere protrudes from the link's geoms by more
     than `stand_out_m`, unless a geom would need more than 2000 spheres. Links of the same shape get the same spheres.
     searching: called before each search, but not for a stored cover.
     """
@@ -119,7 +119,7 @@ def _cover_link(
 
 
 def _solid(part: _Part) -> Solid | None:
-    """Return the solid of a part; None if it encloses nothing."""
+    """Return the solid of a geom; None if it encloses nothing."""
     match part.kind:
         case GeomKind.CYLINDER:
             return cylinder(part.size[0], part.size[1])
@@ -147,7 +147,7 @@ def _with_rows(part: _Part, stand_out_m: float) -> tuple[FloatArray, FloatArray,
 
 
 def link_solids(model: Any, geoms: Sequence[int]) -> list[Solid]:
-    """Return the true shapes of one link's geoms, in its frame, as polyhedra; shapes without volume are left out."""
+    """Return the true shapes of one link's geoms as polyhedra, in the link's frame, except those without volume."""
     identity, origin, solids = Rotation.identity(), np.zeros(3), []
     for geom in geoms:
         part = _part(model, geom, identity, origin)
@@ -158,7 +158,7 @@ def link_solids(model: Any, geoms: Sequence[int]) -> list[Solid]:
 
 
 def placed_corners(model: Any, data: Any, geoms: IntArray) -> FloatArray:
-    """Return the triangles (t, 3, 3) of the geoms' shapes in the world frame, in the simulation's state `data`."""
+    """Return the triangles (t, 3, 3) of the geoms' shapes, in the world frame, in the simulation's state `data`."""
     placed = []
     for geom in geoms.tolist():
         body = int(model.geom_bodyid[geom])

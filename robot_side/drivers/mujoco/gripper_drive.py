@@ -1,4 +1,4 @@
-"""Drive of the gripper: a reference that opens and closes at a bounded speed and force, and detects a grip."""
+"""Drive of the gripper: a reference that opens and closes at a bounded speed and force, and detection of a grip."""
 
 import math
 from typing import Any, Final
@@ -34,20 +34,24 @@ GRIPPER: Final = np.dtype(
         ("lag_s", np.float64),
     ]
 )
-"""Drive of a gripper. reference, closure: commanded and measured position, from open, 0, to closed, 1. speed: averaged
-rate of the closure, 1/s. standing_s: time for which something has stopped it. The others: see `GripperTravel`."""
+"""Record of a gripper's drive. reference, closure: commanded and measured position, from 0 (open) to 1 (closed). speed:
+averaged rate of the closure, in 1/s. standing_s: time for which something has stopped the fingers. For the other fields
+see `GripperTravel`."""
 GRIPPER_INPUT: Final = np.dtype([("place", np.int64), ("open", np.float64), ("closed", np.float64)])
-"""Actuator of the gripper: its index in ctrl, and its inputs at both ends."""
+"""Record of a gripper's actuator: its index in ctrl, and its inputs when the gripper is open and closed."""
 
 
 class GripperDrive:
-    """Reference between open, 0, and closed, 1, with detection of a held object."""
+    """Reference of the gripper between 0 (open) and 1 (closed), and detection of a held object."""
 
     def __init__(self, travel: GripperTravel, stroke_time_s: float = 0.6) -> None:
-        """Start open. stroke_time_s: at full speed; 85 mm at 150 mm/s for a Robotiq 2F-85 (its manual)."""
+        """Begin with an open gripper. stroke_time_s: time for the whole stroke at full speed.
+
+        The default is that of a Robotiq 2F-85: 85 mm at 150 mm/s (its manual).
+        """
         stroke = float(travel.lengths[-1] - travel.lengths[0])
         self.drive: np.ndarray = np.zeros(1, GRIPPER)
-        """(1,) of GRIPPER"""
+        """(1,) record of GRIPPER"""
         for name, value in (
             ("opening_m", travel.openings_m[0]),
             ("open_length", travel.lengths[0]),
@@ -60,14 +64,14 @@ class GripperDrive:
         self.samples: FloatArray = np.column_stack(
             [(travel.lengths - travel.lengths[0]) / stroke, travel.references, travel.openings_m]
         )
-        """(k, 3) closures, references and openings along the travel"""
+        """(k, 3) closure, reference and opening at samples along the travel"""
         self._travel = travel
         self._opening_m, self._standing_s = self.drive["opening_m"], self.drive["standing_s"]
         self._command = 0.0
         self._valid_until_s = -math.inf
 
     def inputs(self, places: IntArray) -> np.ndarray:
-        """Return (g,) of GRIPPER_INPUT for the actuators whose inputs are at `places` (g,) in ctrl."""
+        """Return records (g,) of GRIPPER_INPUT for the actuators whose inputs are at `places` (g,), indices in ctrl."""
         inputs = np.zeros(places.shape, GRIPPER_INPUT)
         inputs["place"], inputs["open"], inputs["closed"] = (
             places,
@@ -77,9 +81,9 @@ class GripperDrive:
         return inputs
 
     def command(self, closing: float, valid_until_s: float) -> None:
-        """Close (+1) or open (-1) at that share of the full speed until `valid_until_s`; 0 holds.
+        """Close (+1), open (-1) or hold (0) until `valid_until_s`; closing: a share of the full speed.
 
-        ValueError for a value outside [-1, 1] or a time that is not finite; then nothing is applied.
+        ValueError for a value outside [-1, 1] or a time that is not finite; nothing of such a command is applied.
         """
         if not -1.0 <= closing <= 1.0:
             raise ValueError(f"closing = {closing}; valid: from -1 (open) to +1 (close)")
@@ -89,23 +93,23 @@ class GripperDrive:
         self._valid_until_s = valid_until_s
 
     def commanded_at(self, time_s: float) -> float:
-        """Return the command at `time_s`: close (+1), hold (0) or open (-1), or a share of it."""
+        """Return the command at `time_s`: share of full speed, +1 closes, 0 holds, -1 opens."""
         return self._command if time_s < self._valid_until_s else 0.0
 
     @property
     def opening_m(self) -> float:
-        """Free gap between the fingers at the last measured length, in metres."""
+        """Free gap between the fingers at the last measurement, in metres."""
         return float(self._opening_m[0])
 
     @property
     def holding(self) -> bool:
-        """Whether something between the fingers stopped them while they were commanded to close."""
+        """Whether an object between the fingers stopped them while they were commanded to close."""
         return bool(self._standing_s[0] >= _STANDING_TIME_S and self._opening_m[0] > _CLOSED_OPENING_M)
 
 
 @inlined
 def _at_closure(samples: Any, closure: float, column: int) -> Any:
-    """Return a column of the samples (k, 3) at `closure`, linearly interpolated; constant beyond the ends."""
+    """Return a column of the samples (k, 3) at `closure`, by linear interpolation; constant beyond the ends."""
     if not closure > samples[0, 0]:
         return samples[0, column]
     for k in range(1, samples.shape[0]):
@@ -119,9 +123,9 @@ def _at_closure(samples: Any, closure: float, column: int) -> Any:
 def advance_gripper(
     gripper: Any, samples: FloatArray, moving: float, step_s: float, length: float, length_speed: float
 ) -> None:
-    """Advance one gripper's reference by `step_s`, from the drive's measured length and its speed.
+    """Advance one gripper's reference by `step_s`, from the drive's measured length and the speed of this length.
 
-    moving: from `GripperDrive.commanded_at`.
+    moving: command from `GripperDrive.commanded_at`.
     """
     gripper.closure = (length - gripper.open_length) / gripper.stroke
     gripper.opening_m = _at_closure(samples, gripper.closure, 2)

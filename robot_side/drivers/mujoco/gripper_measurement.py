@@ -1,4 +1,4 @@
-"""Measurement of a simulated gripper's travel, by driving it, and of the gap that its spheres leave."""
+"""Measurement of a simulated gripper: its travel, by driving it, and the open gap that its spheres leave."""
 
 import copy
 from dataclasses import dataclass
@@ -26,26 +26,26 @@ _SMALLEST_STROKE_M = 1e-3
 
 @dataclass(frozen=True)
 class GripperSweep:
-    """Rest positions of a gripper at k evenly spaced inputs, from one end to the other."""
+    """Rest positions of a gripper at k evenly spaced inputs, from one end of the inputs to the other."""
 
     controls: FloatArray
     """(k, g) inputs of the actuators"""
     fingers: FloatArray
     """(k, f) positions of the fingers' joints"""
     lengths: FloatArray
-    """(k,) position of the first actuator, in its transmission's unit"""
+    """(k,) positions of the first actuator, in the unit of its transmission"""
     gaps_m: FloatArray
-    """(k, p) distances between pairs of the gripper's geoms, negative where they overlap"""
+    """(k, p) distances between pairs of the gripper's geoms, in m, negative where they overlap"""
 
     @property
     def stroke_m(self) -> float:
-        """Largest change of any gap"""
+        """Largest change of any pair's distance during the sweep, in m"""
         return float(np.ptp(self.gaps_m, axis=0).max(initial=0.0))
 
 
 @dataclass(frozen=True)
 class GripperTravel:
-    """Travel of the gripper from open to closed."""
+    """Travel of the gripper from open to closed, at k samples."""
 
     open_control: FloatArray
     """(g,) inputs of the actuators when open"""
@@ -54,22 +54,22 @@ class GripperTravel:
     open_fingers: FloatArray
     """(f,) positions of the fingers' joints when open"""
     references: FloatArray
-    """(k,) inputs as shares from open, 0, to closed, increasing"""
+    """(k,) inputs as shares of the way from open (0) to closed (1), rising"""
     lengths: FloatArray
-    """(k,) positions of the first actuator there, increasing or decreasing"""
+    """(k,) positions of the first actuator at the inputs `references`, rising or falling"""
     openings_m: FloatArray
-    """(k,) free gaps between the fingers there"""
+    """(k,) free gaps between the fingers at the inputs `references`, in m"""
     force_lead: float
-    """Lead of the reference over a blocked drive at the largest allowed force, as a share of the stroke"""
+    """Lead of the reference over a blocked drive that gives the largest allowed force, as a share of the stroke"""
     lag_s: float
-    """Lag of a moving drive behind its reference, in shares of the stroke per share per second"""
+    """Lag of a moving drive behind its reference, in seconds: shares of the stroke for each share per second"""
 
 
 def measure_gripper(scene: Scene) -> GripperTravel | None:
-    """Measure the travel by driving a copy of the scene's gripper to both ends in empty space.
+    """Measure the gripper's travel, by driving a copy of the scene's gripper to both ends in empty space.
 
-    None without a gripper, or if its fingers' geoms do not approach each other.
-    ConfigurationError for a gripper actuator without a known range of inputs.
+    None without a gripper, or if its fingers' geoms do not approach each other. ConfigurationError for a gripper
+    actuator whose range of inputs is not known.
     """
     robot, actuators = scene.robot, scene.robot.gripper_actuators
     if actuators.size == 0:
@@ -125,9 +125,9 @@ def _sweep_gripper(model: Any, scene: Scene, first: FloatArray, last: FloatArray
 
 
 def candidate_ends(lower: FloatArray, upper: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-    """Return possible pairs of inputs (g,) at the travel's ends, from the actuators' ranges (g,).
+    """Return the possible pairs of inputs (g,) at the two ends of the travel, from the actuators' ranges (g,).
 
-    Two actuators may run in the same or in opposite directions; more are assumed to run in the same.
+    Two actuators may run in the same or in opposite directions; more than two are assumed to run in the same direction.
     """
     count = lower.size
     choices = product((False, True), repeat=count - 1) if count <= 2 else [(False,) * (count - 1)]
@@ -136,9 +136,9 @@ def candidate_ends(lower: FloatArray, upper: FloatArray) -> list[tuple[FloatArra
 
 
 def jaw_pairs(geoms: IntArray, bodies: IntArray, on_finger: BoolArray) -> list[tuple[int, int]]:
-    """Return the pairs of a gripper's geoms that can grip an object; all arguments (k,).
+    """Return the pairs of a gripper's geoms that can grip an object between them; all arguments have the shape (k,).
 
-    At least one of the two geoms is on a finger, and they are on different bodies.
+    At least one geom of a pair is on a finger, and the two are on different bodies.
     """
     return [
         (int(geoms[a]), int(geoms[b]))
@@ -149,9 +149,9 @@ def jaw_pairs(geoms: IntArray, bodies: IntArray, on_finger: BoolArray) -> list[t
 
 
 def travel_from_sweep(sweep: GripperSweep, force_lead: float, lag_s: float) -> GripperTravel | None:
-    """Return the gripper's travel; None if no gap changes or the drive does not move.
+    """Return the gripper's travel; None if no distance between geoms changes or the drive does not move.
 
-    The free gap is between the surfaces that move far and are nearest to each other in the closed gripper.
+    The free gap is between those surfaces that move far and are nearest to each other in the closed gripper.
     """
     stroke_m, lengths = sweep.stroke_m, sweep.lengths
     if stroke_m < _SMALLEST_STROKE_M or lengths[0] == lengths[-1]:
@@ -179,7 +179,10 @@ def travel_from_sweep(sweep: GripperSweep, force_lead: float, lag_s: float) -> G
 
 
 def open_gap(scene: Scene, cover: GripperCover) -> tuple[float, float] | None:
-    """Return the open gap between the gripping geoms and the least between their spheres, m; None without fingers."""
+    """Return the gap between the gripping geoms of the open gripper, and the least between their spheres, in m.
+
+    None without fingers.
+    """
     travel, model, robot = measure_gripper(scene), scene.model, scene.robot
     if travel is None:
         return None
@@ -202,7 +205,7 @@ def open_gap(scene: Scene, cover: GripperCover) -> tuple[float, float] | None:
 
 
 def _spheres_of(scene: Scene, cover: GripperCover, data: Any, geom: int) -> tuple[FloatArray, FloatArray]:
-    """Return centres (m, 3) in the world frame and radii (m,) of the spheres whose centres are in a geom."""
+    """Return centres (m, 3) in the world frame and radii (m,) of those spheres whose centres are in a geom."""
     link = int(scene.model.geom_bodyid[geom])
     own = np.flatnonzero(cover.bodies == link)
     for solid in link_solids(scene.model, [geom]):

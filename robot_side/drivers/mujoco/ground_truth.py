@@ -1,4 +1,4 @@
-"""Ground truth of the simulated world, for summaries and tests alone."""
+"""Ground truth of the simulated world, only for summaries and tests."""
 
 import math
 from collections.abc import Iterator
@@ -18,10 +18,10 @@ _FEW: Final = 64
 
 
 class GroundTruth:
-    """True distances, contacts and target of a simulation."""
+    """True distances, contacts and target in a simulation."""
 
     def __init__(self, scene: Scene, farthest_m: float = 1.0) -> None:
-        """farthest_m: largest distance from the gripper at which objects count."""
+        """farthest_m: distance from the gripper within which objects are looked for."""
         self._scene = scene
         self._farthest_m = farthest_m
         model = scene.model
@@ -33,7 +33,7 @@ class GroundTruth:
         self._up: FloatArray = scene.data.xmat[:, 6:].copy()
 
     def observe(self) -> Truth:
-        """Return the distances and contacts in the simulation's present state."""
+        """Return the true distances and contacts in the simulation's present state."""
         to_obstacles = self._distance(self._geoms(Role.OBSTACLE), self._farthest_m)
         to_any = min(to_obstacles, self._distance(self._geoms(Role.TARGET, Role.IGNORED), to_obstacles))
         return Truth(
@@ -72,7 +72,7 @@ class GroundTruth:
         return self._of_roles[wanted]
 
     def _distance(self, theirs: IntArray, farthest_m: float) -> float:
-        """Return the least signed distance between the gripper and geoms, at most `farthest_m`."""
+        """Return the least signed distance, in m, between the gripper and the geoms `theirs`; at most `farthest_m`."""
         mine = np.array(list(self._gripper), dtype=np.int64)
         return least_distance(self._scene.model, self._scene.data, mine, theirs, farthest_m)
 
@@ -86,7 +86,7 @@ class GroundTruth:
 
 
 def least_distance(model: Any, data: Any, mine: IntArray, theirs: IntArray, farthest_m: float) -> float:
-    """Return the least signed distance from geoms `mine` to geoms `theirs`, in metres, at most `farthest_m`."""
+    """Return the least signed distance, in m, from any geom of `mine` to any geom of `theirs`; at most `farthest_m`."""
     theirs = _within(model, data, mine, theirs, farthest_m)
     if mine.size == 0 or theirs.size == 0:
         return farthest_m
@@ -105,7 +105,7 @@ def least_distance(model: Any, data: Any, mine: IntArray, theirs: IntArray, fart
 
 
 def _within(model: Any, data: Any, mine: IntArray, theirs: IntArray, farthest_m: float) -> IntArray:
-    """Return `theirs` without geoms that bounding spheres show to be farther off; all if they are few."""
+    """Return `theirs` without geoms whose bounding spheres are farther than `farthest_m`; all geoms if they are few."""
     if mine.size == 0 or theirs.size <= _FEW:
         return theirs
     middle = data.geom_xpos[mine].mean(axis=0)
@@ -116,7 +116,10 @@ def _within(model: Any, data: Any, mine: IntArray, theirs: IntArray, farthest_m:
 
 
 def _rising(bounds: FloatArray, farthest_m: float) -> Iterator[int]:
-    """Yield the indices of bounds below `farthest_m` in ascending order; sorts the first `_FEW` before the others."""
+    """Yield the indices of the bounds below `farthest_m`, in ascending order of the bounds.
+
+    The least `_FEW` are sorted first, because a caller often needs no more.
+    """
     places = np.flatnonzero(bounds < farthest_m)
     if places.size > _FEW:
         first = np.argpartition(bounds[places], _FEW)[:_FEW]
@@ -128,7 +131,10 @@ def _rising(bounds: FloatArray, farthest_m: float) -> Iterator[int]:
 def geom_distance(
     model: Any, data: Any, mine: int, other: int, farthest_m: float, ends: FloatArray | None = None
 ) -> float:
-    """Return the signed distance of two geoms, at most `farthest_m`; `ends` (6,) are not valid for a height field."""
+    """Return the signed distance of two geoms, at most `farthest_m`.
+
+    ends (6,): filled with the nearest points; not valid for a height field.
+    """
     found = mujoco.mj_geomDistance(model, data, mine, other, farthest_m, ends)
     # MuJoCo measures only the first 50 prisms of a height field within the distance, which need not be the nearest.
     while model.geom_type[other] == GeomKind.HFIELD and 0.0 < found < farthest_m:

@@ -1,4 +1,4 @@
-"""Actuator inputs from joint references, for position servos, velocity servos and motors."""
+"""Actuator inputs that make joints follow their references, for position servos, velocity servos and motors."""
 
 from dataclasses import dataclass
 from typing import Any, Final
@@ -20,8 +20,8 @@ DRIVE: Final = np.dtype(
         ("load", np.float64),
     ]
 )
-"""Drive of a joint, see `JointDrives`. friction: damping of the joint itself, N m s/rad. acceleration: commanded one,
-rad/s². load: torque that it needs, N m."""
+"""Record of a joint's drive; for the other fields see `JointDrives`. friction: damping of the joint itself, N m s/rad.
+acceleration: commanded acceleration, rad/s². load: torque that this acceleration, friction and gravity need, N m."""
 
 # Bandwidths of the loops that this controller closes; servos of the model have their own stiffness.
 _MOTOR_BANDWIDTH_RAD_S = 50.0
@@ -31,10 +31,10 @@ _MOST_WINDUP_RAD = 0.02
 
 @dataclass(frozen=True)
 class JointDrives:
-    """Actuators of the arm joints, all (n,): torque = gear (gain u + offset - stiffness l - damping dl/dt).
+    """Actuators of the arm's joints, (n,) each: torque = gear (gain u + offset - stiffness l - damping dl/dt).
 
-    Here u is the input and l = gear q the length: MuJoCo's fixed gain with an affine bias. A position servo has
-    stiffness and damping, a velocity servo only damping, a motor neither.
+    Here u is the input and l = gear q the actuator's length: MuJoCo's fixed gain with an affine bias. A position servo
+    has stiffness and damping, a velocity servo only damping, a motor neither.
     """
 
     gear: FloatArray
@@ -43,12 +43,12 @@ class JointDrives:
     stiffness: FloatArray
     damping: FloatArray
     strongest: FloatArray
-    """Greatest torque, N m, or force, N; infinite without a limit in the model"""
+    """Greatest torque in N m, or force in N, of each actuator; infinite without a limit in the model"""
 
     def windup_rad(self, least_rad: float) -> FloatArray:
-        """Return the largest lead of a reference over each joint (n,): where a servo gives an eighth of `strongest`.
+        """Return the largest lead (n,) of each reference over its joint: where a servo gives an eighth of `strongest`.
 
-        The lead is at least least_rad and at most 20 mrad; other drives have the 20 mrad.
+        The lead is at least least_rad and at most 20 mrad; drives without stiffness, or without a limit, have 20 mrad.
         """
         stiffness = self.gear**2 * self.stiffness
         known = (stiffness > 0.0) & np.isfinite(self.strongest)
@@ -56,7 +56,7 @@ class JointDrives:
         return np.clip(pressing, least_rad, max(_MOST_WINDUP_RAD, least_rad))
 
     def table(self, friction: FloatArray) -> np.ndarray:
-        """Return (n,) of DRIVE. friction (n,): damping of each joint itself, N m s/rad."""
+        """Return records (n,) of DRIVE. friction (n,): damping of each joint itself, N m s/rad."""
         drives = np.zeros(self.gear.shape, DRIVE)
         for name in ("gear", "gain", "offset", "stiffness", "damping"):
             drives[name] = getattr(self, name)
@@ -66,9 +66,9 @@ class JointDrives:
 
 @inlined
 def motor_acceleration(drive: Any, position_error: float, velocity_error: float) -> float:
-    """Return the joint acceleration that a motor's critically damped loop adds to its reference's; 0 for servos.
+    """Return the acceleration that a motor's critically damped loop adds to the reference's; 0 for servos.
 
-    The errors are reference minus measured. The caller multiplies by the arm's inertia.
+    The errors are reference minus measurement. The caller multiplies the acceleration by the arm's inertia.
     """
     if drive.stiffness != 0.0 or drive.damping != 0.0:
         return 0.0
@@ -77,10 +77,10 @@ def motor_acceleration(drive: Any, position_error: float, velocity_error: float)
 
 @inlined
 def control(drive: Any, position_error: float, position: float, velocity: float, load: float) -> float:
-    """Return the actuator's input u by which the joint follows its reference `position` and `velocity`.
+    """Return the actuator's input u with which the joint follows its reference's `position` and `velocity`.
 
-    position_error: reference minus measured. load: torque, N m, against gravity, friction and inertia; force in N for a
-    prismatic joint. A feedforward term cancels a servo's damping, so that it does not lag while it moves.
+    position_error: reference minus measurement. load: torque against gravity, friction and inertia, N m; force in N for
+    a prismatic joint. A feedforward term cancels a servo's damping, so that a moving servo does not lag.
     """
     if drive.stiffness == 0.0 and drive.damping != 0.0:
         velocity += _VELOCITY_SERVO_BANDWIDTH_RAD_S * position_error

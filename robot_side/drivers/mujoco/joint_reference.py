@@ -1,4 +1,4 @@
-"""Joint references from a commanded velocity; they stop by themselves."""
+"""References of joints that follow a commanded velocity, and stop by themselves when the command expires."""
 
 import math
 from dataclasses import dataclass
@@ -28,24 +28,26 @@ REFERENCE: Final = np.dtype(
         ("change", np.float64),
     ]
 )
-"""Reference of a joint, in rad and s. lower, upper: its ends. to_lower, to_upper: the velocities from which it can
-still stop there. change: target velocity minus present one."""
+"""Record of a joint's reference, in rad and s. lower, upper: ends of its range. to_lower, to_upper: velocities from
+which the joint can still stop at these ends. change: target velocity minus present velocity."""
 
 _Limit = Annotated[float, Meta(gt=0.0)]
 
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """Limits of each joint in the arm's own controller, for any command; metres for a prismatic joint."""
+    """Limits of each joint in the arm's own controller, for any command; in metres for a prismatic joint."""
 
     velocity_rad_s: _Limit = 2.0
-    """Below the 3.14 rad/s of a UR5e and the 2.17 rad/s of a Franka arm's large joints (their data sheets)."""
+    """Largest velocity, below the 3.14 rad/s of a UR5e and the 2.17 rad/s of a Franka arm's large joints
+    (data sheets)"""
     acceleration_rad_s2: _Limit = 8.0
     deceleration_rad_s2: _Limit = 12.0
     """Deceleration of the reference after a command has expired."""
     windup_rad: _Limit = 0.005
-    """Largest lead of the reference over a blocked joint, unless the caller allows more for weak drives. The built-in
-    arm's large joints then press with 20 N m, some 30 N at the tool, and hardly spring when the obstacle gives way."""
+    """Largest lead of the reference over a blocked joint, unless the caller allows more for weak drives. With it the
+    built-in arm's large joints press with 20 N m, about 30 N at the tool, and hardly spring when the obstacle gives
+    way."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -53,13 +55,13 @@ class MotionLimits:
     def of_joints(
         self, count: int, lower_rad: FloatArray | None = None, upper_rad: FloatArray | None = None
     ) -> JointLimits:
-        """Return these limits for `count` joints with the ends lower_rad and upper_rad (n,)."""
+        """Return these limits for `count` joints (n) with the ends of range lower_rad and upper_rad (n,)."""
         velocity, acceleration = np.full(count, self.velocity_rad_s), np.full(count, self.acceleration_rad_s2)
         return JointLimits(velocity, acceleration, lower_rad, upper_rad)
 
 
 class JointReference:
-    """References (n,) for position, velocity and acceleration: they follow a command until it expires, then stop."""
+    """References (n,) of position, velocity and acceleration: they follow a command until it expires, then stop."""
 
     def __init__(
         self,
@@ -69,12 +71,12 @@ class JointReference:
         limits: MotionLimits,
         windup_rad: FloatArray | None = None,
     ) -> None:
-        """Start at `position_rad` (n,), between lower_rad and upper_rad (n,), which may be infinite.
+        """Begin at `position_rad` (n,), between the ends lower_rad and upper_rad (n,), which may be infinite.
 
-        windup_rad (n,): value for each joint, instead of the limits'.
+        windup_rad (n,): largest lead of each joint; None: the value of `limits` for all.
         """
         self.joints: np.ndarray = np.zeros(position_rad.shape, REFERENCE)
-        """(n,) of REFERENCE"""
+        """(n,) records of REFERENCE"""
         for name, values in (
             ("position", np.clip(position_rad, lower_rad, upper_rad)),
             ("lower", lower_rad),
@@ -87,9 +89,9 @@ class JointReference:
         self._following = False
 
     def command(self, velocity_rad_s: FloatArray, valid_until_s: float) -> None:
-        """Follow `velocity_rad_s` (n,), scaled by one factor to the limit, until `valid_until_s`.
+        """Follow `velocity_rad_s` (n,) until `valid_until_s`; above the limit, all are scaled by the same factor.
 
-        ValueError for a wrong shape or a value that is not finite; then nothing is applied.
+        ValueError for a wrong shape or a value that is not finite; nothing of such a command is applied.
         """
         if velocity_rad_s.shape != self.joints.shape:
             raise ValueError(f"joint_velocity_rad_s has the shape {velocity_rad_s.shape}; valid: {self.joints.shape}")
@@ -111,7 +113,7 @@ class JointReference:
 
 @compiled(record_array(REFERENCE), input_array(1), FLOAT64, returns=BOOL)
 def _command(joints: Any, velocity: FloatArray, fastest: float) -> bool:
-    """Store a velocity, scaled by one factor to at most `fastest`; False, and nothing stored, if it is not finite."""
+    """Store the velocities, scaled by one factor to at most `fastest`; False, and no change, if one is not finite."""
     largest = 0.0
     for j in range(joints.size):
         if not math.isfinite(velocity[j]):
@@ -132,7 +134,11 @@ def advance_references(
     acceleration: float,
     deceleration: float,
 ) -> None:
-    """Advance the references of all `joints` by `step_s`, near the measured ones; the largest change limits all."""
+    """Advance the references of all `joints` by `step_s`; they stay near the measured positions.
+
+    All changes of velocity are scaled by the same factor, so that the largest is within the limit. ended: whether the
+    command has just expired.
+    """
     largest = 0.0
     for j in range(joints.size):
         joint = joints[j]

@@ -1,4 +1,4 @@
-"""Forward kinematics of the gripper from encoder readings (eq. 4)."""
+"""Forward kinematics of the simulated robot's gripper from encoder readings (eq. 4)."""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,13 +20,13 @@ from robot_side.gripper.near_order import near_order
 
 
 class MujocoKinematics:
-    """GripperKinematics of the scene's robot: the gripper by its encoders, without the simulation's truth."""
+    """Kinematics of the scene's robot (port GripperKinematics), from its encoders, never the simulation's truth."""
 
     def __init__(self, scene: Scene, stand_out_m: float = 0.003, searching: Callable[[], None] | None = None) -> None:
-        """Cover the gripper's geoms with spheres that stand out by at most `stand_out_m`.
+        """Cover the gripper's geoms with spheres that protrude by at most `stand_out_m`.
 
-        searching: called before each search for spheres, but not for a stored cover.
-        ConfigurationError if the robot has no colliding geoms at the tool.
+        searching: called before each search for spheres, but not for a stored cover. ConfigurationError if the robot
+        has no colliding geoms at the tool.
         """
         model, robot = scene.model, scene.robot
         geoms = robot.gripper_geoms
@@ -56,18 +56,21 @@ class MujocoKinematics:
         self._link_poses: FloatArray = np.zeros((1 + own.size, 7))
 
     def body_poses(self, bodies: IntArray) -> FloatArray:
-        """Return positions and quaternions (n, 7), w first, of the robot's `bodies` (n,) in the newest `pose`."""
+        """Return positions and quaternions (n, 7), w first, of the robot's `bodies` (n,) at the last call of `pose`."""
         poses: FloatArray = self._link_poses[self._link_of[bodies]]
         return poses
 
     def pose(self, state: ArmState) -> GripperPose:
-        """Return the gripper's pose at the encoder readings of `state` (eq. 4); no Jacobian has the finger joints."""
+        """Return the gripper's pose at the encoder readings of `state` (eq. 4).
+
+        The finger joints are in no Jacobian.
+        """
         placed = place(self._tree, state.joint_positions_rad, state.finger_positions, self._link_poses)
         return GripperPose(*placed, self._radii_m, self._on_finger)
 
 
 def _link_tree(model: Any, data: Any, robot: RobotModel, link_of: IntArray, points: Records) -> LinkTree:
-    """Return the robot's links alone. Links that no reading moves keep their poses in `data`."""
+    """Return the tree of the robot's links. Links that no reading moves keep the poses that they have in `data`."""
     arm, fingers = robot.arm_positions.tolist(), robot.finger_positions.tolist()
     links = np.zeros(int(link_of.max()) + 1, dtype=LINK)
     joints: list[tuple[Any, ...]] = []

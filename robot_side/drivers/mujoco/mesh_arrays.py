@@ -1,4 +1,4 @@
-"""Surfaces of mesh geoms and height fields, from the shared arrays of a compiled MuJoCo model."""
+"""Surfaces of mesh geoms and of height fields, read from the shared arrays of a compiled MuJoCo model."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from common.arrays import FloatArray, IntArray
 
 
 def mesh_vertices(model: Any, geom: int) -> FloatArray:
-    """Return vertices (v, 3) in m, in the geom's frame."""
+    """Return the vertices (v, 3) of a mesh geom, in m, in the geom's frame."""
     mesh = int(model.geom_dataid[geom])
     first = int(model.mesh_vertadr[mesh])
     vertices: FloatArray = model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])].astype(np.float64)
@@ -16,7 +16,7 @@ def mesh_vertices(model: Any, geom: int) -> FloatArray:
 
 
 def mesh_triangles(model: Any, geom: int) -> IntArray:
-    """Return triangles (t, 3), indices of `mesh_vertices`."""
+    """Return the triangles (t, 3) of a mesh geom, as indices into `mesh_vertices`."""
     mesh = int(model.geom_dataid[geom])
     first = int(model.mesh_faceadr[mesh])
     triangles: IntArray = model.mesh_face[first : first + int(model.mesh_facenum[mesh])].astype(np.int64)
@@ -24,9 +24,9 @@ def mesh_triangles(model: Any, geom: int) -> IntArray:
 
 
 def height_field_surface(model: Any, geom: int) -> tuple[FloatArray, IntArray]:
-    """Return vertices (v, 3) in m, in the geom's frame, and triangles (t, 3) of a height field's solid, with its base.
+    """Return the solid of a height field with its base: vertices (v, 3) in m in the geom's frame, and triangles (t, 3).
 
-    As in MuJoCo's collisions, two triangles of each cell share the diagonal from its least to its greatest x and y.
+    As in MuJoCo's collisions, the two triangles of a cell share the diagonal from its least to its greatest x and y.
     """
     field = int(model.geom_dataid[geom])
     rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])

@@ -1,4 +1,4 @@
-"""Primitives of a scene's objects: spheres, boxes, tetrahedra, meshes, half-spaces and ellipsoids of geoms, placed."""
+"""Primitives that describe a scene's objects: made from MuJoCo's geoms, and placed in the world for each frame."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -29,7 +29,7 @@ _EXACT: Final[Mapping[GeomKind, str]] = {
     GeomKind.ELLIPSOID: "ellipsoid",
 }
 _MESHES = {GeomKind.CAPSULE, GeomKind.CYLINDER, GeomKind.MESH, GeomKind.HFIELD}
-"""Kinds of geoms that a mesh describes, except a tetrahedron"""
+"""Kinds of geoms that a mesh describes, except for a tetrahedron"""
 _SIZES: Final[Mapping[str, Callable[[Any, IntArray], tuple[FloatArray, ...]]]] = {
     "sphere": lambda model, geoms: (model.geom_size[geoms, 0],),
     "box": lambda model, geoms: (model.geom_aabb[geoms],),
@@ -39,23 +39,23 @@ _SIZES: Final[Mapping[str, Callable[[Any, IntArray], tuple[FloatArray, ...]]]] =
     "half_space": lambda _model, geoms: (np.empty((len(geoms), 0)),),
     "ellipsoid": lambda model, geoms: (model.geom_size[geoms],),
 }
-"""Functions that read the sizes of geoms (k,) in their own frames, as `Kind.placed` takes them; by kind but mesh"""
+"""Functions that read sizes of geoms (k,) in their own frames, as `Kind.placed` takes them, for each kind but meshes"""
 
 
 @dataclass(frozen=True)
 class SceneObject:
-    """Object of the scene, not of the robot: one tree of bodies, or one geom that is fixed to the world."""
+    """Object of the scene that is not of the robot: one tree of bodies, or one geom that is fixed to the world."""
 
     name: str
     geoms: tuple[int, ...]
-    """Geoms that can touch something"""
+    """Geoms of the object that can touch something"""
 
 
 class ObjectPrimitives:
-    """Shapes of the objects in their geoms' frames, to be placed in the world once for each frame.
+    """Shapes of the objects in the frames of their geoms, to be placed in the world for each frame.
 
-    A sphere, a box, a plane, an ellipsoid, a closed mesh and a height field are exact. A cylinder and a capsule are
-    meshes around them, a mesh that is not closed is its convex hull, and any other shape its bounding box.
+    A sphere, a box, a plane, an ellipsoid, a closed mesh and a height field are exact. A cylinder or capsule becomes a
+    mesh around it, a mesh that is not closed its convex hull, and any other shape its bounding box.
     """
 
     def __init__(self, model: Any, objects: Sequence[SceneObject]) -> None:
@@ -79,12 +79,11 @@ class ObjectPrimitives:
                 volume_errors[name] = max(share, volume_errors.get(name, 0.0))
                 stands_out_m[name] = max(distance_m, stands_out_m.get(name, 0.0))
         self.volume_errors: Mapping[str, float] = volume_errors
-        """Greatest share by which a part's volume is too large, for each object that is perceived larger than it is.
-
-        Infinite for a part without a known volume, of which the convex hull or the bounding box is used.
-        """
+        """Greatest share by which a part's perceived volume is too large, for each object that is perceived larger than
+        it is.
+        Infinite for a part whose volume is not known, and whose convex hull or bounding box is used."""
         self.stands_out_m: Mapping[str, float] = stands_out_m
-        """Largest distance by which the perceived shape of each of these objects extends beyond it."""
+        """Largest distance, in m, by which the perceived shape of each such object protrudes from the true shape"""
 
         mesh_index = np.array([meshes[geom][0] for geom, _ in of_kind["mesh"]], dtype=np.int64)
         self._mesh_index: IntArray = mesh_index
@@ -99,16 +98,19 @@ class ObjectPrimitives:
         ]
         of_each = np.concatenate([rows(*columns, width=NUMBERS) for columns in sizes])
         self._primitives = _Primitives(kinds, own, owners, of_each)
-        """Primitives of all objects, kind by kind"""
+        """Primitives of all objects, grouped by kind"""
         self._first_geoms = np.array([thing.geoms[0] for thing in objects], dtype=np.int64)
 
     def _seen(self, roles: Mapping[str, Role]) -> BoolArray:
-        """Return whether each primitive (n,) belongs to an object that is not ignored."""
+        """Return (n,): whether each primitive belongs to an object that is not ignored."""
         seen = np.array([roles[name] is not Role.IGNORED for name in self._names], dtype=np.bool_)
         return seen[self._primitives.owners]
 
     def moving(self, things: IntArray, roles: Mapping[str, Role]) -> "MovingPrimitives":
-        """Return the primitives of `things` (m,), ascending, in the order of `movers`; none of ignored objects."""
+        """Return the primitives of those objects of `things` (m,), ascending, that are not ignored.
+
+        The order is that of `movers`.
+        """
         owners = self._primitives.owners
         kept = np.flatnonzero(self._seen(roles) & np.isin(owners, things))
         kept = kept[np.argsort(owners[kept], kind="stable")]
@@ -124,7 +126,7 @@ class ObjectPrimitives:
     ) -> PerceivedObjects:
         """Return the objects in the world, each moved by its row of `offsets_m` (k, 3); ignored ones lack primitives.
 
-        geom_positions_m (g, 3) and geom_rotations (g, 9) are those of the model's geoms in the world frame.
+        geom_positions_m (g, 3) and geom_rotations (g, 9): poses of the model's geoms in the world frame.
         """
         kept = np.flatnonzero(self._seen(roles))
         primitives = self._primitives.only(kept)
@@ -147,17 +149,17 @@ class ObjectPrimitives:
 
 
 class _Primitives(NamedTuple):
-    """Primitives (n) in the frames of their geoms."""
+    """Primitives (n) in the frames of their geoms; arrays (n,)."""
 
     kinds: IntArray
     geoms: IntArray
     owners: IntArray
-    """Indices among all objects"""
+    """Index of each primitive's object among all objects"""
     sizes: FloatArray
-    """(n, 20) as `Kind.placed` takes them"""
+    """(n, 20) sizes as `Kind.placed` takes them"""
 
     def only(self, places: IntArray) -> "_Primitives":
-        """Return the primitives at these indices."""
+        """Return the primitives at the indices `places`."""
         return _Primitives(self.kinds[places], self.geoms[places], self.owners[places], self.sizes[places])
 
 
@@ -167,10 +169,10 @@ class MovingPrimitives(NamedTuple):
     primitives: _Primitives
     things: IntArray
     first_geoms: IntArray
-    """(m,)"""
+    """(m,) first geom of each object, whose frame is the object's"""
 
     def numbers(self, offsets_m: FloatArray, geom_positions_m: FloatArray, geom_rotations: FloatArray) -> FloatArray:
-        """Return the rows (n + m, 20) of `movers`, with velocities 0; the arguments are those of `place`."""
+        """Return the movers' numbers (n + m, 20) as in `movers`, with velocities 0; arguments as for `place`."""
         primitives, things, first_geoms = self
         numbers: FloatArray = np.empty((len(primitives.kinds) + len(things), NUMBERS))
         _place(geom_positions_m, geom_rotations, offsets_m, *primitives, things, first_geoms, numbers)
@@ -218,7 +220,7 @@ def _primitive_kind(model: Any, geom: int) -> str | None:
 def _meshes(
     model: Any, geoms: Sequence[int]
 ) -> tuple["MeshLibrary | None", dict[int, tuple[int, "GeomMesh"]], frozenset[int]]:
-    """Return the library, (mesh index, mesh) of each geom with a mesh, and the geoms without one."""
+    """Return the library, the (mesh index, mesh) of each geom that has a mesh, and the geoms that have none."""
     candidates = [geom for geom in geoms if int(model.geom_type[geom]) in _MESHES]
     if not candidates:
         return None, {}, frozenset(geoms)

@@ -1,4 +1,4 @@
-"""Control and measurement around a step of the physics: one kernel before it, one after it."""
+"""Control before a step of the physics, and measurement after it: one kernel each."""
 
 from typing import Any, Final, NamedTuple
 
@@ -13,26 +13,27 @@ from robot_side.drivers.mujoco.joint_drives import DRIVE, control, motor_acceler
 from robot_side.drivers.mujoco.joint_reference import REFERENCE, advance_references
 
 INERTIA: Final = np.dtype([("place", np.int64), ("row", np.int64), ("column", np.int64)])
-"""Element of the arm's inertia matrix on or below the diagonal, by joints, and its index in MuJoCo's sparse array"""
+"""Record of an element of the arm's inertia matrix, on or below the diagonal: its index in MuJoCo's sparse array, and
+its row and column as numbers of joints"""
 LIMITS: Final = np.dtype([("velocity", np.float64), ("acceleration", np.float64), ("deceleration", np.float64)])
-"""Limits of each joint in the arm's own controller, rad and s"""
+"""Record of each joint's limits in the arm's own controller, in rad and s"""
 
 
 class Plant(NamedTuple):
-    """Data that the kernels before and after a step read and write; MuJoCo's arrays keep their addresses."""
+    """Data that both kernels read and write; MuJoCo's arrays keep their addresses."""
 
     joints: np.ndarray
-    """(n,) of REFERENCE"""
+    """(n,) records of REFERENCE"""
     drives: np.ndarray
-    """(n,) of DRIVE"""
+    """(n,) records of DRIVE"""
     inertia: np.ndarray
-    """(k,) of INERTIA: elements of `mass` of the arm"""
+    """(k,) records of INERTIA: the elements of `mass` that belong to the arm"""
     grippers: np.ndarray
-    """(g,) of GRIPPER: one or none"""
+    """(g,) records of GRIPPER: one or none"""
     samples: FloatArray
-    """(s, 3) samples of the gripper's travel"""
+    """(s, 3) samples of the gripper's travel (see `GripperDrive`)"""
     inputs: np.ndarray
-    """(i,) of GRIPPER_INPUT"""
+    """(i,) records of GRIPPER_INPUT"""
     positions: IntArray
     """(n,) indices of the joints in qpos"""
     fingers: IntArray
@@ -44,24 +45,24 @@ class Plant(NamedTuple):
     qpos: FloatArray
     qvel: FloatArray
     mass: FloatArray
-    """MuJoCo's inertia matrix"""
+    """MuJoCo's inertia matrix, sparse"""
     bias: FloatArray
-    """(nv,) forces of gravity and velocity"""
+    """(nv,) forces that depend on gravity and velocity (qfrc_bias)"""
     compensated: FloatArray
     """(nv,) forces of gravity compensation"""
     sprung: FloatArray
     """(nv,) forces of springs"""
     gripper_length: FloatArray
-    """Lengths of the actuators from the gripper's first one on; gripper_speed: their speeds"""
+    """Lengths of the actuators, from the gripper's first actuator on; gripper_speed has their speeds"""
     gripper_speed: FloatArray
     ctrl: FloatArray
     """(nu,) inputs of the actuators"""
     limits: np.ndarray
-    """(1,) of LIMITS"""
+    """(1,) record of LIMITS"""
 
 
 def inertia_table(model: Any, velocities: IntArray) -> np.ndarray:
-    """Return the elements (k,) of INERTIA between joints whose degrees of freedom are `velocities` (n,)."""
+    """Return records (k,) of INERTIA for the joints whose degrees of freedom are `velocities` (n,)."""
     joint_of = {int(velocity): joint for joint, velocity in enumerate(velocities)}
     found = [
         (place, joint, joint_of[int(model.M_colind[place])])
@@ -84,7 +85,10 @@ _plant_at = PLANT.at
 
 @compiled(BUNDLE, BOOL, BOOL, FLOAT64, FLOAT64)
 def drive(bundle: IntArray, following: bool, ended: bool, closing: float, step_s: float) -> None:
-    """Advance the references by `step_s` and compute the actuators' inputs from them."""
+    """Advance the references by `step_s`, and compute the actuators' inputs from these.
+
+    following, ended: from `JointReference.follows`. closing: from `GripperDrive.commanded_at`.
+    """
     plant = _plant_at(bundle)
     joints, drives, inertia, limits = plant.joints, plant.drives, plant.inertia, plant.limits[0]
     for j in range(joints.size):
@@ -125,7 +129,7 @@ def sense(
     velocities: FloatArray,
     fingers: FloatArray,
 ) -> None:
-    """Replace the noise in positions (n,) and fingers (f,) with readings, and fill velocities (n,)."""
+    """Replace standard normal noise in `positions` (n,) and `fingers` (f,) by readings; fill `velocities` (n,)."""
     plant = _plant_at(bundle)
     for j in range(positions.size):
         positions[j] = reading(positions[j], plant.qpos[plant.positions[j]], sigma, resolution)

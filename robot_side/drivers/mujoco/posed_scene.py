@@ -14,12 +14,12 @@ from robot_side.surroundings.perceived import PerceivedObjects
 
 
 class ToolPath(NamedTuple):
-    """Poses of the tool, so dense that no contact occurs only between two of them."""
+    """Poses of the tool along a path, so dense that no contact occurs only between two of them."""
 
     positions_m: FloatArray
     """(k, 3)"""
     rotations: FloatArray
-    """(k, 3, 3) from the tool frame"""
+    """(k, 3, 3) tool to world"""
 
 
 class PosedScene:
@@ -36,7 +36,7 @@ class PosedScene:
         self._at_rest_m: FloatArray = np.zeros((self._gripper.size, 3))
 
     def set_pose(self, arm_positions_rad: FloatArray, finger_positions: FloatArray, shift_m: FloatArray) -> None:
-        """Set the joints (n,) and (f,), and move every object by `shift_m` (3,) from its pose in the scene."""
+        """Set the arm's joints (n,) and the fingers' (f,), and move every object by `shift_m` (3,) from its place."""
         data, robot = self._data, self.scene.robot
         data.qpos[robot.arm_positions] = arm_positions_rad
         data.qpos[robot.finger_positions] = finger_positions
@@ -47,7 +47,7 @@ class PosedScene:
         self._at_rest_m = data.geom_xpos[self._gripper].copy()
 
     def approach_axis(self) -> FloatArray:
-        """Return the tool's approach axis (3,) in the present pose, unit, in the world frame."""
+        """Return the tool's approach axis in the present pose: unit vector (3,) in the world frame."""
         axis: FloatArray = self._data.site_xmat[self.scene.robot.site].reshape(3, 3)[:, 2].copy()
         return axis
 
@@ -56,7 +56,7 @@ class PosedScene:
         return least_distance(self.scene.model, self._data, self._gripper, self._objects, farthest_m)
 
     def contact_distance_m(self, farthest_m: float) -> float:
-        """Return the distance that the gripper can move along its approach axis until contact, at most `farthest_m`."""
+        """Return how far the gripper can move along its approach axis until contact, in m; at most `farthest_m`."""
         axis = self.approach_axis()
         contact_distance_m = contact_distance(
             self.scene.model, self._data, self._gripper, self._objects, axis, farthest_m
@@ -65,7 +65,7 @@ class PosedScene:
         return contact_distance_m
 
     def stays_clear(self, path: ToolPath, margin_m: float) -> bool:
-        """Return whether the gripper keeps `margin_m` to all objects on a path that begins at the present pose."""
+        """Return whether the gripper stays `margin_m` away from all objects on a path that begins at this pose."""
         data, gripper = self._data, self._gripper
         turns = data.geom_xmat[gripper].reshape(-1, 3, 3).copy()
         turned = path.rotations @ path.rotations[0].T
@@ -86,11 +86,11 @@ class PosedScene:
         return clear
 
     def perceived(self, errors_m: FloatArray) -> PerceivedObjects:
-        """Return the objects in the present pose as a camera with these errors (k, 3) perceives them (eq. 1)."""
+        """Return the objects in the present pose, as a camera with errors `errors_m` (k, 3) perceives them (eq. 1)."""
         scene, data = self.scene, self._data
         return scene.primitives.place(0.0, scene.roles, errors_m, data.geom_xpos, data.geom_xmat)
 
 
 def disable_contacts(scene: Scene) -> None:
-    """Disable contacts: from now on the gripper passes through objects."""
+    """Disable contacts in the simulation: from now on the gripper passes through objects."""
     scene.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT

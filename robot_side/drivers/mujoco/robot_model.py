@@ -1,4 +1,4 @@
-"""Arm, gripper and their actuators in a compiled model, found from the tool's site alone."""
+"""Arm, gripper and their actuators in a compiled model, found only from the tool's site."""
 
 import hashlib
 from dataclasses import dataclass
@@ -16,34 +16,37 @@ _TURNING_OR_SLIDING = (JointKind.HINGE, JointKind.SLIDE)
 
 @dataclass(frozen=True)
 class RobotModel:
-    """Indices of the robot in a model's arrays. The robot is the whole tree of bodies with the tool's site."""
+    """Indices of the robot's parts in a model's arrays.
+
+    The robot is the whole tree of bodies that has the tool's site.
+    """
 
     site: int
     root_body: int
     arm_joints: IntArray
-    """(n,) joints on the chain from the world to the site"""
+    """(n,) joints between the world and the site"""
     arm_positions: IntArray
-    """(n,) into qpos"""
+    """(n,) indices of the arm's joints in qpos"""
     arm_velocities: IntArray
-    """(n,) into qvel and other arrays of degrees of freedom"""
+    """(n,) indices of the arm's joints in qvel and other arrays of degrees of freedom"""
     lower_rad: FloatArray
-    """(n,) position limits, infinite where there are none"""
+    """(n,) lower ends of the joints' ranges, `upper_rad` the upper ends; infinite without a limit"""
     upper_rad: FloatArray
     arm_controls: IntArray
-    """(n,) into ctrl"""
+    """(n,) indices of the arm's actuators in ctrl"""
     drives: JointDrives
     finger_positions: IntArray
-    """(f,) into qpos: the joints beyond the last arm joint"""
+    """(f,) indices in qpos of the finger joints, which are those beyond the last arm joint"""
     finger_velocities: IntArray
-    """(f,) into qvel"""
+    """(f,) indices of the finger joints in qvel"""
     gripper_actuators: IntArray
     """(g,) actuators that move the finger joints"""
     gripper_controls: IntArray
-    """(g,) into ctrl"""
+    """(g,) indices of the gripper's actuators in ctrl"""
     fingerprint: str
-    """Twelve digits that identify an arm by its joints, links and limits, not by its base's position"""
+    """Twelve hexadecimal digits that identify an arm by its joints, links and limits, wherever its base is"""
     gripper_geoms: IntArray
-    """(k,) colliding geoms beyond the last arm link, or on that link if there are none beyond"""
+    """(k,) colliding geoms beyond the last arm link; on that link if there are none beyond"""
     geom_on_finger: BoolArray
     """(k,) whether a finger joint moves the geom"""
 
@@ -51,8 +54,8 @@ class RobotModel:
 def find_robot(model: Any, site_name: str | None) -> RobotModel:
     """Find the arm that carries the site `site_name` in a compiled MuJoCo model.
 
-    ConfigurationError, one line each: an unknown site, no actuators, no joint between the world and the site, a
-    joint that is neither hinge nor slide, an arm joint without an actuator or with one of an unsupported kind.
+    ConfigurationError, of one line, for an unknown site, a model without actuators, a site that no joint moves, a joint
+    that is neither hinge nor slide, and an arm joint without an actuator or with one of an unsupported kind.
     """
     site = _find_site(model, site_name)
     if model.nu == 0:
@@ -61,7 +64,7 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
     joints = np.array([joint for body in chain for joint in _joints(model, body)], dtype=np.int64)
     if joints.size == 0:
         raise ConfigurationError(
-            f"site: {site_name!r} hangs on no joint{_moved_by_mocap(model, chain)}; valid: a site that 1 or more joints"
+            f"site: no joint moves {site_name!r}{_moved_by_mocap(model, chain)}; valid: a site that 1 or more joints"
             " move, of " + ", ".join(_site_names(model))
         )
     _require_simple(model, joints)
@@ -107,7 +110,7 @@ def find_robot(model: Any, site_name: str | None) -> RobotModel:
 
 
 def _strongest(model: Any, actuators: IntArray) -> FloatArray:
-    """Return the greatest torque or force of `actuators` (n,) at their joints (n,); infinite without a limit."""
+    """Return the greatest torque or force (n,) of the `actuators` (n,) at their joints; infinite without a limit."""
     most: FloatArray = np.abs(model.actuator_gear[actuators, 0]) * model.actuator_forcerange[actuators, 1]
     return np.where(model.actuator_forcelimited[actuators].astype(bool), most, np.inf)
 
@@ -129,7 +132,7 @@ def _fingerprint(model: Any, joints: IntArray, site: int) -> str:
 
 
 def can_touch(model: Any, geom: int) -> bool:
-    """Return whether a geom takes part in collisions; other geoms are only visual."""
+    """Return whether a geom takes part in collisions; all other geoms are only visual."""
     return bool(model.geom_contype[geom]) or bool(model.geom_conaffinity[geom])
 
 
@@ -153,7 +156,7 @@ def _find_site(model: Any, site_name: str | None) -> int:
 
 
 def _chain(model: Any, body: int) -> list[int]:
-    """Return the bodies from the child of the world down to `body`."""
+    """Return the bodies on the chain from the world's child to `body`, in this order."""
     chain: list[int] = []
     while body != 0:
         chain.insert(0, body)
@@ -175,7 +178,7 @@ def _require_simple(model: Any, joints: IntArray) -> None:
 
 
 def _joint_name(model: Any, joint: int) -> str:
-    """Return a description by which a person finds the joint in the model."""
+    """Return a description of the joint by which a person can find it in the model."""
     if name := model.joint(joint).name:
         return f"joint {name!r}"
     body = int(model.jnt_bodyid[joint])
@@ -183,7 +186,7 @@ def _joint_name(model: Any, joint: int) -> str:
 
 
 def _why_no_actuator(model: Any, joint: int) -> str:
-    """Return the reason why a joint has no own actuator."""
+    """Return the reason why a joint has no actuator of its own."""
     if any(_moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu)):
         return "it is pulled by a tendon that it shares"
     if model.nmocap > 0:
@@ -192,7 +195,7 @@ def _why_no_actuator(model: Any, joint: int) -> str:
 
 
 def _actuator_of(model: Any, joint: int) -> int:
-    """Return the first actuator on `joint`; ConfigurationError for none, or for one of an unsupported kind."""
+    """Return the first actuator on `joint`; ConfigurationError if there is none, or if its kind is not supported."""
     for actuator in range(model.nu):
         on_joint = model.actuator_trntype[actuator] in (TransmissionKind.JOINT, TransmissionKind.JOINT_IN_PARENT)
         if not on_joint or model.actuator_trnid[actuator, 0] != joint:

@@ -1,4 +1,4 @@
-"""Simulated world, loaded from MJCF: an arm among objects."""
+"""Simulated world of an arm among objects, loaded from MJCF files."""
 
 import logging
 import math
@@ -36,24 +36,24 @@ class Scene:
     """Compiled model and its only live state, which the arm advances and all others only read."""
 
     model: Any
-    """mujoco.MjModel"""
+    """Compiled model, a mujoco.MjModel"""
     data: Any
-    """mujoco.MjData"""
+    """Live state, a mujoco.MjData"""
     robot: RobotModel
     objects: tuple[SceneObject, ...]
     roles: dict[str, Role]
     """Present role of each object; `MujocoCamera.set_role` changes it."""
     primitives: ObjectPrimitives
     start_pose: str
-    """Start pose of the arm, in words."""
+    """Description of the arm's start pose"""
     shared_names: tuple[str, ...]
-    """Names that several elements share, such as a body and a geom of the world; each name is one object."""
+    """Names that several elements share, such as a body and a geom of the world; each name makes one object."""
     warnings: tuple[str, ...]
-    """Warnings of MuJoCo about the model."""
+    """Warnings that MuJoCo gave about the model"""
 
     @property
     def fixed(self) -> frozenset[str]:
-        """Names of the objects that neither a joint nor mocap moves"""
+        """Names of the objects that neither a joint nor a mocap body can move"""
         model = self.model
         movable = (model.body_weldid != 0) | (model.body_mocapid[model.body_rootid] >= 0)
         moves = movable[model.geom_bodyid]
@@ -64,7 +64,7 @@ class Scene:
         mujoco.mj_step(self.model, self.data)
 
     def show(self, measured: ArmState) -> None:
-        """Set the robot to the state measured by a driver's arm; the scene is then not simulated."""
+        """Set the robot to the state that a driver measured on its arm; such a scene is not simulated."""
         self.data.qpos[self.robot.arm_positions] = measured.joint_positions_rad
         self.data.qpos[self.robot.finger_positions] = measured.finger_positions
         mujoco.mj_kinematics(self.model, self.data)
@@ -77,11 +77,12 @@ def load_scene(
     name: SceneName = "table",
     seed: int = 0,
 ) -> Scene:
-    """Load the built-in arm at its table, or the MJCF file `model_path` whose tool is the site `site`.
+    """Load the built-in arm, or the MJCF file `model_path`, whose tool is the site `site`.
 
-    A file with only a robot and planes gets the built-in scene `name`, drawn from `seed`, in front of the robot.
-    The arm starts at the keyframe `home`, else the first keyframe, else the middle of the joints' ranges.
-    `roles` overrides the roles by name. ConfigurationError, one line, for an unusable file, model or site.
+    A file with only a robot and planes gets the built-in scene `name`, drawn from `seed`, in front of the robot; so
+    does the built-in arm. The arm starts at the keyframe `home`, else at the first keyframe, else in the middle of the
+    joints' ranges. roles: override the roles that objects' names tell. ConfigurationError, of one line, for a file,
+    model or site that cannot be used.
     """
     mujoco.set_mju_user_warning(_log_warning)
     with warnings.catch_warnings(record=True) as said:
@@ -164,7 +165,7 @@ def _unusable(error: Exception) -> ConfigurationError:
 
 
 def _start_key(model: Any) -> int | None:
-    """Return the keyframe that the arm starts from: `home`, else the first one; None without keyframes."""
+    """Return the keyframe at which the arm starts: `home`, else the first one; None without keyframes."""
     keyframes = [model.key(key).name for key in range(model.nkey)]
     if not keyframes:
         return None
@@ -172,7 +173,7 @@ def _start_key(model: Any) -> int | None:
 
 
 def _start_configuration(model: Any, robot: RobotModel) -> tuple[FloatArray, str]:
-    """Return qpos (nq,) of the start keyframe, else of the middle of the ranges; and its description."""
+    """Return qpos (nq,) of the start keyframe, else of the middle of the joints' ranges; and its description."""
     start: FloatArray
     key = _start_key(model)
     if key is not None:
@@ -197,7 +198,7 @@ def _start_velocities(model: Any, robot: RobotModel) -> FloatArray:
 
 
 def _finite(model: Any, key: int, part: str) -> FloatArray:
-    """Return a copy of a keyframe's `part`, qpos or qvel; ConfigurationError if not finite."""
+    """Return a copy of a keyframe's `part`, qpos or qvel; ConfigurationError if it is not finite."""
     values: FloatArray = getattr(model, f"key_{part}")[key].copy()
     if not np.isfinite(values).all():
         raise ConfigurationError(f"model: keyframe {model.key(key).name!r} holds NaN or infinity; valid: finite {part}")
@@ -205,7 +206,7 @@ def _finite(model: Any, key: int, part: str) -> FloatArray:
 
 
 def _objects(model: Any, robot: RobotModel) -> tuple[tuple[SceneObject, ...], tuple[str, ...]]:
-    """Return the colliding objects other than the robot, by their first geom, and the shared names."""
+    """Return the colliding objects other than the robot, in the order of their first geoms, and the shared names."""
     geoms_of: dict[str, list[int]] = {}
     parts_of: dict[str, set[tuple[str, int]]] = {}
     for geom in range(model.ngeom):
@@ -222,7 +223,7 @@ def _objects(model: Any, robot: RobotModel) -> tuple[tuple[SceneObject, ...], tu
 
 
 def _attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatArray) -> None:
-    """Attach the scene below the tool's start, at the base's height, turned towards the tool."""
+    """Attach the built-in scene below the tool's start position, at the base's height, turned towards the tool."""
     data = mujoco.MjData(model)
     data.qpos[:] = start
     mujoco.mj_kinematics(model, data)

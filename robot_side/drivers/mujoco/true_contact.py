@@ -1,4 +1,4 @@
-"""True contacts of the gripper and a held object: onset, closing speed and free gap; for experiments alone."""
+"""True contacts of the gripper and a held object: onset, closing speed and free gap; only for experiments."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -18,18 +18,19 @@ _MOST_STEPS = 200
 
 @dataclass(frozen=True)
 class ContactOnset:
-    """Onset of a contact."""
+    """Beginning of a contact."""
 
     thing: str
-    """Name of the object"""
+    """Name of the object that is touched"""
     gripper_part: str
-    """Geom of the gripper or of the held object"""
+    """Name of the geom, of the gripper or of the held object, that touches it"""
     closing_speed_m_s: float
-    """Closing speed of the two points along the contact's normal, before the physics step that detected the contact"""
+    """Closing speed of the touching points along the contact's normal, before the physics step that
+    found the contact"""
 
 
 class TrueContact:
-    """Observer of a scene's contacts from turn to turn; it changes nothing."""
+    """Observer of a scene's contacts from turn to turn; it does not change the simulation."""
 
     def __init__(self, scene: Scene, *, supports: bool = True) -> None:
         """supports: whether contacts with supports count."""
@@ -51,9 +52,9 @@ class TrueContact:
         self._remember()
 
     def update(self, held: str | None) -> ContactOnset | None:
-        """Return the fastest new contact of the steps since the last call; None without one.
+        """Return the new contact with the greatest closing speed since the last call; None without a new contact.
 
-        held: object that the gripper holds, which counts as a part of it.
+        held: object that the gripper holds, which counts as a part of the gripper.
         """
         if self._data.time == self._seen_s:
             return None
@@ -68,7 +69,7 @@ class TrueContact:
         return max(found, key=lambda onset: onset.closing_speed_m_s, default=None)
 
     def approach(self) -> tuple[FloatArray, float]:
-        """Return the tool's approach axis (3,), unit, in the world frame, and its true speed along the axis in m/s."""
+        """Return the tool's approach axis, a unit vector (3,) in the world, and its true speed along it in m/s."""
         site = self._scene.robot.site
         axis: FloatArray = self._data.site_xmat[site].reshape(3, 3)[:, 2].copy()
         twist: FloatArray = np.zeros(6)
@@ -77,7 +78,7 @@ class TrueContact:
 
     @property
     def touched(self) -> frozenset[str]:
-        """Objects that the gripper, or the held object, touched at the last `update`"""
+        """Objects that the gripper or the held object touched at the last `update`"""
         return self._touched
 
     def gap_m(self, held: str | None, farthest_m: float = 1.0) -> float:
@@ -86,7 +87,7 @@ class TrueContact:
         return least_distance(self._model, self._data, mine, theirs, farthest_m)
 
     def way_left_m(self, direction: FloatArray, held: str | None, farthest_m: float = 1.0) -> float:
-        """Return `contact_distance` of the gripper, with `held`, along the unit vector `direction` (3,)."""
+        """Return the `contact_distance` of the gripper, with the object `held`, along the unit vector `direction`."""
         model, thought = self._model, self._thought
         thought.qpos[:] = self._data.qpos
         mujoco.mj_kinematics(model, thought)
@@ -99,7 +100,7 @@ class TrueContact:
         return np.array([*self._gripper, *carried], dtype=np.int64), np.array(others, dtype=np.int64)
 
     def _geoms_of(self, held: str | None) -> BoolArray:
-        """Return whether each geom is the gripper's or the held object's."""
+        """Return whether each geom belongs to the gripper or to the held object."""
         ours = np.zeros(self._model.ngeom, dtype=bool)
         ours[[*self._gripper, *(geom for geom, name in self._object_of.items() if name == held)]] = True
         return ours
@@ -113,7 +114,7 @@ class TrueContact:
         return [pair for row in rows if (pair := self._pair(contacts[row], held)) is not None]
 
     def _pair(self, contact: Any, held: str | None) -> tuple[Any, int, int, float] | None:
-        """Return contact, gripper's geom, other geom, and the sign that directs the normal to the other; or None."""
+        """Return contact, our geom, other geom, and the sign that turns the normal to the other; None if not ours."""
         first, second = (int(geom) for geom in contact.geom)
         for mine, theirs, sign in ((first, second, 1.0), (second, first, -1.0)):
             thing = self._object_of.get(theirs)
@@ -137,7 +138,7 @@ class TrueContact:
         return onsets
 
     def _velocity(self, geom: int, point_m: FloatArray) -> FloatArray:
-        """Return the velocity (3,) of a geom's body at `point_m` (3,), before the last step, world frame, in m/s."""
+        """Return the velocity (3,) of a geom's body at `point_m` (3,) before the last step, world frame, in m/s."""
         body = int(self._model.geom_bodyid[geom])
         twist: FloatArray = np.zeros(6)
         mujoco.mj_objectVelocity(self._model, self._before, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 0)
@@ -156,7 +157,8 @@ def contact_distance(
 ) -> float:
     """Return the distance that geoms `mine` can move along `direction` (3,) until contact with `theirs`.
 
-    The distance is at most `farthest_m`. Moves `mine` in `data`, whose kinematics must be up to date: pass a copy.
+    The distance is at most `farthest_m`. This moves `mine` in `data`, so pass a copy; its kinematics must be up to
+    date.
     """
     start = data.geom_xpos[mine].copy()
     moved_m, ends = 0.0, np.zeros(6)

@@ -1,1 +1,1 @@
-"""Arms and perceived objects of separate programs: MessagePack over a port (docs/drivers.md)."""
+"""Arms and perceived objects that come from separate programs: MessagePack over a port (docs/drivers.md)."""

@@ -1,4 +1,4 @@
-"""Arm whose driver is a separate process, in any language."""
+"""Arm whose driver is a separate process, written in any language."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol
@@ -10,19 +10,22 @@ from robot_side.drivers.remote.driver_session import ArmShape, DriverSession
 
 
 class Wire(Protocol):
-    """Port to a driver's program."""
+    """Port over which messages of a driver's program arrive and leave."""
 
     def receive(self) -> Sequence[tuple[bytes, bytes, float]]:
-        """Return the arrived messages: (peer, payload, time of reading from the socket)."""
+        """Return the messages that have arrived: (peer, payload, time of reading from the socket)."""
         ...
 
     def send(self, peer: bytes, payload: bytes) -> bool:
-        """Send at once or not at all."""
+        """Send the payload at once or not at all; return whether it was sent."""
         ...
 
 
 class RemoteArm(Arm):
-    """Arm by a driver's states and commands. `time_s` of a state is the earliest possible time of measurement."""
+    """Arm that is a driver's states and commands.
+
+    A state's `time_s` is the earliest possible time of its measurement.
+    """
 
     joint_count = 0
 
@@ -37,22 +40,23 @@ class RemoteArm(Arm):
         self._now_s = 0.0
 
     def command(self, joint_velocity_rad_s: FloatArray, valid_until_s: float) -> None:
-        """Follow `joint_velocity_rad_s` (n,) until `valid_until_s`; it leaves with the gripper's command.
+        """Follow `joint_velocity_rad_s` (n,) until `valid_until_s`; it is sent with the gripper's next command.
 
-        ValueError for a wrong shape or a value that is not finite; then nothing is applied.
+        ValueError for a wrong shape or a value that is not finite; nothing of such a command is applied.
         """
         self.session.command(joint_velocity_rad_s, valid_until_s)
 
     def command_gripper(self, closing: float, valid_until_s: float) -> None:
-        """Close (+1), hold (0) or open (-1) at that share of the gripper's speed until `valid_until_s`; send both.
+        """Move the gripper until `valid_until_s`, and send this and the arm's command.
 
-        ValueError for a value outside [-1, 1] or a time that is not finite.
+        closing: share of the gripper's full speed, +1 closes, 0 holds, -1 opens. ValueError for a value outside [-1, 1]
+        or a time that is not finite.
         """
         self.session.command_gripper(closing, valid_until_s)
         self._send()
 
     def exchange(self, now_s: float) -> bool:
-        """Take the driver's messages until `now_s`; return whether there has been a state."""
+        """Take the driver's messages that have arrived; return whether there has ever been a state."""
         session, self._now_s = self.session, now_s
         for message in self._wire.receive():
             session.receive(*message)
@@ -65,13 +69,13 @@ class RemoteArm(Arm):
         return session.state is not None
 
     def begin(self, now_s: float) -> bool:
-        """Exchange before the first tick, with the command to stand still; return whether there has been a state."""
+        """Take messages before the first tick, and command to stand still; return whether there has been a state."""
         ready = self.exchange(now_s)
         self._send()
         return ready
 
     def state(self, now_s: float) -> ArmState:
-        """Return the newest state that has arrived by `now_s`, of any age; FeelaheadError before the first."""
+        """Return the newest state that has arrived by `now_s`, however old; FeelaheadError before the first state."""
         self.exchange(now_s)
         if self.session.state is None:
             raise FeelaheadError("the driver has not sent a state yet")

@@ -1,4 +1,4 @@
-"""Ports of --arm and --objects, and the wait for the first messages over them."""
+"""Ports of the settings --arm and --objects, and the wait for the first messages over these."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -19,7 +19,7 @@ _AWAITED: Final = {"--arm": "an arm's driver", "--objects": "a process that perc
 
 
 class ConnectedDrivers:
-    """Connected programs by the settings: the arm's driver and the perception process."""
+    """Programs that connect: the arm's driver and the perception process, if the settings name a port for them."""
 
     def __init__(
         self,
@@ -30,7 +30,7 @@ class ConnectedDrivers:
         insecure: bool = False,
         keys: RobotKeys | None = None,
     ) -> None:
-        """Bind at once; ConfigurationError as for DriverPort. note: called with lines for a person."""
+        """Bind the ports at once; ConfigurationError as for DriverPort. note: called with lines that people read."""
         self._note = note
         with ExitStack() as opened:
             ports = [
@@ -52,18 +52,18 @@ class ConnectedDrivers:
         return "--arm" in self._ports
 
     def arm(self, shape: ArmShape, show: Callable[[ArmState], None]) -> RemoteArm:
-        """Return the arm of --arm; arguments as for RemoteArm."""
+        """Return the arm whose driver connects at --arm; arguments as for RemoteArm."""
         self._arm = RemoteArm(self._ports["--arm"], shape, show, self._note)
         return self._arm
 
     def objects(self, roles: dict[str, Role], sd_m: float) -> RemoteObjects | None:
-        """Return the objects of --objects; None without it."""
+        """Return the source of objects that connects at --objects; None without --objects."""
         if (port := self._ports.get("--objects")) is not None:
             self._objects = RemoteObjects(port, roles, sd_m, self._note)
         return self._objects
 
     def wait(self) -> None:
-        """Wait for the arm's first state and the first objects, without a limit: a signal ends the wait."""
+        """Wait for the arm's first state and the first objects, however long; a signal ends the wait."""
         begin = {
             flag: part.begin if isinstance(part, RemoteArm) else part.exchange
             for flag, part in (("--arm", self._arm), ("--objects", self._objects))
@@ -81,7 +81,7 @@ class ConnectedDrivers:
             self._ports[waiting[0]].wait(_TURN_S)
 
     def summary(self) -> dict[str, Any]:
-        """Return the counts of accepted and rejected messages by port; None for a port that is not used."""
+        """Return the numbers of accepted and rejected messages of each port; None for a port that is not used."""
         arm = None if self._arm is None else self._arm.session.summary()
         return {"arm": arm, "objects": None if self._objects is None else self._objects.summary()}
 

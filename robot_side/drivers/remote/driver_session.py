@@ -1,4 +1,4 @@
-"""Session with the arm's driver: states in, commands out, without I/O."""
+"""Session with the arm's driver, without I/O: states come in, commands go out."""
 
 import math
 from collections import Counter
@@ -25,8 +25,10 @@ _ROUNDING: Final = 1e-15
 
 
 class DriverClock:
-    """Bounds of the driver's clock minus ours, from stamps: a message is sent before it arrives, and read before its
-    echo is sent. So a state never counts as younger than it can be, and a time to stop is never sent too late.
+    """Bounds of the driver's clock minus ours, computed from stamps.
+
+    A message is sent before it arrives, and read before its echo is sent. With these bounds a state never counts as
+    younger than it can be, and a time to stop is never too late.
     """
 
     def __init__(self) -> None:
@@ -34,9 +36,9 @@ class DriverClock:
         self._at_s = 0.0
 
     def take(self, sent_s: float, received_s: float, echoed: tuple[float, float] | None) -> bool:
-        """Take a message; False for stamps that contradict earlier ones: a clock has jumped, or they are false.
+        """Take a message's stamps; False if they contradict earlier stamps, because a clock jumped or a stamp is false.
 
-        echoed: our stamp, and the time for which the driver held the stamp.
+        echoed: our stamp that the message echoes, and the time for which the driver held it.
         """
         self._at_s, margin_s = max(self._at_s, received_s), _ROUNDING * (abs(sent_s) + abs(received_s))
         self._interval.advance(received_s)
@@ -48,60 +50,60 @@ class DriverClock:
 
     @property
     def known(self) -> bool:
-        """Whether both bounds are known"""
+        """Whether both bounds of the clock's offset are known"""
         least_s, greatest_s = self._interval.at(self._at_s)
         return greatest_s - least_s < float("inf")
 
     def ours_s(self, driver_s: float) -> float:
-        """Return the earliest time of `driver_s` on our clock; minus infinity before the first echo."""
+        """Return the earliest possible time of `driver_s` on our clock; minus infinity before the first echo."""
         return driver_s - self._interval.at(self._at_s)[1]
 
     def drivers_s(self, our_s: float) -> float:
-        """Return the earliest time of `our_s` on the driver's clock."""
+        """Return the earliest possible time of `our_s` on the driver's clock."""
         return our_s + self._interval.at(self._at_s)[0]
 
 
 SILENT_S: Final = 0.1
-"""Silence after which a driver is lost, in seconds."""
+"""Silence, in seconds, after which a driver is lost"""
 COMMAND_PERIOD_S: Final = 0.004
-"""Least period of commands, in seconds; a command that stops the arm leaves at once."""
+"""Minimum period of commands, in seconds; a command that stops the arm leaves at once."""
 _REFUSAL_PERIOD_S: Final = 1.0
 _NEWS_PERIOD_S: Final = 1.0
-"""Least period of notes about a driver's connection, in seconds."""
+"""Minimum period of notes about a driver's connection, in seconds"""
 _DECODER: Final = msgspec.msgpack.Decoder(DriverState)
 
 _UNANSWERED: Final = 250
-"""Commands without an echo, those of a second, after which the driver counts as not echoing."""
+"""Number of commands without an echo, as many as in a second, after which the driver counts as not echoing"""
 
 Why = Literal["second", "version", "malformed", "joints", "order", "echo", "clock"]
 
 
 class ArmShape(NamedTuple):
-    """Joints of every state, and the gripper of states without one."""
+    """Names of the joints in every state, and the gripper's values for states that lack them."""
 
     joint_names: tuple[str, ...]
     finger_names: tuple[str, ...]
     open_fingers: FloatArray
-    """(f,) positions of an open gripper"""
+    """(f,) positions of the open gripper's joints"""
     opening_m: float
-    """Free gap of the open gripper; 0 without a gripper"""
+    """Free gap of the open gripper, in m; 0 without a gripper"""
 
 
 class _LastCommand(NamedTuple):
-    """Last command of the arm."""
+    """Last command to the arm."""
 
     velocities: tuple[float, ...]
     until_s: float
 
 
 class DriverSession:
-    """Session with one driver at a time: the first that sends, until it is silent."""
+    """Session with one driver at a time: the first that sends, until it falls silent."""
 
     def __init__(self, shape: ArmShape) -> None:
         self.state: ArmState | None = None
-        """Newest state; None before the first of known age"""
+        """Newest state; None before the first state whose age is known"""
         self.rejected: Counter[Why] = Counter()
-        """Counts of rejected states by reason; a state is rejected as a whole"""
+        """Number of rejected states by reason; a state is rejected as a whole."""
         self.accepted = 0
         self._shape = shape
         self._peer: bytes | None = None
@@ -122,11 +124,11 @@ class DriverSession:
 
     @property
     def present(self) -> bool:
-        """Whether there is a driver"""
+        """Whether a driver is connected"""
         return self._peer is not None
 
     def receive(self, peer: bytes, payload: bytes, received_s: float) -> None:
-        """Take one message; an invalid one is rejected as a whole, counted and reported."""
+        """Take one message; an invalid message is rejected as a whole, counted and reported."""
         if self._peer not in (None, peer):
             self._reject("second", "a second driver, while the first one goes on", peer, received_s)
             return
@@ -143,7 +145,7 @@ class DriverSession:
             self._take(peer, said, received_s)
 
     def expire(self, now_s: float) -> None:
-        """Drop a silent driver, so that another may connect; to be called after `receive` of all arrived messages."""
+        """Forget a silent driver, so that another may connect; call this after `receive` of all arrived messages."""
         if self._peer is not None and now_s - self._heard_s > SILENT_S:
             self._peer = None
         if self.present is not self._told_present and now_s - self._told_s >= _NEWS_PERIOD_S:
@@ -152,7 +154,10 @@ class DriverSession:
             self._notes.append("driver: connected" if self.present else gone)
 
     def command(self, velocities_rad_s: FloatArray, until_s: float) -> None:
-        """Store the arm's command until `until_s`, on our clock, for `outgoing`. ValueError as for `Arm.command`."""
+        """Store the arm's command for `outgoing`; until_s: when it expires, on our clock.
+
+        ValueError as for `Arm.command`.
+        """
         velocities = tuple(velocities_rad_s.tolist())
         if velocities_rad_s.shape != (len(self._shape.joint_names),) or not all(map(math.isfinite, velocities)):
             raise ValueError(
@@ -163,13 +168,13 @@ class DriverSession:
         self._last_command = _LastCommand(velocities, until_s)
 
     def command_gripper(self, closing: float, until_s: float) -> None:
-        """Store the gripper's command until `until_s`. ValueError as for `Arm.command_gripper`."""
+        """Store the gripper's command, which expires at `until_s`. ValueError as for `Arm.command_gripper`."""
         if not (-1.0 <= closing <= 1.0 and math.isfinite(until_s)):
             raise ValueError(f"closing = {closing} until {until_s}; valid: -1 to 1, and a finite time")
         self._closing = closing, until_s
 
     def outgoing(self, now_s: float) -> list[tuple[bytes, bytes]]:
-        """Return the messages that must leave now: (peer, payload)."""
+        """Return the messages that must leave at `now_s`: (peer, payload)."""
         leaving, self._outgoing = self._outgoing, []
         closing = self._closing[0] if self._closing[1] > now_s else 0.0
         moves = (any(self._last_command.velocities) and self._last_command.until_s > now_s) or closing != 0.0
@@ -184,16 +189,16 @@ class DriverSession:
         return leaving
 
     def take_notes(self) -> list[str]:
-        """Return the notes since the last call, a line each."""
+        """Return the notes made since the last call, one line each."""
         notes, self._notes = self._notes, []
         return notes
 
     def summary(self) -> dict[str, int]:
-        """Return the counts of accepted states, and of rejected ones by reason."""
+        """Return the number of accepted states, and of rejected states by reason."""
         return {"accepted": self.accepted} | {str(why): count for why, count in self.rejected.items()}
 
     def _require_fitting(self, said: DriverState) -> None:
-        """Raise ValueError for other joints than the model's, RemoteProtocolError for a measurement after sending."""
+        """Raise ValueError for joints other than the model's, RemoteProtocolError if `measured_s` is after `sent_s`."""
         for name, values, names in (
             ("joint_positions", said.joint_positions, self._shape.joint_names),
             ("joint_velocities", said.joint_velocities, self._shape.joint_names),
@@ -243,14 +248,14 @@ class DriverSession:
         )
 
     def _begin(self, sequence: int) -> None:
-        """Begin with a new driver, whose first message has the number `sequence`."""
+        """Begin with a new driver; sequence: number of its first message."""
         self._clock, self._sequence, self._sent_before = DriverClock(), sequence - 1, self._sent
 
     def _reject(self, why: Why, text: str, peer: bytes, now_s: float) -> None:
         self.rejected[why] += 1
         if why not in self._said:
             self._said.add(why)
-            self._notes.append(f"driver: refused whole, and counted from now on: {text}")
+            self._notes.append(f"driver: a message was refused as a whole; more of this kind are only counted: {text}")
         if now_s - self._refused_s >= _REFUSAL_PERIOD_S:
             self._refused_s = now_s
             self._outgoing.append((peer, encode(Refusal(DRIVER_VERSION, text))))

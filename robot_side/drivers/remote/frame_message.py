@@ -1,4 +1,4 @@
-"""Message of a perception process to the robot side (docs/drivers.md), and its conversion to a frame."""
+"""Message of a perception process to the robot side (docs/drivers.md), and its conversion to a frame of objects."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -19,7 +19,7 @@ FRAME_LIMIT_BYTES: Final = 1024 * 1024
 MOST_OBJECTS: Final = 512
 _MOST_TETRAHEDRA: Final = 1024
 _UNIT: Final = 0.01
-"""Largest deviation of a quaternion's length from 1."""
+"""Largest deviation of a quaternion's length from 1 that is accepted"""
 
 _Coordinate = Annotated[float, Meta(ge=-1e3, le=1e3)]
 _Size = Annotated[float, Meta(gt=0.0, le=1e3)]
@@ -32,39 +32,39 @@ SHAPES: Final = ("sphere", "box", "ellipsoid", "half_space", "tetrahedra")
 
 
 class SeenObject(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Object: a name, a pose, and exactly one shape."""
+    """Perceived object: a name, a pose, and exactly one shape."""
 
     name: Annotated[str, Meta(min_length=1, max_length=100)]
     role: Role | None = None
-    """Role; None: by the beginning of the name"""
+    """Role of the object; None: the role that the beginning of its name tells"""
     position_m: _Three = (0.0, 0.0, 0.0)
     quaternion: tuple[_Coordinate, _Coordinate, _Coordinate, _Coordinate] = (1.0, 0.0, 0.0, 0.0)
-    """Orientation, object to world, w first"""
+    """Orientation: quaternion from the object's frame to the world, w first"""
     velocity_m_s: _Three = (0.0, 0.0, 0.0)
     mean_m: _Three = (0.0, 0.0, 0.0)
-    """Mean error of the position, true minus perceived"""
+    """Mean error of the position in m, true minus perceived, per axis"""
     sd_m: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
-    """Standard deviation of the position, per axis"""
+    """Standard deviation of the position's error along each axis, in m"""
     sphere: _Size | None = None
-    """Radius"""
+    """Radius of a sphere, in m"""
     box: _Sizes | None = None
-    """Half sizes"""
+    """Half sizes of a box, in m"""
     ellipsoid: _Sizes | None = None
-    """Half axes"""
+    """Half axes of an ellipsoid, in m"""
     half_space: bool = False
-    """Solid where z <= 0 in the object's frame"""
+    """Whether the shape is a half-space, solid where z <= 0 in the object's frame"""
     tetrahedra: Annotated[tuple[_Tetrahedron, ...], Meta(min_length=1, max_length=_MOST_TETRAHEDRA)] | None = None
-    """Four corners each, in the object's frame"""
+    """Four corners of each tetrahedron, in m in the object's frame"""
 
 
 class ObjectFrame(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """All present objects; times are by the sender's clock."""
+    """Frame of all objects that are present; its times are on the sender's clock."""
 
     version: int
     sequence: Annotated[int, Meta(ge=0, le=2**53)]
     sent_s: Finite
     taken_s: Finite
-    """Time of the camera's picture, no later than `sent_s`"""
+    """Time at which the camera took the picture, no later than `sent_s`"""
     objects: Annotated[tuple[SeenObject, ...], Meta(max_length=MOST_OBJECTS)]
 
 
@@ -72,13 +72,13 @@ FRAME_DECODER: Final = msgspec.msgpack.Decoder(ObjectFrame)
 
 
 def require_possible(frame: ObjectFrame) -> None:
-    """Raise ValueError for a repeated name, no shape or several, an invalid quaternion, or `taken_s` after `sent_s`."""
+    """Raise ValueError for a repeated name, no or several shapes, a wrong quaternion, or `taken_s` after `sent_s`."""
     if frame.taken_s > frame.sent_s:
         raise ValueError(f"taken_s = {frame.taken_s} after sent_s = {frame.sent_s}; valid: before")
     names = [thing.name for thing in frame.objects]
     for thing in frame.objects:
         if names.count(thing.name) > 1:
-            raise ValueError(f"{thing.name!r} is there {names.count(thing.name)} times; valid: once")
+            raise ValueError(f"{thing.name!r} occurs {names.count(thing.name)} times; valid: once")
         shapes = sum(bool(getattr(thing, shape)) for shape in SHAPES)
         if shapes != 1:
             raise ValueError(f"{thing.name!r} has {shapes} shapes; valid: 1 of {', '.join(SHAPES)}")
@@ -87,7 +87,7 @@ def require_possible(frame: ObjectFrame) -> None:
 
 
 def perceived(things: Sequence[SeenObject], roles: Sequence[Role], time_s: float) -> PerceivedObjects:
-    """Return a frame of these valid objects in these roles."""
+    """Return a frame with these objects, which must be valid, in these roles."""
     quaternions = np.array([thing.quaternion for thing in things]).reshape(-1, 4)
     turned = Rotation.from_quat(quaternions, scalar_first=True).as_matrix() if things else np.empty((0, 3, 3))
     # The known mean error is corrected.
@@ -115,7 +115,7 @@ def perceived(things: Sequence[SeenObject], roles: Sequence[Role], time_s: float
 
 
 def _primitives(thing: SeenObject, position: FloatArray, turned: FloatArray) -> tuple[str, list[dict[str, Any]]]:
-    """Return the kind of the object's shape, and the array values of each primitive."""
+    """Return the kind of the object's shape, and the values of the frame's arrays for each of its primitives."""
     if thing.sphere is not None:
         return "sphere", [{"sphere_centers_m": position, "sphere_radii_m": thing.sphere}]
     if thing.tetrahedra is not None:

@@ -16,55 +16,55 @@ MOST_JOINTS: Final = 64
 _Count = Annotated[int, Meta(ge=0, le=2**53)]
 _Duration = Annotated[float, Meta(ge=0.0, lt=1e6)]
 _Stamp = Annotated[float, Meta(ge=-1e12, le=1e12)]
-"""Time in s; beyond the limits a double no longer resolves milliseconds"""
+"""Time in s; beyond these limits a double no longer resolves milliseconds."""
 _Opening = Annotated[float, Meta(ge=0.0, le=1.0)]
-"""Free gap in m"""
+"""Free gap between the fingers, in m"""
 _Value = Annotated[float, Meta(ge=-1e6, le=1e6)]
 _Values = Annotated[tuple[_Value, ...], Meta(max_length=MOST_JOINTS)]
 Message = TypeVar("Message", bound=Struct)
 
 
 class DriverState(Struct, frozen=True, forbid_unknown_fields=True):
-    """State of the arm by its driver; times are by the driver's clock."""
+    """State of the arm as its driver measured it; times are on the driver's clock."""
 
     version: int
     sequence: _Count
     """Number that rises with every message of a connection"""
     sent_s: _Stamp
     measured_s: _Stamp
-    """No later than `sent_s`"""
+    """Time of the measurement, no later than `sent_s`"""
     joint_positions: _Values
-    """(n,) in the model's order; rad, or m for a prismatic joint"""
+    """(n,) positions in the model's order, in rad, or in m for a prismatic joint"""
     joint_velocities: _Values
-    """(n,) in rad/s or m/s"""
+    """(n,) velocities, in rad/s or m/s"""
     echo_s: _Stamp | None = None
     """`sent_s` of the newest command that the driver has read; None before the first"""
     held_s: _Duration = 0.0
-    """Time between reading that command and `sent_s`"""
+    """Time between reading that command and sending this message, in s"""
     finger_positions: _Values | None = None
-    """(f,) of the joints beyond the tool's, in the model's order"""
+    """(f,) positions of the joints beyond the tool's, in the model's order"""
     opening_m: _Opening | None = None
     holding: bool = False
     joint_loads: _Values | None = None
-    """(n,) N m, or N: torques or forces of the carried load"""
+    """(n,) torques in N m, or forces in N, from the carried load"""
 
 
 class DriverCommand(Struct, frozen=True):
-    """Command for the driver's arm."""
+    """Command to the driver's arm."""
 
     version: int
     sequence: int
     sent_s: float
-    """Time on the robot side's clock, to be echoed"""
+    """Time of sending on the robot side's clock, which the driver echoes"""
     joint_velocities: tuple[float, ...]
     closing: float
-    """1 closes and -1 opens the gripper at full speed, 0 holds it"""
+    """Share of the gripper's full speed: 1 closes, -1 opens, 0 holds"""
     valid_until_s: float
-    """Time on the driver's clock at which the arm stops, unless there is a newer command"""
+    """Time on the driver's clock at which the arm stops, unless a newer command has come"""
 
 
 class Refusal(Struct, frozen=True):
-    """Reason for which the sender's last message was rejected."""
+    """Reason why the last message of the program that receives this was rejected."""
 
     version: int
     refused: str
@@ -83,7 +83,7 @@ def encode(message: DriverCommand | Refusal) -> bytes:
 def decoded(payload: bytes, decoder: "msgspec.msgpack.Decoder[Message]", version: int) -> Message:
     """Unpack and validate a message; RemoteProtocolError names an invalid field.
 
-    OtherVersionError, a subclass, for a map of another version.
+    OtherVersionError, a subclass of it, for a message of another version.
     """
     try:
         message = decoder.decode(payload)
@@ -96,7 +96,7 @@ def decoded(payload: bytes, decoder: "msgspec.msgpack.Decoder[Message]", version
 
 
 def _require_version(payload: bytes, version: int) -> None:
-    """Raise OtherVersionError for a map of another version, with any other content."""
+    """Raise OtherVersionError if the payload is a map of another version, whatever else the map holds."""
     try:
         said = _VERSION.decode(payload).get("version")
     except _BAD_BYTES:

@@ -1,4 +1,4 @@
-"""Perceived objects of a separate process, in any language."""
+"""Perceived objects from a separate process, written in any language."""
 
 import math
 from collections import Counter
@@ -23,19 +23,19 @@ from robot_side.surroundings.roles import role_from_name
 from robot_side.surroundings.validity import require_valid
 
 OLD_S: Final = 0.5
-"""Age of the newest frame, in seconds, above which a note is made. The frame stays valid: nobody feels less for it."""
+"""Age of the newest frame, in seconds, above which a note is made. The frame stays valid, so triggers stay stiff."""
 _REFUSAL_PERIOD_S: Final = 1.0
 
 Why = Literal["second", "version", "malformed", "order"]
 
 
 class RemoteObjects:
-    """ObjectSource of the newest valid frame, from one sender at a time."""
+    """Source of perceived objects: the newest valid frame, from one sender at a time."""
 
     def __init__(self, wire: Wire, roles: Mapping[str, Role], sd_m: float, note: Callable[[str], None]) -> None:
-        """roles: by name, before those of frames. sd_m: σ_c that the law uses. note: called with each fault."""
+        """roles: by name, before those in frames. sd_m: σ_c that the law uses. note: called with each fault's line."""
         self.rejected: Counter[Why] = Counter()
-        """Counts of rejected frames by reason; a frame is rejected as a whole"""
+        """Number of rejected frames by reason; a frame is rejected as a whole."""
         self.accepted = 0
         self._wire, self._roles, self._sd_m, self._note = wire, dict(roles), sd_m, note
         self._peer: bytes | None = None
@@ -47,7 +47,7 @@ class RemoteObjects:
         self._is_old = False
 
     def perceive(self, now_s: float) -> PerceivedObjects:
-        """Return the newest frame at `now_s`; FeelaheadError before the first."""
+        """Return the newest frame at `now_s`; FeelaheadError before the first frame."""
         if not self.exchange(now_s) or self._frame is None:
             raise FeelaheadError("no objects have been perceived yet")
         return self._frame
@@ -57,7 +57,7 @@ class RemoteObjects:
         self._roles[name] = role
 
     def exchange(self, now_s: float) -> bool:
-        """Take the arrived frames; return whether there has been one."""
+        """Take the frames that have arrived; return whether there has ever been one."""
         newest = {peer: (payload, received_s) for peer, payload, received_s in self._wire.receive()}
         for peer, (payload, received_s) in newest.items():
             self._receive(peer, payload, received_s)
@@ -65,11 +65,11 @@ class RemoteObjects:
         if old is not self._is_old:
             self._is_old = old
             age = f"the newest frame is {now_s - self._taken_s:.1f} s old; its objects stay valid"
-            self._note(f"objects: {age if old else 'frames come again'}")
+            self._note(f"objects: {age if old else 'frames arrive again'}")
         return self._frame is not None
 
     def summary(self) -> dict[str, int]:
-        """Return the counts of accepted frames, and of rejected ones by reason."""
+        """Return the number of accepted frames, and of rejected frames by reason."""
         return {"accepted": self.accepted} | {str(why): count for why, count in self.rejected.items()}
 
     def _receive(self, peer: bytes, payload: bytes, received_s: float) -> None:
@@ -92,7 +92,7 @@ class RemoteObjects:
             self._peer, self._sequence, self._heard_s = peer, frame.sequence, received_s
 
     def _take(self, frame: ObjectFrame, received_s: float) -> None:
-        """Take a frame; ValueError for an invalid one."""
+        """Take a frame; ValueError if it is invalid."""
         require_possible(frame)
         # An object keeps its index; a missing one has no shape but keeps its name, as it may be held.
         known = self._known | {thing.name: thing for thing in frame.objects}
@@ -121,7 +121,7 @@ class RemoteObjects:
 
     def _reject(self, why: Why, text: str, peer: bytes, now_s: float) -> None:
         self.rejected[why] += 1
-        self._report_once(why, f"objects: refused whole, and counted from now on: {text}")
+        self._report_once(why, f"objects: a frame was refused as a whole; more of this kind are only counted: {text}")
         if now_s - self._refused_s >= _REFUSAL_PERIOD_S:
             self._refused_s = now_s
             self._wire.send(peer, encode(Refusal(FRAME_VERSION, text)))

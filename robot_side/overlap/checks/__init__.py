@@ -1,1 +1,1 @@
-"""Requirements of the public functions on their arguments."""
+"""Checks of the arguments of the public overlap functions."""

@@ -9,18 +9,18 @@ import numpy.typing as npt
 from common.arrays import BoolArray, FloatArray
 
 LARGEST = 1e50
-"""Largest magnitude of any coordinate or length, in m: products of six such numbers stay finite."""
+"""Largest magnitude of any coordinate or length, in m, so that products of six such numbers stay finite"""
 
 SMALLEST_NORMAL = 1e-50
-"""Least length of the normal of a half-space"""
+"""Smallest valid length of a half-space's normal"""
 
 ORTHONORMALITY = 1e-6
-"""Largest Frobenius norm of QᵀQ - I of a rotation Q"""
+"""Largest valid Frobenius norm of QᵀQ - I for a rotation matrix Q"""
 
 
 @dataclass(frozen=True)
 class Argument:
-    """Checked argument: every row of the last `trailing` dimensions is one item."""
+    """Checked argument: an array whose last dimensions `trailing` are those of one item, such as (3,) of a centre."""
 
     name: str
     values: FloatArray
@@ -28,16 +28,19 @@ class Argument:
 
     @property
     def leading(self) -> tuple[int, ...]:
-        """Dimensions that broadcast"""
+        """Dimensions before `trailing`, which broadcast with those of other arguments"""
         return self.values.shape[: self.values.ndim - len(self.trailing)]
 
     @property
     def items(self) -> FloatArray:
-        """Items in consecutive rows, (items, *trailing), contiguous"""
+        """All items in one contiguous array (number of items, *trailing)"""
         return np.ascontiguousarray(self.values).reshape(-1, *self.trailing)
 
     def refuse_any(self, wrong: BoolArray, shape: tuple[int, ...], what_is_valid: str) -> None:
-        """Raise a ValueError that names the first item or number that is wrong; `shape` is that of their array."""
+        """Raise a ValueError that names the first item or number that is wrong, unless none is.
+
+        wrong: a flag for each item or number. shape: their dimensions, from which the index in the message follows.
+        """
         if not wrong.any():
             return
         index = tuple(int(place) for place in np.unravel_index(wrong.argmax(), shape))
@@ -45,7 +48,7 @@ class Argument:
         raise ValueError(f"{label} = {self.values[index].tolist()} is out of range; valid: {what_is_valid}")
 
     def rows(self, shape: tuple[int, ...]) -> FloatArray:
-        """Return the items repeated to the leading dimensions `shape`, flattened to (items, *trailing), contiguous."""
+        """Return the items broadcast to the leading dimensions `shape`, in one contiguous array (items, *trailing)."""
         if self.leading == shape:
             return self.items
         repeated = np.broadcast_to(self.values, (*shape, *self.trailing))
@@ -53,7 +56,7 @@ class Argument:
 
 
 Check = Callable[[str, npt.ArrayLike, tuple[int, ...]], Argument]
-"""Check of an argument by name, value and last dimensions; ValueError if it fails"""
+"""Function (name, value, trailing dimensions) that checks an argument and returns it; ValueError for a wrong one"""
 
 _FLOAT64 = np.dtype(np.float64)
 
@@ -61,7 +64,10 @@ _FLOAT64 = np.dtype(np.float64)
 def plain_rows(
     values: Sequence[npt.ArrayLike], trailing: Sequence[tuple[int, ...]]
 ) -> tuple[list[FloatArray], tuple[int, ...]] | None:
-    """Return the items of float64 arrays with equal leading dimensions, and these; None for any other arguments."""
+    """Return the items of each argument and the common leading dimensions, if nothing needs to be converted.
+
+    That is so for contiguous float64 arrays with equal leading dimensions. Return None for any other arguments.
+    """
     try:
         arrays = [np.asarray(value) for value in values]
     except ValueError:
@@ -76,17 +82,17 @@ def plain_rows(
 
 
 def numbers(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = ()) -> Argument:
-    """Return `value` as finite float64 with the last dimensions `trailing`, or raise a ValueError."""
+    """Return `value` as finite float64 numbers with the last dimensions `trailing`, or raise a ValueError."""
     return _within(name, value, trailing, -LARGEST, f"finite, magnitude at most {LARGEST:g}")
 
 
 def lengths(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = ()) -> Argument:
-    """Return `numbers` that are not negative, or raise a ValueError."""
+    """Return `value` as `numbers` does, or raise a ValueError if one is negative."""
     return _within(name, value, trailing, 0.0, f"finite, 0 to {LARGEST:g} m")
 
 
 def directions(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = (3,)) -> Argument:
-    """Return `numbers` (..., 3) of which no vector is 0, or raise a ValueError."""
+    """Return `value` (..., 3) as `numbers` does, or raise a ValueError if a vector is shorter than SMALLEST_NORMAL."""
     argument = numbers(name, value, trailing)
     short = np.hypot(np.hypot(*argument.items.T[:2]), argument.items[:, 2]) < SMALLEST_NORMAL
     argument.refuse_any(short, argument.leading, f"a vector of length {SMALLEST_NORMAL:g} or more")
@@ -94,7 +100,7 @@ def directions(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = (3,)
 
 
 def rotations(name: str, value: npt.ArrayLike, trailing: tuple[int, ...] = (3, 3)) -> Argument:
-    """Return `numbers` (..., 3, 3) of which every matrix is orthonormal, or raise a ValueError."""
+    """Return `value` (..., 3, 3) as `numbers` does, or raise a ValueError if a matrix is not orthonormal."""
     argument = numbers(name, value, trailing)
     excess = argument.items.swapaxes(1, 2) @ argument.items - np.eye(3)
     skewed = (excess * excess).sum(axis=(1, 2)) > ORTHONORMALITY**2

@@ -1,1 +1,1 @@
-"""Closed forms: ball, half-space, and the results that all solids share."""
+"""Closed forms of the overlap of a sphere with a ball or a half-space, and results that all solids share."""

@@ -12,10 +12,10 @@ from robot_side.overlap.digits.double_double import minus, plus, rounded, square
 def sphere_overlap(center: Vector, radius: float, other_center: Vector, other_radius: float) -> Overlap:
     """Return the overlap of the sphere (`center`, `radius`) with another one, a lens; all in m.
 
-    The volume of the lens is made of positive terms only. They come from three gaps, differences of lengths in
-    double-double: `overlap` between the surfaces that face each other, and the distances by which the smaller
-    sphere sticks out. So the volume is relatively accurate at every depth. Spheres that touch, inside or outside,
-    give the limit exactly. Two equal spheres at the same place count as the first within the second.
+    The lens's volume is a sum of positive terms only. They are computed from gaps between the surfaces, differences of
+    lengths in double-double: the depth `overlap`, and the distances by which the smaller sphere protrudes. So the
+    volume has a small relative error at every depth. Spheres that touch, inside or outside, give the limit exactly. Of
+    two equal spheres at the same place, the first counts as lying within the second.
     """
     x = two_sum(other_center[0], -center[0])
     y = two_sum(other_center[1], -center[1])

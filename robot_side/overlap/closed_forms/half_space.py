@@ -12,8 +12,8 @@ from robot_side.overlap.digits.double_double import divided, minus, multiple, pl
 def half_space_overlap(center: Vector, radius: float, normal: Vector, offset: float) -> Overlap:
     """Return the cap of the sphere (`center`, `radius`) within {x: normal·x <= offset}; lengths in m.
 
-    `normal` may have any length but 0. The result is relatively accurate at every depth: the distance of the plane
-    is a small difference of large products, hence double-double.
+    `normal` may have any length but 0. The result has a small relative error at every depth. The plane's distance is a
+    small difference of large products, so it is computed in double-double.
     """
     x, y, z = center
     a, b, c = normal
@@ -27,9 +27,10 @@ def half_space_overlap(center: Vector, radius: float, normal: Vector, offset: fl
 
 @inlined
 def cap(depth: float, rest: float, radius: float, normal: Vector) -> Overlap:
-    """Return the cap of height `depth` of a sphere; `rest` = 2 `radius` - `depth`. All in m and relatively accurate.
+    """Return the cap of height `depth` of a sphere; `rest` = 2 `radius` - `depth`. All are in m.
 
-    `normal` is the unit vector at the cap's flat side that points away from the solid.
+    `rest` is an argument because it keeps its relative accuracy where the cap is nearly the whole sphere. `normal` is
+    the unit vector across the cap's flat side, pointing out of the solid.
     """
     if depth <= 0.0 or radius == 0.0:
         return nothing()

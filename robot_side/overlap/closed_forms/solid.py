@@ -1,4 +1,4 @@
-"""Results of all scalar kernels: the trivial ones, and the sum over faces with its bounds."""
+"""Results that the overlap kernels share: nothing, a whole solid or sphere, and a sum over faces with its bounds."""
 
 import math
 
@@ -7,9 +7,9 @@ from robot_side.compiled.kernel import inlined
 from robot_side.compiled.vectors import Vector, negative
 
 Overlap = tuple[float, Vector, float]
-"""(V in m³, dV/dcentre in m², dV/dradius in m²)."""
+"""Overlap of one sphere and one solid: (V in m³, dV/dcentre in m², dV/dradius in m²)"""
 Overlaps = tuple[FloatArray, FloatArray, FloatArray]
-"""The overlaps of many pairs: (volumes (p,), gradients (p, 3), areas (p,))."""
+"""Overlaps of many pairs: (volumes (p,), gradients (p, 3), areas (p,)), in the same units"""
 
 
 @inlined
@@ -44,13 +44,13 @@ def sphere_area(radius: float) -> float:
 
 @inlined
 def from_faces(moment: float, push: Vector, covered: float, radius: float) -> Overlap:
-    """Return eq. 11 as a sum over the faces of a closed surface, with the gradients, without bounds.
+    """Return the overlap (eq. 11) with its derivatives from sums over the faces of a closed surface, without bounds.
 
-    `moment` is Σ h·A (m³), `push` Σ A·n (m²) and `covered` Σ S (m²). h is a face's signed distance from the centre, n
-    its outward normal, A its area inside the ball and S the sphere's surface that it covers. The volume follows from
-    the divergence theorem, with the origin at the centre. A step δ of the centre moves the faces by -δ against the
-    sphere, hence dV/dcentre = -Σ A·n. A growing sphere gains volume only where its surface lies within the solid,
-    hence dV/dradius = Σ S.
+    `moment` is Σ h·A (m³), `push` Σ A·n (m²) and `covered` Σ S (m²). h is a face's signed distance from the sphere's
+    centre, n its outward normal, A its area inside the ball. S is the part of the sphere's surface that the face
+    covers (see `face_angles`). The volume follows from the divergence theorem, with the origin at the centre. A step δ
+    of the centre moves the faces by -δ relative to the sphere, hence dV/dcentre = -Σ A·n. A growing sphere gains volume
+    only where its surface lies within the solid, hence dV/dradius = Σ S.
     """
     return (moment + radius * covered) / 3.0, negative(push), covered
 
@@ -59,8 +59,8 @@ def from_faces(moment: float, push: Vector, covered: float, radius: float) -> Ov
 def bounded(overlap: Overlap, radius: float, solid_volume: float) -> Overlap:
     """Bound `overlap` to 0 <= V <= min(sphere's volume, `solid_volume`) and 0 <= dV/dradius <= sphere's area.
 
-    The terms of a sum over faces are of the order of the sphere's volume, and each rounds at some 1e-16 of it. So a
-    sum can lie below 0, or above the smaller volume, by as much; a closed form by its last digit.
+    The terms of a sum over faces are of the order of the sphere's volume, and each has a rounding error of some 1e-16
+    of it. So a sum may lie below 0, or above the smaller volume, by as much. A closed form may do so by its last digit.
     """
     volume, gradient, area = overlap
     most = min(sphere_volume(radius), solid_volume)

@@ -1,1 +1,1 @@
-"""Arithmetic with more digits than a double, and arctangents."""
+"""Arithmetic with more digits than a float64 has, and arctangents."""

@@ -1,7 +1,7 @@
-"""Angle of (cosine, sine) without a branch, so that LLVM computes several at a time.
+"""Angle of the direction (cosine, sine) without a branch, so that LLVM computes several angles at a time.
 
-The C library's atan2 keeps a loop scalar. Here the argument is turned into |angle| <= π/8, where the odd polynomial
-below differs from the arctangent by less than 6e-18. The result has a relative error below 4e-16.
+A call of the C library's atan2 would prevent that. Here the direction is turned until |angle| <= π/8. There the odd
+polynomial below differs from the arctangent by less than 6e-18. The result has a relative error below 4e-16.
 """
 
 import math
@@ -12,7 +12,7 @@ TANGENT_OF_EIGHTH = math.sqrt(2.0) - 1.0
 """tan(π/8)"""
 
 # (arctan(x)/x - 1)/x² as a polynomial in x² over [0, tan²(π/8)], highest power first: the Chebyshev fit of degree
-# 10, which tests/robot_side/overlap/test_arctangent.py recomputes with mpmath.
+# 10, which tests/robot_side/overlap/test_digits.py recomputes with mpmath.
 COEFFICIENTS = (
     -0.01917688711906226,
     0.03923165829558719,
@@ -27,7 +27,7 @@ COEFFICIENTS = (
     -0.3333333333333333,
 )
 
-# Parts of π/4, π/2 and π that a double leaves out; without these, angles nearby lose their last digit.
+# Parts of π/4, π/2 and π that do not fit into a double. Without them, angles close to these lose their last digit.
 _QUARTER, _QUARTER_REST = math.pi / 4.0, 3.061616997868383e-17
 _HALF, _HALF_REST = math.pi / 2.0, 6.123233995736766e-17
 _WHOLE, _WHOLE_REST = math.pi, 1.2246467991473532e-16
@@ -37,7 +37,7 @@ _WHOLE, _WHOLE_REST = math.pi, 1.2246467991473532e-16
 def arctangent(sine: float, cosine: float) -> float:
     """Return the angle in (-π, π] of the direction (`cosine`, `sine`), of any length; 0 for (0, 0).
 
-    The negative half of the axis gives π for both signs of a zero `sine`.
+    A zero `sine` with a negative `cosine` gives π, whatever the sign of the zero.
     """
     opposite, adjacent = abs(sine), abs(cosine)
     low, high = min(opposite, adjacent), max(opposite, adjacent)

@@ -1,9 +1,9 @@
-"""Double-double arithmetic: a number as the unevaluated sum of two floats, with some 31 digits.
+"""Double-double arithmetic: each number is the unevaluated sum of two floats, with some 31 digits.
 
-The building blocks are Knuth's two-sum, Dekker's fast two-sum and the two-product with a fused multiply-add, after
-Hida, Li and Bailey, "Library for double-double and quad-double arithmetic" (2007). Unless stated otherwise, the error
-of a result is at most 2⁻¹⁰³ times the sum of the terms' magnitudes: a relative bound if nothing cancels. Overflow and
-products below 1e-290 are not treated.
+It is built from Knuth's two-sum, Dekker's fast two-sum and the two-product with a fused multiply-add, after Hida, Li
+and Bailey, "Library for double-double and quad-double arithmetic" (2007). Unless stated otherwise, the error of a
+result is at most 2⁻¹⁰³ times the sum of the terms' magnitudes. So the relative error is small if nothing cancels.
+Overflow and products below 1e-290 are not treated.
 """
 
 import math
@@ -11,7 +11,7 @@ import math
 from robot_side.compiled.kernel import fused_multiply_add, inlined
 
 DoubleDouble = tuple[float, float]
-"""(high, low): their sum, where high is that sum rounded to a float."""
+"""(high, low): stands for the number high + low, where high is this number rounded to a float"""
 
 PI: DoubleDouble = (3.141592653589793, 1.2246467991473532e-16)
 ZERO: DoubleDouble = (0.0, 0.0)
@@ -19,14 +19,14 @@ ZERO: DoubleDouble = (0.0, 0.0)
 
 @inlined
 def fast_two_sum(a: float, b: float) -> DoubleDouble:
-    """Return the exact sum a + b, for |a| >= |b| or a = 0."""
+    """Return the exact sum a + b of two floats with |a| >= |b| or a = 0."""
     high = a + b
     return high, b - (high - a)
 
 
 @inlined
 def two_sum(a: float, b: float) -> DoubleDouble:
-    """Return the exact sum a + b."""
+    """Return the exact sum a + b of two floats."""
     high = a + b
     part = high - a
     return high, (a - (high - part)) + (b - part)
@@ -34,7 +34,7 @@ def two_sum(a: float, b: float) -> DoubleDouble:
 
 @inlined
 def two_product(a: float, b: float) -> DoubleDouble:
-    """Return the exact product a · b."""
+    """Return the exact product a · b of two floats."""
     high = a * b
     return high, fused_multiply_add(a, b, -high)
 

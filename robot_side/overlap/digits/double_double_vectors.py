@@ -1,4 +1,4 @@
-"""Vectors of three double-double numbers, as tuples and as rows of arrays (n, 3, 2)."""
+"""Vectors of three double-double numbers, as tuples or as rows of arrays (n, 3, 2)."""
 
 from common.arrays import FloatArray
 from robot_side.compiled.kernel import building_block, inlined
@@ -18,13 +18,13 @@ PreciseVector = tuple[DoubleDouble, DoubleDouble, DoubleDouble]
 
 @inlined
 def load_number(array: FloatArray, row: int) -> DoubleDouble:
-    """Return the number that `store_number` put into row `row` of an (n, 3, 2) array."""
+    """Return the double-double number that `store_number` put into row `row` of an (n, 3, 2) array."""
     return array[row, 0, 0], array[row, 0, 1]
 
 
 @inlined
 def store_number(array: FloatArray, row: int, value: DoubleDouble) -> None:
-    """Put a number into row `row` of an (n, 3, 2) array."""
+    """Put one double-double number into row `row` of an (n, 3, 2) array; the rest of the row is unused."""
     array[row, 0, 0] = value[0]
     array[row, 0, 1] = value[1]
 
@@ -95,7 +95,7 @@ def precise_cross(a: PreciseVector, b: PreciseVector) -> PreciseVector:
 
 @building_block
 def precise_unit(a: PreciseVector) -> tuple[PreciseVector, DoubleDouble]:
-    """Return (a / |a|, |a|); the vector is 0 if |a| is 0 or underflows to it."""
+    """Return (a / |a|, |a|); the vector is 0 if |a| is 0 or underflows to 0."""
     length = square_root(precise_dot(a, a))
     if length[0] == 0.0:
         return ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0)), length

@@ -1,7 +1,7 @@
-"""Sums and products without rounding, where a sign decides whether there is any overlap.
+"""Exact sums and products, for values whose sign decides whether there is any overlap.
 
-The terms of a sum are distilled by two-sums until one term is the sum (Ogita, Rump and Oishi, "Accurate sum and
-dot product", 2005). This is slow, and used only if double-double cannot distinguish a value from 0.
+Repeated two-sums gather the terms of a sum in the last one (Ogita, Rump and Oishi, "Accurate sum and dot product",
+2005). This is slow, so it is used only where double-double cannot distinguish a value from 0.
 """
 
 from common.arrays import FloatArray
@@ -12,7 +12,7 @@ from robot_side.overlap.digits.double_double import two_product, two_sum
 from robot_side.overlap.digits.double_double_vectors import PreciseVector, highs, precise_cross, precise_dot
 
 _UNCERTAIN = 1e-15
-"""Size of determinants, for vectors of length 1, below which they are computed again without rounding"""
+"""Size of a determinant of vectors of length 1, below which it is computed again without rounding"""
 _power_terms, _determinant_terms = on_stack(20), on_stack(192)
 
 

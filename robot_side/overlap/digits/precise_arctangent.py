@@ -1,7 +1,7 @@
 """Arctangent in double-double, and sums of angles as products of complex numbers.
 
-A table holds (cos, sin) of the multiples of π/256 up to π/4. Turning (x, y) back by the nearest multiple leaves an
-angle of at most π/512, for which eight terms of the arctangent's series suffice.
+A table has (cos, sin) of the multiples of π/256 up to π/4. Turned back by the nearest multiple, (x, y) has an angle of
+at most π/512, for which eight terms of the arctangent's series suffice.
 """
 
 import math
@@ -22,17 +22,17 @@ from robot_side.overlap.digits.double_double import (
 )
 
 STEPS = 256
-"""Steps of the table in π"""
+"""Number of the table's steps in an angle of π"""
 _BITS = 200
 
 Turn = tuple[DoubleDouble, DoubleDouble, float]
-"""(real part, imaginary part, full turns): an angle of any size as a complex number and whole turns."""
+"""Angle of any size: (real part, imaginary part, number of full turns); the complex number has the rest's angle"""
 
 NO_TURN: Turn = ((1.0, 0.0), (0.0, 0.0), 0.0)
 
 
 def _split(value: int) -> tuple[float, float]:
-    """Return a fixed-point number of `_BITS` binary places as a double-double."""
+    """Return the number `value` / 2^`_BITS`, which is in fixed point, as a double-double."""
     high = value / (1 << _BITS)
     numerator, denominator = high.as_integer_ratio()
     return high, (value - (numerator << _BITS) // denominator) / (1 << _BITS)
@@ -89,7 +89,7 @@ def arctangent(y: DoubleDouble, x: DoubleDouble) -> DoubleDouble:
 
 @inlined
 def turned(turn: Turn, x: DoubleDouble, y: DoubleDouble) -> Turn:
-    """Return the sum of an angle and the angle of the complex number x + i y."""
+    """Return the sum of the angle `turn` and the angle of the complex number x + i y."""
     real = minus(times(turn[0], x), times(turn[1], y))
     imaginary = plus(times(turn[0], y), times(turn[1], x))
     turns = turn[2]
@@ -109,5 +109,5 @@ def turned(turn: Turn, x: DoubleDouble, y: DoubleDouble) -> Turn:
 
 @inlined
 def whole_angle(turn: Turn) -> DoubleDouble:
-    """Return the angle (rad), with whole turns."""
+    """Return the angle in rad, full turns included."""
     return plus(arctangent(turn[1], turn[0]), multiple(2.0 * turn[2], PI))

@@ -1,4 +1,4 @@
-"""Loop over many pairs of one kind: bounds settle most pairs, the others are gathered into full blocks of lanes."""
+"""Loop over many pairs of one kind. Bounds settle most pairs; the others are gathered into full blocks and computed."""
 
 from collections.abc import Callable
 from typing import Any
@@ -28,13 +28,13 @@ Run = Callable[[FloatArray, FloatArray, Any, FloatArray, FloatArray, FloatArray,
 
 
 def found_columns(inputs: int) -> tuple[int, int, int]:
-    """Return the indices of a block's columns after the inputs: the verdict, the solid's volume, the result."""
+    """Return the first indices of a block's columns after its `inputs`: verdict, solid's volume and result."""
     return inputs, inputs + 1, inputs + 2
 
 
 @inlined
 def _fill_group(block: FloatArray, count: int, inputs: int) -> None:
-    """Copy the first lane to the lanes of the last group beyond `count`."""
+    """Fill the unused lanes of the last group, those from `count` on, with copies of the first lane."""
     for lane in range(count, lane_groups(count) * WIDTH):
         copy_lane(block, 0, block, lane, inputs)
 
@@ -45,15 +45,15 @@ def batch(
     compute: Callable[[FloatArray, int], None],
     inputs: int,
 ) -> Run:
-    """Return the loop over spheres `centers` (p, 3), `radii` (p,) and solids, a tuple of arrays; in kernels only.
+    """Return the loop over spheres `centers` (p, 3), `radii` (p,) and `solids`, a tuple of arrays; in kernels only.
 
-    A block has `inputs` columns for the pair, then a verdict, the solid's volume, and the result. `load` fills the
-    first columns with `count` pairs from `first` on. `bound` fills verdicts and volumes of the first groups of lanes,
-    and returns the sum of weights and doubts. `compute` fills results.
+    A block has `inputs` columns for the pair, then columns for the verdict, the solid's volume and the result. `load`
+    fills the first columns with `count` pairs, from pair `first` on. `bound` fills verdicts and volumes of the first
+    groups of lanes, and returns the sum of weights and doubts. `compute` fills the results.
 
-    The results must hold zeros. Pairs that need precise forms go to the first entries of `rows` (p + 1,); the loop
-    returns their number. The last entry is the number n of pairs that lanes computed, or ~n, below 0, if a number may
-    be NaN or out of range.
+    The loop's result arrays must be filled with zeros before. Pairs that need precise forms go to the first entries of
+    `rows` (p + 1,); the loop returns their number. The last entry of `rows` is the number n of pairs that bounds did
+    not settle. It is ~n, below 0, if an argument may be NaN or out of range.
     """
     bounds, solid_volume, result = found_columns(inputs)
     lanes, indices = on_stack((result + RESULT_COLUMNS) * LANES), on_stack(LANES, dtype=np.int64)

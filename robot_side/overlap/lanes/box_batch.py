@@ -1,4 +1,4 @@
-"""Pairs of spheres and boxes: bounds settle pairs that do not cut, lanes compute the others."""
+"""Pairs of spheres and boxes: bounds settle most pairs whose surfaces do not cut, `box_lane` computes the others."""
 
 import numpy as np
 
@@ -39,11 +39,11 @@ _CENTER, _RADIUS, _BOX_CENTER, _ROTATION, _HALF_SIZES, _INPUTS = 0, 3, 4, 7, 16,
 _BOUNDS, _SOLID_VOLUME, _RESULT = found_columns(_INPUTS)
 
 _SLACK = 1e-5
-"""Margin of the bounds, as a share of all lengths: rotations are orthonormal only to 1e-6."""
+"""Margin of the bounds, as a share of the sum of all lengths, because rotations are orthonormal only to 1e-6"""
 
 
 _SURELY_ORTHONORMAL = 0.99 * ORTHONORMALITY**2
-"""Squared limit of ORTHONORMALITY, with a margin for rounding"""
+"""ORTHONORMALITY squared, less a margin for rounding"""
 
 
 @inlined
@@ -75,7 +75,7 @@ def _columns(block: FloatArray, lane: int) -> Columns:
 
 @building_block
 def _bound(block: FloatArray, groups: int) -> int:
-    """Fill verdicts of the first groups of lanes, and the boxes' volumes; return the sum of weights and doubts."""
+    """Fill the verdicts and the boxes' volumes of the first groups of lanes; return the sum of weights and doubts."""
     total = 0
     for lane in range(groups * WIDTH):
         q_0, q_1, q_2 = _columns(block, lane)
@@ -110,7 +110,7 @@ def _bound(block: FloatArray, groups: int) -> int:
 
 @inlined
 def _excess_2(q_0: Vector, q_1: Vector, q_2: Vector) -> float:
-    """Return the squared Frobenius norm of QᵀQ - I for the columns of Q."""
+    """Return the squared Frobenius norm of QᵀQ - I for a matrix Q with these columns."""
     first, second, third = dot(q_0, q_0) - 1.0, dot(q_1, q_1) - 1.0, dot(q_2, q_2) - 1.0
     across_0, across_1, across_2 = dot(q_1, q_2), dot(q_2, q_0), dot(q_0, q_1)
     across_2 = across_0 * across_0 + across_1 * across_1 + across_2 * across_2
@@ -160,8 +160,8 @@ def overlap_boxes(
     areas: FloatArray,
     rows: IntArray,
 ) -> int:
-    """Fill overlaps with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3) to world, `box_half_sizes` (p, 3).
+    """Fill the overlaps of spheres with boxes; `batch` describes the results and `rows`.
 
-    See `batch`.
+    box_centers (p, 3), box_rotations (p, 3, 3) from the box's frame to the spheres', box_half_sizes (p, 3).
     """
     return _run(centers, radii, (box_centers, box_rotations, box_half_sizes), volumes, gradients, areas, rows)

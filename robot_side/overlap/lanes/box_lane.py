@@ -1,8 +1,9 @@
-"""Overlap of a sphere and a box without a branch, for each lane of the vectorised loop of `box_batch`.
+"""Overlap of a sphere and a box, computed without a branch: one lane of the vectorised loop in `box_batch`.
 
-The box is the parallelepiped {c + Σ xₖ qₖ : |xₖ| <= halfₖ} for the given columns qₖ of its rotation, which need only
-be perpendicular to 1e-6. Coordinates start at the point of the box nearest to the sphere's centre, so that the size of
-the box costs no digits. Axes are named k, i and j in cyclic order; each has an upper and a lower side.
+The box is the parallelepiped {c + Σ xₖ qₖ : |xₖ| <= halfₖ} with the columns qₖ of the given rotation, which need to be
+perpendicular only to 1e-6. Its sides are measured from a reference point, the box's point nearest to the sphere's
+centre, so that a large box costs no digits. Axes are named k, i and j in cyclic order; each has an upper and a lower
+side.
 """
 
 import math
@@ -21,32 +22,33 @@ Sides = tuple[float, float]
 """Values for an axis's upper side and lower side"""
 
 Axis = tuple[Vector, float, Vector, float, Sides]
-"""(unit direction of q, |q|, outward unit normal of the upper face, q·normal, coordinates of the sides along q from the
-reference point in m)"""
+"""(unit direction of q, |q|, outward unit normal of the upper face, q·normal, coordinates of both sides along q from
+the reference point in m)"""
 
 EdgeLine = tuple[float, float, float, float, float]
-"""(start, end, squared distance of the foot from the centre, distance d in the face across i, d in the face across j):
-start and end are signed distances (m) from the foot."""
+"""(start, end, squared distance of the foot point from the centre, d in the face across i, d in the face across j). The
+foot point is the line's point nearest to the sphere's centre. start, end: signed distances (m) from it."""
 
 FourLines = tuple[EdgeLine, EdgeLine, EdgeLine, EdgeLine]
 """Edges along an axis at the (upper i, upper j), (upper, lower), (lower, upper) and (lower, lower) sides"""
 
 EdgeInFaces = tuple[SplitEdge, float, float]
-"""(split edge, d in the face across i, d in the face across j)"""
+"""(split edge, d in the face across i, d in the face across j); d is the edge's distance from the face's foot point"""
 
 FourEdges = tuple[EdgeInFaces, EdgeInFaces, EdgeInFaces, EdgeInFaces]
 
 LARGEST_REACH = 1e4
-"""Distance, in radii, from the nearest point to the sphere's centre, at which boxes are cut off"""
+"""Distance from the box's point nearest to the sphere's centre, in radii, at which boxes are cut off"""
 
 NO_REST = (0.0, 0.0, 0.0)
 
 
 @inlined
 def box_lane(center: Vector, radius: float, box_center: Vector, columns: Columns, half: Vector) -> LaneResult:
-    """Return the overlap of the sphere (`center`, `radius`) with a box of any handedness; the radius is about 1.
+    """Return the overlap of the sphere (`center`, `radius`) with a box; its columns may be left- or right-handed.
 
-    The overlap is exact to some 4e-16 of the sphere, unless the result asks for precise forms.
+    The lengths are scaled so that the radius is 1 to 2. The overlap is exact to some 4e-16 of the sphere, unless the
+    result is marked for precise forms.
     """
     q_0, q_1, q_2 = columns
     across_0, across_1, across_2 = cross(q_1, q_2), cross(q_2, q_0), cross(q_0, q_1)
@@ -121,7 +123,7 @@ def _axis(q: Vector, normal: Vector, rise: float, place: float, half: float, mos
 
 @inlined
 def _heights(reference: Vector, axis: Axis) -> Sides:
-    """Return signed distances (m) of the upper and the lower face from the centre, along their outward normals."""
+    """Return signed distances (m) of the upper and the lower face from the centre, each along its outward normal."""
     shift = dot(reference, axis[2])
     return shift + axis[4][0] * axis[3], -shift - axis[4][1] * axis[3]
 
@@ -137,7 +139,7 @@ def _lines(
     heights_i: Sides,
     handedness: float,
 ) -> FourLines:
-    """Return the lines of the four edges along `axis`; `heights_i` are those of the faces across i."""
+    """Return the lines of the four edges along `axis`. `heights_i`: signed distances (m) of the faces across axis i."""
     direction, length, _, _, sides = axis
     # Unit vectors at right angles to the edges: in the faces across i towards upper j, and across j towards upper i.
     toward_j, toward_i = (
@@ -168,7 +170,10 @@ def _line(
     height: float,
     ends: tuple[float, float],
 ) -> EdgeLine:
-    """Return the line through reference + side_i q_i + side_j q_j; the signs of the sides: 1 upper, -1 lower."""
+    """Return the line of the edge through reference + x_i q_i + x_j q_j.
+
+    side_i, side_j: (x, sign) of the edge's side on each axis; the sign is 1 for the upper side, -1 for the lower.
+    """
     shift = along[0] + (side_i[0] * along[1] + side_j[0] * along[2])
     distance_i = side_j[1] * (across_i[0] + (side_i[0] * across_i[1] + side_j[0] * across_i[2]))
     distance_j = side_i[1] * (across_j[0] + (side_i[0] * across_j[1] + side_j[0] * across_j[2]))
@@ -205,9 +210,10 @@ def _split_line(line: EdgeLine, start_norm: float, end_norm: float, radius: floa
 def _opposite_faces(
     edges_i: FourEdges, edges_j: FourEdges, heights: Sides, radius: float
 ) -> tuple[float, float, float]:
-    """Return (Σ h·A, A of the upper face less A of the lower, Σ S) of the faces across an axis k.
+    """Return (Σ h·A, A of the upper face minus A of the lower face, Σ S) of the two faces across an axis k.
 
-    k is the second axis for the edges along i, and the first one for those along j.
+    Edges are in the order of their sides on the two other axes. k is the second of these for edges along i, the first
+    for edges along j.
     """
     disc, covered = _face(edges_i[0], edges_i[2], edges_j[0], edges_j[1], heights[0], radius)
     lower_disc, lower_covered = _face(edges_i[1], edges_i[3], edges_j[2], edges_j[3], heights[1], radius)
@@ -218,7 +224,7 @@ def _opposite_faces(
 def _face(
     first: EdgeInFaces, second: EdgeInFaces, third: EdgeInFaces, fourth: EdgeInFaces, height: float, radius: float
 ) -> tuple[float, float]:
-    """Return (A, S) of a face from its two edges along i and its two along j."""
+    """Return (A, S) of a face from its two edges along i, `first` and `second`, and its two along j."""
     depth = abs(height)
     total = first_edge(edge_terms(first[0], first[2], depth))
     total = add_edge(total, edge_terms(second[0], second[2], depth))

@@ -1,20 +1,21 @@
-"""Area of a face inside the ball, and the part of the sphere's surface that the face covers, from its split edges.
+"""Area of a face inside the ball, and the part of the sphere's surface that it covers, as sums over the face's edges.
 
 The origin is the sphere's centre. By the divergence theorem the overlap with a solid of flat faces is
 Σ (h A + R S) / 3 over the faces. h is a face's signed distance along its outward normal, A its area inside the ball,
 and S the part of the sphere's surface that lies within the solid as far as this face bounds it. Each face is a sum over
-the triangles of its edges with the face's foot point; d is an edge's signed distance from the foot point:
+the triangles of its edges with the face's foot point, the point of its plane nearest to the centre. d is an edge's
+signed distance from the foot point, and `inside` the length of the edge inside the ball:
 
     A = Σ d·inside/2 + (R² - h²) φ/2,     S = R sign(h) (R Ω - (R - |h|) φ)
 
-φ is the angle at the face's foot over the parts of its edges outside the ball. Ω is the solid angle at the centre over
-the triangles of the foot with these parts. No topological decision is taken (whether an edge is cut, where the foot
-lies), so rounding cannot flip one. The sum is continuous in all its inputs, on tangents and corners, too, and holds for
-every closed oriented surface.
+φ is the sum of the angles at the foot point that the parts of the edges outside the ball subtend. Ω is the solid angle
+at the centre of the triangles that the foot point makes with these parts. The sums need no decision about an edge (is
+it cut?) or the foot point (where does it lie?), so rounding cannot reverse one. They are continuous in all inputs, also
+at tangents and corners, and hold for every closed oriented surface.
 
-Each part from t to t' along the edge adds to φ the angle of the complex number (d² + t·t', d |t' - t|). It adds to Ω/2
-the angle of van Oosterom and Strackee (1983) for such a triangle. Angles are summed by multiplying the complex
-numbers: one arctangent for each of φ and Ω, and no branch.
+Each part, from t to t' along the edge, adds to φ the angle of the complex number (d² + t·t', d |t' - t|). It adds to
+Ω/2 the angle of van Oosterom and Strackee (1983) for such a triangle. Angles are summed by multiplying the complex
+numbers. So one arctangent each for φ and Ω suffices, and no branch is needed.
 """
 
 import math
@@ -24,21 +25,21 @@ from robot_side.overlap.digits.arctangent import arctangent
 from robot_side.overlap.lanes.split_edge import OutsidePart, SplitEdge
 
 Turn = tuple[float, float]
-"""(cosine, sine) of an angle, times a common positive factor."""
+"""Angle as (cosine, sine), both times any positive factor"""
 
 EdgeTerms = tuple[float, Turn, Turn]
-"""Terms of an edge in the sum of a face: (d·inside in m², turn of φ, turn of Ω/2)"""
+"""One edge's terms in the sum of a face: (d·inside in m², turn by the part of φ, turn by the part of Ω/2)"""
 
 FaceSum = tuple[float, Turn, float, Turn]
-"""Sum over the edges so far: Σ d·inside, the turn of φ and its whole turns, and the turn of Ω/2"""
+"""Sum over a face's edges so far: (Σ d·inside in m², turn by φ, number of whole turns in φ, turn by Ω/2)"""
 
 
 @inlined
 def edge_terms(edge: SplitEdge, distance: float, depth: float) -> EdgeTerms:
     """Return the terms of `edge` in a face at the distance `depth` = |h| (m) from the sphere's centre.
 
-    `distance` is d (m): from the face's foot to the edge's line, positive where the edge runs anticlockwise round
-    the foot as seen from outside.
+    `distance` is d (m), from the face's foot point to the edge's line. It is positive where the edge runs anticlockwise
+    round the foot point, as seen from outside.
     """
     inside, before, before_norms, after, after_norms = edge
     first_plane, first_solid = _part_turns(before, before_norms, distance, depth)
@@ -59,21 +60,21 @@ def _part_turns(part: OutsidePart, norms: float, distance: float, depth: float) 
 
 @inlined
 def multiply(a: Turn, b: Turn) -> Turn:
-    """Return the turn by both angles."""
+    """Return the turn by the sum of two angles."""
     return a[0] * b[0] - a[1] * b[1], a[1] * b[0] + a[0] * b[1]
 
 
 @inlined
 def first_edge(terms: EdgeTerms) -> FaceSum:
-    """Return the sum of one edge."""
+    """Return the sum that has the terms of one edge only."""
     return terms[0], terms[1], 0.0, terms[2]
 
 
 @inlined
 def add_edge(total: FaceSum, terms: EdgeTerms) -> FaceSum:
-    """Return the sum with another edge.
+    """Return the sum with another edge's terms added.
 
-    φ reaches a whole turn, so passages through ±π are counted; Ω/2 reaches half a turn at most.
+    φ may reach a whole turn, so its passages through ±π are counted. Ω/2 reaches half a turn at most.
     """
     triangle, plane, turns, solid = total
     turned = multiply(plane, terms[1])

@@ -1,4 +1,4 @@
-"""Result of a lane: bounds, exact values if nothing is cut, and whether the pair needs precise forms."""
+"""Result of one lane, a pair in the vectorised loop: it is bounded, and marked if the pair needs precise forms."""
 
 import math
 
@@ -6,23 +6,23 @@ from robot_side.compiled.kernel import inlined
 from robot_side.overlap.closed_forms.solid import Overlap, sphere_area, sphere_volume
 
 LaneResult = tuple[Overlap, float]
-"""(overlap, 1 if doubles do not suffice, so that the pair needs precise forms, else 0)"""
+"""(overlap, 1 if doubles do not suffice and the pair needs precise forms, else 0)"""
 
 TINY = 1e-6
-"""Share of the sphere's volume below which an overlap is computed precisely: the lanes' error, some 4e-16 of the
+"""Share of the sphere's volume below which an overlap needs precise forms. There the lanes' error, some 4e-16 of the
 sphere, would be more than 1e-9 of the overlap."""
 
 FARTHEST_REFERENCE = 4.0
-"""Distance, in radii, of a reference point from the sphere's centre, beyond which digits are lost"""
+"""Distance of the reference point from the sphere's centre, in radii, beyond which digits are lost"""
 
 FARTHEST_CORNER = 1e10
-"""Distance of corners, in radii, beyond which products of distances could overflow"""
+"""Distance of a corner from the sphere's centre, in radii, beyond which products of distances could overflow"""
 
 CLEAR = 1.0 + 1e-9
-"""Ratio of squared distance to squared radius above which there is no contact, in spite of rounding"""
+"""Ratio of squared distance to squared radius above which there is certainly no contact, in spite of rounding"""
 
 WELL_CLEAR = 1.1
-"""CLEAR for lanes that lost digits"""
+"""The same ratio as CLEAR for lanes that lost digits"""
 
 
 @inlined
@@ -37,12 +37,12 @@ def settle(
     extent: float,
     imprecise: bool,
 ) -> LaneResult:
-    """Return `overlap` within its bounds, and exact values if the solid's surface does not reach the sphere.
+    """Return `overlap` within its bounds. If the solid's surface does not reach the sphere, return the exact result.
 
-    `nearest_2` is the squared distance (m²) of the surface from the sphere's centre, `lowest` the least signed distance
-    (m) of the centre below the faces' planes, positive inside. `reference_2` is the squared distance (m²) of the
-    reference point, `farthest` (m) the distance of the farthest corner, `extent` (m) the length of the longest edge.
-    `imprecise`: digits were lost.
+    All distances are from the sphere's centre. `nearest_2` is that of the surface, squared (m²). `lowest` (m) is the
+    least signed distance below the planes of the faces, positive inside the solid. `reference_2` is that of the
+    reference point, squared (m²), `farthest` (m) that of the farthest corner. `extent` (m) is the length of the longest
+    edge. `imprecise`: whether digits were lost.
     """
     # Every choice is between computed values, so that it compiles to an instruction without a branch.
     volume, gradient, area = overlap
@@ -54,7 +54,7 @@ def settle(
     apart = (nearest_2 > clear * (radius * radius)) | (solid_volume == 0.0)
     bounded_volume = min(max(volume, 0.0), whole, solid_volume)
     bounded_area = min(max(area, 0.0), whole_area)
-    # The error of a solid smaller than the sphere is smaller, too.
+    # For a solid smaller than the sphere, the error is smaller, too.
     tiny = TINY * whole * min(extent, radius)
     doubtful = (reference_2 > FARTHEST_REFERENCE**2 * (radius * radius)) | (bounded_volume * radius < tiny) | imprecise
     # After an overflow this is not finite, and the comparison is false.

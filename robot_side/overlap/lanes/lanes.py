@@ -1,7 +1,7 @@
-"""Columns of numbers, one lane a pair: the working memory of the vectorised loops.
+"""Working memory of the vectorised loops: a block has columns of numbers, with one lane for each pair.
 
-A block's columns lie one after another in a single array, at distances known at compile time. So LLVM can distinguish
-them and compile a loop over lanes to vector instructions.
+A block's columns lie one after another in a single array, at distances known at compile time. So LLVM can see that
+columns do not overlap, and compile a loop over lanes to vector instructions.
 """
 
 import numpy as np
@@ -13,22 +13,22 @@ from robot_side.compiled.vectors import Vector
 from robot_side.overlap.closed_forms.solid import Overlap
 
 LANES = 64
-"""Pairs in a block: few enough for the columns to stay in the first-level cache"""
+"""Number of pairs in a block: few enough for the columns to stay in the first-level cache"""
 
 WIDTH = 8
-"""Lanes in a group: as many as the widest vectors hold, so that loops have no scalar remainder"""
+"""Number of lanes in a group: as many as the widest vector registers hold, so that loops have no scalar remainder"""
 
 RESULT_COLUMNS = 6
-"""Columns of a result: V, the gradient, the area, and 1 if the pair is unsettled"""
+"""Number of columns of a result: V, the gradient (3), the area, and 1 if the pair needs precise forms"""
 
 NOTHING, WHOLE_SPHERE, WHOLE_SOLID, PARTIAL = 0.0, 1.0, 2.0, 3.0
-"""Verdicts of the bounds: no contact, the sphere within the solid, the solid within the sphere, or none of these"""
+"""Verdicts of the bounds on a pair: no contact, sphere within the solid, solid within the sphere, none of these"""
 
 SOME_PARTIAL = 1 << 32
-"""Least sum of `weight` over a block in which a lane is `PARTIAL`; 0 is the sum without any contact."""
+"""`weight` of a lane that is `PARTIAL`. A block's sum of weights is less if none is, and 0 if there is no contact."""
 
 SOME_DOUBTFUL = 1 << 48
-"""Least sum of `doubt` over a block in which a lane is doubtful; otherwise 0."""
+"""`doubt` of a lane whose numbers may be wrong. A block's sum of weights is always less."""
 
 
 @inlined
@@ -50,25 +50,25 @@ def vector_column(lanes: FloatArray, index: int, lane: int) -> Vector:
 
 @inlined
 def weight(verdict: float) -> int:
-    """Return the term of one lane's verdict in the block's sum: an integer, as LLVM adds no others in vectors."""
+    """Return the term of one lane's verdict in the block's sum: an integer, as LLVM sums only integers in vectors."""
     return 0 if verdict == NOTHING else (SOME_PARTIAL if verdict == PARTIAL else 1)
 
 
 @inlined
 def doubt(sure: bool) -> int:
-    """Return the term of one lane in the block's sum; `sure`: the lane's numbers are in range."""
+    """Return a lane's term in the block's sum for its numbers. `sure`: whether they are certainly in range."""
     return 0 if sure else SOME_DOUBTFUL
 
 
 @inlined
 def reach(vector: Vector) -> float:
-    """Return the sum of the magnitudes, NaN if there is one: no component is larger."""
+    """Return the sum of the components' magnitudes, an upper bound of each of them; NaN if one is NaN."""
     return abs(vector[0]) + abs(vector[1]) + abs(vector[2])
 
 
 @inlined
 def store_result(lanes: FloatArray, index: int, lane: int, overlap: Overlap, size: float, unsettled: float) -> None:
-    """Write an overlap, computed with lengths divided by `size`, to the columns from `index` on."""
+    """Write an overlap to the columns from `index` on. It was computed with all lengths divided by `size` (m)."""
     area = size * size
     lanes[np.uint64(index * LANES + lane)] = overlap[0] * (area * size)
     lanes[np.uint64((index + 1) * LANES + lane)] = overlap[1][0] * area
@@ -80,7 +80,10 @@ def store_result(lanes: FloatArray, index: int, lane: int, overlap: Overlap, siz
 
 @inlined
 def load_rows(rows: FloatArray, first: int, count: int, width: int, lanes: FloatArray, index: int) -> None:
-    """Copy `count` rows of `width` numbers from row `first` of a flat array into the columns from `index` on."""
+    """Copy `count` rows, from row `first` on, of a flat array into lanes of the block, one number a column.
+
+    Rows have `width` numbers, for as many columns from `index` on.
+    """
     if count == LANES:
         # The number of lanes is known at compile time: vector instructions.
         for lane in range(0, LANES, 4):
@@ -99,7 +102,7 @@ def load_rows(rows: FloatArray, first: int, count: int, width: int, lanes: Float
 
 @inlined
 def load_vectors(rows: FloatArray, first: int, count: int, lanes: FloatArray, index: int) -> None:
-    """Do as `load_rows`, for rows of three numbers."""
+    """Do the same as `load_rows` for rows of three numbers."""
     if count == LANES:
         for lane in range(0, LANES, 4):
             transpose_three(rows, 3 * (first + lane), lanes, index * LANES + lane, LANES)
@@ -109,7 +112,7 @@ def load_vectors(rows: FloatArray, first: int, count: int, lanes: FloatArray, in
 
 @inlined
 def copy_lane(lanes: FloatArray, lane: int, target: FloatArray, target_lane: int, columns: int) -> None:
-    """Copy the first `columns` of `lane` to a lane of `target`."""
+    """Copy the first `columns` numbers of `lane` to the lane `target_lane` of `target`."""
     for index in range(columns):
         target[np.uint64(index * LANES + target_lane)] = lanes[np.uint64(index * LANES + lane)]
 
@@ -126,9 +129,10 @@ def scatter(
     rows: IntArray,
     unsettled: int,
 ) -> int:
-    """Write the results of `count` lanes, in the columns from `index`, to the rows `pairs` (LANES,) of the results.
+    """Write the results of `count` lanes, in the columns from `index` on, to the rows `pairs` (LANES,) of the results.
 
-    `rows` holds `unsettled` pairs that need precise forms; those of these lanes are added. Return the new number.
+    The first `unsettled` entries of `rows` are pairs that need precise forms. Such pairs among these lanes are added;
+    return the new number.
     """
     for lane in range(count):
         pair = pairs[lane]
@@ -143,5 +147,5 @@ def scatter(
 
 @inlined
 def lane_groups(count: int) -> int:
-    """Return the number of groups of `WIDTH` lanes that hold `count` pairs."""
+    """Return the number of groups of `WIDTH` lanes that `count` pairs need."""
     return (count + (WIDTH - 1)) // WIDTH

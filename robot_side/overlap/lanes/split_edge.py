@@ -1,6 +1,6 @@
-"""Edge that is split where the ball begins and ends, for its two faces.
+"""Split of an edge into its parts before, inside and after the ball; both faces of the edge use the same split.
 
-Without branches, for the vectorised loops.
+The code has no branches, for the vectorised loops.
 """
 
 import math
@@ -8,12 +8,12 @@ import math
 from robot_side.compiled.kernel import inlined
 
 OutsidePart = tuple[float, float, float]
-"""(t' - t, t·t', |P||P'| + P·P') of the part of an edge outside the ball, from P to P' relative to the sphere's centre.
-t and t' are signed distances (m) along the edge from its line's point nearest to the centre; see also `SplitEdge`."""
+"""Part of an edge outside the ball, from the point P to P' relative to the sphere's centre: (t' - t, t·t', |P||P'| +
+P·P'). t and t' are the points' signed distances (m) along the edge, from the line's point nearest to the centre."""
 
 SplitEdge = tuple[float, OutsidePart, float, OutsidePart, float]
-"""(inside, before, before_norms, after, after_norms): `inside` (m) is the length of the edge in the ball; the parts
-before and after come with the sums |P| + |P'| (m)."""
+"""(inside, before, before_norms, after, after_norms). `inside` (m) is the length of the edge in the ball. `before` and
+`after` are the parts outside, each followed by the sum |P| + |P'| (m) of the distances of its ends."""
 
 
 @inlined

@@ -1,4 +1,4 @@
-"""Pairs of spheres and tetrahedra: bounds settle pairs that do not cut, lanes compute the others."""
+"""Pairs of spheres and tetrahedra: bounds settle most without a cut, `tetrahedron_lane` computes the others."""
 
 import numpy as np
 
@@ -41,10 +41,11 @@ _CENTER, _RADIUS, _CORNERS, _INPUTS = 0, 3, 4, 16
 _BOUNDS, _SOLID_VOLUME, _RESULT = found_columns(_INPUTS)
 
 _SURE = 1.0 + 1e-9
-"""Margin of the bounds for rounding, as a factor"""
+"""Factor on squared lengths by which the bounds allow for rounding"""
 
 _ROUNDING_2 = 1e-21
-"""(8 · 2⁻⁵³)² / 1e-9: squared rounding error of products of three lengths, where the margin above does not cover it"""
+"""(8 · 2⁻⁵³)² / 1e-9: allowance for the rounding error of a product of three lengths, where the factor above does not
+cover it. It is relative to the sixth power of the longest length, as the product is squared."""
 
 
 @inlined
@@ -68,7 +69,7 @@ def _corners(block: FloatArray, lane: int) -> tuple[Vector, Vector, Vector, Vect
 
 @inlined
 def _bound(block: FloatArray, groups: int) -> int:
-    """Fill verdicts of the first groups of lanes; return the sum of weights and doubts."""
+    """Fill the verdicts and the volumes of the first groups of lanes; return the sum of weights and doubts."""
     left = _bound_by_corners(block, groups)
     doubts = left // SOME_DOUBTFUL * SOME_DOUBTFUL
     left -= doubts
@@ -81,7 +82,7 @@ def _bound(block: FloatArray, groups: int) -> int:
 
 @building_block
 def _bound_by_corners(block: FloatArray, groups: int) -> int:
-    """Fill verdicts from the corners and their bounding box; return the sum of weights and doubts."""
+    """Fill verdicts that follow from the corners and their bounding box; return the sum of weights and doubts."""
     total = 0
     for lane in range(groups * WIDTH):
         first, second, third, fourth = _corners(block, lane)
@@ -104,7 +105,10 @@ def _bound_by_corners(block: FloatArray, groups: int) -> int:
 
 @building_block
 def _measure_within(block: FloatArray, groups: int) -> int:
-    """Fill the volumes of the tetrahedra, for those within the sphere; return the sum of weights."""
+    """Fill the tetrahedra's volumes, which are the results of those within the sphere; return the sum of weights.
+
+    A flat tetrahedron within the sphere becomes `PARTIAL`, because its volume would lose digits here.
+    """
     total = 0
     for lane in range(groups * WIDTH):
         first, second, third, fourth = _corners(block, lane)
@@ -123,7 +127,7 @@ def _measure_within(block: FloatArray, groups: int) -> int:
 
 @building_block
 def _bound_by_planes(block: FloatArray, groups: int) -> int:
-    """Settle more pairs by the planes of the faces, after `_bound_by_corners`; return the sum of weights."""
+    """Settle some of the `PARTIAL` pairs by the planes of the faces; return the sum of weights."""
     total = 0
     for lane in range(groups * WIDTH):
         first, second, third, fourth = _corners(block, lane)
@@ -149,16 +153,17 @@ def _bound_by_planes(block: FloatArray, groups: int) -> int:
 
 @inlined
 def _beyond_2(a: float, b: float, c: float, d: float) -> float:
-    """Return the squared distance (m²) of 0 from the interval that a to d span."""
+    """Return the squared distance (m²) of 0 from the interval that the four numbers span."""
     gap = max(min(a, b, c, d), -max(a, b, c, d), 0.0)
     return gap * gap
 
 
 @inlined
 def _side(sense: float, corner: Vector, across: Vector, enough_2: float, rounding: float) -> tuple[bool, bool]:
-    """Return whether the centre lies at least the square root of `enough_2` (m²) below, or above, a face's plane.
+    """Return whether the centre lies below a face's plane by at least √`enough_2` (m), and whether above it by as much.
 
-    `rounding` (m⁶) is the squared rounding error of the product with the face's normal, twice its area long.
+    `across` is the face's normal, twice its area long; `sense` is 1 or -1, so that below is inside. `rounding` (m⁶)
+    allows for the rounding error of the product of `across` and `corner`, which is squared.
     """
     height = sense * dot(corner, across)
     far = height * height >= enough_2 * dot(across, across) + rounding
@@ -201,5 +206,5 @@ def overlap_tetrahedra(
     areas: FloatArray,
     rows: IntArray,
 ) -> int:
-    """Fill overlaps with tetrahedra `vertices` (p, 4, 3); see `batch`."""
+    """Fill the overlaps of spheres with the tetrahedra `vertices` (p, 4, 3); `batch` describes results and `rows`."""
     return _run(centers, radii, (vertices,), volumes, gradients, areas, rows)

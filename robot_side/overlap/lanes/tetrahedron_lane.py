@@ -1,9 +1,9 @@
-"""Overlap of a sphere and a tetrahedron without a branch, for each lane of the vectorised loop of `tetrahedron_batch`.
+"""Overlap of a sphere and a tetrahedron, computed without a branch: one lane of the vectorised loop.
 
-Heights of faces, lines of edges and their ends are measured from a reference point. This is a point of the tetrahedron
-near the sphere's centre, given by barycentric coordinates ("shares") of the corners. The distance of a face from the
-point is the opposite corner's share of that corner's altitude. So near distances are known to their last digit, even
-in a large tetrahedron.
+The loop is in `tetrahedron_batch`. Faces, edges and corners are measured from a reference point. This is a point of the
+tetrahedron near the sphere's centre, given by its barycentric coordinates, the "shares" of the corners. A face's
+distance from the reference point is the opposite corner's share times that corner's altitude. So short distances are
+known to their last digit, even in a large tetrahedron.
 """
 
 import math
@@ -21,21 +21,24 @@ Corners = tuple[Vector, Vector, Vector, Vector]
 Shares = tuple[float, float, float, float]
 
 PlacedEdge = tuple[Vector, Vector, SplitEdge, float, float, bool]
-"""(unit direction, foot of the line relative to the centre, the edge's split, its squared distance from the centre,
-its length, whether the foot lost digits)"""
+"""(unit direction, foot point of the line relative to the sphere's centre, the edge's split, its squared distance from
+the centre, its length, whether the foot point lost digits)"""
 
 LARGEST_CANCELLATION = 10.0
-"""Size of a foot's terms, over the larger of foot and radius, beyond which the foot has lost digits"""
+"""Size of a foot point's terms, divided by the larger of the radius and the foot point's distance from the centre,
+beyond which the foot point has lost digits"""
 
 SHARPEST_FACE = 20.0
-"""Product of a triangle's two shortest sides, over that of its normal, beyond which the normal has lost digits"""
+"""Product of a triangle's two shortest sides, divided by the length of their cross product, beyond which the normal has
+lost digits"""
 
 
 @inlined
 def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneResult:
-    """Return the overlap of the sphere (`center`, `radius`) with the tetrahedron of `corners`; the radius is about 1.
+    """Return the overlap of the sphere (`center`, `radius`) with the tetrahedron of `corners`.
 
-    The overlap is exact to some 4e-16 of the sphere, unless the result asks for precise forms.
+    The lengths are scaled so that the radius is 1 to 2. The overlap is exact to some 4e-16 of the sphere, unless the
+    result is marked for precise forms.
     """
     first, second, third, fourth = corners
     a, a_rest = difference(first, center)
@@ -132,7 +135,10 @@ def tetrahedron_lane(center: Vector, radius: float, corners: Corners) -> LaneRes
 
 @inlined
 def _across(ab: Vector, bc: Vector, ca: Vector) -> Vector:
-    """Return the normal of the triangle with these edges, twice its area long, from the two shortest edges."""
+    """Return the normal of the triangle with these edges, of twice the area's length.
+
+    It is the cross product of the two shortest edges, which round least.
+    """
     ab_2, bc_2, ca_2 = dot(ab, ab), dot(bc, bc), dot(ca, ca)
     ab_longest = (ab_2 >= bc_2) & (ab_2 >= ca_2)
     bc_longest = bc_2 >= ca_2
@@ -143,7 +149,7 @@ def _across(ab: Vector, bc: Vector, ca: Vector) -> Vector:
 
 @inlined
 def _is_sharp(edges: tuple[Vector, Vector, Vector], across: Vector, height: float, radius_2: float) -> bool:
-    """Return whether the sphere cuts a face whose normal has lost digits, and that is large enough for an effect."""
+    """Return whether a face's lost digits matter: its normal has lost digits, it is large, and the sphere cuts it."""
     first_2, second_2, third_2 = dot(edges[0], edges[0]), dot(edges[1], edges[1]), dot(edges[2], edges[2])
     shortest_4 = min(first_2 * second_2, first_2 * third_2, second_2 * third_2)
     cut = height * height < radius_2
@@ -165,7 +171,10 @@ def _select(condition: bool, yes: Vector, no: Vector) -> Vector:
 
 @inlined
 def _shares(first: float, second: float, third: float, fourth: float) -> Shares:
-    """Return barycentric coordinates >= 0 from those of the sphere's centre; the first makes the sum exactly 1."""
+    """Return barycentric coordinates of the reference point, from those of the sphere's centre.
+
+    They are cut to 0 to 1 and scaled; the first one is chosen so that their sum is exactly 1.
+    """
     first, second = min(max(first, 0.0), 1.0), min(max(second, 0.0), 1.0)
     third, fourth = min(max(third, 0.0), 1.0), min(max(fourth, 0.0), 1.0)
     total = first + second + third + fourth
@@ -188,7 +197,11 @@ def _edge(
     end_norm: float,
     radius: float,
 ) -> PlacedEdge:
-    """Return the edge from start to end. `shares`: of (start, end, third, fourth). `from_third`: start - third."""
+    """Return the measures of the edge from the start corner to the end corner.
+
+    `edge`: end - start. `from_third`, `from_fourth`: start minus each of the two other corners. `shares`: those of
+    (start, end, third, fourth).
+    """
     inverse_length = _inverse_norm(edge)
     direction = scale(inverse_length, edge)
     length = dot(edge, direction)
@@ -212,7 +225,11 @@ def _edge(
 def _face(
     edges: tuple[PlacedEdge, PlacedEdge, PlacedEdge], senses: Vector, normal: Vector, height: float
 ) -> tuple[FaceSum, float]:
-    """Return (sum over the edges, squared distance from the centre if the foot lies within the face, else infinity)."""
+    """Return (sum over the face's edges, the face's squared distance from the centre).
+
+    The distance is that of the foot point if it lies within the face, else infinite: then an edge is nearest. senses: 1
+    if the face runs along an edge, -1 if against it.
+    """
     first, second, third = edges
     depth = abs(height)
     distance_1 = senses[0] * dot(first[1], cross(first[0], normal))

@@ -1,1 +1,1 @@
-"""Closed triangle meshes, convex or not."""
+"""Overlap of spheres with closed triangle meshes, convex or not."""

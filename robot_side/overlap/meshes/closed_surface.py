@@ -1,4 +1,4 @@
-"""Checks that triangles are the surface of a solid: closed, oriented outward, without overlapping parts."""
+"""Checks that triangles are the surface of a solid: closed, oriented outward, and without overlapping parts."""
 
 from collections.abc import Sequence
 
@@ -11,13 +11,13 @@ from common.arrays import FloatArray, IntArray
 from robot_side.overlap.checks.arguments import numbers
 
 _FLAT = 1e-14
-"""Volume of a part, as a share of its size cubed, up to which the part is flat and has no orientation"""
+"""Volume of a part, as a share of the cube of its size, up to which it counts as flat and has no orientation"""
 _SAMPLES = 8
 _CERTAIN = 0.1
 
 
 def checked_vertices(vertices: npt.ArrayLike) -> FloatArray:
-    """Return `vertices` as finite float64 (v, 3), or raise a ValueError."""
+    """Return `vertices` as finite float64 numbers (v, 3), or raise a ValueError."""
     values = numbers("vertices", vertices, (3,)).values
     if values.ndim != 2:
         raise ValueError(f"vertices has the shape {values.shape}; valid: the shape (v, 3)")
@@ -44,9 +44,9 @@ def checked_triangles(triangles: npt.ArrayLike, vertex_count: int) -> IntArray:
 
 
 def merged(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
-    """Return (triangles (k, 3) with each set of equal vertices as one, the triangles' numbers (k,)).
+    """Return (triangles (k, 3) in which equal vertices are merged into one, these triangles' numbers (k,) as given).
 
-    Triangles that have a corner twice are left out: they bound nothing.
+    A triangle that has a corner twice is left out, because it bounds nothing.
     """
     # Adding 0 makes -0 equal to 0.
     _, first, inverse = np.unique(vertices + 0.0, axis=0, return_index=True, return_inverse=True)
@@ -56,7 +56,7 @@ def merged(vertices: FloatArray, triangles: IntArray) -> tuple[IntArray, IntArra
 
 
 def require_closed(triangles: IntArray, numbers_given: IntArray) -> None:
-    """Raise a ValueError that names the first edge with unequal numbers of uses in its two directions."""
+    """Raise a ValueError that names the first edge that is not used equally often in both directions."""
     starts, ends = triangles, np.roll(triangles, -1, axis=1)
     keys = _edge_keys(starts, ends)
     _, place = np.unique(keys, return_inverse=True)
@@ -75,7 +75,7 @@ def require_closed(triangles: IntArray, numbers_given: IntArray) -> None:
 
 
 def components(triangles: IntArray) -> IntArray:
-    """Return the number of each triangle's part (t,); a part is connected by edges."""
+    """Return for each triangle the number of its part (t,); the triangles of a part are connected by edges."""
     keys = _edge_keys(triangles, np.roll(triangles, -1, axis=1))
     _, place = np.unique(keys, return_inverse=True)
     count = len(triangles)
@@ -86,7 +86,7 @@ def components(triangles: IntArray) -> IntArray:
 
 
 def require_all_different(triangles: IntArray, numbers_given: IntArray) -> None:
-    """Raise a ValueError that names the first triangle given twice in the same direction: the solid overlaps itself."""
+    """Raise a ValueError that names the first triangle given twice the same way round: the solid overlaps itself."""
     first = triangles.argmin(axis=1)
     rows = np.arange(len(triangles))
     turned = np.column_stack([triangles[rows, (first + corner) % 3] for corner in range(3)])
@@ -103,7 +103,7 @@ def require_all_different(triangles: IntArray, numbers_given: IntArray) -> None:
 
 
 def signed_volume(corners: FloatArray) -> float:
-    """Return the volume (m³) within closed triangles `corners` (t, 3, 3), negative if they are oriented inward."""
+    """Return the volume (m³) within a closed surface `corners` (t, 3, 3), negative if it is oriented inward."""
     # In extended precision if the machine has it: the terms of a thin plate cancel.
     a, b, c = np.moveaxis((corners - corners.reshape(-1, 3).mean(axis=0)).astype(np.longdouble), 1, 0)
     return float(np.sum(a * np.cross(b, c)) / 6.0)
@@ -140,7 +140,10 @@ def require_outward(corners: FloatArray, parts: IntArray, numbers_given: IntArra
 
 
 def _winding_around(corners: FloatArray, members: Sequence[IntArray], boxes: FloatArray, part: int) -> int | None:
-    """Return the winding number of the other parts about this one; None if it touches them at all sampled points."""
+    """Return the winding number of all other parts about the part `part`: 0 if it lies within none.
+
+    Return None if it touches them at all sampled points, so that the number is undecided.
+    """
     if len(members) == 1:
         return 0
     candidates = corners[members[part]].mean(axis=1)
@@ -158,7 +161,10 @@ def _winding_around(corners: FloatArray, members: Sequence[IntArray], boxes: Flo
 
 
 def _winding(corners: FloatArray, point: FloatArray) -> float:
-    """Return the winding number about `point` of triangles (t, 3, 3), by van Oosterom's and Strackee's solid angles."""
+    """Return the winding number of triangles (t, 3, 3) about `point`.
+
+    It is the sum of their solid angles (van Oosterom and Strackee, 1983), divided by 4π.
+    """
     a, b, c = np.moveaxis(corners - point, 1, 0)
     length_a, length_b, length_c = (np.linalg.norm(side, axis=1) for side in (a, b, c))
     cosine = length_a * length_b * length_c + np.sum(a * b, axis=1) * length_c
@@ -167,6 +173,6 @@ def _winding(corners: FloatArray, point: FloatArray) -> float:
 
 
 def _edge_keys(starts: IntArray, ends: IntArray) -> IntArray:
-    """Return one number for each edge (3 t,), equal for both directions."""
+    """Return a number for each triangle's edges (3 t,), the same for an edge and its reverse."""
     count = int(starts.max()) + 1
     return np.asarray((np.minimum(starts, ends) * count + np.maximum(starts, ends)).ravel(), dtype=np.int64)

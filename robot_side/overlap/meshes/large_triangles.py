@@ -1,6 +1,6 @@
-"""Lanes of triangles much larger than the ball: the rounding errors of their far corners matter near the centre.
+"""Corrections for triangles much larger than the ball, whose corners are far away and so have large rounding errors.
 
-The foot points of their edges and their heights are recomputed in double-double arithmetic.
+The foot points of their edges, and their heights, are recomputed in double-double arithmetic.
 """
 
 import math
@@ -21,9 +21,9 @@ from robot_side.overlap.meshes.mesh_tables import MeshTables
 from robot_side.overlap.meshes.triangle_lanes import BASES, CORNER_DISTANCES, DISTANCES, HEIGHT, HEIGHTS, ROW, aside
 
 FAR = 3.0
-"""Distance, in radii, of both ends of an edge, beyond which the edge is recomputed"""
+"""Distance from the centre, in radii: an edge is recomputed if both ends are farther"""
 _VANISHED = 1e-28
-"""Distance of a foot point from the centre, as a share of an end's distance, up to which it is a rounding error"""
+"""Distance of a foot point from the centre, as a share of an end's distance, up to which it is only a rounding error"""
 
 PreciseTriangle = tuple[PreciseVector, PreciseVector, PreciseVector]
 
@@ -41,7 +41,7 @@ def corners_about(tables: MeshTables, triangle: int, center: PreciseVector) -> P
 
 @inlined
 def is_far(scratch: FloatArray, lane: int) -> bool:
-    """Return whether a triangle has an edge that is far at both ends."""
+    """Return whether the triangle in a lane has an edge with both ends farther than `FAR` from the centre."""
     far = 0
     for corner in range(3):
         far += 1 if scratch[CORNER_DISTANCES + corner * ROW + lane] > FAR else 0
@@ -52,7 +52,10 @@ def is_far(scratch: FloatArray, lane: int) -> bool:
 def refine_lane(
     scratch: FloatArray, lane: int, tables: MeshTables, triangle: int, center: PreciseVector, radius: float
 ) -> None:
-    """Recompute `HEIGHTS` to `BASES` of a lane's far edges, and `HEIGHT` if no edge is near."""
+    """Recompute `HEIGHTS` to `BASES` of a lane's far edges, and take `HEIGHT` from the edge nearest to the centre.
+
+    If no edge reaches the ball, `HEIGHT` is computed from the triangle's plane.
+    """
     corners = corners_about(tables, triangle, center)
     row = tables.triangles[triangle]
     normal = row[9], row[10], row[11]
@@ -81,5 +84,8 @@ def refine_lane(
 
 @inlined
 def _rank(corner: Vector) -> float:
-    """Return the rank by nearness: it chooses the same end for the reversed edge, even if both are equally near."""
+    """Return a rank, lower for nearer corners. The ends of an edge differ in rank, even if they are equally near.
+
+    So an edge and its reverse choose the same end.
+    """
     return dot(corner, corner) * (1.0 + 1e-9 * math.tanh(corner[0] + 0.73 * corner[1] + 0.29 * corner[2]))

@@ -25,20 +25,20 @@ from robot_side.overlap.meshes.mesh_tables import mesh_tables
 Array = npt.ArrayLike
 
 _IN_PLACE = np.zeros(1, dtype=np.int64), np.zeros((1, 3)), np.eye(3)[None]
-"""Index, position and rotation of a single mesh that is placed in its own frame"""
+"""Arguments index, position and rotation that leave a single mesh in its own frame"""
 
 
 class Mesh:
     """Solid bounded by triangles, prepared once for many queries; immutable.
 
-    `vertices` (v, 3) in m, `triangles` (t, 3) indices of these, anticlockwise as seen from outside. Vertices at exactly
-    the same place count as one. Every edge must be used equally often in both directions. A triangle must not be
-    given twice. Parts that share no edge may touch but not overlap. A part inside another one is a cavity and must be
-    oriented inward. Triangles without area are tolerated. Parts that overlap only partly are not detected: their common
-    volume then counts wrongly.
+    `vertices` (v, 3) in m. `triangles` (t, 3): indices of three vertices each, anticlockwise as seen from outside.
+    Vertices with equal coordinates count as one. Every edge must be used equally often in both directions. A triangle
+    must not be given twice. Parts that share no edge may touch but not overlap. A part inside another one is a cavity
+    and must be oriented inward. Triangles without area are allowed. Parts that overlap partly are not detected, and
+    their common volume is then counted wrongly.
 
-    ValueError for NaN, infinity, a magnitude above 1e50, wrong shapes, types or indices, an open or inward surface,
-    or an overlapping part. The text names the argument and the first triangle or edge.
+    ValueError for NaN, infinity, a magnitude above 1e50, wrong shapes, types or indices, an open surface, or a part of
+    the wrong orientation. Its text names the argument and the first wrong triangle or edge.
     """
 
     def __init__(self, vertices: Array, triangles: Array) -> None:
@@ -57,9 +57,9 @@ class Mesh:
             raise ValueError(f"triangles enclose {self.volume_m3:.3g} m³; valid: a volume above 0")
         self.triangle_count = len(kept)
         self.lowest_m: FloatArray = corners.reshape(-1, 3).min(axis=0)
-        """(3,) least coordinates (m)"""
+        """Lowest coordinate (m) on each axis (3,)"""
         self.highest_m: FloatArray = corners.reshape(-1, 3).max(axis=0)
-        """(3,) greatest coordinates (m)"""
+        """Highest coordinate (m) on each axis (3,)"""
         self.tables = mesh_tables(corners, self.volume_m3)
 
     @overload
@@ -67,12 +67,12 @@ class Mesh:
     @overload
     def overlap(self, centers: Array, radii: Array, *, gradient: Literal[True]) -> Overlaps: ...
     def overlap(self, centers: Array, radii: Array, *, gradient: bool = False) -> FloatArray | Overlaps:
-        """Return the overlap with the spheres `centers` (..., 3), `radii` (...) in m; see `volumes`."""
+        """Return the overlap with the spheres `centers` (..., 3), `radii` (...) in m; results are as in `volumes`."""
         (volumes, gradients, areas), _ = self._query(centers, radii)
         return (volumes, gradients, areas) if gradient else volumes
 
     def counts(self, centers: Array, radii: Array) -> IntArray:
-        """Return the number of triangles (...) that a query of each sphere evaluates: its cost."""
+        """Return how many triangles (...) the overlap with each sphere has to evaluate: the query's cost."""
         return self._query(centers, radii)[1]
 
     def _query(self, centers: Array, radii: Array) -> tuple[Overlaps, IntArray]:
@@ -101,9 +101,10 @@ def sphere_mesh(
 def sphere_mesh(
     centers: Array, radii: Array, vertices: Array, triangles: Array, *, gradient: bool = False
 ) -> FloatArray | Overlaps:
-    """Return the overlap of the spheres `centers` (..., 3), `radii` (...) with one mesh; see `Mesh` and `volumes`.
+    """Return the overlap of the spheres `centers` (..., 3), `radii` (...) with one mesh.
 
-    The last eight meshes are cached, so that they are not prepared again. A `Mesh` object also avoids the look-up.
+    `Mesh` describes `vertices` and `triangles`, `volumes` the results. The last eight meshes are cached, so that they
+    are not prepared again. With a `Mesh` object even the look-up is saved.
     """
     places = np.ascontiguousarray(checked_vertices(vertices))
     indices = checked_triangles(triangles, len(places))

@@ -1,6 +1,6 @@
 """Overlaps and distances of (sphere, placed mesh) pairs in contiguous arrays, for calls in a 1 kHz tick.
 
-Arguments are not validated, see `kernels`. A placed mesh is queried in its own frame. There the sphere's centre is
+Arguments are not checked, as in `kernels`. A placed mesh is queried in its own frame. There the sphere's centre is
 Qᵀ (centre - position), with Q the rotation from the mesh's frame to the world.
 """
 
@@ -28,16 +28,20 @@ MESH_ARGUMENTS = (
 )
 """Numba types of the fields of `MeshTables`"""
 PLACED_ARGUMENTS = (input_indices(), input_array(2), input_array(3))
-"""Numba types of placed meshes: indices (q,), positions (q, 3) and rotations (q, 3, 3)"""
+"""Numba types of placed meshes: indices of the meshes (q,), positions (q, 3) and rotations (q, 3, 3)"""
 
 _ON_SURFACE = 1e-12
-"""Distance from the surface, as a share of the mesh's size, up to which the nearest triangle decides a point's side"""
+"""Distance from the surface, as a share of the mesh's size, up to which the nearest triangle's normal decides whether a
+point is inside; the winding number decides farther away"""
 _scratch = on_stack(SCRATCH)
 
 
 @inlined
 def to_mesh(center: Vector, positions: FloatArray, rotations: FloatArray, pair: int) -> PreciseVector:
-    """Return a centre in the mesh's frame; a float would be too coarse for a ball at the far end of a large mesh."""
+    """Return a sphere's centre in the mesh's frame, in double-double.
+
+    A float would be too coarse for a small ball at the far end of a large mesh.
+    """
     away = (
         two_sum(center[0], -positions[pair, 0]),
         two_sum(center[1], -positions[pair, 1]),
@@ -88,10 +92,10 @@ def overlap_loop(
     touched: IntArray,
     near: IntArray,
 ) -> None:
-    """Fill volumes, gradients (in the world frame), areas, and the numbers of triangles that each pair evaluated.
+    """Fill volumes, gradients (in the world frame), areas, and `touched`: how many triangles each pair evaluated.
 
-    placed (p,): each sphere's placed mesh, a row of the three arrays that follow.
-    near: scratch for one triangle more than there are.
+    placed (p,): each sphere's placed mesh, as a row of mesh_index, positions and rotations. near: scratch with room for
+    all triangles and one more.
     """
     tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
     scratch = _scratch()
@@ -114,7 +118,10 @@ def overlap_loop(
 
 @building_block
 def _signed_distance(tables: MeshTables, mesh: int, point: Vector) -> tuple[float, Vector]:
-    """Return (signed distance in m, negative inside; unit vector along which it falls fastest), in the mesh's frame."""
+    """Return (signed distance of `point` in m, negative inside; unit vector along which it falls fastest).
+
+    Both are in the mesh's frame.
+    """
     triangle, foot = nearest_triangle(tables, mesh, point)
     distance = norm(foot)
     normal = tables.triangles[triangle, 9], tables.triangles[triangle, 10], tables.triangles[triangle, 11]
@@ -150,7 +157,11 @@ def nearest_loop(
     distances: FloatArray,
     directions: FloatArray,
 ) -> None:
-    """Fill signed distances (m) and directions (in the world frame)."""
+    """Fill the centres' signed distances (m) from placed meshes, and directions in the world frame, one mesh each.
+
+    The signed distance falls fastest along the direction. Row by row, `mesh_index`, `positions` and `rotations` are the
+    placed mesh of the centre in the same row.
+    """
     tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
     for pair in range(mesh_index.size):
         point = to_mesh(load(centers, pair), positions, rotations, pair)

@@ -1,4 +1,4 @@
-"""Several meshes in one set of arrays, so that one kernel call handles all pairs of a sphere and a placed mesh."""
+"""Several meshes in one set of arrays, so that one kernel call can handle all pairs of a sphere and a placed mesh."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,25 +13,26 @@ from robot_side.overlap.meshes.mesh_kernels import nearest_loop, overlap_loop
 from robot_side.overlap.meshes.mesh_tables import joined
 
 _FLAT_M = 1e-7
-"""Depth of a dent up to which a mesh counts as convex"""
+"""Depth of a dent, in m, up to which a mesh counts as convex"""
 _BATCH = 64
-"""Triangles that are tested together: most meshes with dents show one early."""
+"""Number of triangles that are tested together for dents. The test ends at the first dent, which most meshes with dents
+show early."""
 
 
 @dataclass(frozen=True)
 class MeshBounds:
-    """Bounding volumes of m meshes in their own frames: boxes along the axes, and spheres about the same middles."""
+    """Bounding boxes along the axes of m meshes in their own frames, and bounding spheres about the boxes' middles."""
 
     middles_m: FloatArray
-    """(m, 3)"""
+    """Middle of each box, and centre of each sphere (m, 3)"""
     half_sizes_m: FloatArray
-    """(m, 3)"""
+    """Half the size of each box along the axes (m, 3)"""
     radii_m: FloatArray
-    """(m,)"""
+    """Radius of each sphere (m,)"""
 
 
 class MeshLibrary:
-    """Meshes that a scene places by their indices; immutable. ValueError for an empty list."""
+    """Meshes to which a scene refers by their indices; immutable. ValueError for an empty list."""
 
     def __init__(self, meshes: Sequence[Mesh]) -> None:
         if not meshes:
@@ -46,7 +47,7 @@ class MeshLibrary:
 
     @cached_property
     def bounds(self) -> MeshBounds:
-        """Bounding volumes of the meshes"""
+        """Bounding boxes and spheres of the meshes"""
         tables = self.tables
         roots = tables.roots[:-1]
         lowest, highest = tables.boxes[roots, :3], tables.boxes[roots, 3:]
@@ -59,7 +60,7 @@ class MeshLibrary:
 
     @cached_property
     def convex(self) -> BoolArray:
-        """(m,) whether each mesh is convex: no corner in front of any of its triangles"""
+        """Whether each mesh (m,) is convex: none of its corners lies in front of any of its triangles"""
         tables = self.tables
         first = tables.links.reshape(-1, 3)[tables.roots[:-1], 1]
         parts = (np.split(part, first[1:]) for part in (tables.triangles[:, :9], tables.triangles[:, 9:12]))
@@ -72,14 +73,17 @@ class MeshLibrary:
         return np.split(self.tables.triangles[:, :9].reshape(-1, 3, 3), first_triangles[1:])
 
     def placed_middles_m(self, mesh_index: IntArray, positions: FloatArray, rotations: FloatArray) -> FloatArray:
-        """Return the middles (q, 3) of placed meshes' bounds in the world frame; arguments as for `mesh_pairs`."""
+        """Return the middles (q, 3) of the bounding volumes of placed meshes, in the world frame.
+
+        mesh_index (q,), positions (q, 3), rotations (q, 3, 3): as for `mesh_pairs`.
+        """
         middles = self.bounds.middles_m.take(mesh_index, axis=0)
         placed: FloatArray = positions + np.einsum("qij,qj->qi", rotations, middles)
         return placed
 
 
 def _is_convex(corners: FloatArray, normals: FloatArray) -> bool:
-    """Return whether triangles (t, 9) with outward normals (t, 3) bound a convex solid."""
+    """Return whether triangles with `corners` (t, 9) and outward `normals` (t, 3) bound a convex solid."""
     first, places = corners[:, :3], np.unique(corners.reshape(-1, 3), axis=0)
     offsets = np.einsum("ti,ti->t", normals, first)
     return all(
@@ -96,10 +100,11 @@ def mesh_pairs(
     positions: FloatArray,
     rotations: FloatArray,
 ) -> Overlaps:
-    """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with meshes `mesh_index` (p,) int64.
+    """Return the overlap of each sphere (`centers` (p, 3), `radii` (p,)) with one placed mesh of the library.
 
-    Meshes are at `positions` (p, 3); `rotations` (p, 3, 3) turn their frames to the world's. The result is (volumes
-    (p,), gradients (p, 3), areas (p,)), as in `kernels`. Nothing is checked: a wrong index reads beyond the arrays.
+    `mesh_index` (p,) int64 is the mesh's index, `positions` (p, 3) its position; `rotations` (p, 3, 3) turn from its
+    frame to the world's. The result is (volumes (p,), gradients (p, 3), areas (p,)), as in `kernels`. Nothing is
+    checked: a wrong index would read beyond the arrays.
     """
     count = len(radii)
     volumes, gradients, areas = np.empty(count), np.empty((count, 3)), np.empty(count)
@@ -113,10 +118,10 @@ def mesh_pairs(
 def nearest_mesh_pairs(
     centers: FloatArray, library: MeshLibrary, mesh_index: IntArray, positions: FloatArray, rotations: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return (signed distances (p,) in m, negative inside; unit directions (p, 3)) of points and placed meshes.
+    """Return each point's signed distance (p,) in m from one placed mesh, negative inside, and a unit vector (p, 3).
 
-    The signed distance falls fastest along the direction: towards the nearest point of the surface from outside, away
-    from that point from inside. Arguments as for `mesh_pairs`.
+    The signed distance falls fastest along this vector. From outside it points towards the nearest point of the
+    surface, from inside away from that point. The arguments are those of `mesh_pairs`; `centers` (p, 3) are the points.
     """
     distances, directions = np.empty(len(centers)), np.empty((len(centers), 3))
     nearest_loop(centers, mesh_index, positions, rotations, *library.tables, distances, directions)

@@ -47,17 +47,18 @@ from robot_side.overlap.meshes.triangle_lanes import (
 
 _WHOLE = 4.0 * math.pi
 _UNDECIDED_AREA = 1e-11
-"""Distance of a solid angle (sr) from 0 or 4π up to which it may be either"""
+"""Distance of a solid angle from 0 or 4π, in sr, up to which rounding may have turned one into the other"""
 _UNDECIDED_VOLUME = 1e-8
-"""Volume of the part inside (for radius 1) up to which it does not decide between 0 and 4π"""
+"""Size of the volume that follows from a solid angle near 0 (radius 1), up to which it does not show whether the solid
+angle is really 4π"""
 _SMALL_VOLUME = 1e-5
-"""Volume (for radius 1) below which it is recomputed with less cancellation"""
+"""Overlap (for radius 1) below which it is recomputed with less cancellation"""
 _CLOSE = 0.02
-"""Distance from the surface, in radii, beyond which a centre cannot be inside if the volume is small"""
+"""Distance of the centre from the surface, in radii, beyond which the centre is outside if the overlap is small"""
 
 
 class Sums(NamedTuple):
-    """Sums over triangles: the product of their complex numbers, and the sums of `TURN`, `MOMENT` and `PUSH`."""
+    """Product of the triangles' complex numbers, and sums of their `TURN`, `MOMENT` and `PUSH` (`triangle_lanes`)."""
 
     product: Complex
     turn: float
@@ -77,10 +78,10 @@ def mesh_overlap(
     near: IntArray,
     scratch: FloatArray,
 ) -> tuple[Overlap, int]:
-    """Return (the overlap of the sphere with a mesh, the number of triangles evaluated).
+    """Return (the overlap of the sphere with the mesh, the number of triangles evaluated).
 
-    The centre (m) is in the mesh's frame. `near` has room for one triangle more than the mesh has, `scratch` for
-    `triangle_lanes.SCRATCH` numbers.
+    `precise_center` (m) is in the mesh's frame; `mesh` is the mesh's number in `tables`. `near` has room for one
+    triangle more than the mesh has, `scratch` for `triangle_lanes.SCRATCH` numbers.
     """
     center = highs(precise_center)
     least_2, most_2 = box_distances_2(tables, mesh, center)
@@ -140,7 +141,10 @@ def measured(
     count: int,
     scratch: FloatArray,
 ) -> tuple[int, bool]:
-    """Measure the triangles in `near` from `first` on; return how many fitted, and whether any is large."""
+    """Fill the scratch's lanes with the geometry of the triangles in `near` from `first` on.
+
+    Return how many triangles fitted, and whether any is much larger than the ball.
+    """
     size = min(count - first, LANES)
     groups = (size + (WIDTH - 1)) // WIDTH
     _load_lanes(tables, near, first, size, groups, scratch)
@@ -153,7 +157,7 @@ def measured(
 
 @inlined
 def with_lanes(sums: Sums, size: int, scratch: FloatArray) -> Sums:
-    """Return the sums with the measured triangles added."""
+    """Return the sums with the terms of the scratch's first `size` triangles added."""
     triangle_terms(scratch, (size + (WIDTH - 1)) // WIDTH)
     reduce_lanes(scratch, size)
     product = times(sums.product, (scratch[REAL], scratch[IMAGINARY]))
@@ -168,7 +172,7 @@ def with_lanes(sums: Sums, size: int, scratch: FloatArray) -> Sums:
 
 @inlined
 def solid_angle_inside(sums: Sums, tables: MeshTables, mesh: int, center: Vector, radius: float) -> float:
-    """Return the part of the sphere (sr) that lies inside the mesh."""
+    """Return the solid angle (sr) of the sphere's surface that lies inside the mesh."""
     covered = -2.0 * (math.atan2(sums.product[1], sums.product[0]) + sums.turn)
     covered -= _WHOLE * math.floor(covered / _WHOLE)
     if covered < _UNDECIDED_AREA or covered > _WHOLE - _UNDECIDED_AREA:
@@ -183,7 +187,11 @@ def solid_angle_inside(sums: Sums, tables: MeshTables, mesh: int, center: Vector
 def _small_overlap(
     center: PreciseVector, radius: float, tables: MeshTables, near: IntArray, count: int
 ) -> tuple[bool, float, float, Vector]:
-    """Return (whether it applies, volume, covered solid angle, Σ A n) of the triangles in `near`, for radius 1."""
+    """Recompute a small overlap in double-double from the `count` triangles in `near`.
+
+    Return (whether this form applies, volume, solid angle inside, Σ A n), for radius 1. It does not apply if the centre
+    is close to the surface.
+    """
     volume, covered, push = ZERO, ZERO, (ZERO, ZERO, ZERO)
     to_radii = divided((1.0, 0.0), (radius, 0.0))
     for index in range(count):
@@ -211,7 +219,7 @@ def _lows(vector: PreciseVector) -> Vector:
 @inlined
 def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, groups: int, scratch: FloatArray) -> None:
     triangles, last = tables.triangles.reshape(-1), first + size - 1
-    # Only whole groups, so that loops have no remainder; the last triangle fills the last group.
+    # Loops take whole groups, so that they have no remainder; copies of the last triangle fill the last group.
     for lane in range(0, groups * WIDTH, 4):
         place = first + lane
         row_0, row_1 = FIELDS * near[min(place, last)], FIELDS * near[min(place + 1, last)]
@@ -223,10 +231,10 @@ def _load_lanes(tables: MeshTables, near: IntArray, first: int, size: int, group
 
 @building_block
 def _mostly_inside(tables: MeshTables, mesh: int, center: Vector, radius: float) -> bool:
-    """Return whether the ball lies inside the mesh, up to a tiny part; otherwise it lies outside, up to a tiny part.
+    """Return whether the ball lies inside the mesh or outside, apart from a tiny part of it.
 
-    The centre itself may be in that part, in a needle or a narrow slit. So the point farthest from the surface decides,
-    of eight points.
+    The centre itself may be in this part, for example in a needle or a narrow slit. So eight points in the ball are
+    tried, and the one farthest from the surface decides.
     """
     best, best_2 = center, -1.0
     for number in range(8):

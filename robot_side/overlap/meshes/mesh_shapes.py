@@ -1,6 +1,6 @@
-"""Closed meshes around round solids, never smaller than these, with bounds on the excess; convex hulls.
+"""Closed meshes that contain cylinders, ellipsoids and capsules, with the excess of their volume; convex hulls.
 
-Rounding may move a vertex by its last digit.
+They are not smaller than the solid anywhere, except that rounding may move a vertex by its last digit.
 """
 
 from typing import NamedTuple
@@ -13,22 +13,23 @@ from common.arrays import FloatArray, IntArray
 
 
 class ShapeMesh(NamedTuple):
-    """Mesh that contains a solid."""
+    """Mesh that contains a solid, and by how much it is larger."""
 
     vertices: FloatArray
-    """(v, 3) in m"""
+    """Corners (v, 3) in m"""
     triangles: IntArray
-    """(t, 3)"""
+    """Indices of each triangle's corners (t, 3), anticlockwise as seen from outside"""
     excess: float
-    """Largest excess of the mesh's volume, as a share of the solid's"""
+    """Excess of the mesh's volume over the solid's, as a share of the solid's"""
     stands_out_m: float
-    """Largest distance of a point of the mesh from the solid"""
+    """Upper bound of the distance by which the mesh protrudes from the solid"""
 
 
 def cylinder_mesh(radius: float, half_length: float, segments: int = 32) -> ShapeMesh:
-    """Return a prism of `segments` sides, each touching the cylinder about the z axis, |z| <= half_length; m.
+    """Return a prism around the cylinder of `radius` about the z axis, |z| <= half_length; all in m.
 
-    The excess is that of a circumscribed polygon: (n / π) tan(π / n) - 1.
+    Each of the `segments` sides touches the cylinder. The excess is that of a circumscribed polygon of n sides:
+    (n / π) tan(π / n) - 1.
     """
     turns = 2.0 * np.pi * np.arange(segments) / segments
     reach = radius / np.cos(np.pi / segments)
@@ -40,10 +41,10 @@ def cylinder_mesh(radius: float, half_length: float, segments: int = 32) -> Shap
 
 
 def ellipsoid_mesh(semi_axes: npt.ArrayLike, subdivisions: int = 8) -> ShapeMesh:
-    """Return a polyhedron about the ellipsoid Σ (xᵢ / semi_axesᵢ)² <= 1, `semi_axes` (3,) in m.
+    """Return a polyhedron around the ellipsoid Σ (xᵢ / semi_axesᵢ)² <= 1, `semi_axes` (3,) in m.
 
-    The sphere's octahedron with `subdivisions` triangles along each edge, enlarged until no face cuts the sphere, and
-    stretched. Its volume is known, so the excess is exact.
+    An octahedron in a sphere, each edge divided by `subdivisions`, is enlarged until no face cuts the sphere, and then
+    stretched. The excess is computed exactly, from the polyhedron's volume.
     """
     axes = np.asarray(semi_axes, dtype=np.float64)
     unit = _round(subdivisions, 0.0)
@@ -51,9 +52,9 @@ def ellipsoid_mesh(semi_axes: npt.ArrayLike, subdivisions: int = 8) -> ShapeMesh
 
 
 def capsule_mesh(radius: float, half_length: float, subdivisions: int = 8) -> ShapeMesh:
-    """Return a polyhedron about the capsule, the points within `radius` of |z| <= half_length on the z axis; m.
+    """Return a polyhedron around a capsule: the points within `radius` of the z axis' segment |z| <= half_length, in m.
 
-    The halves of an `ellipsoid_mesh` of equal axes, moved apart.
+    It consists of the halves of an `ellipsoid_mesh` of equal axes, moved apart, and a prism between them.
     """
     unit = _round(subdivisions, half_length / radius)
     return unit._replace(vertices=unit.vertices * radius, stands_out_m=unit.stands_out_m * radius)
@@ -87,7 +88,7 @@ def _outward_hull(vertices: FloatArray) -> IntArray:
 
 
 def _round(subdivisions: int, half_length: float) -> ShapeMesh:
-    """Return a mesh about the unit sphere with halves moved apart by ±half_length along z, and a prism in between."""
+    """Return a mesh around the unit sphere whose halves are moved along z by ±half_length, with a prism in between."""
     steps = range(-subdivisions, subdivisions + 1)
     lattice = [(x, y, z) for x in steps for y in steps for z in steps if abs(x) + abs(y) + abs(z) == subdivisions]
     directions = np.array(lattice, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Tables for the mesh kernels: triangles in the order of their tree, and the tree, of one or several meshes."""
+"""Tables for the mesh kernels, of one or several meshes: the triangles in the order of their tree, and the tree."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -9,29 +9,30 @@ from common.arrays import FloatArray, IntArray
 from robot_side.overlap.meshes.triangle_tree import LINKS, build_tree
 
 FIELDS = 16
-"""Numbers for each triangle in `MeshTables.triangles`"""
+"""How many numbers describe one triangle in `MeshTables.triangles`"""
 
 
 class MeshTables(NamedTuple):
     """Flat arrays of m meshes with t triangles and n nodes in all; lengths in m."""
 
     triangles: FloatArray
-    """(t, 16) corners (9), outward unit normal (3), inverse edge lengths (3, from corner i to i + 1), longest edge"""
+    """(t, 16) for each triangle: corners (9), outward unit normal (3), 1 / length of each edge from corner i to i + 1
+    (3), length of the longest edge (1)"""
     spheres: FloatArray
     """(t, 4) centre and radius of a ball around each triangle"""
     boxes: FloatArray
-    """(n, 6) see `TriangleTree`"""
+    """(n, 6) box of each node, as in `TriangleTree`"""
     links: IntArray
-    """(3 n,) see `TriangleTree`, with indices into these arrays"""
+    """(3 n,) links of each node, as in `TriangleTree`, but with indices into the arrays of all meshes"""
     moments: FloatArray
-    """(n, 7) see `TriangleTree`"""
+    """(n, 7) moments of each node, as in `TriangleTree`"""
     roots: IntArray
-    """(m + 1,) root node of each mesh, and n"""
+    """(m + 1,) root node of each mesh, followed by n"""
     volumes: FloatArray
     """(m,) volume of each mesh (m³)"""
 
     def room(self) -> IntArray:
-        """Return uninitialised scratch (t + 1,) for the triangles near a sphere, and one more."""
+        """Return uninitialised scratch (t + 1,) for the numbers of the triangles near a sphere, and one more."""
         return np.empty(len(self.triangles) + 1, dtype=np.int64)
 
 
@@ -58,7 +59,7 @@ def mesh_tables(corners: FloatArray, volume: float) -> MeshTables:
 
 
 def joined(parts: Sequence[MeshTables]) -> MeshTables:
-    """Join the tables of several meshes."""
+    """Return the tables of several meshes joined into one."""
     links, roots, nodes, triangles = [], [0], 0, 0
     for part in parts:
         shift = np.array([nodes, triangles, 0], dtype=np.int64)
@@ -84,7 +85,10 @@ def _read_only(*arrays: np.ndarray) -> MeshTables:
 
 
 def _normals(edges: FloatArray, lengths: FloatArray) -> FloatArray:
-    """Return the unit normals (t, 3), in extended precision; for a triangle without area, any across its edges."""
+    """Return the triangles' unit normals (t, 3), computed in extended precision.
+
+    A triangle without area gets any unit vector at right angles to its longest edge.
+    """
     wide = edges.astype(np.longdouble)
     longest = lengths.argmax(axis=1)
     rows = np.arange(len(edges))
@@ -99,7 +103,10 @@ def _normals(edges: FloatArray, lengths: FloatArray) -> FloatArray:
 
 
 def _enclosing_balls(corners: FloatArray, edges: FloatArray, lengths: FloatArray) -> FloatArray:
-    """Return the smaller ball (t, 4) around each triangle: about the middle of its longest edge, or its centroid."""
+    """Return a ball (t, 4) around each triangle, about the middle of its longest edge or about its centroid.
+
+    The smaller one is taken, enlarged by a millionth.
+    """
     rows, longest = np.arange(len(corners)), lengths.argmax(axis=1)
     middles = corners[rows, longest] + 0.5 * edges[rows, longest]
     centroids = corners.mean(axis=1)

@@ -1,4 +1,7 @@
-"""Overlap of a sphere and a closed mesh to 1e-13 of the sphere, for looks: without the steps for further digits."""
+"""Overlap of a sphere and a closed mesh with an error of 1e-13 of the sphere, for the law.
+
+The steps of `mesh_overlap` for further digits are left out.
+"""
 
 import math
 
@@ -13,14 +16,14 @@ from robot_side.overlap.meshes.tree_queries import corner_of, gather_near, is_in
 from robot_side.overlap.meshes.triangle_lanes import LANES
 
 _SAME_PLANE = 1e-9
-"""Largest difference of the normals, and of the distances in radii, of triangles in one plane"""
+"""Largest difference of the unit normals, and of the distances in radii, of two triangles that count as in one plane"""
 
 
 @building_block
 def rounded_overlap(
     center: Vector, radius: float, tables: MeshTables, mesh: int, near: IntArray, scratch: FloatArray
 ) -> tuple[float, Vector]:
-    """Return (volume, gradient); arguments as of `mesh_overlap`."""
+    """Return (volume, gradient) of the overlap; the arguments are those of `mesh_overlap`, with a rounded centre."""
     least_2, most_2 = box_distances_2(tables, mesh, center)
     if least_2 >= radius * radius or radius == 0.0:
         return 0.0, (0.0, 0.0, 0.0)
@@ -31,7 +34,7 @@ def rounded_overlap(
     if count == 0:
         return sphere_volume(radius) if is_inside(tables, mesh, center) else 0.0, (0.0, 0.0, 0.0)
     if flat:
-        # If the ball meets no other plane, the triangles of this one cover the whole disc.
+        # If the ball touches triangles of one plane only, these cover the ball's whole disc in this plane.
         normal = corner_of(tables, near[0], 3)
         height = dot(normal, subtract(center, corner_of(tables, near[0], 0)))
         volume, gradient, _ = cap(radius - height, radius + height, radius, normal)
@@ -60,9 +63,10 @@ def _keep_near(tables: MeshTables, center: Vector, radius: float, near: IntArray
 
 @building_block
 def _keep_touched(tables: MeshTables, center: Vector, radius: float, near: IntArray, count: int) -> tuple[int, bool]:
-    """Keep the triangles in `near` that the ball touches, and all from the second plane on.
+    """Keep the triangles in `near` that the ball touches, as long as they lie in one plane.
 
-    Return their number, and whether there is only one plane.
+    From the first triangle that is touched in a second plane on, keep all triangles, touched or not. Return the number
+    of kept triangles, and whether they lie in one plane.
     """
     kept = 0
     for index in range(count):
@@ -91,7 +95,7 @@ def _has_corner_in(tables: MeshTables, triangle: int, center: Vector, radius: fl
 
 @inlined
 def _in_plane(tables: MeshTables, triangle: int, other: int, radius: float) -> bool:
-    """Return whether two triangles lie in one plane."""
+    """Return whether two triangles lie in the same plane, within `_SAME_PLANE`."""
     normal = corner_of(tables, triangle, 3)
     off = subtract(normal, corner_of(tables, other, 3))
     lifted = dot(normal, subtract(corner_of(tables, triangle, 0), corner_of(tables, other, 0)))

@@ -1,8 +1,9 @@
 """Tiny overlaps of a mesh and a sphere whose centre lies outside, in double-double arithmetic.
 
-The sum of `triangle_lanes` is a small difference from a whole turn, with the rounding errors of the whole. Without a
-whole turn the volume is - Σ (R³ Ω - h A) / 3. Each face's term is the part of the ball beyond the face. The terms are
-small if the overlap is small, but the overlap with an edge or corner is far smaller still. Hence 31 digits.
+The sum of `triangle_lanes` is then a small difference from 4π, with the rounding errors of the whole 4π. As the centre
+lies outside, 4π is not needed and the volume is -Σ (R³ Ω - h A) / 3. Each face's term is the part of the ball beyond
+the face. These terms are small if the overlap is small. But an overlap with an edge or corner is far smaller than the
+terms, so they are computed with 31 digits.
 """
 
 from robot_side.compiled.kernel import building_block, inlined
@@ -33,14 +34,15 @@ from robot_side.overlap.meshes.large_triangles import PreciseTriangle
 _ONE: DoubleDouble = (1.0, 0.0)
 
 BeyondFace = tuple[DoubleDouble, DoubleDouble, PreciseVector]
-"""(volume, solid angle, area times normal), for radius 1"""
+"""Part of the ball beyond a face: (volume, solid angle, area of the face in the ball times its normal), for radius 1"""
 
 
 @building_block
 def beyond_face(corners: PreciseTriangle) -> BeyondFace:
-    """Return the part of the unit ball beyond a triangle as seen from the centre, positive if that is inward.
+    """Return the part of the unit ball that lies beyond a triangle, as seen from the centre.
 
-    `corners` are relative to the centre, in radii.
+    Volume and solid angle are positive if the solid's inside is beyond the triangle, else negative. `corners` are
+    relative to the centre, in radii.
     """
     normal, size = precise_unit(
         precise_cross(precise_subtract(corners[1], corners[0]), precise_subtract(corners[2], corners[0]))
@@ -91,7 +93,10 @@ def _clipped(along: DoubleDouble, half_chord: DoubleDouble) -> DoubleDouble:
 
 @building_block
 def _angle(distance: DoubleDouble, start: DoubleDouble, end: DoubleDouble) -> DoubleDouble:
-    """Return the angle about the face's foot point from one place along an edge to another."""
+    """Return the angle, seen from the face's foot point, between two points of an edge.
+
+    `start`, `end`: their positions along the edge from the edge's own foot point. `distance`: that of the edge's line.
+    """
     return arctangent(times(distance, minus(end, start)), plus(times(distance, distance), times(start, end)))
 
 

@@ -1,4 +1,4 @@
-"""Queries of a mesh's tree: the triangles that a ball may reach, the nearest one, the winding number."""
+"""Queries of a mesh's tree: triangles that a ball may reach, nearest triangle, inside or outside, winding number."""
 
 import math
 
@@ -10,7 +10,7 @@ from robot_side.compiled.vectors import Vector, add, cross, dot, load, norm, sca
 from robot_side.overlap.meshes.mesh_tables import MeshTables
 
 _CERTAIN = 0.2
-"""Distance from a whole number up to which a winding number is rounded to it"""
+"""Largest distance of a computed winding number from a whole number to which it may be rounded"""
 
 
 @inlined
@@ -27,16 +27,17 @@ def _box_distance_2(tables: MeshTables, node: int, point: Vector) -> float:
 
 @inlined
 def is_clear_of(tables: MeshTables, mesh: int, point: Vector, radius: float) -> bool:
-    """Return whether a ball lies outside a mesh's box, with a margin for the rounding of `point`."""
+    """Return whether the ball (`point`, `radius`) lies outside a mesh's box, with a margin for `point`'s rounding."""
     apart_2 = _box_distance_2(tables, tables.roots[mesh], point)
     return apart_2 > 1.000001 * radius * radius + 1e-24 * dot(point, point)
 
 
 @building_block
 def gather_near(tables: MeshTables, mesh: int, point: Vector, radius: float, near: IntArray) -> int:
-    """Write the triangles that the ball (`point`, `radius`) may reach into `near`; return their number.
+    """Write the numbers of the triangles that the ball (`point`, `radius`) may reach into `near`; return their count.
 
-    No triangle that the ball reaches is missing. `near` has room for every triangle of the mesh and one more.
+    Some of them may be out of reach, but no triangle within reach is missing. `near` has room for all triangles of the
+    mesh and one more.
     """
     count = 0
     node, end = tables.roots[mesh], tables.roots[mesh + 1]
@@ -51,7 +52,7 @@ def gather_near(tables: MeshTables, mesh: int, point: Vector, radius: float, nea
             gap_y = tables.spheres[row, 1] - point[1]
             gap_z = tables.spheres[row, 2] - point[2]
             reach = tables.spheres[row, 3] + radius
-            # Always written, and kept by the count: no branch to predict.
+            # Always written, but counted only if near: so there is no branch to predict.
             near[count] = triangle
             count += 1 if gap_x * gap_x + gap_y * gap_y + gap_z * gap_z <= reach * reach else 0
         node += 1
@@ -60,7 +61,7 @@ def gather_near(tables: MeshTables, mesh: int, point: Vector, radius: float, nea
 
 @inlined
 def corner_of(tables: MeshTables, triangle: int, number: int) -> Vector:
-    """Return a corner of a triangle (m), 0 to 2; its outward unit normal for 3."""
+    """Return the corner 0, 1 or 2 of a triangle (m); for `number` = 3 its outward unit normal."""
     return (
         tables.triangles[triangle, 3 * number],
         tables.triangles[triangle, 3 * number + 1],
@@ -85,7 +86,7 @@ def to_triangle(tables: MeshTables, triangle: int, point: Vector) -> Vector:
             best, best_2 = foot, distance_2
         inside = inside and dot(start, cross(edge, normal)) >= 0.0
     if inside:
-        # The edge's nearest point, `best`, rounds least; near the triangle any point is good.
+        # Any point of the plane gives the distance; `best`, the nearest point of the edges, rounds least.
         return scale(dot(best, normal), normal)
     return best
 
@@ -99,7 +100,7 @@ def squared_distance(tables: MeshTables, triangle: int, point: Vector) -> float:
 
 @building_block
 def touches_surface(tables: MeshTables, mesh: int, point: Vector, radius: float) -> bool:
-    """Return whether any triangle is nearer to `point` than `radius`."""
+    """Return whether any triangle of the mesh is nearer to `point` than `radius`."""
     node, end = tables.roots[mesh], tables.roots[mesh + 1]
     while node < end:
         if radius <= 0.0 or _box_distance_2(tables, node, point) > radius * radius:
@@ -117,7 +118,7 @@ def touches_surface(tables: MeshTables, mesh: int, point: Vector, radius: float)
 
 @building_block
 def nearest_triangle(tables: MeshTables, mesh: int, point: Vector) -> tuple[int, Vector]:
-    """Return (the triangle nearest to `point`, the vector in m from `point` to its nearest point)."""
+    """Return (the number of the triangle nearest to `point`, the vector in m from `point` to its nearest point)."""
     first, end = tables.roots[mesh], tables.roots[mesh + 1]
     # Descend to the nearer child for a good first bound.
     node = first
@@ -147,7 +148,10 @@ def nearest_triangle(tables: MeshTables, mesh: int, point: Vector) -> tuple[int,
 
 @inlined
 def _crosses(start: Vector, end: Vector, point: Vector, u: int, v: int) -> bool:
-    """Return whether the ray from `point` along `u` crosses an edge in the u-v plane; equal for a reversed edge."""
+    """Return whether the ray from `point` along the axis `u` crosses an edge, both projected to the u-v plane.
+
+    An edge and its reverse give the same answer.
+    """
     if (start[v] > point[v]) == (end[v] > point[v]):
         return False
     low, high = (start, end) if start[v] < end[v] else (end, start)
@@ -157,9 +161,10 @@ def _crosses(start: Vector, end: Vector, point: Vector, u: int, v: int) -> bool:
 
 @building_block
 def is_inside(tables: MeshTables, mesh: int, point: Vector) -> bool:
-    """Return whether a point off the surface lies inside a mesh.
+    """Return whether a point that is not on the surface lies inside a mesh.
 
-    From inside, a ray along an axis, to the nearest side of the mesh's box, crosses the surface an odd number of times.
+    It counts how often a ray from the point, along an axis to the nearest side of the mesh's box, crosses the surface.
+    From inside the number is odd.
     """
     node, end = tables.roots[mesh], tables.roots[mesh + 1]
     axis, sign, least = 0, 1.0, math.inf
@@ -192,7 +197,7 @@ def is_inside(tables: MeshTables, mesh: int, point: Vector) -> bool:
 
 @inlined
 def _solid_angle(tables: MeshTables, triangle: int, point: Vector) -> float:
-    """Return the signed solid angle (sr) of a triangle, by van Oosterom and Strackee (1983)."""
+    """Return the signed solid angle (sr) of a triangle seen from `point`, by van Oosterom and Strackee (1983)."""
     a = subtract(corner_of(tables, triangle, 0), point)
     b = subtract(corner_of(tables, triangle, 1), point)
     c = subtract(corner_of(tables, triangle, 2), point)
@@ -205,10 +210,11 @@ def _solid_angle(tables: MeshTables, triangle: int, point: Vector) -> float:
 
 @building_block
 def winding_number(tables: MeshTables, mesh: int, point: Vector) -> int:
-    """Return the winding number of the mesh's surface about `point`, which lies off it: 1 inside, 0 outside.
+    """Return the winding number of the mesh's surface about `point`, which is not on it: 1 inside, 0 outside.
 
-    Triangles far from the point count as dipoles (Barill and others, Fast Winding Numbers, 2018). The exact sum is a
-    whole number. A sum that is not near to one is recomputed with fewer dipoles, at last with none.
+    Groups of triangles far from the point are approximated by dipoles (Barill and others, Fast Winding Numbers, 2018).
+    The exact sum is a whole number. If the sum is not close to one, it is recomputed with fewer dipoles, at last with
+    none.
     """
     total = 0.0
     for share in (2.0, 4.0, math.inf):

@@ -1,23 +1,24 @@
-"""Many triangles and one ball at once: branch-free loops over lanes, which LLVM compiles to vector code.
+"""Overlap of one ball with many triangles at once: branch-free loops over lanes, which LLVM compiles to vector code.
 
-The sphere has its centre at the origin, and radius 1. A face at the signed distance h along its outward normal has a
-piece inside the ball. Ω is the solid angle of that piece at the centre, with the sign of h. Far faces need not be
-visited: the solid angles of a closed surface sum to 4π w, with w its winding number about the centre. So the part of
-the sphere's surface inside the solid is
+The sphere has its centre at the origin, and radius 1. A face lies at the signed distance h along its outward normal;
+its piece inside the ball has the area A. Ω is the solid angle of this piece at the centre, with the sign of h. Faces
+out of reach need not be visited, because the solid angles of a closed surface sum to 4π w, with w its winding number
+about the centre. So the part of the sphere's surface inside the solid is
 
     S = 4π w - Σ Ω        (sum over the faces that reach the ball)
 
 and the volume is (Σ h A + S) / 3. Only S modulo 4π is needed, as it lies between 0 and 4π.
 
-Ω is a sum over the face's edges. Let p be the foot point of the centre on an edge's line, h = n·p, d the signed
-distance of p from the face's foot point, b = |p|, t the place of an edge's end along the edge, clipped to the
-ball, and c its distance. The triangle (face's foot, edge's foot, end) has the solid angle
-2 atan(d t / ((b + h)(b + c))). The part of the face's disc beyond the edges' ends adds (1 - |h|) φ, with φ its angle.
-The half angles multiply as complex numbers over all edges of all faces and need no arctangent.
+Ω is a sum over the face's edges. Let p be the foot point on an edge's line, its point nearest to the centre; h = n·p
+with the face's unit normal n; d the signed distance of p from the face's own foot point; and b = |p|. Let t be the
+position of an edge's end along the edge, from p and clipped to the ball, and c the clipped end's distance from the
+centre. Then the triangle (face's foot point, p, clipped end) has the solid angle 2 atan(d t / ((b + h)(b + c))). Where
+the face's piece is bounded by the sphere instead of an edge, it has a sector of the angle φ, which adds (1 - |h|) φ.
+Half of each triangle's angle is a complex number; their product over all edges of all faces needs no arctangents.
 
-Two faces that share an edge use the same p to the last bit. At an edge or corner through the centre each face's angle
-is undetermined. Both faces then move it by the same rounding error. The sum modulo 4π does not depend on the place of
-an edge inside the ball, and stays correct.
+Two faces that share an edge use the same p to the last bit. If an edge or corner passes through the centre, the angle
+of each of its faces is undetermined. Both faces then displace the edge by the same rounding error. The sum modulo 4π
+does not depend on the position of an edge inside the ball, so it stays correct.
 """
 
 import math
@@ -28,11 +29,12 @@ from robot_side.compiled.vectors import Vector, cross, dot, scale, subtract
 from robot_side.overlap.digits.arctangent import arctangent
 
 LANES = 64
-"""Triangles in a batch"""
+"""Number of triangles in a batch, one for each lane"""
 WIDTH = 8
-"""Lanes in a group: as many as the widest vectors hold"""
+"""Number of lanes in a group: as many as the widest vector registers hold"""
 ROW = LANES + 8
-"""Distance between two rows of the scratch array: rows 4096 bytes apart would slow each other down."""
+"""Distance between two rows of the scratch array, in numbers. It is more than LANES, because rows 4096 bytes apart
+would slow each other down."""
 
 # The rows of the scratch array, each of `LANES` numbers: one flat array with constant offsets lets LLVM see that
 # rows do not overlap. (A sum of two of these constants as an argument is enough to hide it.)
@@ -46,9 +48,11 @@ SCRATCH = 41 * ROW
 """Length of the scratch array"""
 
 ASIDE = 0.62e-30, -0.51e-30, 0.47e-30
-"""Displacement of all triangles, out of positions in which a corner, edge or face passes through the centre"""
+"""Small shift of all triangles, in radii, so that no corner, edge or face passes exactly through the sphere's centre
+(a degenerate case)"""
 _ROUNDING = 4e-16
-"""Distance of a foot point from the centre, as a share of its end's distance, up to which it is a rounding error"""
+"""Distance of an edge's foot point from the centre, as a share of the distance of the edge's nearer end, up to which it
+is only a rounding error"""
 _FAR = 1e18
 
 
@@ -66,20 +70,20 @@ def _store3(scratch: FloatArray, row: int, lane: int, values: Vector) -> None:
 
 @inlined
 def _relative(corner: Vector, center: Vector, center_rest: Vector, scaling: float) -> Vector:
-    """Return `corner` from the centre, in radii, displaced so little that only coordinates of 0 change."""
+    """Return `corner` relative to the centre, in radii, shifted by ASIDE; only coordinates of 0 change by that."""
     x, y, z = scale(scaling, subtract(subtract(corner, center), center_rest))
     return x + ASIDE[0], y + ASIDE[1], z + ASIDE[2]
 
 
 @inlined
 def aside(along: Vector) -> Vector:
-    """Return the foot point on an edge through the centre: the displacement across the edge's unit vector `along`."""
+    """Return the foot point of an edge through the centre: the part of ASIDE across the edge's unit vector `along`."""
     return subtract(ASIDE, scale(dot(ASIDE, along), along))
 
 
 @inlined
 def _foot(start: Vector, end: Vector, start_rank: float, end_rank: float, along: Vector) -> Vector:
-    """Return the foot point on an edge's line, from the end of lower rank: equal for the reversed edge."""
+    """Return the foot point on an edge's line, computed from the end of lower rank: a reversed edge gives the same."""
     from_start = start_rank < end_rank
     near = (
         start[0] if from_start else end[0],
@@ -159,7 +163,11 @@ def _times_conjugate(a: Complex, b: Complex) -> Complex:
 def _end(
     along: float, away: float, distance: float, base: float, height: float, half_chord: float, shrink: float
 ) -> tuple[Complex, Complex, float]:
-    """Return (turn in the face beyond the ball, half the solid angle up to the ball, clipped `along`) of an end."""
+    """Return three terms of an edge's end: two angles as complex numbers, and the clipped `along`.
+
+    The first angle is that of the part of the edge beyond the ball, about the face's foot point. The second is half the
+    solid angle of the triangle up to the clipped end. `along`: the end's position along the edge. `away`: its distance.
+    """
     clipped = min(max(along, -half_chord), half_chord)
     near_away = min(away, max(1.0, base))
     shrunk, reach = distance * shrink, min(max(along * shrink, -_FAR), _FAR)
@@ -175,7 +183,11 @@ def _end(
 def _edge(
     start: float, end: float, away_start: float, away_end: float, distance: float, base: float, height: float
 ) -> tuple[Complex, Complex, float]:
-    """Return (turn, half solid angle, twice the straight-bounded area) of an edge."""
+    """Return three terms of an edge: two angles as complex numbers, and twice the area of a triangle.
+
+    The triangle has the face's foot point and the edge's part inside the ball. The first angle is that of the edge's
+    parts outside the ball, about the foot point. The second is half the triangle's solid angle.
+    """
     shrink = 1.0 / max(base, 1.0)
     half_chord = math.sqrt(max((1.0 - base) * (1.0 + base), 0.0))
     turn_start, half_start, clipped_start = _end(start, away_start, distance, base, height, half_chord, shrink)
@@ -189,7 +201,7 @@ def _edge(
 
 @inlined
 def _wraps(a: Complex, b: Complex, product: Complex) -> float:
-    """Return the whole turns by which arg a + arg b exceeds arg ab."""
+    """Return the number of whole turns, -1, 0 or 1, by which arg a + arg b exceeds arg(a b)."""
     upper = a[1] >= 0.0 and b[1] >= 0.0 and product[1] < 0.0
     lower = a[1] < 0.0 and b[1] < 0.0 and (product[1] > 0.0 or (product[1] == 0.0 and product[0] < 0.0))
     return (1.0 if upper else 0.0) - (1.0 if lower else 0.0)
@@ -197,10 +209,10 @@ def _wraps(a: Complex, b: Complex, product: Complex) -> float:
 
 @building_block
 def triangle_terms(scratch: FloatArray, groups: int) -> None:
-    """Fill `REAL` to `PUSH` of `groups` of `WIDTH` lanes from their `NORMAL`, `HEIGHTS` to `HEIGHT`.
+    """Fill the rows `REAL` to `PUSH_Z` of `groups` of `WIDTH` lanes from `NORMAL` and `HEIGHTS` to `HEIGHT`.
 
-    The argument of REAL + i IMAGINARY is half of the straight-bounded part of Ω. TURN is half of the rest of Ω, MOMENT
-    is h A, and PUSH is A n.
+    The argument of REAL + i IMAGINARY is half of the part of Ω that the triangles give. TURN is half of the rest of Ω,
+    that of the sectors. MOMENT is h A, and PUSH is A n.
     """
     for lane in range(groups * WIDTH):
         normal = _load3(scratch, NORMAL, lane)
@@ -233,7 +245,7 @@ def triangle_terms(scratch: FloatArray, groups: int) -> None:
 
 @inlined
 def _fold(scratch: FloatArray, lane: int, other: int) -> None:
-    """Add lane `other` to `lane`."""
+    """Combine lane `other` into `lane`: multiply the complex numbers, add the other rows."""
     real, imaginary = scratch[REAL + lane], scratch[IMAGINARY + lane]
     other_real, other_imaginary = scratch[REAL + other], scratch[IMAGINARY + other]
     scratch[REAL + lane] = real * other_real - imaginary * other_imaginary
@@ -247,7 +259,7 @@ def _fold(scratch: FloatArray, lane: int, other: int) -> None:
 
 @building_block
 def reduce_lanes(scratch: FloatArray, count: int) -> None:
-    """Reduce the lanes to lane 0: the product of the complex numbers, and the sums of the other rows."""
+    """Combine the first `count` lanes in lane 0: the product of the complex numbers, and the sums of the other rows."""
     # Constant counts give vector code without remainders; unused lanes are filled with neutral elements.
     filled = 64 if count > 32 else 32 if count > 16 else 16 if count > 8 else 8
     for lane in range(count, filled):

@@ -1,7 +1,8 @@
 """Bounding volume hierarchy: a tree of boxes over a mesh's triangles, in flat arrays that are walked without a stack.
 
-The nodes are in depth-first order. From a node that is skipped, its escape index leads on: the number of the node after
-its last descendant. Otherwise the next node is the first child. The triangles are in the order of the leaves.
+The nodes are in depth-first order, so a node's first child follows it directly. To skip a node with all descendants,
+the walk goes on at its escape index, the number of the node after its last descendant. The triangles are in the order
+of the leaves.
 """
 
 from dataclasses import dataclass
@@ -11,10 +12,10 @@ import numpy as np
 from common.arrays import FloatArray, IntArray
 
 LEAF_TRIANGLES = 10
-"""Most triangles of a leaf"""
+"""Maximum number of triangles in a leaf"""
 
 LINKS = 3
-"""Numbers for each node in `TriangleTree.links`"""
+"""How many numbers describe one node in `TriangleTree.links`"""
 
 
 @dataclass(frozen=True)
@@ -22,17 +23,21 @@ class TriangleTree:
     """Boxes, links and moments of n nodes over t triangles."""
 
     order: IntArray
-    """(t,) triangles in the order of the leaves"""
+    """(t,) numbers of the triangles, in the order of the leaves"""
     boxes: FloatArray
-    """(n, 6) lowest and highest coordinates (m)"""
+    """(n, 6) bounding box of each node: lowest, then highest coordinates (m)"""
     links: IntArray
-    """(3 n,) for each node its escape index, its first triangle and its number of triangles, 0 with children"""
+    """(3 n,) for each node its escape index, its first triangle, and its number of triangles (0 if it has children)"""
     moments: FloatArray
-    """(n, 7) centroid by area (m), sum of area times outward normal (m²), radius about the centroid (m)"""
+    """(n, 7) for each node the centroid weighted by area (m), the sum of area times outward normal (m²), and the radius
+    about the centroid that contains all corners (m)"""
 
 
 def build_tree(corners: FloatArray) -> TriangleTree:
-    """Build the tree over triangles `corners` (t, 3, 3), halved at the median of the centroids' longest side."""
+    """Build the tree over triangles `corners` (t, 3, 3).
+
+    A node is halved at the median of its triangles' centroids, along the axis on which these are spread most.
+    """
     middles, parts = corners.mean(axis=1), []
     boxes: list[FloatArray] = []
     links: list[tuple[int, int, int]] = []

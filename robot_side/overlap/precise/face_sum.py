@@ -1,11 +1,12 @@
 """Overlap of a sphere with a polyhedron in double-double, as a sum over the faces.
 
-The sum is that of `face_angles`, arranged for few functions. For every face that the ball reaches, the sides' parts
-outside the ball form triangles with the face's foot point. Their solid angles all have the weight R²/3 in the volume,
-and are multiplied as complex numbers over the whole solid; their angles about the foot point over the face. A face that
-the ball does not reach adds its own solid angle. All solid angles are van Oosterom's and Strackee's (1983); the angle
-of each complex number is half of the solid angle. Only the parts inside the ball remain as lengths. The result is
-continuous, as in `face_angles`, for all rounding errors of a crossing.
+The sum is that of `face_angles`, arranged so that few arctangents are needed. Where the ball reaches a face, the parts
+of the face's sides outside the ball form triangles with the face's foot point. The solid angles of these triangles all
+have the same weight in the volume. So they are summed over the whole solid, as a product of complex numbers; their
+angles about the foot point are summed in this way over the face. A face that the ball does not reach adds its own solid
+angle. All solid angles are van Oosterom's and Strackee's (1983), whose complex number has half of the solid angle. Of
+the sides' parts inside the ball only the lengths are needed. As in `face_angles`, the result is continuous wherever
+rounding moves the point at which a side enters or leaves the ball.
 """
 
 import numpy as np
@@ -59,7 +60,7 @@ from robot_side.overlap.precise.features import (
 
 @building_block
 def sum_over_faces(features: FloatArray, solid: np.int64, radius: float) -> Overlap:
-    """Return the overlap with the solid measured in `features`, without bounds."""
+    """Return the overlap with the solid whose measures are in `features`, without bounds; `measure_all` fills these."""
     ball = (radius, 0.0)
     radius_2 = times(ball, ball)
     solid_angle = NO_TURN
@@ -121,7 +122,10 @@ def sum_over_faces(features: FloatArray, solid: np.int64, radius: float) -> Over
 
 @inlined
 def _is_reached(features: FloatArray, solid: np.int64, face: int, plane_reached: bool) -> tuple[bool, bool]:
-    """Return whether the ball reaches the face, and whether it reaches one of the face's sides."""
+    """Return whether the ball reaches the face, and whether it reaches any of the face's sides.
+
+    plane_reached: whether the ball reaches the face's plane.
+    """
     foot_inside, side_reached = plane_reached, False
     if plane_reached:
         for side in range(SIDES[solid]):
@@ -131,7 +135,8 @@ def _is_reached(features: FloatArray, solid: np.int64, face: int, plane_reached:
 
 
 Frame = tuple[DoubleDouble, DoubleDouble, DoubleDouble, DoubleDouble, bool]
-"""(|h|, d, d², h² + d², whether h < 0) of a side of a face."""
+"""Distances of one side of a face: (|h|, d, d², h² + d², whether h < 0); h is the face's height, d the side's distance
+from the face's foot point"""
 
 
 @building_block
@@ -142,7 +147,10 @@ def _outside(
     plane_angle: Turn,
     solid_angle: Turn,
 ) -> tuple[Turn, Turn]:
-    """Add the part of a side between two points to both angles; each point is (along, slant)."""
+    """Add the part of a side from `start` to `end` to the angle about the foot point and to the solid angle.
+
+    Each point is (signed distance along the side from the line's foot point, distance from the sphere's centre).
+    """
     depth, distance, distance_2, base_2, below = frame
     sine = times(distance, minus(end[0], start[0]))
     alongs = times(start[0], end[0])
@@ -154,7 +162,7 @@ def _outside(
 
 @building_block
 def _whole_face(features: FloatArray, solid: np.int64, face: int, solid_angle: Turn) -> Turn:
-    """Add the solid angle of a face, which does not contain the centre, to `solid_angle`."""
+    """Return `solid_angle` with the solid angle of a whole face added; the face must not contain the centre."""
     volume_6 = load_number(features, MOMENTS + face)
     a_corner = FACE_CORNERS[solid, face, 0]
     a, a_length = load_vector(features, POINTS + a_corner), load_number(features, LENGTHS + a_corner)

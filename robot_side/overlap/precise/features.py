@@ -1,4 +1,7 @@
-"""Corners, edges and faces of tetrahedra and boxes, and their measures from the sphere's centre in double-double."""
+"""Features (corners, edges, faces) of tetrahedra and boxes: tables of how they meet, and measures in double-double.
+
+Measures are lengths, vectors and areas relative to the sphere's centre.
+"""
 
 from collections.abc import Sequence
 
@@ -36,20 +39,22 @@ from robot_side.overlap.digits.double_double_vectors import (
 from robot_side.overlap.digits.expansion import exact_power
 
 UNCERTAIN = 1e-28
-"""Power of corners and edges, for R = 1, below which it is recomputed with less rounding or none"""
+"""Power R² - |p|² of a corner or edge, for R = 1, below which it is recomputed with less rounding or none"""
 
 
 TETRAHEDRON, BOX = np.int64(0), np.int64(1)
-"""Kinds of solid, the first index of the tables below. NumPy's, as Numba compiles again for every literal int."""
+"""Kinds of solid, the first index of the tables below. They are NumPy's integers, because Numba compiles a function
+again for every literal Python int."""
 
 _FACES = (
     ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)),
     ((1, 3, 7, 5), (0, 4, 6, 2), (2, 6, 7, 3), (0, 1, 5, 4), (4, 5, 7, 6), (0, 2, 3, 1)),
 )
-"""Corners of faces, anticlockwise as seen from outside.
+"""Corners of each face, anticlockwise as seen from outside; the tetrahedron's faces first, then the box's.
 
-A tetrahedron's corners are in the order in which (b - a) · ((c - a) × (d - a)) > 0. A box's corner 1·i + 2·j + 4·k
-lies at the upper end of the first axis where i = 1, and so on, with right-handed axes.
+A tetrahedron's corners a, b, c, d are in an order in which (b - a) · ((c - a) × (d - a)) > 0. A box has right-handed
+axes. Its corner 1·i + 2·j + 4·k lies at the upper end of the first axis if i = 1, else at the lower end; so do j and k
+for the second and third axis.
 """
 _EDGES = (
     [(start, end) for start in range(4) for end in range(start + 1, 4)],
@@ -61,7 +66,7 @@ _CORNERS = (range(4), range(8))
 
 
 def _table(tetrahedron: Sequence[Sequence[float]], box: Sequence[Sequence[float]]) -> IntArray:
-    """Return both kinds in one array, with zeros where the tetrahedron has fewer."""
+    """Return both kinds' tables as one array, filled with zeros where the tetrahedron has fewer entries."""
     table = np.zeros((2, len(box), len(box[0])), dtype=np.int64)
     table[0, : len(tetrahedron), : len(tetrahedron[0])] = tetrahedron
     table[1] = box
@@ -69,61 +74,61 @@ def _table(tetrahedron: Sequence[Sequence[float]], box: Sequence[Sequence[float]
 
 
 CORNERS, EDGES, FACES, SIDES = np.array([[4, 8], [6, 12], [4, 6], [3, 4]])
-"""Numbers of corners, edges and faces by kind, and of sides of a face"""
+"""Number of corners, edges, faces, and sides of a face, each (2,) by kind of solid"""
 EDGE_ENDS = _table(*_EDGES)
-"""(2, 12, 2) start and end corner"""
+"""(2, 12, 2) start corner and end corner of each edge, by kind of solid"""
 EDGE_FACES = _table(*([(left[edge], left[edge[::-1]]) for edge in _EDGES[kind]] for kind, left in enumerate(_LEFT)))
-"""(2, 12, 2) face on the left and on the right of the edge, as seen from outside"""
+"""(2, 12, 2) face on the left and face on the right of each edge, as seen from outside"""
 PARALLEL_EDGES = np.array([range(12), [_EDGES[1].index((0, end - start)) for start, end in _EDGES[1]]])
-"""(2, 12) lowest edge with the same vector"""
+"""(2, 12) for each edge the lowest number of an edge with the same vector; edges of a box are parallel in fours"""
 FACE_CORNERS = _table(*_FACES)
 """(2, 6, 4) corners of each face"""
 FACE_EDGES = _table(*([[_EDGES[kind].index((min(r), max(r))) for r in f] for f in _RUNS[kind]] for kind in range(2)))
-"""(2, 6, 4) edge from each corner to the next one"""
+"""(2, 6, 4) edge of each side of a face: from each corner to the face's next corner"""
 FACE_SIGNS = _table(*([[1 if start < end else -1 for start, end in face] for face in runs] for runs in _RUNS))
-"""(2, 6, 4) 1 if the face runs along that edge, -1 if against it"""
+"""(2, 6, 4) for each side of a face 1 if it runs along its edge, -1 if it runs from the edge's end to its start"""
 CORNER_EDGES = _table(
     *([[n for n, edge in enumerate(_EDGES[kind]) if c in edge] for c in _CORNERS[kind]] for kind in range(2))
 )
-"""(2, 8, 3) edges that meet in the corner"""
+"""(2, 8, 3) edges that meet in each corner"""
 CORNER_FACES = _table(
     *([[n for n, face in enumerate(_FACES[kind]) if c in face] for c in _CORNERS[kind]] for kind in range(2))
 )
-"""(2, 8, 3) faces that meet in the corner"""
+"""(2, 8, 3) faces that meet in each corner"""
 
-# The measures of one solid from the sphere's centre are rows of an array (ROWS, 3, 2). First rows:
+# The measures of one solid are rows of an array (ROWS, 3, 2). These are the first rows of each measure:
 POINTS = 0
-"""Corners relative to the centre (m)."""
+"""First row of the corners p, relative to the sphere's centre (m)"""
 LENGTHS = 8
-"""Distances |p| of the corners (m)"""
+"""First row of the corners' distances |p| from the sphere's centre (m)"""
 POWERS = 16
-"""R² - |p|² (m²)."""
+"""First row of the corners' powers R² - |p|² (m²), positive inside the ball"""
 DIRECTIONS = 24
-"""Unit vectors of the edges."""
+"""First row of the edges' unit vectors"""
 FEET = 36
-"""Foot points: the point of each edge's line nearest to the centre (m)"""
+"""First row of the edges' foot points: the point of each edge's line nearest to the sphere's centre (m)"""
 STARTS, ENDS = 48, 60
-"""Signed distances of the edge's ends from the foot point (m)"""
+"""First rows of the signed distances of each edge's start and end from the foot point (m)"""
 BASES = 72
-"""Squared distance of the foot point from the centre (m²)"""
+"""First row of the foot points' squared distances from the sphere's centre (m²)"""
 HALF_CHORDS = 84
-"""Half the length of the edge's line within the ball (m)."""
+"""First row of the half-chords: half the length of each edge's whole line within the ball (m)"""
 REACHED = 96
-"""1 if the edge has a point inside the ball, else 0"""
+"""First row of flags: 1 if the edge has a point inside the ball, else 0"""
 NORMALS = 108
-"""Outward unit vectors of the faces."""
+"""First row of the faces' outward unit vectors"""
 HEIGHTS = 114
-"""Signed distances of the faces from the centre (m)"""
+"""First row of the faces' signed distances from the sphere's centre along these vectors (m)"""
 MOMENTS = 120
-"""Height times twice the area of a triangle of three of the face's corners (m³)"""
+"""First row of the faces' moments (m³): height times twice the area of a triangle of three of the face's corners"""
 SQUARED_AREAS = 126
-"""Twice the area of that triangle, squared (m⁴)."""
+"""First row of (2 × area)² of these triangles (m⁴)"""
 ROWS = 132
 
 
 @building_block
 def measure_corner(features: FloatArray, corner: int, radius: float) -> None:
-    """Fill the measures of `corner` from the corners and the `radius` (m)."""
+    """Fill the length and the power of `corner` from its point and the `radius` (m)."""
     point = load_vector(features, POINTS + corner)
     distance_2 = precise_dot(point, point)
     power = minus(two_product(radius, radius), distance_2)
@@ -135,7 +140,7 @@ def measure_corner(features: FloatArray, corner: int, radius: float) -> None:
 
 @building_block
 def measure_direction(features: FloatArray, solid: np.int64, edge: int) -> None:
-    """Fill the direction of `edge` from the corners."""
+    """Fill the direction of `edge` from its corners."""
     start, end = EDGE_ENDS[solid, edge]
     side = precise_subtract(load_vector(features, POINTS + end), load_vector(features, POINTS + start))
     direction, _ = precise_unit(side)
@@ -144,7 +149,7 @@ def measure_direction(features: FloatArray, solid: np.int64, edge: int) -> None:
 
 @building_block
 def measure_edge(features: FloatArray, solid: np.int64, edge: int, radius: float) -> None:
-    """Fill the measures of `edge` from corners, directions and the `radius` (m)."""
+    """Fill `FEET` to `REACHED` of `edge` from its corners, its direction and the `radius` (m)."""
     start_corner, end_corner = EDGE_ENDS[solid, edge]
     start, end = load_vector(features, POINTS + start_corner), load_vector(features, POINTS + end_corner)
     direction = load_vector(features, DIRECTIONS + edge)
@@ -174,10 +179,10 @@ def measure_edge(features: FloatArray, solid: np.int64, edge: int, radius: float
 
 @building_block
 def measure_face(features: FloatArray, solid: np.int64, face: int) -> None:
-    """Fill the normal and the distances of `face` from the corners.
+    """Fill `NORMALS` to `SQUARED_AREAS` of `face` from its corners.
 
-    The two shortest sides give the normal and the nearest corner the distance, as these round least. A face
-    without area gets the normal 0, so it has no effect.
+    The normal comes from a triangle's two shortest sides, the height from the nearest corner, as these round least. A
+    face without area gets the normal 0, so it has no effect.
     """
     corners = FACE_CORNERS[solid, face]
     a, b = load_vector(features, POINTS + corners[0]), load_vector(features, POINTS + corners[1])
@@ -213,7 +218,10 @@ def _square(vector: PreciseVector) -> float:
 
 @inlined
 def distance_in_face(features: FloatArray, solid: np.int64, face: int, side: int) -> DoubleDouble:
-    """Return the signed distance d (m) of a side of `face` from the face's foot point, positive if that is inside."""
+    """Return the signed distance d (m) of a side of `face` from the face's foot point.
+
+    It is positive if the foot point lies on the face's side of the line.
+    """
     edge, sign = FACE_EDGES[solid, face, side], FACE_SIGNS[solid, face, side]
     outward = precise_cross(load_vector(features, DIRECTIONS + edge), load_vector(features, NORMALS + face))
     distance = precise_dot(load_vector(features, FEET + edge), outward)
@@ -222,7 +230,7 @@ def distance_in_face(features: FloatArray, solid: np.int64, face: int, side: int
 
 @building_block
 def measure_all(features: FloatArray, solid: np.int64, radius: float) -> None:
-    """Fill all measures from the corners and the `radius` (m)."""
+    """Fill all measures of a solid from its corners and the `radius` (m)."""
     for corner in range(CORNERS[solid]):
         measure_corner(features, corner, radius)
     for edge in range(EDGES[solid]):
@@ -238,7 +246,10 @@ def measure_all(features: FloatArray, solid: np.int64, radius: float) -> None:
 
 @inlined
 def depth_and_rest(features: FloatArray, face: int, radius: float) -> tuple[float, float]:
-    """Return (R + h, R - h) in m: the heights of the ball's parts inside and outside the plane of `face`."""
+    """Return (R + h, R - h) in m: the heights of the ball's parts inside and outside the plane of `face`.
+
+    h is the face's signed distance from the centre, so R + h is small where the ball only just reaches the solid.
+    """
     height = load_number(features, HEIGHTS + face)
     depth, rest = plus((radius, 0.0), height), minus((radius, 0.0), height)
     if depth[0] < UNCERTAIN * radius:

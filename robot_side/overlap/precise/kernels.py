@@ -1,6 +1,7 @@
-"""Overlaps that need more than float64: tiny ones, and those of solids much larger or smaller than the sphere.
+"""Overlaps for which float64 has too few digits: tiny ones, and those of solids much larger or smaller than the sphere.
 
-Arguments are not validated, as in `kernels`. Each function overwrites the results of the pairs in `rows`.
+Arguments are not checked, as in `kernels`. Each function overwrites the results of the pairs whose numbers are in
+`rows`.
 """
 
 import math
@@ -39,7 +40,10 @@ def precise_tetrahedra(
     gradients: FloatArray,
     areas: FloatArray,
 ) -> None:
-    """Fill overlaps of spheres `centers` (p, 3), `radii` (p,) with tetrahedra `vertices` (p, 4, 3), for `rows` (k,)."""
+    """Fill overlaps of spheres with tetrahedra, for the pairs `rows` (k,).
+
+    centers (p, 3), radii (p,), vertices (p, 4, 3): each tetrahedron's corners in any order.
+    """
     features = _features()
     for index in range(rows.size):
         pair = rows[index]
@@ -71,7 +75,10 @@ def precise_boxes(
     gradients: FloatArray,
     areas: FloatArray,
 ) -> None:
-    """Fill overlaps with boxes `box_centers` (p, 3), `box_rotations` (p, 3, 3), `box_half_sizes` (p, 3), for `rows`."""
+    """Fill overlaps of spheres with boxes, for the pairs `rows` (k,).
+
+    centers (p, 3), radii (p,), box_centers (p, 3), box_rotations (p, 3, 3), box_half_sizes (p, 3).
+    """
     features = _features()
     for index in range(rows.size):
         pair = rows[index]
@@ -113,7 +120,7 @@ def precise_boxes(
 
 @inlined
 def _reachable(middle: Vector, radius: float, column: Vector, half_size: float) -> tuple[float, float]:
-    """Return the range (m) of a box along `column` that the sphere may reach; farther parts are cut off.
+    """Return the range (m) of a box along the axis `column` to which it is cut off: the sphere reaches no part beyond.
 
     So a box much larger than the sphere costs no digits.
     """
@@ -132,7 +139,7 @@ def _multiple(factor: float, column: Vector) -> PreciseVector:
 
 @inlined
 def _side(vertices: FloatArray, pair: int, corner: int, scale: float) -> PreciseVector:
-    """Return the exact vector from the first corner to another, times `scale`."""
+    """Return the exact vector from the first corner to the corner `corner`, times `scale`."""
     return (
         two_sum(scale * vertices[pair, corner, 0], -scale * vertices[pair, 0, 0]),
         two_sum(scale * vertices[pair, corner, 1], -scale * vertices[pair, 0, 1]),
@@ -142,7 +149,7 @@ def _side(vertices: FloatArray, pair: int, corner: int, scale: float) -> Precise
 
 @inlined
 def _scaled_radius(radius: float) -> tuple[float, float]:
-    """Return (the radius scaled to between 1 and 2, the power of two that scales it)."""
+    """Return (the radius times a power of two, from 1 to below 2; this power of two)."""
     if radius == 0.0:
         return 0.0, 1.0
     _, exponent = math.frexp(radius)
@@ -154,7 +161,7 @@ def _scaled_radius(radius: float) -> tuple[float, float]:
 def _store(
     pair: int, overlap: Overlap, unit: float, volumes: FloatArray, gradients: FloatArray, areas: FloatArray
 ) -> None:
-    """Store the results of `pair` in m² and m³, converted from lengths in units of `unit` (m)."""
+    """Store the results of `pair` in m³ and m². They were computed with lengths in units of `unit` (m)."""
     volume, gradient, area = overlap
     volumes[pair] = volume * unit * unit * unit
     for axis in range(3):

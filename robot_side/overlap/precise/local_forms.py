@@ -1,10 +1,11 @@
-"""Overlaps of a sphere with a single corner or edge of a solid, as sums of positive terms.
+"""Overlaps of a sphere with a single corner or edge of a solid, as sums of positive terms: so nothing cancels.
 
-If the sphere bulges by only a fraction of the overlap, a straight-sided solid is most of it. That is the tetrahedron
-between a corner and the points where its edges leave the ball, or a stack of such triangles along an edge. The rest is
-a smooth factor little above 1: a ray from the corner reaches the sphere at s times the distance of that flat side. The
-factor's mean is taken by Gauss quadrature. So nothing cancels, and the relative accuracy is that of the inputs for
-every size of the overlap. The relative error of the quadrature is below 1e-12 within SHARP_CORNER and SHARP_EDGE.
+A tiny overlap with a corner is nearly the tetrahedron of the corner and the points where its three edges leave the
+ball. The overlap with an edge is nearly a stack of triangles along it. Only the side on the sphere is not flat but
+bulges slightly: a ray from the corner meets the sphere at s times the distance of the flat side. The factor s is smooth
+and little above 1, so Gauss quadrature gives the mean of its powers. The relative accuracy is that of the inputs,
+however small the overlap is. The quadrature's relative error is below 1e-12 up to the sharpness SHARP_CORNER or
+SHARP_EDGE.
 """
 
 import math
@@ -23,13 +24,15 @@ from robot_side.overlap.digits.double_double_vectors import (
 )
 
 SHARP_CORNER = 4e-4
-"""Largest (length of an edge in the ball) / (distance of the centre from the corner along that edge)"""
+"""Largest sharpness for which `corner_overlap` is accurate. The sharpness is the largest, over the corner's edges, of
+(length of the edge in the ball) / (distance of the sphere's centre from the corner, measured along the edge)."""
 SHARP_EDGE = 0.05
-"""Largest (half the length of the edge in the ball) / (distance of the centre from the edge along a face)"""
+"""Largest sharpness for which `edge_overlap` is accurate. The sharpness is the larger, over the edge's two faces, of
+(half the length of the edge in the ball) / (distance of the sphere's centre from the edge, measured along the face)."""
 
 
 def _triangle_rule() -> tuple[FloatArray, FloatArray]:
-    """Return Radon's rule of 7 points and degree 5: (barycentric coordinates, weights)."""
+    """Return Radon's rule for integrals over a triangle, 7 points, degree 5: (barycentric coordinates, weights)."""
     root = math.sqrt(15.0)
     points, weights = [[1.0 / 3.0] * 3], [9.0 / 40.0]
     for sign in (-1.0, 1.0):
@@ -43,7 +46,7 @@ def _triangle_rule() -> tuple[FloatArray, FloatArray]:
 TRIANGLE_POINTS, TRIANGLE_WEIGHTS = _triangle_rule()
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 ALONG_NODES, ALONG_WEIGHTS = _NODES[4:].copy(), 2.0 * _WEIGHTS[4:]
-"""Gauss-Legendre rule of 8 points for even functions on [-1, 1]: the positive nodes"""
+"""Gauss-Legendre rule of 8 points for even functions on [-1, 1]: positive nodes only, with doubled weights"""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 ACROSS_NODES, ACROSS_WEIGHTS = 0.5 + 0.5 * _NODES, 0.5 * _WEIGHTS
 """Gauss-Legendre rule of 4 points on [0, 1]"""
@@ -51,7 +54,10 @@ ACROSS_NODES, ACROSS_WEIGHTS = 0.5 + 0.5 * _NODES, 0.5 * _WEIGHTS
 
 @inlined
 def reach(outward: float, power: float) -> float:
-    """Return the length (m) of a ray in the ball; from p with `power` R² - |p|² > 0, `outward` = p · direction."""
+    """Return the length (m) of a ray inside the ball, from a point p in the ball.
+
+    `power` is R² - |p|² > 0, `outward` is p · (the ray's unit vector).
+    """
     root = math.sqrt(outward * outward + power)
     return power / (outward + root) if outward > 0.0 else root - outward
 
@@ -63,9 +69,10 @@ def corner_overlap(
     edges: tuple[PreciseVector, PreciseVector, PreciseVector],
     radius: float,
 ) -> tuple[Overlap, float]:
-    """Return the overlap of the ball about the origin with the cone that three edges span, and its sharpness.
+    """Return the overlap of the ball about the origin with the cone that three edges span, and the sharpness.
 
-    `corner` lies in the ball, its `power` R² - |corner|² (m²) is positive; `edges` are unit vectors.
+    `corner` is the cone's tip; it lies in the ball, so its `power` R² - |corner|² (m²) is positive. `edges` are unit
+    vectors from the tip.
     """
     first, second, third = edges
     outward = precise_dot(corner, first)[0], precise_dot(corner, second)[0], precise_dot(corner, third)[0]
@@ -103,10 +110,10 @@ def edge_overlap(
     sides: tuple[PreciseVector, PreciseVector],
     radius: float,
 ) -> tuple[Overlap, float]:
-    """Return the overlap of the ball about the origin with the wedge of two faces, and its sharpness.
+    """Return the overlap of the ball about the origin with the wedge of two faces, and the sharpness.
 
-    `foot` is the point of the edge nearest to the centre, its `power` R² - |foot|² (m²) is positive; `sides` are
-    unit vectors in the faces, across the edge and away from it.
+    `foot` is the point of the edge nearest to the centre; it lies in the ball, so its `power` R² - |foot|² (m²) is
+    positive. `sides` are unit vectors, one in each face, at right angles to the edge and away from it.
     """
     first, second = sides
     outward = precise_dot(foot, first)[0], precise_dot(foot, second)[0]
@@ -138,9 +145,10 @@ def edge_overlap(
 
 @inlined
 def _within_cap(overlap: Overlap, power: float, radius: float) -> Overlap:
-    """Bound the overlap by the cap beyond the plane across the direction to the nearest point.
+    """Cut the overlap to a bound of the cap that a plane cuts off the ball.
 
-    A cone or wedge that is not sharp may reach deeper into the ball elsewhere than at its corner or edge.
+    The plane goes through the corner or foot point p, at right angles to p. `power` is R² - |p|² (m²). A cone or wedge
+    that is too blunt for its form may reach deeper into the ball elsewhere than at p: then its overlap is too large.
     """
     volume, push, area = overlap
     most = 2.0 * math.pi * power
@@ -150,9 +158,10 @@ def _within_cap(overlap: Overlap, power: float, radius: float) -> Overlap:
 
 @inlined
 def _stretch(origin: Vector, ray: Vector, along: float, power: float) -> tuple[float, float, Vector]:
-    """Return (s, surface per volume, direction times R) where the ray from `origin` meets the sphere at s · `ray`.
+    """Return (s, 1 / √discriminant, the point origin + s · `ray`), at which the ray from `origin` meets the sphere.
 
-    `along` is origin · ray. The surface is relative to that of a cone of the same base, over its number of dimensions.
+    `along` is origin · ray, `power` is R² - |origin|². The second number gives surface elements: times the straight
+    part's volume element and 3 s² (cone) or 2 s (wedge), it is the element of the sphere's surface divided by R.
     """
     length_2 = ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2]
     root = math.sqrt(along * along + power * length_2)

@@ -1,8 +1,9 @@
-"""Overlap of a sphere with a tetrahedron or a box, to the accuracy of the input at every size of the overlap.
+"""Overlap of a sphere with a tetrahedron or a box, as accurate as the input allows, however small the overlap is.
 
-Caps, and single edges and corners that hardly reach the ball, have own forms, in which nothing cancels. All other cases
-take the sum over faces in double-double. Its error is about 1e-31 of the sphere's volume, more if the solid is much
-larger than the sphere. A smaller result is replaced by the form of the feature that reaches deepest.
+If the ball reaches only one face, or only just reaches one edge or corner, the overlap has a form in which nothing
+cancels (`cap`, `local_forms`). All other cases take the sum over faces in double-double (`face_sum`). The sum's error
+is about 1e-31 of the sphere's volume, or more if the solid is much larger than the sphere. A sum below this error is
+replaced by the form of the feature (corner, edge or face) that reaches deepest into the ball.
 """
 
 import math
@@ -54,14 +55,15 @@ from robot_side.overlap.precise.local_forms import SHARP_CORNER, SHARP_EDGE, cor
 from robot_side.overlap.precise.screening import ANYTHING, CORNER, EDGE, FACE, NOTHING, WHOLE_SPHERE, screened
 
 NOISE = 1e-29
-"""Rounding error of a sum over faces, in R³, or in R² times the size of the solid if that is larger"""
+"""Bound of the rounding error of a sum over faces, as a share of R³, or of R² times the distance of the farthest corner
+if that is larger"""
 
 
 @building_block
 def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, solid_volume: float) -> Overlap:
-    """Return the overlap of the ball about the origin with the solid of the corners in `features`; 1 <= `radius` < 2.
+    """Return the overlap of the ball about the origin with a solid whose corners are in `features`; 1 <= `radius` < 2.
 
-    `solid` is its kind and `solid_volume` its volume, which is 0 only for a solid without volume.
+    `solid` is the kind, TETRAHEDRON or BOX. `solid_volume` is exact enough to be 0 only for a solid without volume.
     """
     if solid_volume == 0.0 or radius == 0.0:
         return nothing()
@@ -95,7 +97,7 @@ def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, sol
 
 @inlined
 def _is_inside(features: FloatArray, solid: np.int64, radius: float) -> bool:
-    """Return whether the ball contains all corners, by more than rounding."""
+    """Return whether the ball contains all corners, by a margin larger than rounding errors."""
     farthest_2 = 0.0
     for corner in range(CORNERS[solid]):
         x, y, z = features[POINTS + corner, 0, 0], features[POINTS + corner, 1, 0], features[POINTS + corner, 2, 0]
@@ -105,9 +107,10 @@ def _is_inside(features: FloatArray, solid: np.int64, radius: float) -> bool:
 
 @inlined
 def _below_noise(local: Overlap, summed: Overlap, most: float, thin: float, radius: float) -> Overlap:
-    """Return the form of a single feature if the sum's volume is noise, with the sum's surface if that is not noise.
+    """Return the overlap for a sum whose volume is below its rounding error: the local form of a single feature.
 
-    The volume is at most `most`, and `thin` if the form has none.
+    Gradient and area are the sum's, if its area is above the rounding error. The volume is cut to `most`; it is `thin`
+    if the local form has none.
     """
     volume, gradient, area = local
     volume = thin if volume == 0.0 else volume
@@ -124,7 +127,10 @@ def _below_noise(local: Overlap, summed: Overlap, most: float, thin: float, radi
 def _local_form(
     features: FloatArray, solid: np.int64, radius: float, reached: int, number: int
 ) -> tuple[Overlap, float]:
-    """Return the overlap with the reached feature alone, and its sharpness: 0 if that is exact."""
+    """Return the overlap with the reached feature alone, and its sharpness: the smaller, the more accurate; 0 is exact.
+
+    The sharpness is infinite if there is no such form.
+    """
     overlap, sharpness = nothing(), math.inf
     if reached == NOTHING:
         sharpness = 0.0
@@ -142,7 +148,7 @@ def _local_form(
 
 @building_block
 def _measure_lone(features: FloatArray, solid: np.int64, radius: float, reached: int, number: int) -> None:
-    """Fill the measures for the form of a single feature."""
+    """Fill the measures in `features` that the local form of a single feature needs."""
     if reached == FACE:
         measure_face(features, solid, number)
     elif reached == EDGE:
@@ -158,14 +164,17 @@ def _measure_lone(features: FloatArray, solid: np.int64, radius: float, reached:
 
 @building_block
 def _deepest(features: FloatArray, solid: np.int64) -> tuple[int, int]:
-    """Return the corner, else edge, else face that reaches deepest into the ball, for a tiny overlap."""
+    """Return (kind, number) of the feature that reaches deepest into the ball, for a tiny overlap.
+
+    It is the deepest corner in the ball; without any, the deepest edge; without any, a face that the ball reaches.
+    """
     deepest, reached, number = 0.0, NOTHING, 0
     for corner in range(CORNERS[solid]):
         if features[POWERS + corner, 0, 0] > deepest:
             deepest, reached, number = features[POWERS + corner, 0, 0], CORNER, corner
     if reached == NOTHING:
         for edge in range(EDGES[solid]):
-            # An edge without its line's nearest point is no deeper than its corners.
+            # An edge that does not contain its line's nearest point is no deeper than its corners.
             passes = features[STARTS + edge, 0, 0] < 0.0 < features[ENDS + edge, 0, 0]
             if passes and features[HALF_CHORDS + edge, 0, 0] > deepest:
                 deepest, reached, number = features[HALF_CHORDS + edge, 0, 0], EDGE, edge
@@ -205,6 +214,6 @@ def _corner_cone(features: FloatArray, solid: np.int64, corner: int, radius: flo
 
 @inlined
 def _away_from(features: FloatArray, solid: np.int64, corner: int, edge: int) -> PreciseVector:
-    """Return the direction of an edge from `corner` to its other end."""
+    """Return the unit vector of an edge from its end `corner` to its other end."""
     direction = load_vector(features, DIRECTIONS + edge)
     return direction if EDGE_ENDS[solid, edge, 0] == corner else precise_negative(direction)

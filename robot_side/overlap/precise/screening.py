@@ -1,4 +1,7 @@
-"""Screening in float64, with a margin, of the features of a solid that the ball can reach: finds the simple cases."""
+"""Screening of a solid's features in float64, with a margin: it finds the simple cases, in which the ball reaches one.
+
+Features are corners, edges and faces.
+"""
 
 import math
 
@@ -22,9 +25,10 @@ from robot_side.overlap.precise.features import (
 )
 
 NOTHING, WHOLE_SPHERE, FACE, EDGE, CORNER, ANYTHING = 0, 1, 2, 3, 4, 5
-"""Results of `screened`"""
+"""Results of `screened`: what the ball reaches"""
 _APART, _PIERCED, _UNCERTAIN = 0, 1, 2
-"""States of a face whose sides the ball does not reach: not reached; contains the ball's disc; uncertain"""
+"""States of a face whose sides the ball does not reach: the ball does not reach the face; the ball cuts a disc from the
+face's inside; rounding may decide"""
 _MARGIN = 1e-14
 
 
@@ -32,11 +36,13 @@ _MARGIN = 1e-14
 def screened(features: FloatArray, solid: np.int64, radius: float) -> tuple[int, int]:
     """Return (the kind of feature that the ball reaches, its number) from the corners in `features` and `radius` (m).
 
-    - NOTHING or WHOLE_SPHERE: no point of the surface lies inside the ball, which is outside or inside the solid;
-    - FACE: no edge has a point inside the ball, and one face at most;
-    - EDGE: no corner lies in the ball, and no other edge and no face but its own two has a point there;
-    - CORNER: no other corner and only edges and faces that meet in this one have a point inside the ball;
-    - ANYTHING: all other cases, and cases that rounding may decide.
+    - NOTHING: no point of the surface lies inside the ball, and the ball is outside the solid;
+    - WHOLE_SPHERE: no point of the surface lies inside the ball, and the ball is inside the solid;
+    - FACE: exactly one face has points inside the ball, and no edge has;
+    - EDGE: exactly one edge has points inside the ball; no corner lies inside it, and no face but the edge's own two
+      has points there;
+    - CORNER: exactly one corner lies inside the ball, and only edges and faces that meet in it have points there;
+    - ANYTHING: all other cases, and those that rounding may decide.
     """
     farthest_2 = 0.0
     for candidate in range(CORNERS[solid]):
@@ -71,7 +77,7 @@ def screened(features: FloatArray, solid: np.int64, radius: float) -> tuple[int,
 
 @building_block
 def _screened_faces(features: FloatArray, solid: np.int64, radius: float, farthest: float) -> tuple[int, int]:
-    """Do as `screened`, if the ball reaches no edge."""
+    """Return what `screened` returns, if the ball reaches no edge."""
     pierced, pierced_face, all_above = 0, 0, True
     for face in range(FACES[solid]):
         state, above = _pierced(features, solid, face, radius, farthest)
@@ -93,7 +99,7 @@ def _point(features: FloatArray, corner: int) -> Vector:
 
 @building_block
 def _side(features: FloatArray, start: int, end: int) -> Vector:
-    """Return the vector from one corner to another, with full relative accuracy."""
+    """Return the vector from one corner to another, rounded only at the end, from corners in double-double."""
     a, b = load_vector(features, POINTS + start), load_vector(features, POINTS + end)
     return (
         (b[0][0] - a[0][0]) + (b[0][1] - a[0][1]),
@@ -119,7 +125,10 @@ def _is_near(features: FloatArray, solid: np.int64, edge: int, within_2: float) 
 
 @building_block
 def _pierced(features: FloatArray, solid: np.int64, face: int, radius: float, farthest: float) -> tuple[int, bool]:
-    """Return (state of a face whose sides the ball does not reach, whether the centre is over R below its plane)."""
+    """Return (state of a face whose sides the ball does not reach, whether the whole ball may lie below its plane).
+
+    The second is so if the centre lies at least R below the plane, less a margin for rounding.
+    """
     corners, sides = FACE_CORNERS[solid, face], SIDES[solid]
     first, second = _side(features, corners[0], corners[1]), _side(features, corners[1], corners[2])
     normal = cross(first, second)

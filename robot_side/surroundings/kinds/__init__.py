@@ -1,1 +1,1 @@
-"""Kinds of primitives that objects consist of, one a file: arrays, bounds, nearest point, contact, overlap."""
+"""Kinds of primitives that objects consist of, a file for each: arrays, bounds, nearest point, contact and overlap."""

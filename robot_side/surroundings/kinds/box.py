@@ -1,4 +1,4 @@
-"""Boxes {c + Q diag(half) x : |x_i| <= 1}: centre (3), Q by rows (9), half sizes (3)."""
+"""Boxes {c + Q diag(half) x : |x_i| <= 1}. Numbers of a box: centre c (3), rotation Q by rows (9), half sizes (3)."""
 
 import math
 from typing import Final
@@ -25,7 +25,7 @@ from robot_side.surroundings.kinds.layout import (
 
 @inlined
 def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Write one box's bounds; return its volume in m³."""
+    """Write the bounding sphere of one box; return the box's volume in m³."""
     half = numbers[k, 12], numbers[k, 13], numbers[k, 14]
     for axis in range(3):
         bounds[row, axis] = numbers[k, axis]
@@ -37,7 +37,7 @@ def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
 def placed(
     sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
 ) -> None:
-    """Write the numbers of a box at a pose; sizes: the centre in the posed frame, and half sizes."""
+    """Write the numbers of a box in a frame at this pose. sizes: the box's centre in that frame, and its half sizes."""
     write_pose(posed(position, turns, turn, sizes[k, 0], sizes[k, 1], sizes[k, 2]), turns, turn, numbers, row)
     for axis in range(3):
         numbers[row, 12 + axis] = sizes[k, 3 + axis]
@@ -51,13 +51,13 @@ def _axis(shapes: FloatArray, row: int, k: int) -> Vector:
 
 @inlined
 def _along(shapes: FloatArray, row: int, k: int, point: Vector) -> float:
-    """Return the coordinate of `point` along edge k, from the centre."""
+    """Return the coordinate of `point` along the box's edge k, measured from the box's centre."""
     return dot(_axis(shapes, row, k), subtract(point, (shapes[row, 0], shapes[row, 1], shapes[row, 2])))
 
 
 @building_block
 def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
-    """Return the nearest point of the surface of the box in `row`; from inside, on the nearest face."""
+    """Return signed distance and direction from `point` to the surface of the box in `row` (see `Nearest`)."""
     local = _along(shapes, row, 0, point), _along(shapes, row, 1, point), _along(shapes, row, 2, point)
     beyond = abs(local[0]) - shapes[row, 12], abs(local[1]) - shapes[row, 13], abs(local[2]) - shapes[row, 14]
     excess = max(beyond[0], 0.0), max(beyond[1], 0.0), max(beyond[2], 0.0)
@@ -76,9 +76,9 @@ def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
 
 @building_block
 def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, reach: float) -> Contact:
-    """Return the first contact of a sphere that moves along the unit vector `along`.
+    """Return the first contact of a sphere that moves along the unit vector `along`, computed in the box's own frame.
 
-    In the box's own frame. Each step ends at the tangent plane at the box's nearest point.
+    Each step of the sphere ends at the tangent plane at the box's nearest point.
     """
     x, y, z = _along(shapes, row, 0, start), _along(shapes, row, 1, start), _along(shapes, row, 2, start)
     u, v, w = (
@@ -111,9 +111,9 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
 
 @building_block
 def _beyond_edge(a: float, b: float) -> tuple[float, float, float]:
-    """Return the volume of the unit ball with x >= a and y >= b, and the areas of its flat sides at a and at b.
+    """Return the volume of the unit ball's part with x >= a, y >= b, and areas of its flat sides at x = a and y = b.
 
-    V = (S - a A - b B) / 3, where the spherical part's area S follows from its boundary's curvature (Gauss and Bonnet).
+    V = (S - a A - b B) / 3. The area S of the spherical side follows from its boundary's curvature (Gauss and Bonnet).
     """
     if a * a + b * b >= 1.0 and a > 0.0 and b > 0.0:
         return 0.0, 0.0, 0.0
@@ -128,7 +128,7 @@ def _beyond_edge(a: float, b: float) -> tuple[float, float, float]:
 
 @inlined
 def _arc_cosine(near: float, far: float) -> float:
-    """Return the angle whose cosine is near / far; 0 or π beyond."""
+    """Return the angle whose cosine is near / far; 0 for a ratio above 1, π for a ratio below -1."""
     if abs(near) >= far:
         return 0.0 if near > 0.0 else math.pi
     return math.acos(near / far)
@@ -136,7 +136,7 @@ def _arc_cosine(near: float, far: float) -> float:
 
 @inlined
 def _reaches_corner(a: float, b: float, c: float) -> bool:
-    """Return whether the unit ball reaches beyond three faces at once."""
+    """Return whether a part of the unit ball is beyond three faces at once; a, b, c: their heights over its centre."""
     return max(a, 0.0) ** 2 + max(b, 0.0) ** 2 + max(c, 0.0) ** 2 < 1.0
 
 
@@ -151,10 +151,11 @@ def overlap_one_box(
     _meshes: IntArray,
     overlap_gradient: FloatArray,
 ) -> float:
-    """Return the overlap of a sphere with a box, by inclusion-exclusion over the parts beyond its faces.
+    """Return the overlap of a sphere with a box, by inclusion-exclusion over the sphere's parts beyond faces.
 
-    Subtract the parts beyond each face, then add back those beyond two.
-    `box_lane` takes over at corners. Units are radii. Faces 0 to 2 are the upper ones of each axis, 3 to 5 the lower.
+    The parts beyond one face are subtracted, then the parts beyond two faces are added again. If a part lies beyond
+    three faces (a corner), `box_lane` computes the overlap. Lengths are in units of the radius. Faces 0 to 2 are the
+    upper faces of the three axes, 3 to 5 the lower faces.
     """
     a, b, c = x - shapes[row, 0], y - shapes[row, 1], z - shapes[row, 2]
     axes = (

@@ -1,4 +1,4 @@
-"""Contact of a moving sphere with a convex primitive, from its nearest points (conservative advancement)."""
+"""Contact of a moving sphere with a convex primitive, from its function `nearest` (conservative advancement)."""
 
 from collections.abc import Callable
 from typing import Any

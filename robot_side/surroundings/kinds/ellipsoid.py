@@ -1,6 +1,6 @@
-"""Ellipsoids {c + Q diag(a) x : |x| <= 1}: centre (3), Q by rows (9), half axes a (3).
+"""Ellipsoids {c + Q diag(a) x : |x| <= 1}. Numbers of one: centre c (3), rotation Q by rows (9), half axes a (3).
 
-The rule: nearest points by Newton's method on the secular equation (Eberly 2013), contact by tangent planes, overlap by
+Nearest points: Newton's method on the secular equation (Eberly 2013). Contact: steps to tangent planes. Overlap:
 adaptive quadrature over plane sections (`ellipsoid_sections`).
 """
 
@@ -26,7 +26,7 @@ _NEWTON_STEPS: Final = 60
 
 @inlined
 def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Write one ellipsoid's bounds; return its volume in m³."""
+    """Write the bounding sphere of one ellipsoid; return the ellipsoid's volume in m³."""
     volume = box.place(numbers, k, bounds, row)
     bounds[row, 3] = max(numbers[k, 12], numbers[k, 13], numbers[k, 14])
     return math.pi / 6.0 * volume
@@ -36,7 +36,7 @@ def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
 def placed(
     sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
 ) -> None:
-    """Write the numbers of an ellipsoid at a pose; sizes: its half axes."""
+    """Write the numbers of an ellipsoid at this pose. sizes: its half axes."""
     write_pose(position, turns, turn, numbers, row)
     for axis in range(3):
         numbers[row, 12 + axis] = sizes[k, axis]
@@ -68,10 +68,11 @@ def _local(shapes: FloatArray, row: int, point: Vector) -> Vector:
 
 @building_block
 def _surface(a: Vector, x: Vector) -> tuple[float, Vector]:
-    """Return the signed distance of a point from the surface, and the unit normal at the nearest point; own frame.
+    """Return the signed distance of the point x from the surface, and the unit normal at the nearest point.
 
-    The nearest point is y_i = a_i² x_i / (a_i² + t), where t solves F(t) = Σ (a_i x_i / (a_i² + t))² - 1 = 0. F falls
-    and is convex, and starts at 2 or less where its largest term is 1: Newton's method climbs to the root from there.
+    x, a: the point and the half axes in the ellipsoid's own frame. The nearest point is y_i = a_i² x_i / (a_i² + t),
+    where t solves F(t) = Σ (a_i x_i / (a_i² + t))² - 1 = 0. F is falling and convex. Newton's method starts where the
+    largest term is 1, so that 0 <= F <= 2, and t rises to the root.
     """
     least = 0
     if a[1] < a[least]:
@@ -108,7 +109,7 @@ def _surface(a: Vector, x: Vector) -> tuple[float, Vector]:
 
 @building_block
 def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
-    """Return the nearest point of the surface of the ellipsoid in `row`."""
+    """Return signed distance and direction from `point` to the surface of the ellipsoid in `row` (see `Nearest`)."""
     distance, normal = _surface((shapes[row, 12], shapes[row, 13], shapes[row, 14]), _local(shapes, row, point))
     return distance, _turned(shapes, row, scale(-1.0, normal))
 
@@ -127,7 +128,10 @@ def overlap_one_ellipsoid(
     _meshes: IntArray,
     overlap_gradient: FloatArray,
 ) -> float:
-    """Return the overlap with an ellipsoid, by sections across the axis closest to the nearest normal; in radii."""
+    """Return the overlap of a sphere with an ellipsoid, by quadrature over plane sections; lengths are in radii.
+
+    The sections are perpendicular to the ellipsoid's axis that is closest to the surface normal at the nearest point.
+    """
     half = scale(1.0 / radius, (shapes[row, 12], shapes[row, 13], shapes[row, 14]))
     center = scale(1.0 / radius, _local(shapes, row, (x, y, z)))
     distance, normal = _surface(half, center)

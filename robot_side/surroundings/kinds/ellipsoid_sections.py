@@ -1,7 +1,7 @@
-"""Overlap of the unit ball and an ellipsoid: integral of plane sections, each a disc ∩ an ellipse in closed form.
+"""Overlap of the unit ball and an ellipsoid, by quadrature over plane sections: intersections of a disc and an ellipse.
 
-Adaptive Gauss-Kronrod quadrature with 7 and 15 nodes. The regret: circle and ellipse cross at the roots of a quartic,
-and sections begin and end like powers of 3/2, for which no fixed rule is good.
+Their areas are closed forms of the crossings, roots of a quartic. No fixed rule is accurate, because areas begin and
+end like powers of 3/2. So the rule is adaptive: Gauss-Kronrod with 7 and 15 nodes.
 """
 
 import math
@@ -13,16 +13,18 @@ from robot_side.compiled.kernel import building_block, inlined
 from robot_side.compiled.vectors import Vector, add, norm, scale
 
 _TOLERANCE: Final = 1e-10
-"""Largest difference of the two rules over a piece, in cubes of the radius; the finer rule errs by a tenth of that."""
+"""Largest accepted difference of both rules' volumes over a piece, in cubes of the radius. The finer rule's error is a
+tenth of the difference."""
 _NO_PUSH: Final = (0.0, 0.0, 0.0)
 _TOLERANCE_OF_GRADIENT: Final = 1e-5
-"""Largest difference of the gradients, in squares of the radius; they show corners that both rules miss."""
+"""Largest accepted difference of both rules' gradients, in squares of the radius; gradients show corners that both
+rules miss."""
 _HARDLY: Final = 1e-4
-"""Largest angle, in rad, by which rounding turns an arc back"""
+"""Largest angle, in rad, by which an arc may seem to run backwards from rounding"""
 _AT_POLE: Final = 1e-12
-"""Squared size of a section, over that of the largest, below which the section is a point"""
+"""A section is a point below this square of its size, relative to the largest section's."""
 _FINEST: Final = 1 << 12
-"""Most pieces of the range of sections"""
+"""Maximum number of pieces into which the range of sections is divided"""
 _NODES: Final = np.array(
     [
         0.99145537112081263,
@@ -59,19 +61,19 @@ _COARSE: Final = np.array(
         0.41795918367346938,
     ]
 )
-"""Gauss-Kronrod weights of 7 nodes; above: nodes, and weights of all 15"""
+"""Gauss weights of 7 nodes, 0 at the others. `_FINE`: Kronrod's weights of all 15 nodes, `_NODES`: their positions."""
 
 
 @inlined
 def _excess(angle: float, u: float, v: float, rho: float, alpha: float, beta: float) -> float:
-    """Return the value of the ellipse's equation at a point of the circle: ≤ 0 inside the ellipse."""
+    """Return the value of the ellipse's equation at an angle of the circle: <= 0 inside the ellipse."""
     x, y = (u + rho * math.cos(angle)) / alpha, (v + rho * math.sin(angle)) / beta
     return x * x + y * y - 1.0
 
 
 @inlined
 def _pair(half: float, rest: float) -> tuple[float, float]:
-    """Return the roots of y² + 2 half y + rest; NaN if there are none."""
+    """Return the two real roots of y² + 2 half y + rest; NaN if there are none."""
     inside = half * half - rest
     if inside < 0.0:
         return math.nan, math.nan
@@ -101,10 +103,10 @@ def _largest_root(a: float, b: float, c: float) -> float:
 def _crossings(  # noqa: PLR0912
     u: float, v: float, rho: float, alpha: float, beta: float
 ) -> tuple[int, Vector, float]:
-    """Return the number of the circle's angles on the ellipse, and these, rising: three and a fourth.
+    """Return how many points of the circle lie on the ellipse, and their angles in rising order: three and a fourth.
 
-    The excess is C0 + C1 cos φ + S1 sin φ + C2 cos 2φ, a quartic in tan(φ/2) (Ferrari). φ begins at that of four
-    angles where |excess| is greatest, so that no root is at infinity.
+    The excess is C0 + C1 cos φ + S1 sin φ + C2 cos 2φ, a quartic in tan(φ/2) (Ferrari). φ is first turned by one of
+    four quarter turns, so that |excess| is greatest at φ = π. Then no root is at infinity.
     """
     p, q = 1.0 / (alpha * alpha), 1.0 / (beta * beta)
     c0 = u * u * p + v * v * q - 1.0 + 0.5 * rho * rho * (p + q)
@@ -131,7 +133,7 @@ def _crossings(  # noqa: PLR0912
         one, two = _pair(0.5 * s, 0.5 * f + m - 0.5 * g / s)
         three, four = _pair(-0.5 * s, 0.5 * f + m + 0.5 * g / s)
     else:
-        # Even in y.
+        # The quartic is even in y.
         low, high = _pair(0.5 * f, h)
         one, three = math.sqrt(low) if low >= 0.0 else math.nan, math.sqrt(high) if high >= 0.0 else math.nan
         two, four = -one, -three
@@ -159,10 +161,10 @@ def _crossings(  # noqa: PLR0912
 
 @building_block
 def _section(u: float, v: float, rho: float, alpha: float, beta: float) -> tuple[float, Vector, int]:
-    """Return the area of the intersection of a disc about (u, v) and an ellipse about the origin, and its sort.
+    """Return area, derivatives and sort of the intersection of a disc about (u, v) with an ellipse about the origin.
 
-    With its derivatives by u, v and the disc's radius. Sorts: 0 nothing, 1 the disc, 2 the ellipse, 3 a part of both.
-    By Green's theorem over arcs of the circle within the ellipse, and arcs of the ellipse between them.
+    The derivatives are by u, v and the disc's radius. Sorts: 0 empty, 1 the whole disc, 2 the whole ellipse, 3 a part
+    of both. By Green's theorem, over the circle's arcs within the ellipse and the ellipse's arcs between them.
     """
     count, angles, last = _crossings(u, v, rho, alpha, beta)
     if count < 2:
@@ -184,7 +186,7 @@ def _section(u: float, v: float, rho: float, alpha: float, beta: float) -> tuple
         else:
             # Arc of the ellipse from the circle's exit to its next entry.
             turn = math.atan2(to_y / beta, to_x / alpha) - math.atan2(from_y / beta, from_x / alpha)
-            # Where rounding makes two crossings of one, both arcs are tiny.
+            # Where rounding turns one crossing into two, both arcs are tiny.
             if turn < 0.0 and (turn < -_HARDLY or end - start > 1.0):
                 turn += 2.0 * math.pi
             area += 0.5 * alpha * beta * turn
@@ -197,7 +199,10 @@ def _section(u: float, v: float, rho: float, alpha: float, beta: float) -> tuple
 
 @building_block
 def _slice(z: float, x: Vector, a: Vector) -> tuple[float, Vector, int]:
-    """Return area, gradient by x, and sort of the section at height z of a unit ball about x and an ellipsoid."""
+    """Return area, gradient by x, and sort of the section at height z.
+
+    The section is through a unit ball about x and an ellipsoid with half axes a about the origin.
+    """
     up = z - x[2]
     rho, size = math.sqrt(max(1.0 - up * up, 0.0)), math.sqrt(max(1.0 - z * z / (a[2] * a[2]), 0.0))
     if rho == 0.0 or size == 0.0:
@@ -224,10 +229,11 @@ def _height(low: float, high: float, t: float) -> float:
 
 @building_block
 def sum_slices(x: Vector, a: Vector, low: float, high: float) -> tuple[float, Vector]:
-    """Integrate the sections from `low` to `high`, with the gradient. Pieces are halved until both rules agree.
+    """Return volume and gradient: integrals of the sections' areas and gradients from height `low` to height `high`.
 
-    At `low` and `high`, powers of 3/2 are smooth in t. Elsewhere, each halving divides the error of such a power by 5.
-    A piece is halved, too, if the section at its end has another sort than that at its outermost node.
+    Pieces are halved until both rules agree. Heights are a cubic of t, in which the powers of 3/2 at `low` and `high`
+    are smooth. Elsewhere each halving divides the error of such a power by 5. A piece is also halved if the sort of the
+    section at one of its ends differs from the sort at the outermost node there.
     """
     volume, gradient, place, size, first, last = 0.0, (0.0, 0.0, 0.0), 0, _FINEST, 0, 0
     while place < _FINEST:
@@ -264,7 +270,7 @@ def sum_slices(x: Vector, a: Vector, low: float, high: float) -> tuple[float, Ve
 
 @inlined
 def reach_up(normal_z: float, distance: float) -> float:
-    """Return the greatest height of the unit ball's part beyond a plane at this distance from the centre."""
+    """Return the greatest height in the part of the unit ball where n·p <= -distance; normal_z: height of n."""
     if -normal_z >= distance:
         return 1.0
     across = max(1.0 - distance * distance, 0.0) * max(1.0 - normal_z * normal_z, 0.0)
@@ -273,7 +279,7 @@ def reach_up(normal_z: float, distance: float) -> float:
 
 @inlined
 def rolled(vector: Vector, by: int) -> Vector:
-    """Return the vector with its axes rolled, so that they begin with `by` + 1."""
+    """Return the vector with its axes rolled, so that axis `by` is the last one."""
     if by == 0:
         return vector[1], vector[2], vector[0]
     return (vector[2], vector[0], vector[1]) if by == 1 else vector

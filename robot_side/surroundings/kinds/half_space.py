@@ -1,4 +1,4 @@
-"""Half-spaces, solid where normal·x <= offset: normal (3), offset."""
+"""Half-spaces, solid where normal·x <= offset. Numbers of a half-space: normal (3), offset."""
 
 import math
 from typing import Final
@@ -14,7 +14,7 @@ from robot_side.surroundings.kinds.layout import CLOSING, LEAST_CONTACT_M, NEVER
 
 @inlined
 def place(_numbers: FloatArray, _k: int, bounds: FloatArray, row: int) -> float:
-    """Write one half-space's bounds; return its volume, infinity."""
+    """Write the bounding sphere of one half-space, of infinite radius; return its volume, infinity."""
     for axis in range(3):
         bounds[row, axis] = 0.0
     bounds[row, 3] = math.inf
@@ -25,7 +25,7 @@ def place(_numbers: FloatArray, _k: int, bounds: FloatArray, row: int) -> float:
 def placed(
     _sizes: FloatArray, _k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
 ) -> None:
-    """Write the numbers of the half-space below a plane at a pose; the plane's normal is the third axis."""
+    """Write the numbers of the half-space below a plane at this pose; the plane's normal is the pose's third axis."""
     normal = turns[turn, 2], turns[turn, 5], turns[turn, 8]
     for axis in range(3):
         numbers[row, axis] = normal[axis]
@@ -34,14 +34,14 @@ def placed(
 
 @inlined
 def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
-    """Return the nearest point of the plane in `row`."""
+    """Return signed distance and direction from `point` to the plane in `row` (see `Nearest`)."""
     normal = shapes[row, 0], shapes[row, 1], shapes[row, 2]
     return dot(normal, point) - shapes[row, 3], negative(normal)
 
 
 @inlined
 def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, _reach: float) -> Contact:
-    """Return the contact of a sphere that moves along the unit vector `along` with the plane."""
+    """Return the contact with the half-space in `row` of a sphere that moves along the unit vector `along`."""
     normal = shapes[row, 0], shapes[row, 1], shapes[row, 2]
     gap, closing = dot(normal, start) - shapes[row, 3] - radius, -dot(normal, along)
     if gap < -TOUCHING_M:

@@ -1,7 +1,8 @@
 """Descriptor of a kind of primitive; every list of kinds follows from the descriptors.
 
-The rule: a kind is one file with one `KIND`, named once in `perceived.KINDS` beside its arrays. The regret: a kernel
-takes no list of arrays, so `by_kind` builds an if-chain of nested closures, and types end at `Any`.
+A kind is one file with one `KIND`, named once in `perceived.KINDS`; its arrays are fields of `PerceivedObjects`.
+Kernels cannot choose from a list of functions, so `by_kind` builds an if-chain of nested closures, whose types are
+`Any`.
 """
 
 import math
@@ -18,11 +19,11 @@ from robot_side.compiled.kernel import Compiled, inlined
 from robot_side.surroundings.kinds.layout import NUMBERS, rows
 
 Row = tuple[int, ...]
-"""Shape of an array's rows"""
+"""Shape of one row of an array"""
 
 
 class Check(Enum):
-    """Condition on the numbers of an array, besides that they are finite."""
+    """Condition that all numbers of an array meet, besides being finite."""
 
     FINITE = auto()
     NOT_NEGATIVE = auto()
@@ -46,46 +47,52 @@ class Array(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """Kind of primitive; k counts its primitives, `columns` are the arrays that `read` returns."""
+    """Kind of primitive.
+
+    In shapes, k is the number of its primitives; the columns are the arrays that `read` returns.
+    """
 
     name: str
     arrays: tuple[Array, ...]
-    """Arrays of poses and sizes"""
+    """Arrays of a frame with the poses and sizes of this kind's primitives"""
     placed: Callable[..., None]
-    """(sizes (k, 20), k, position, turns (g, 9), turn, numbers (n, 20), row): write the numbers of a primitive of these
-    sizes, given in its own frame, at this pose. Compiled, as all below."""
+    """Function (sizes (k, 20), k, position, turns (g, 9), turn, numbers (n, 20), row). It writes the numbers of a
+    primitive into `row`, from the sizes in row k and the pose: `position`, and the rotation in row `turn` of turns. It
+    is compiled, as are all functions below."""
     place: Callable[..., float]
-    """(numbers, k, bounds (n, 4), row) to the volume in m³: convert the numbers to the shape, and write the bounds"""
+    """Function (numbers, k, bounds (n, 4), row). It converts row k of the numbers to the primitive's shape, writes the
+    bounding sphere into `row` of the bounds, and returns the volume in m³."""
     nearest: Callable[..., Any]
-    """(shapes (n, 15), row, point) to Nearest"""
+    """Function (shapes (n, 15), row, point) that returns a Nearest"""
     contact: Callable[..., Any]
-    """(shapes (n, 15), row, start, radius, along, reach) to Contact"""
+    """Function (shapes (n, 15), row, start, radius, along, reach) that returns a Contact"""
     overlap: Callable[..., Any] | None = None
-    """(shapes (n, 15), row, center, radius) to Overlap, if the closed form is short; else `kernel` computes it"""
+    """Function (shapes (n, 15), row, center, radius) that returns an Overlap; None if only `kernel` computes it"""
     kernel: Compiled | None = None
-    """Overlap kernel with the signature OVERLAP; a scene loads only those of its own kinds"""
+    """Overlap kernel with the argument types OVERLAP; None if `overlap` is given. A scene loads only the kernels of its
+    own kinds."""
     centers: Callable[..., Any] | None = None
-    """(columns) to centres (k, 3) in metres; None for an infinite kind"""
+    """Function of the columns that returns centres (k, 3) in metres; None for an infinite kind"""
     in_box: bool = False
-    """Whether the columns are a bounding box: centres (k, 3), rotations (k, 3, 3), half sizes (k, 3)"""
+    """Whether the columns give each primitive's bounding box: centres (k, 3), rotations (k, 3, 3), half sizes (k, 3)"""
     derive: Callable[[Any], tuple[Any, ...]] | None = None
-    """(frame) to the columns, if these are not the arrays"""
+    """Function of a frame that returns the columns; None if the columns are the arrays"""
     more: Callable[[Any], FloatArray] | None = None
-    """(frame) to the numbers that follow those of the arrays"""
+    """Function of a frame that returns further numbers of each primitive, which follow those of the arrays"""
 
     @cached_property
     def owner(self) -> str:
-        """Name of the field that holds each primitive's object"""
+        """Name of the frame's field with the index of each primitive's object"""
         return f"{self.name}_object"
 
     @cached_property
     def fields(self) -> tuple[str, ...]:
-        """Names of the arrays that may differ from frame to frame: all but indices"""
+        """Names of the arrays whose values may change from frame to frame: all but indices"""
         return tuple(array.name for array in self.arrays if array.check is not Check.INDEX)
 
     @cached_property
     def parts(self) -> Mapping[str, tuple[slice, Row]]:
-        """Places of the values of `fields` in a primitive's numbers, and the shape of their rows"""
+        """For each array of `fields`: slice of its values in a primitive's numbers, and shape of one of its rows"""
         found, end = {}, 0
         for array in self.arrays:
             if array.check is not Check.INDEX:
@@ -94,17 +101,20 @@ class Kind:
         return found
 
     def numbers(self, objects: Any) -> FloatArray:
-        """Return the numbers (k, 20) of each primitive of a frame."""
+        """Return the numbers (k, 20) of this kind's primitives in a frame."""
         further = () if self.more is None else (self.more(objects),)
         return rows(*(getattr(objects, name) for name in self.fields), *further, width=NUMBERS)
 
     def read(self, objects: Any) -> tuple[Any, ...]:
-        """Return the columns of a frame."""
+        """Return the columns of this kind's primitives in a frame."""
         return self.derive(objects) if self.derive else tuple([getattr(objects, name) for name in self.fields])
 
 
 def by_kind(functions: Sequence[Callable[..., Any]], first: int = 0) -> Any:
-    """Return a function (kind, arguments) that calls the function of this kind; other numbers call the last one."""
+    """Return a function (kind, *arguments) that calls the function for the number `kind`; the first's is `first`.
+
+    Any other number calls the last function.
+    """
     function, *others = functions
     if not others:
 

@@ -1,4 +1,4 @@
-"""Common layout of the kinds: their numbers, and a row of 15 numbers for the shape of each."""
+"""Layout of tables of primitives: the kinds' numbers, and a row of 15 numbers for the shape of each primitive."""
 
 import math
 from typing import Any, Final
@@ -16,27 +16,31 @@ BOX: Final = 1
 TETRAHEDRON: Final = 2
 HALF_SPACE: Final = 3
 MESH: Final = 4
-"""A mesh has the layout of the box around it. Contact and overlap come from `placed_meshes`, by address."""
+"""Number of the kind of meshes. A mesh has the layout of the box around it. Kernels of `placed_meshes`, called by their
+addresses, compute its contact and overlap."""
 SHAPE_NUMBERS: Final = 15
-"""Numbers of a primitive in a table"""
+"""How many numbers describe the shape of one primitive (columns of a scene table's row)"""
 NUMBERS: Final = 20
-"""Numbers of a primitive in a frame: the values of its arrays, for a mesh also its sizes from the library"""
+"""How many numbers describe one primitive of a frame: the values of its arrays, and for a mesh also its sizes from the
+library"""
 VELOCITY: Final = 12
-"""Index of the velocity in an object's numbers, after position and rotation"""
+"""Index at which the velocity begins among an object's numbers, after position and rotation"""
 
 Nearest = tuple[float, Vector]
-"""Signed distance, positive outside, and the unit vector along which it falls fastest: towards the nearest point from
-outside, away from it from inside, the same on both sides of a face."""
+"""Signed distance from a point to a surface, positive outside, and the unit vector along which this distance falls
+fastest. Outside, the vector points towards the nearest point of the surface, inside away from it. So it is the same on
+both sides of a face."""
 Contact = tuple[float, float]
-"""Distance along û at which a moving sphere first touches, and û·n of the contact plane. 0 and 1 if it overlaps
-already; infinite and 0 without contact, or beyond a given reach."""
+"""Distance along û, the direction of motion, at which a sphere first touches a primitive, and û·n, where n is normal to
+the contact plane and points into the primitive. (0, 1) if the sphere overlaps already; (inf, 0) without a contact
+within the given reach."""
 NEVER: Final[Contact] = (math.inf, 0.0)
 ANY_DIRECTION: Final = (0.0, 0.0, 1.0)
 """Direction for a point that is equally far in all directions"""
 
 
 def rows(*columns: FloatArray, width: int = SHAPE_NUMBERS) -> FloatArray:
-    """Return shapes (k, width) from consecutive columns (k, ...), the rest 0."""
+    """Return a table (k, width) with these columns (k, ...) side by side; the rest is 0."""
     count = len(columns[0])
     flat = [column.reshape(count, math.prod(column.shape[1:])) for column in columns]
     used = sum(column.shape[1] for column in flat)
@@ -47,17 +51,17 @@ OVERLAP: Final[tuple[Any, ...]] = (
     *(input_array(2), INT64, FLOAT64, FLOAT64, FLOAT64, FLOAT64, BUNDLE, output_array(1)),
 )
 """Argument types of an overlap kernel: shapes (n, 15), the row, the sphere's centre and radius, the scene's meshes, and
-an output (3,) for dV/dcentre. It returns V."""
+an output (3,) for dV/dcentre. The kernel returns the overlap V."""
 CONTACT: Final[tuple[Any, ...]] = (BUNDLE, INT64, *(FLOAT64,) * 8, BOOL)
 """Argument types of the contact kernel of meshes (see `placed_meshes`)"""
 MESH_CONTACT: Final[Any] = tuple_type(FLOAT64, FLOAT64)
 """Return type of the contact kernel of meshes: a `Contact`"""
 TOUCHING_M: Final = 1e-7
-"""Largest gap and depth at which bodies touch: they do not overlap yet, and may begin to."""
+"""Largest gap, and largest depth, in m, at which bodies touch but do not count as overlapping"""
 LEAST_CONTACT_M: Final = 1e-12
-"""Contact distance of bodies that touch already; 0 is that of bodies that overlap."""
+"""Contact distance, in m, of bodies that touch already; bodies that overlap have 0."""
 CLOSING: Final = 1e-9
-"""Least û·n of an approach: below it a surface is beside the path and does not come nearer."""
+"""Least û·n at which a surface with the normal n is approached along û; with less, the surface is beside the path."""
 MOST_STEPS: Final = 60
 ENLARGED: Final = 1.0 + 1e-9
 """Factor on bounds around meshes, so that rounding never misses a contact"""
@@ -65,13 +69,16 @@ ENLARGED: Final = 1.0 + 1e-9
 
 @inlined
 def way_by(part: float) -> float:
-    """Return 1 / part: the distance along the path for a metre along an axis, at most 1e15 m."""
+    """Return 1 / part, at most 1e15: metres along the path for each metre along an axis.
+
+    part: component of the path's unit vector along that axis.
+    """
     return 1.0 / part if abs(part) > 1e-15 else 1e15
 
 
 @inlined
 def posed(position: Vector, turns: FloatArray, k: int, x: float, y: float, z: float) -> Vector:
-    """Return the point (x, y, z) of a frame at this pose in world coordinates; turns (g, 9) by rows."""
+    """Return in the world the point (x, y, z) of a frame at a pose: `position`, and rotation k of turns (g, 9)."""
     return (
         position[0] + (turns[k, 0] * x + turns[k, 1] * y + turns[k, 2] * z),
         position[1] + (turns[k, 3] * x + turns[k, 4] * y + turns[k, 5] * z),
@@ -81,7 +88,7 @@ def posed(position: Vector, turns: FloatArray, k: int, x: float, y: float, z: fl
 
 @inlined
 def write_pose(position: Vector, turns: FloatArray, k: int, numbers: FloatArray, row: int) -> None:
-    """Write a position, and a rotation of turns (g, 9), as the first twelve numbers."""
+    """Write a position, and rotation k of turns (g, 9), as the first twelve numbers of `row`."""
     for axis in range(3):
         numbers[row, axis] = position[axis]
     for entry in range(9):
@@ -90,7 +97,10 @@ def write_pose(position: Vector, turns: FloatArray, k: int, numbers: FloatArray,
 
 @inlined
 def to_metres(volume: float, gradient: Vector, size: float, radius: float, overlap_gradient: FloatArray) -> float:
-    """Convert an overlap from units of `size` to metres; after an overflow, the whole sphere, which warns early."""
+    """Return an overlap's volume in m³, and write its gradient in m²; both are given in units of the length `size`.
+
+    After an overflow the volume is the whole sphere's, so that the operator is warned too early rather than not at all.
+    """
     area = size * size
     if not math.isfinite(volume + gradient[0] + gradient[1] + gradient[2]):
         overlap_gradient[0] = overlap_gradient[1] = overlap_gradient[2] = 0.0

@@ -1,4 +1,7 @@
-"""Closed meshes: rows of the boxes around them; contact and overlap come from `placed_meshes`, by address."""
+"""Closed meshes.
+
+A table's row describes the box around a mesh; kernels of `placed_meshes` compute contact and overlap.
+"""
 
 from typing import Any, Final
 
@@ -14,7 +17,7 @@ from robot_side.surroundings.kinds.layout import ENLARGED, NEVER, NUMBERS, TOUCH
 
 @inlined
 def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Convert a mesh's numbers to those of the box around it, and write its bounds; return its volume in m³."""
+    """Convert a mesh's numbers to those of the box around it, and write its bounding sphere; return its volume (m³)."""
     x, y, z = numbers[k, 0], numbers[k, 1], numbers[k, 2]
     for axis in range(3):
         first = 3 + 3 * axis
@@ -31,14 +34,17 @@ def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
 def placed(
     sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
 ) -> None:
-    """Write the numbers of a mesh at a pose; sizes: the numbers that follow the pose."""
+    """Write the numbers of a mesh at this pose. sizes: the 8 numbers that follow the pose (see `of_library`)."""
     write_pose(position, turns, turn, numbers, row)
     for entry in range(12, NUMBERS):
         numbers[row, entry] = sizes[k, entry - 12]
 
 
 def of_library(library: Any, index: IntArray) -> FloatArray:
-    """Return half sizes, middles and radii of the bounds of the library's meshes, and their volumes (q, 8)."""
+    """Return for each mesh (q, 8): half sizes and middle of its bounding box, radius of its bounding sphere, volume.
+
+    index (q,): of each mesh in the library.
+    """
     if library is None:
         return np.empty((0, 8))
     around = library.bounds
@@ -48,7 +54,10 @@ def of_library(library: Any, index: IntArray) -> FloatArray:
 
 @inlined
 def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, reach: float) -> Contact:
-    """Return where a sphere enters the box around a mesh, enlarged by the radius: at or before its contact."""
+    """Return where a sphere enters the box around a mesh, enlarged by the radius.
+
+    It touches the mesh there or later.
+    """
     enter, leave, grown = 0.0, reach, radius * ENLARGED + TOUCHING_M
     offset = subtract(start, load(shapes, row))
     for k in range(3):
@@ -60,7 +69,7 @@ def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: V
 
 
 def _derive(objects: Any) -> tuple[FloatArray, ...]:
-    """Return middles, rotations and half sizes of the boxes around meshes."""
+    """Return middles, rotations and half sizes of the boxes around a frame's meshes."""
     library, index = objects.mesh_library, objects.mesh_index
     if library is None:
         return objects.mesh_positions_m, objects.mesh_rotations, np.empty((0, 3))

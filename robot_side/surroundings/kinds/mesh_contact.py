@@ -1,8 +1,8 @@
 """Contact of a moving sphere with a closed mesh, convex or not.
 
-The overlap rises only by the part of the surface that faces the motion and lies in the ball: dV/dE = -∫ n·û dA. So
-only the triangles in front count, those with n·û < 0: the next rise begins where the sphere next touches one.
-All coordinates are in the mesh's own frame; the trees are walked as in `tree_queries`.
+The overlap rises only by the part of the surface that faces the motion and lies in the ball: dV/dE = -∫ n·û dA. So only
+the triangles in front count, those with n·û < 0: the overlap may next rise where the sphere next touches such a
+triangle. All coordinates are in the mesh's own frame; the trees are walked as in `tree_queries`.
 """
 
 import math
@@ -30,18 +30,18 @@ class Sweep(NamedTuple):
     radius: float
     reach: float
     by_axis: Vector
-    """Distance along the path for a metre along each axis"""
+    """Metres along the path for each metre along an axis, for the three axes"""
 
 
 @inlined
 def swept(start: Vector, along: Vector, radius: float, reach: float) -> Sweep:
-    """Make a sweep."""
+    """Return the sweep of a sphere, with `by_axis` computed."""
     return Sweep(start, along, radius, reach, (way_by(along[0]), way_by(along[1]), way_by(along[2])))
 
 
 @building_block
 def overlaps(tables: MeshTables, mesh: int, sweep: Sweep) -> bool:
-    """Return whether a sphere overlaps a mesh at its start, by more than a touch."""
+    """Return whether the sphere at the start of its sweep overlaps the mesh by more than TOUCHING_M."""
     if is_clear_of(tables, mesh, sweep.start, sweep.radius):
         return False
     return touches_surface(tables, mesh, sweep.start, sweep.radius - TOUCHING_M) or is_inside(tables, mesh, sweep.start)
@@ -49,7 +49,7 @@ def overlaps(tables: MeshTables, mesh: int, sweep: Sweep) -> bool:
 
 @inlined
 def _enters(tables: MeshTables, node: int, sweep: Sweep, reach: float) -> float:
-    """Return the distance at which a node's box, enlarged by the radius, is entered; infinite beyond the reach."""
+    """Return the distance at which the sphere's centre enters a node's box, enlarged by the radius, or infinity."""
     enter, leave = 0.0, reach
     grown = sweep.radius * ENLARGED + TOUCHING_M
     for axis in range(3):
@@ -61,7 +61,7 @@ def _enters(tables: MeshTables, node: int, sweep: Sweep, reach: float) -> float:
 
 @inlined
 def _is_passed(tables: MeshTables, triangle: int, sweep: Sweep, reach: float) -> bool:
-    """Return whether the sweep misses the ball around a triangle, or the triangle faces away."""
+    """Return whether a triangle cannot be touched: the sweep misses the ball around it, or the triangle faces away."""
     normal = corner_of(tables, triangle, 3)
     if dot(normal, sweep.along) >= -CLOSING:
         return True
@@ -74,9 +74,10 @@ def _is_passed(tables: MeshTables, triangle: int, sweep: Sweep, reach: float) ->
 
 @building_block
 def _touch(tables: MeshTables, triangle: int, sweep: Sweep, best: float) -> float:
-    """Return the contact distance to a triangle in front, 0 if the sphere touches; `best` or more if it is beyond.
+    """Return the contact distance to a triangle in front; 0 if the sphere touches it at the start of the sweep.
 
-    The triangle enlarged by the radius is a prism, three cylinders and three balls; the first contact counts.
+    The result is `best` or more if the contact is no nearer than `best`. The triangle enlarged by the radius consists
+    of a prism, three cylinders and three balls; the first contact with any of them counts.
     """
     start, along, radius = sweep.start, sweep.along, sweep.radius
     normal = corner_of(tables, triangle, 3)
@@ -139,9 +140,11 @@ def _edge_touch(first: Vector, second: Vector, along: Vector, radius: float) -> 
 
 @building_block
 def next_touch(tables: MeshTables, mesh: int, sweep: Sweep, nodes: IntArray, enters: FloatArray) -> tuple[float, int]:
-    """Return the contact distance to the next triangle in front, 0 if it touches, and its index; infinite for none.
+    """Return the contact distance to the next triangle in front, and the triangle's index.
 
-    Boxes come in the order in which they are entered. nodes, enters: scratch for waiting boxes, one for each level.
+    The distance is 0 if the sphere touches the triangle at its start, and infinite if it touches none. Boxes are
+    examined in the order in which the sphere enters them. nodes, enters: scratch for waiting boxes, one for each level
+    of the tree.
     """
     best, touched, node, waiting = math.inf, -1, tables.roots[mesh], 0
     reach = sweep.reach

@@ -1,4 +1,4 @@
-"""Spheres: centre (3), radius."""
+"""Spheres. Numbers of a sphere: centre (3), radius."""
 
 import math
 from typing import Final
@@ -14,7 +14,7 @@ from robot_side.surroundings.kinds.layout import ANY_DIRECTION, LEAST_CONTACT_M,
 
 @inlined
 def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Write one sphere's bounds; return its volume in m³."""
+    """Write the bounding sphere of one sphere; return its volume in m³."""
     for axis in range(4):
         bounds[row, axis] = numbers[k, axis]
     return 4.0 / 3.0 * math.pi * float(numbers[k, 3] ** 3)
@@ -24,7 +24,7 @@ def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
 def placed(
     sizes: FloatArray, k: int, position: Vector, _turns: FloatArray, _turn: int, numbers: FloatArray, row: int
 ) -> None:
-    """Write the numbers of a sphere at a pose; sizes: its radius."""
+    """Write the numbers of a sphere at this pose. sizes: its radius."""
     for axis in range(3):
         numbers[row, axis] = position[axis]
     numbers[row, 3] = sizes[k, 0]
@@ -32,7 +32,7 @@ def placed(
 
 @inlined
 def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
-    """Return the nearest point of the sphere in `row`."""
+    """Return signed distance and direction from `point` to the surface of the sphere in `row` (see `Nearest`)."""
     offset = subtract((shapes[row, 0], shapes[row, 1], shapes[row, 2]), point)
     length = norm(offset)
     return length - shapes[row, 3], unit(offset) if length > 0.0 else ANY_DIRECTION
@@ -40,7 +40,7 @@ def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
 
 @inlined
 def contact(shapes: FloatArray, row: int, start: Vector, radius: float, along: Vector, _reach: float) -> Contact:
-    """Return the contact of a sphere that moves along the unit vector `along` with the sphere in `row`."""
+    """Return the contact with the sphere in `row` of a sphere that moves along the unit vector `along`."""
     offset = subtract((shapes[row, 0], shapes[row, 1], shapes[row, 2]), start)
     reach = shapes[row, 3] + radius
     ahead, apart = dot(offset, along), dot(offset, offset) - reach * reach

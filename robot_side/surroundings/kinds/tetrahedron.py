@@ -1,4 +1,4 @@
-"""Tetrahedra, vertices in any order: four vertices (12)."""
+"""Tetrahedra. Numbers of a tetrahedron: its four vertices (12), in any order."""
 
 import math
 from typing import Final
@@ -28,7 +28,7 @@ def _corner(shapes: FloatArray, row: int, k: int, point: Vector) -> Vector:
 
 @inlined
 def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
-    """Write one tetrahedron's bounds; return its volume in m³."""
+    """Write the bounding sphere of one tetrahedron; return the tetrahedron's volume in m³."""
     for axis in range(3):
         p, q, r, s = numbers[k, axis], numbers[k, 3 + axis], numbers[k, 6 + axis], numbers[k, 9 + axis]
         bounds[row, axis] = 0.5 * (min(p, q, r, s) + max(p, q, r, s))
@@ -46,7 +46,7 @@ def place(numbers: FloatArray, k: int, bounds: FloatArray, row: int) -> float:
 def placed(
     sizes: FloatArray, k: int, position: Vector, turns: FloatArray, turn: int, numbers: FloatArray, row: int
 ) -> None:
-    """Write the numbers of a tetrahedron at a pose; sizes: its vertices in its own frame."""
+    """Write the numbers of a tetrahedron at this pose. sizes: its vertices in its own frame."""
     for corner in range(4):
         x, y, z = sizes[k, 3 * corner], sizes[k, 3 * corner + 1], sizes[k, 3 * corner + 2]
         point = posed(position, turns, turn, x, y, z)
@@ -67,7 +67,7 @@ def _edge_foot(start: Vector, end: Vector) -> Vector:
 
 @inlined
 def _face(a: Vector, b: Vector, c: Vector, orientation: float) -> tuple[float, Vector, bool]:
-    """Return the origin's height over the face abc, its outward normal, and whether the origin's foot is inside."""
+    """Return the origin's height over the face abc, its outward normal, and whether the origin's foot is inside it."""
     raw = cross(subtract(b, a), subtract(c, a))
     area = norm(raw)
     if area == 0.0:
@@ -80,7 +80,10 @@ def _face(a: Vector, b: Vector, c: Vector, orientation: float) -> tuple[float, V
 
 @building_block
 def nearest(shapes: FloatArray, row: int, point: Vector) -> Nearest:
-    """Return the nearest surface point of the tetrahedron in `row`; without volume it is a plate, without an inside."""
+    """Return signed distance and direction from `point` to the surface of the tetrahedron in `row` (see `Nearest`).
+
+    A tetrahedron without volume is a plate: its distances are never negative.
+    """
     a, b = _corner(shapes, row, 0, point), _corner(shapes, row, 1, point)
     c, d = _corner(shapes, row, 2, point), _corner(shapes, row, 3, point)
     vertices = a, b, c, d
@@ -130,7 +133,7 @@ def overlap_one_tetrahedron(
     _meshes: IntArray,
     overlap_gradient: FloatArray,
 ) -> float:
-    """Return the overlap with a tetrahedron."""
+    """Return the overlap of a sphere with the tetrahedron in `row`."""
     size, center = power_of_two_below(radius), (x, y, z)
     part = 1.0 / size
     corners = (

@@ -125,9 +125,7 @@ main()
 def test_a_machine_without_mujoco_is_told_what_to_install() -> None:
     code, _, complaint = ended("-c", WITHOUT_MUJOCO)
     assert code == 2
-    assert complaint == (
-        "feelahead-robot: mujoco is not installed on this machine; valid: pip install '.[robot]' in the clone\n"
-    )
+    assert complaint == ("feelahead-robot: mujoco is not installed; install it in the clone: pip install '.[robot]'\n")
 
 
 @pytest.mark.processes
@@ -175,5 +173,5 @@ def test_an_output_that_cannot_be_written_is_one_line(code: str) -> None:
         )
     assert done.returncode == 1
     assert done.stderr == (
-        "x: the output cannot be written: No space left on device; valid: a place with room for it\n"
+        "x: the output cannot be written: No space left on device; valid: an output with enough room\n"
     )

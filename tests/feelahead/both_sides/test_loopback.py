@@ -1,4 +1,4 @@
-"""Both sides in virtual time, from a scripted person's fingers to a lifted target, and back to the fingers."""
+"""Both sides in virtual time: a scripted person lifts the target, and feels the stiffness at the triggers."""
 
 import functools
 import itertools
@@ -33,12 +33,12 @@ def loopback(link: str, *, seed: int = 0, compensation: Compensation = "operator
 
 
 episodes = pytest.mark.xdist_group("episodes")
-"""Mark for a single worker, so that each episode is run once."""
+"""Mark that runs these tests in one worker of pytest-xdist, so that each episode is computed once."""
 
 
 @dataclass(frozen=True)
 class Moment:
-    """Person's phase and feeling."""
+    """What the person does and feels at one time."""
 
     phase: Doing
     l2: Strengths
@@ -48,7 +48,7 @@ class Moment:
 
 @dataclass(frozen=True)
 class Episode:
-    """Run of the person from the start, sampled every 50 ms."""
+    """Run of both sides with the scripted person from the start, sampled every 50 ms."""
 
     moments: tuple[Moment, ...]
     summary: dict[str, Any]

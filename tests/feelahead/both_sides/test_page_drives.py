@@ -1,4 +1,4 @@
-"""Whole runs in virtual time in which a page drives, stops and tunes."""
+"""Whole runs in virtual time in which a page of the console drives, stops the arm, and tunes."""
 
 from collections.abc import Callable
 from typing import Any
@@ -34,7 +34,7 @@ def run_of(does: Does, device: Any = "browser", link: str = "", *, permit_tuning
 
 
 def timetable(*rows: tuple[float, dict[str, Any] | None]) -> Does:
-    """Return hands that do each thing until its time, in turn."""
+    """Return the page's inputs over time: each row's inputs hold until the row's time."""
     return lambda now_s: next((hands for until_s, hands in rows if now_s < until_s), rows[-1][1])
 
 

@@ -1,4 +1,4 @@
-"""Two real processes: clean ends, crashes, and failures around them, reported in one line."""
+"""Both sides as two real processes: they end cleanly, and crashes and outside failures are reported in one line."""
 
 import contextlib
 import json
@@ -34,7 +34,7 @@ DEMO = ("-P", "-m", "feelahead", "demo", "--no-console")
 
 
 def wait_until(side: SideProcess, condition: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    """Return the side's first unread status for which `condition` holds, however late it is read."""
+    """Wait for the side's first unread status for which `condition` holds, and return it."""
     for _ in range(5000):
         status = side.wait_for("status", LIMIT_S)
         if condition(status):
@@ -108,7 +108,7 @@ def test_a_killed_operator_is_noticed_and_another_one_takes_over() -> None:
 
 @pytest.mark.parametrize("name", ["operator", "robot"])
 def test_a_side_that_stood_still_disarms_and_what_was_held_back_is_discarded(tmp_path: Path, name: str) -> None:
-    """SIGSTOP in full motion, then SIGCONT: armed again only after a healthy second, and by no old message."""
+    """Stop a side by SIGSTOP in full motion, and continue it: only a healthy second and new messages arm it again."""
     path = tmp_path / "robot.json"
     with robot(f"--summary={path}") as robot_side:
         with operator(robot_side.wait_for("listening", LIMIT_S)) as operator_side:
@@ -236,7 +236,7 @@ def test_a_run_that_fails_in_whatever_way_has_its_summary(
 
 @contextlib.contextmanager
 def stalled(kind: str) -> Iterator[int]:
-    """Yield a full standard output that nobody reads."""
+    """Yield the descriptor of a standard output that is full and that nobody reads."""
     reads, writes = pty.openpty() if kind == "terminal" else os.pipe()
     os.set_blocking(writes, False)
     with contextlib.suppress(BlockingIOError):
@@ -261,7 +261,7 @@ def stalling(module: str, output: int, *arguments: str) -> Iterator["subprocess.
 
 
 def free_port() -> int:
-    """Return a port below those that Linux assigns itself (32768 and up), so that no other process gets it."""
+    """Return a free port below 32768: Linux itself assigns only higher ports, so that no other process gets it."""
     for port in random.SystemRandom().sample(range(20_000, 30_000), 1000):
         with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)):
             return port

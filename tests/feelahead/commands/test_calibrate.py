@@ -1,6 +1,7 @@
-"""`feelahead calibrate`, and the operator side that uses its stored result."""
+"""`feelahead calibrate`, and how the operator side uses the stored result."""
 
 import math
+import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -9,19 +10,23 @@ import pytest
 
 import feelahead.commands.calibrate
 import operator_side.main
-from common.errors import ConfigurationError, DeviceError
+import operator_side.turns
+from common.errors import ConfigurationError, DeviceError, NoDeviceError
 from common.loop import process
 from feelahead.main import command
+from operator_side.calibration.forces import ControllerForces, TriggerForces, forces_path, write_forces
 from operator_side.calibration.procedure import CalibrationError
 from operator_side.calibration.store import calibration_path, load_calibration, read_calibration, write_calibration
 from operator_side.controller import connection
 from operator_side.controller.feel import RELEASED
 from operator_side.controller.state import ControllerState
 from operator_side.core import OperatorSide
+from operator_side.dualsense.hid.second_writer import SecondWriters
 from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
 from tests.helpers.fake_hid import ADDRESS, FakeBackend, FakeHandle
+from tests.helpers.machines.fake_proc import add_process
 
 REPORT_S = 0.004
 MEASURED = TravelCalibration(l2=TriggerTravel(0.1, 0.7))
@@ -34,7 +39,7 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def willing_hands(now_s: float) -> ControllerState:
-    """Rest, pull L2 up to 0.9, pull R2, turn the sticks, rest: by the clock."""
+    """Return the state of hands that follow a timetable: rest, pull L2 to 0.9, pull R2, turn the sticks, rest."""
     pulled = math.sin(math.pi * now_s) ** 2
     if 2.0 <= now_s < 5.0:
         return ControllerState(l2=0.9 * pulled)
@@ -47,7 +52,7 @@ def willing_hands(now_s: float) -> ControllerState:
 
 
 class PlayedHandle(FakeHandle):
-    """Real controller to hidapi, whose state follows a separate clock."""
+    """Controller that hidapi takes for a real one, and whose state is a function of a separate clock."""
 
     def play(self, hands: Callable[[float], ControllerState | None]) -> None:
         self.hands, self.now_s = hands, 0.0
@@ -102,7 +107,7 @@ def test_a_simulated_controller_is_kept_only_where_asked_for(
 
 
 @pytest.mark.parametrize(
-    ("still_s", "error", "said"), [(math.inf, CalibrationError, "Pull L2"), (1.0, DeviceError, "said nothing for 5 s")]
+    ("still_s", "error", "said"), [(math.inf, CalibrationError, "Pull L2"), (1.0, DeviceError, "sent nothing for 5 s")]
 )
 def test_hands_that_do_not_pull_or_a_silent_controller_end_it_and_nothing_is_stored(
     handle: PlayedHandle, own_folder: Path, still_s: float, error: type[Exception], said: str
@@ -123,6 +128,17 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_anything_is_meas
         command(["calibrate", "--out", out])
     assert handle.now_s == 0.0
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_controller_that_was_asked_for_is_measured_or_the_others_are_named(handle: PlayedHandle) -> None:
+    with pytest.raises(NoDeviceError, match=f"aa:bb:cc:dd:ee:ff is not there, only: {ADDRESS}"):
+        command(["calibrate", "--controller", "aa:bb:cc:dd:ee:ff"])
+    with pytest.raises(ConfigurationError, match="--controller with --device simulated; valid"):
+        command(["calibrate", "--controller", ADDRESS, "--device", "simulated"])
+    assert load_calibration(ADDRESS) is None
+    assert command(["calibrate", "--controller", ADDRESS]) == 0
+    assert load_calibration(ADDRESS) is not None
+    assert handle.closed == handle.times_opened
 
 
 # The operator side
@@ -153,6 +169,31 @@ def test_the_operator_side_uses_what_is_given_else_what_is_stored_for_its_contro
         run()
 
 
+def test_the_operator_side_names_a_second_writer_measured_forces_and_the_controllers_it_does_not_take(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    backend = FakeBackend({0x0CE6: {b"/dev/hidraw93": FakeHandle()}})
+    monkeypatch.setattr(process, "raise_priority", lambda: False)
+    add_process(tmp_path / "proc", 11, "steam", {"/dev/hidraw93": os.O_RDWR})
+    monkeypatch.setattr(operator_side.turns, "SecondWriters", lambda: SecondWriters(tmp_path / "proc"))
+    forces = ControllerForces(r2=TriggerForces(tuple(2.0 + 0.2 * strength for strength in range(9))))
+    write_forces(forces_path(ADDRESS), ADDRESS, forces)
+
+    def run(address: str) -> str:
+        options = ["--connect", "tcp://127.0.0.1:9", "--duration", "0.5", "--no-haptics", "--controller", address]
+        operator_side.main.command(options, backend)
+        return capsys.readouterr().out
+
+    said = run(ADDRESS)
+    assert said.count("steam (11) holds the controller open for writing, too: ") == 1
+    assert "measured: R2 yields to 2.0 N without an effect; strengths 1 to 8 add 0.2 0.4 0.6 " in said
+    assert f"the controller aa:bb:cc:dd:ee:ff is not there, only: {ADDRESS}; waiting for one" in run(
+        "aa:bb:cc:dd:ee:ff"
+    )
+    forces_path(ADDRESS).write_text("version = 7")
+    assert "feelahead feel --measure" in run(ADDRESS)
+
+
 def test_a_file_that_breaks_while_it_runs_is_said_and_the_defaults_hold(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -162,7 +203,7 @@ def test_a_file_that_breaks_while_it_runs_is_said_and_the_defaults_hold(
     taken: list[TravelCalibration] = []
 
     def calibrate(_: OperatorSide, calibration: TravelCalibration) -> None:
-        """Store another calibration and unplug each time; the third time is the last."""
+        """At each loading, store another calibration and unplug the controller; the third time ends the test."""
         taken.append(calibration)
         if len(taken) == 1:
             calibration_path(ADDRESS).write_text("version = 7")

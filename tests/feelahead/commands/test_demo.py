@@ -1,4 +1,4 @@
-"""The demo: its arguments to the two sides, its page and its messages at an early end."""
+"""The demo: the flags that it gives to both sides, its page, and its messages when a side ends early."""
 
 import json
 import os

@@ -1,14 +1,25 @@
-"""The demo's end by its pages or its duration, and the address that outlives a restart; without processes."""
+"""When the demo ends, by its pages or its duration, and that its address survives a restart; without processes."""
 
+import json
+import re
+import sys
+import time
 from pathlib import Path
 
 import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
+from websockets.typing import Origin
 
 from feelahead.commands.demo.page import AFTER_PAGES_S, FIRST_PAGE_S, KeptPage, Lifetime, free_ports
+from tests.operator_side.viewing.terminal.on_terminal import OnTerminal
+
+_LIMIT_S = 60.0
 
 
 def ends_at(lifetime: Lifetime, pages: dict[float, int], limit_s: float = 500.0) -> tuple[float, str]:
-    """Return when and why the run ends; pages: their number from each time on, since the link was up."""
+    """Return when and why the run ends. pages: number of open pages, by the time from which on it holds."""
     lifetime.begin(0.0)
     now_s, open_now = 0.0, 0
     while now_s < limit_s:
@@ -65,3 +76,57 @@ def test_ports_for_both_sides_differ() -> None:
     ports = free_ports(2)
     assert len(set(ports)) == 2
     assert all(1024 <= port <= 65535 for port in ports)
+
+
+def opened(address: str) -> Connection:
+    """Open the page's connection, again and again until the console serves it."""
+    end_s = time.monotonic() + _LIMIT_S
+    while True:
+        try:
+            page = connect(
+                address.replace("http", "ws", 1) + "live",
+                origin=Origin(re.sub(r"/[^/]*/$", "", address)),
+                max_size=None,
+            )
+        except (OSError, ConnectionClosed):
+            assert time.monotonic() < end_s
+            continue
+        page.send(json.dumps({"slow": True, "looks": True}))
+        return page
+
+
+def read_until(page: Connection, kind: str) -> dict[str, object]:
+    """Return the page's next message of this kind; a picture counts as `picture`."""
+    end_s = time.monotonic() + _LIMIT_S
+    while time.monotonic() < end_s:
+        content = page.recv(timeout=_LIMIT_S)
+        message: dict[str, object] = json.loads(content) if isinstance(content, str) else {"kind": "picture"}
+        if message["kind"] == "end":
+            page.send(json.dumps({"taken": True}))
+        if message["kind"] == kind:
+            return message
+    raise AssertionError(f"no {kind}")
+
+
+@pytest.mark.processes
+def test_a_page_keeps_the_demo_alive_and_runs_it_again_at_the_same_address() -> None:
+    demo = OnTerminal([sys.executable, "-P", "-m", "feelahead", "demo"])
+    address = re.compile(rb"http://127\.0\.0\.1:\d+/[\w-]+/")
+    try:
+        demo.read_until(lambda seen: address.search(seen.replace(b"\r\n", b"")))
+        found = address.search(demo.seen.replace(b"\r\n", b""))
+        assert found is not None
+        with opened(found[0].decode()) as page:
+            assert read_until(page, "run")["may_run_again"] is True
+            read_until(page, "picture")
+            page.send(json.dumps({"again": True}))
+            assert read_until(page, "ended") == {"kind": "ended"}
+            with pytest.raises(ConnectionClosed):
+                read_until(page, "nothing more")
+        with opened(found[0].decode()) as page:
+            read_until(page, "picture")
+        demo.read_until(lambda seen: b"the page was closed: the run ends" in seen)
+        demo.read_until(lambda seen: b"contacts with obstacles" in seen)
+        assert demo.process.wait(_LIMIT_S) == 0
+    finally:
+        demo.close()

@@ -1,6 +1,7 @@
-"""Checks of `feelahead doctor` on invented facts, and the command on this machine."""
+"""Each check of `feelahead doctor` with invented facts, and the whole command on this machine."""
 
 import json
+import os
 import re
 import tomllib
 from pathlib import Path
@@ -29,6 +30,7 @@ from operator_side.dualsense.hid.device import HidBackend
 from operator_side.dualsense.hid.udev import RULE_FILE, RULES, installing_command
 from robot_side.compiled import warm_up as warm_up_module
 from tests.helpers.fake_hid import ADDRESS, BLUETOOTH, FakeBackend, FakeHandle
+from tests.helpers.machines.fake_proc import add_process
 from tests.helpers.repository import ROOT
 from tests.robot_side.compiled.fresh_kernels import fresh_kernels
 
@@ -129,6 +131,16 @@ def test_controllers_are_looked_at_and_left_alone(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(controllers, "load_backend", missing)
     [finding] = controllers.controllers_seen()
     assert (finding.verdict, finding.remedy) == (NOTE, "pip install it")
+
+
+def test_a_second_writer_is_a_note_with_its_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    add_process(tmp_path, 11, "steam", {"/dev/a": os.O_RDWR})
+    monkeypatch.setattr(controllers, "PROC", tmp_path)
+    monkeypatch.setattr(controllers, "load_backend", lambda: FakeBackend({0x0CE6: {b"/dev/a": FakeHandle()}}))
+    found = controllers.controllers_seen()
+    assert (found[1].verdict, found[1].said) == (NOTE, "steam (11) holds /dev/a open for writing")
+    assert "Steam Input" in (found[1].remedy or "")
+    assert permission(*found).said == "the controller can be opened"
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""`feelahead doctor --connect`: every fault on the path, by invented facts and by sockets on loopback."""
+"""`feelahead doctor --connect` names every fault on the path; tested with invented facts, and sockets on loopback."""
 
 import contextlib
 import errno
@@ -76,12 +76,12 @@ def test_a_robot_side_is_as_it_should_be_and_a_closed_port_of_this_machine_has_a
 
 
 LONG_S, SHORT_S = 60.0, 0.3
-"""Waits for an event that comes in the end, and for one that never comes."""
+"""Time limits in seconds: for an event that will come, and for one that never comes"""
 
 
 @pytest.fixture(autouse=True)
 def patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Long limits, however busy the machine is."""
+    """Raise the doctor's time limits, so that tests pass on a busy machine."""
     limits = ("_ANSWER_LIMIT_S", "_HANDSHAKE_LIMIT_S", "_LARGE_LIMIT_S", "_TELEMETRY_LIMIT_S", "_MEASURE_S")
     for name in limits:
         monkeypatch.setattr(link, name, LONG_S)
@@ -91,7 +91,7 @@ def patience(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Doctor:
-    """Doctor whose output is kept."""
+    """Run of the doctor whose output is stored."""
 
     def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
         self._capsys = capsys
@@ -112,7 +112,7 @@ def doctor(capsys: pytest.CaptureFixture[str]) -> Doctor:
 
 @contextlib.contextmanager
 def listening(accept: bool = False) -> Iterator[str]:
-    """Yield a port that accepts connections and says nothing, or hangs up at once."""
+    """Yield the address of a port that takes connections and sends nothing; with `accept` it hangs up at once."""
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def hang_up() -> None:
@@ -128,7 +128,7 @@ def listening(accept: bool = False) -> Iterator[str]:
 
 @contextlib.contextmanager
 def closed() -> Iterator[str]:
-    """Yield a port on which nobody listens, bound so that no other process gets it."""
+    """Yield the address of a port on which nobody listens; it is bound, so that no other process gets it."""
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         yield f"tcp://127.0.0.1:{taken.getsockname()[1]}"

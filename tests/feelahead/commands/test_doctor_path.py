@@ -1,4 +1,4 @@
-"""`feelahead doctor --connect` measures the path: the verdict by invented facts, the measurement on loopback."""
+"""`feelahead doctor --connect` measures the path: verdicts on invented figures, and a measurement on loopback."""
 
 import json
 from typing import Any, cast
@@ -60,7 +60,7 @@ def test_lost_packets_are_a_share_of_those_sent_meanwhile() -> None:
 
 
 class _Filming(ServingRobot):
-    """Robot side that lets everybody feel, and publishes a picture, 50 ms old, in each turn while watched."""
+    """Robot side that sends stiffness to all, and while it is watched a picture, 50 ms old, in each turn."""
 
     def tick(self, now_s: float) -> None:
         for one in [*self.session.owners(now_s), *self.session.observers(now_s)]:

@@ -1,4 +1,4 @@
-"""`feelahead keys` as a person uses it: two machines, here two folders."""
+"""`feelahead keys` as a person uses it on two machines, which are two folders here."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Commands on recordings: bad input in one line, and a real demo that is replayed to the same bits."""
+"""Commands on recordings: bad input is reported in one line, and a recorded demo is replayed to the same bits."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -59,7 +59,7 @@ def test_where_nothing_can_be_recorded(tmp_path: Path, name: str, told: str) -> 
 def test_without_the_extra_the_command_that_mends_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(packages, "find_spec", lambda _: None)
     for command, arguments in ((demo, ["--record", str(tmp_path / "run.mcap")]), (replay, ["run.mcap"])):
-        with pytest.raises(ConfigurationError, match=r"pip install 'feelahead\[record\]'"):
+        with pytest.raises(ConfigurationError, match=r"pip install '.\[record\]'"):
             command(arguments)
 
 

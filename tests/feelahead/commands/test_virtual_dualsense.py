@@ -1,4 +1,4 @@
-"""`feelahead virtual-dualsense` towards a kernel in virtual time, and without one."""
+"""`feelahead virtual-dualsense` with a simulated kernel in virtual time, and on a machine without /dev/uhid."""
 
 from collections import deque
 
@@ -19,14 +19,14 @@ INPUT2, GET_REPORT_REPLY, DESTROY = 12, 10, 1
 
 
 def lived(kernel: FakeKernel, settings: VirtualDualSenseSettings) -> list[str]:
-    """Run a controller's life; return its lines."""
+    """Run one controller from plugging in to unplugging; return the lines that it prints."""
     lines: list[str] = []
     live(settings, kernel, kernel.clock, lambda: False, lines.append)
     return lines
 
 
 def sent_states(kernel: FakeKernel) -> list[ControllerState]:
-    """Return the states of the input reports, without the 6 bytes in front of each."""
+    """Return the states in the input reports that the kernel got; each report has 6 bytes in front."""
     return [parse_input_report(event[6:]) for _, event in kernel.heard_of(INPUT2)]
 
 

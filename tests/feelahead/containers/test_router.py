@@ -1,4 +1,4 @@
-"""Router without any network: the cable that it finds, and its words for the kernel."""
+"""The router without any network: which interfaces it chooses, and its commands for the kernel."""
 
 import re
 from collections.abc import Mapping
@@ -49,7 +49,7 @@ def test_the_robots_end_is_the_one_that_reaches_it(order: int) -> None:
 
 @pytest.mark.parametrize("sides", [[], SIDES[:1], SIDES[1:], [SIDES[1], interface("eth0", 5)]])
 def test_half_a_cable_is_none(sides: list[dict[str, Any]]) -> None:
-    """A network is being removed, or has no address yet."""
+    """One of the interfaces is missing: its network is being removed, or has no address yet."""
     assert find_cable([LO, *sides], ROBOT) is None
 
 

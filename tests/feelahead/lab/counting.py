@@ -1,4 +1,4 @@
-"""Question with free cells, for tests of the engine; a file can make them wait, fail or be killed."""
+"""Question for tests of the engine, whose cells need no time; files can make cells wait, fail or be killed."""
 
 import os
 import signal
@@ -15,11 +15,12 @@ from feelahead.lab.table import Row, Table
 
 @dataclass(frozen=True)
 class Counting(Sweep):
-    """Count."""
+    """Count cells; the simplest question, for tests."""
 
     numbers: tuple[int, ...] = (1, 2, 3)
     folder: str = ""
-    """Folder in which each cell leaves a file; a file named after the cell makes it `kill`, `fail` or `refuse`."""
+    """Folder in which each cell writes a file. A file with a cell's name says what the cell must do: `kill`, `fail` or
+    `refuse`."""
     wait_s: float = 0.0
 
 

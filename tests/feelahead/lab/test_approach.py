@@ -1,4 +1,4 @@
-"""`feelahead try approach` from its flags to its sentence, table, summary and figure; most runs are invented."""
+"""`feelahead try approach`, from its flags to its sentence, table, summary and figure, mostly with invented runs."""
 
 import csv
 import json
@@ -25,7 +25,7 @@ SEVERAL = ("swept", "swept_robot", "paper", "none", "full")
 
 
 def outcome(end: End = "contact", figure: float = 150.0, turns: int = 1) -> Outcome:
-    """Return an outcome: a contact at `figure` mm/s, or a stop `figure` mm off."""
+    """Return an outcome: a contact at `figure` mm/s, or a stop `figure` mm before the object."""
     hits, stops = end == "contact", end == "stopped"
     return Outcome(
         end=end,
@@ -47,12 +47,12 @@ def outcome(end: End = "contact", figure: float = 150.0, turns: int = 1) -> Outc
 
 
 class MadeUp:
-    """Stand-in for the runs that remembers their settings."""
+    """Replacement for running approaches: it stores their settings and returns given outcomes."""
 
     def __init__(self) -> None:
         self.asked: list[Approach] = []
         self.ends: dict[float, Outcome] = {}
-        """Outcomes by force; a contact for all others."""
+        """Outcome for each force; other forces end in a contact"""
 
     def run(self, approach: Approach) -> Outcome:
         self.asked.append(approach)

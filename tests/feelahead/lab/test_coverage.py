@@ -1,4 +1,4 @@
-"""Last releases that avoid a contact, false alarms, and `bench coverage`'s figures of both."""
+"""Last releases that avoid a contact, false alarms, and the figures of `bench coverage` that follow from both."""
 
 from dataclasses import replace
 from functools import cache
@@ -36,7 +36,7 @@ from robot_side.settings import EncoderSettings
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("coverage")]
 
 SEED = 1
-"""Seed whose steady pull reaches 0.24 m/s."""
+"""Seed that draws a steady pull of up to 0.24 m/s."""
 
 
 @cache
@@ -56,7 +56,7 @@ def staged(
 
 @cache
 def approaching(link: str = "0 ms", ahead_m: float = 0.0) -> tuple[Draw, float, float]:
-    """Put a wall ahead; return the draw, the time of contact and the last release that avoids it."""
+    """Put a wall ahead; return the approach, the time of contact, and that of the last release that avoids it."""
     replay, posed, draw = staged("wall", LINKS[link], ahead_m)
     touch_s = first_touch_s(replay, posed, ahead_m * replay.axis)
     assert touch_s is not None

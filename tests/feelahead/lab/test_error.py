@@ -1,4 +1,4 @@
-"""The propagation's truth is exact, and predictions are compared with the right displacement."""
+"""The truth for the error propagation is exact, and predictions are compared with the true displacement."""
 
 import math
 import tomllib
@@ -50,7 +50,7 @@ def gripper() -> PosedGripper:
 
 
 def crank(radius_m: float) -> Chain:
-    """Return one hinge about z at the origin, whose point is on x."""
+    """Return a chain of one hinge about the z axis, whose point lies on the x axis at `radius_m`."""
     jacobian = np.array([[0.0], [radius_m], [0.0], [0.0], [0.0], [1.0]])
     return Chain(jacobian, radius_m * X, radius_m * X)
 
@@ -108,9 +108,10 @@ def pose_at(joints: FloatArray) -> GripperPose:
 
 
 def recorded(travels: FloatArray, there_ms: int, back_ms: int, quantile_s: float = 0.5) -> RecordedApproach:
-    """Return an arm that follows exactly over a steady link: `travels`, one every 4 ms, times full speed.
+    """Return the record of an arm that follows its commands exactly, over a link with constant delays.
 
-    Its speed changes by at most 8 m/s², in whole steps of a millisecond.
+    travels: one every 4 ms; the arm is commanded to move at travel times full speed. Its speed changes by at most
+    8 m/s², in steps of a millisecond.
     """
     ticks = np.round(np.arange(0.0, END_S, TICK_S), 3)
     sent_s = np.round(0.004 * np.arange(len(travels)), 3)

@@ -1,4 +1,4 @@
-"""The compiled law agrees with the plain definition, and `feelahead bench felt` measures what it says."""
+"""The compiled law agrees with its definition, and `feelahead bench felt` measures what its help says."""
 
 import csv
 import json
@@ -28,7 +28,7 @@ COVER_MM, RAMP_MM = 3.0, 12.0
 
 
 def replayed(*rows_m: float) -> Replayed:
-    """Return the same distance of every kind in each tick."""
+    """Return results with a tick for each of `rows_m`, in which all onset distances have this value."""
     ways = np.repeat(np.array(rows_m)[:, None], len(WAYS), axis=1)
     return Replayed(np.arange(1.0, len(ways) + 1.0), ways, np.full(len(ways), HORIZON_M), 246, 200.0)
 
@@ -101,7 +101,7 @@ def test_the_cover_of_a_gripper_is_a_row_for_each_part_and_a_picture(
 
 
 def test_spheres_that_are_too_small_are_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Spheres of half a millimetre less leave corners out, and stand out by that much less."""
+    """Spheres with radii that are half a millimetre too small leave corners out, and protrude by so much less."""
 
     def smaller(*arguments: Any) -> GripperCover:
         found = cover_gripper(*arguments)

@@ -1,4 +1,4 @@
-"""Frozen inputs do not change: figures measured at different times are compared with each other."""
+"""The frozen inputs do not change, as figures that were measured at different times are compared."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from tests.helpers.repository import DATA
 HASH = "1ca4b26f5fb3"
 WHAT_A_CHANGE_MEANS = (
     "a frozen scene, force or limit is another one: no figure measured with the former hash may be compared with one"
-    " measured from now on. Take the change back, or give it a scene of its own; if it must be, measure everything anew"
+    " measured from now on. Take the change back, or give it its own scene; if it must be, measure everything anew"
 )
 
 

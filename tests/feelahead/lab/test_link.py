@@ -1,4 +1,4 @@
-"""`bench link`: the model beside recordings of the kernel's netem, real ends beside bare ones."""
+"""`bench link`: the model compared with recordings of the kernel's netem, and our ends with bare ZeroMQ."""
 
 import csv
 import functools
@@ -46,7 +46,7 @@ def recording(name: str) -> LinkSample:
 
 
 def held(name: str, spec: str, seeds: int, pairs: int = 0) -> list[Goal]:
-    """Compare the model with a recording."""
+    """Compare the model with the recording `name`; return the goals."""
     profile = LinkProfile.parse(spec)
     reference, _ = recording(name).without_stalls(profile)
     results = [compare_one(profile, reference, seed, SIZE_BYTES) for seed in range(seeds)]

@@ -1,4 +1,4 @@
-"""Definition of the contact distances that judges the field, against closed forms and a fine, even grid."""
+"""The definition of onset distances, by which the field is judged, compared with closed forms and a fine grid."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ DUE = (np.arange(8) + 0.5) / 8
 
 
 def any_scene(rng: np.random.Generator) -> PerceivedObjects:
-    """Draw up to three objects of up to three primitives, some about the gripper and some ahead of it."""
+    """Draw up to three objects, each of up to three primitives, around the gripper and ahead of it."""
     scene = Scene()
     for _ in range(rng.integers(1, 4)):
         scene.add()
@@ -52,7 +52,7 @@ def any_scene(rng: np.random.Generator) -> PerceivedObjects:
 def on_a_grid(
     pose: GripperPose, objects: PerceivedObjects, classes: IntArray, ahead: Along, widest_m: float
 ) -> FloatArray:
-    """Return the distances (2, 8) with each sphere and object alone, nothing passed over."""
+    """Return the onset distances (2, 8) from all pairs of sphere and object, none of which is skipped."""
     alone_m, sigma_m = statistical_m(pose, ahead, ENCODER_SIGMA_RAD)
     along_m, expected_m = max(0.0, (sigma_m - alone_m).max()), max(0.0, ahead.mean_m + ahead.mean_along_m)
     solids, onsets_m = Solids(objects), np.full((2, 8), np.inf)
@@ -88,7 +88,7 @@ def on_a_grid(
 @settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_any_look_is_defined_as_on_a_grid(seed: int) -> None:
-    """Objects of all kinds and roles, moving and swallowed ones, and fingers near a target."""
+    """The scenes have objects of all kinds and roles, moving and swallowed ones, and fingers near a target."""
     rng = np.random.default_rng(seed)
     objects, count = any_scene(rng), int(rng.integers(1, 6))
     pose = free_pose(rng.uniform(-0.03, 0.03, (count, 3)), rng.uniform(0.004, 0.02, count), rng.random(count) < 0.5)

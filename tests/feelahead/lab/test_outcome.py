@@ -1,4 +1,4 @@
-"""Approaches whose ends can be computed by hand, and the definitions of an outcome."""
+"""Approaches whose outcomes can be computed by hand, and the criteria for outcomes."""
 
 import functools
 import math
@@ -19,7 +19,7 @@ from tests.helpers.repository import DATA
 pytestmark = pytest.mark.long
 
 approaches = pytest.mark.xdist_group("approaches")
-"""Mark for a single worker, so that each approach is made once."""
+"""Mark that runs these tests in one worker of pytest-xdist, so that each approach is computed once."""
 WAY_MM = 320.0
 FAR = "delay 200ms"
 JITTER = "delay 20ms 10ms distribution normal"
@@ -31,7 +31,7 @@ def ended(scene: str = "wall", force_n: float = 3.0, **changes: Any) -> Outcome:
 
 
 def free_speed_mm_s(force_n: float) -> float:
-    """Return the speed of a finger against the spring alone: sensed travel, calibrated, times 250 mm/s."""
+    """Return the commanded speed of a finger that pulls a free trigger with `force_n`: calibrated travel x 250 mm/s."""
     sensed = min((force_n - 0.5) / 4.0 / 0.75, 1.0)
     return 250.0 * min((sensed - 0.05) / (0.98 - 0.05), 1.0)
 

@@ -1,4 +1,4 @@
-"""`feelahead bench overlap` at its smallest, and the methods that it compares."""
+"""`feelahead bench overlap` with its smallest grid, and the methods that it compares."""
 
 import csv
 import math

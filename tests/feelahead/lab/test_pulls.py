@@ -1,4 +1,4 @@
-"""Pulls: reproducible by seed, within a finger's limits, and shaped as their names say."""
+"""Pulls are the same for the same seed, stay within a finger's limits, and have the shapes that their names say."""
 
 import itertools
 
@@ -22,7 +22,7 @@ def samples(pull: Pull, end_s: float = 19.0, step_s: float = STEP_S) -> list[Han
 
 
 def settled_travel(force_n: float) -> float:
-    """Return the calibrated travel of a free trigger after a long press."""
+    """Return the calibrated travel at which a free trigger comes to rest under `force_n`."""
     trigger = SimulatedTrigger()
     trigger.set_finger_force(force_n)
     trigger.advance(5.0)

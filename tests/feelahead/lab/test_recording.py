@@ -1,4 +1,4 @@
-"""Recorded approaches: each side's knowledge, the arm's motion, and its motion after a release."""
+"""Recorded approaches: what each side knew, how the arm moved, and how it would move after a release."""
 
 import functools
 from dataclasses import fields
@@ -21,10 +21,10 @@ from tests.helpers.repository import DATA
 pytestmark = pytest.mark.long
 
 recordings = pytest.mark.xdist_group("recordings")
-"""Mark for a single worker, so that each pull is recorded once."""
+"""Mark that runs these tests in one worker of pytest-xdist, so that each pull is recorded once."""
 DELAY_S, DURATION_S = 0.05, 2.0
 SEED = 1
-"""Seed whose steady pull is a fast one, as the tests check."""
+"""Seed that draws a fast steady pull, as the tests check."""
 
 
 @functools.cache
@@ -89,7 +89,7 @@ def test_a_seed_gives_the_same_record_and_another_one_another() -> None:
 # From a moment until the arm stops
 
 STARTS_S, GOES_S = 0.02, 0.8
-"""Moments of a pull over 200 ms, in seconds: as the first command arrives, and when the arm moves evenly."""
+"""Times in a pull over a link of 200 ms, in seconds: the first command arrives; the arm moves at constant speed."""
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""Oracle of overlaps against the definition (eq. 11), and the classes for comparisons."""
+"""The oracle of overlaps, compared with their definition (eq. 11), and the classes of pairs for comparisons."""
 
 import math
 from dataclasses import replace
@@ -22,7 +22,7 @@ Point = list[Any]
 
 
 def crossing(a: Point, b: Point, radius: Any) -> tuple[Any, Any] | None:
-    """Return the shares of a to b between which the segment is inside the ball at the origin."""
+    """Return from which to which share of the way from a to b the segment is inside the ball at the origin."""
     step = [y - x for x, y in zip(a, b, strict=True)]
     length_2, half = sum(x * x for x in step), sum(x * y for x, y in zip(a, step, strict=True))
     inside = half**2 - length_2 * (sum(x * x for x in a) - radius**2)
@@ -33,7 +33,7 @@ def crossing(a: Point, b: Point, radius: Any) -> tuple[Any, Any] | None:
 
 
 def slice_area(rings: list[list[Point]], z: Any, radius: Any) -> Any:
-    """Return the area common to the convex solid and the ball at the height z."""
+    """Return the area that the convex solid and the ball at the origin share in the plane at height z."""
     disc = mp.sqrt(max(mpf(0), radius**2 - z**2))
 
     def sector(p: Point, q: Point) -> Any:
@@ -56,7 +56,7 @@ def slice_area(rings: list[list[Point]], z: Any, radius: Any) -> Any:
 
 
 def volume_by_slices(pairs: Pairs) -> Any:
-    """Integrate the area of the horizontal slices of the first pair."""
+    """Return the overlap of the first pair, as the integral of the area of its horizontal slices."""
     radius, center = mpf(float(pairs.radii[0])), [mpf(float(x)) for x in pairs.centers[0]]
     faces = TETRAHEDRON_TRIANGLES.tolist() if pairs.solid == "tetrahedron" else BOX_QUADRILATERALS
     corners = [
@@ -139,7 +139,7 @@ def test_a_mesh_of_the_same_surface_has_the_same_truth() -> None:
 
 
 def box_below(gap: float) -> Pairs:
-    """Return a unit sphere `gap` above a unit cube's edge (gap 3/5, 4/5 away), on the grid but for the gap."""
+    """Return a sphere beyond a cube's edge in the direction (3/5, 4/5); at `gap` 0 it touches, exactly on the grid."""
     corner = np.array([0.0, 3.0, 4.0]) * (5.0 + gap)
     return Pairs("box", corner[None], np.array([25.0]), (-np.ones((1, 3)), np.eye(3)[None], np.ones((1, 3))))
 

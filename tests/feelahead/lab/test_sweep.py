@@ -1,4 +1,4 @@
-"""The engine: the same table for any workers and after any interruption, and its messages when it cannot continue."""
+"""The engine gives the same table with any workers and after any interruption, and says why it cannot continue."""
 
 import csv
 import json
@@ -219,7 +219,7 @@ def _drive(arguments: Sequence[str]) -> "subprocess.Popen[str]":
 
 @contextmanager
 def _dask(workers: int) -> Iterator[tuple[str, list["subprocess.Popen[str]"]]]:
-    """Start a scheduler and workers on loopback, the scheduler first; end them all."""
+    """Start a dask scheduler and workers on loopback; yield its address and all processes, and end them afterwards."""
     started: list[subprocess.Popen[str]] = []
 
     def start(*arguments: str) -> "subprocess.Popen[str]":
@@ -261,7 +261,8 @@ def test_a_worker_that_is_killed_leaves_what_is_finished(tmp_path: Path, capsys:
     assert f"{finished} rows" in said.out
     [line] = said.err.splitlines()
     assert re.fullmatch(
-        r"feelahead try counting: a worker process was ended from outside; \d+ runs are left; with --resume FILE.*",
+        r"feelahead try counting: a worker process ended unexpectedly \(killed, or out of memory\);"
+        r" \d+ runs are left; with --resume FILE.*",
         line,
     )
 
@@ -346,8 +347,8 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ("name", "code", "said"),
     [
-        ("json.py", "QUESTION = 3", "named like a module of Python"),
-        ("own_number.py", "QUESTION = 3", "it holds no QUESTION"),
+        ("json.py", "QUESTION = 3", "already has a module of this name"),
+        ("own_number.py", "QUESTION = 3", "the file defines no QUESTION"),
         ("own_import.py", "from feelahead.lab.sweep import Questio", "cannot import name 'Questio'"),
         ("own_syntax.py", "QUESTION =", "invalid syntax"),
     ],

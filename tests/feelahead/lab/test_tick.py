@@ -1,4 +1,4 @@
-"""`bench tick`: the meaning of its figures, and the crowd of objects around."""
+"""`bench tick`: its figures mean what they say, and its crowd of objects is out of reach."""
 
 import numpy as np
 import pytest

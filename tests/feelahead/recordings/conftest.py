@@ -1,4 +1,4 @@
-"""One recorded run of both sides in virtual time, for everything that uses recordings."""
+"""One recorded run of both sides in virtual time, for all tests that need a recording."""
 
 import io
 from collections.abc import Callable, Mapping, Sequence

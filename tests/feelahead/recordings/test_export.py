@@ -1,4 +1,4 @@
-"""Exports hold the recording's content, in the layouts of other programs."""
+"""Exported files have the recording's content, in the layouts that other programs expect."""
 
 import csv
 import io

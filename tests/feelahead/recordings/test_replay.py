@@ -1,4 +1,4 @@
-"""Replays: the cores give the same bits, and each moment looks the same, however it was reached."""
+"""Replays: the cores give the same bits, and playback shows the same at each time, by playing or by jumping."""
 
 import dataclasses
 import json

@@ -56,7 +56,7 @@ def test_another_is_taken_only_after_several_looks_for_the_one_from_before() -> 
     look = Finder(backend)
     for _ in range(2):  # The one found then is looked for as often again.
         for _ in range(LOOKS_FOR_THE_SAME):
-            with pytest.raises(NoDeviceError, match=f"{ADDRESS} is not there, only another: {OTHER}"):
+            with pytest.raises(NoDeviceError, match=f"{ADDRESS} is not there, only: {OTHER}"):
                 look(ADDRESS)
             assert other.closed == other.times_opened
         found = look(ADDRESS)
@@ -67,6 +67,18 @@ def test_another_is_taken_only_after_several_looks_for_the_one_from_before() -> 
     backend.found[0x0CE6][A] = same
     assert look(ADDRESS).address == ADDRESS
     assert other.closed == other.times_opened
+
+
+def test_the_one_that_was_asked_for_is_taken_alone_and_the_others_are_named() -> None:
+    wanted, other, edge = FakeHandle(), FakeHandle(USB, OTHER), FakeHandle(BLUETOOTH, "22:22:33:44:55:66")
+    backend = FakeBackend({0x0CE6: {B: other}, 0x0DF2: {b"/dev/hidraw5": edge}})
+    look = Finder(backend, ADDRESS)
+    for _ in range(2 * LOOKS_FOR_THE_SAME):
+        with pytest.raises(NoDeviceError, match=f"{ADDRESS} is not there, only: {OTHER}, 22:22:33:44:55:66$"):
+            look(None)
+    backend.found[0x0CE6][A] = wanted
+    assert look(OTHER).address == ADDRESS
+    assert (other.closed, edge.closed) == (other.times_opened, edge.times_opened)
 
 
 def test_no_other_is_taken_while_one_refuses_that_may_be_the_one_from_before() -> None:

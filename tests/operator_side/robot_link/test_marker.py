@@ -34,12 +34,12 @@ class Desk(Bench):
         self.heard = Heard()
         self.side = OperatorSide(2, "clock", CoreSettings(), [self.heard])
         self.side.receive(encode(self.robot.hello(self.now_s)), self.now_s)
-        self.session, self.answer = SessionState.DISARMED, {"marked": 0, "mark_refused": ""}
+        self.session, self.answer = SessionState.DISARMED, (0, "")
         self.tell()
 
     def tell(self) -> None:
         notice = LeaseNotice(self.robot.stamp(self.now_s), session=self.session, why="", token=7, waiting=0)
-        self.side.receive(encode(msgspec.structs.replace(notice, **self.answer)), self.now_s)
+        self.side.receive(encode(msgspec.structs.replace(notice, marked=self.answer)), self.now_s)
 
     def marks(self, for_s: float, *buttons: Button) -> list[tuple[int, EpisodeMark]]:
         """Hold the buttons for `for_s`; return the marks sent meanwhile."""
@@ -59,11 +59,11 @@ def desk() -> Desk:
 
 def test_a_press_counts_once_and_is_repeated_until_it_was_answered(desk: Desk) -> None:
     assert desk.marks(0.38, Button.UP) == [(1, "start")] * 4
-    desk.answer["marked"] = 1
+    desk.answer = 1, ""
     assert desk.marks(0.3, Button.UP) == []
     assert desk.marks(0.1) == []
     assert desk.marks(0.04, Button.RIGHT) == [(2, "success")]
-    desk.answer["marked"] = 2
+    desk.answer = 2, ""
     desk.marks(0.1)
     assert desk.heard.marks == ["start", "success"]
     assert desk.side.summary()["episodes"] == {"start": 1, "success": 1}
@@ -82,14 +82,14 @@ def test_results_need_a_start_and_marks_the_lease(desk: Desk) -> None:
 
 def test_a_reset_counts_once_the_robot_side_says_it_is_done(desk: Desk) -> None:
     desk.marks(0.1, Button.UP)
-    desk.answer["marked"] = 1
+    desk.answer = 1, ""
     assert (2, "reset") in desk.marks(0.3, Button.R3)
-    desk.answer = {"marked": 2, "mark_refused": "the arm is armed"}
+    desk.answer = 2, "the arm is armed"
     desk.marks(0.1)
     assert desk.heard.marks == ["start"]
     assert desk.side.marker.take_notes()[-1] == "reset refused: the arm is armed"
     assert desk.marks(0.3, Button.R3)[0] == (3, "reset")
-    desk.answer = {"marked": 3, "mark_refused": ""}
+    desk.answer = 3, ""
     desk.marks(0.1)
     assert desk.heard.marks == ["start", "reset"]
     # It ended the episode.

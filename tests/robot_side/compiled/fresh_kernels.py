@@ -1,4 +1,4 @@
-"""Kernels that compile quickly, in the state of a new process."""
+"""Kernels that compile quickly, not yet compiled, as in a new process."""
 
 import robot_side.parts  # noqa: F401  (brings the kernels)
 from robot_side.compiled import kernel as compile_module
@@ -12,7 +12,7 @@ NAMES = (
 
 
 def fresh_kernels() -> tuple[Compiled, ...]:
-    """Return the kernels of `NAMES`, not yet compiled, and not registered."""
+    """Return new copies of the kernels `NAMES`: not yet compiled, and not in the list of imported kernels."""
     fresh = tuple(
         Compiled(kernel.function, tuple(kernel.signature.args), kernel.signature.return_type)
         for kernel in imported_kernels()

@@ -1,4 +1,4 @@
-"""Columns declared once: a kernel's views of them, and refusals."""
+"""Bundles of arrays: what a kernel reads from them, and which arrays are refused."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple

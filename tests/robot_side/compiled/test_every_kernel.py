@@ -1,4 +1,4 @@
-"""Kernels of the pipeline: all ready before the first tick."""
+"""All kernels that a side calls are compiled before its first tick."""
 
 import sys
 from typing import get_args

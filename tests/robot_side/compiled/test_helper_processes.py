@@ -1,4 +1,4 @@
-"""Compilation in other processes: distribution of kernels, files left on disk, and failures."""
+"""Compilation in helper processes: how kernels are shared out, which files are stored, and failures."""
 
 import os
 import select
@@ -25,7 +25,7 @@ def ours() -> list[Compiled]:
 
 
 def taken_in_turns(kernels: Sequence[Compiled], processes: int) -> list[list[Compiled]]:
-    """Return each process's kernels if all take time in proportion to their bytecode."""
+    """Return which kernels each process takes, if compilation takes time in proportion to the bytecode."""
     queue, busy, found = KernelQueue(kernels, processes), [0] * processes, [list[Compiled]() for _ in range(processes)]
     while (kernel := queue.take(place := busy.index(min(busy)))) is not None:
         before = size(found[place])
@@ -120,7 +120,7 @@ def test_nothing_goes_on_compiling_for_a_process_that_has_gone(tmp_path: Path) -
         ended = os.pidfd_open(int(process.stdout.readline()))
         process.kill()
     try:
-        # Readable at its end: within a few seconds, too few to compile the kernels.
+        # The descriptor becomes readable when the helper ends. That takes seconds, less than compiling the kernels.
         assert select.select([ended], [], [], 30.0)[0]
     finally:
         os.close(ended)

@@ -1,4 +1,4 @@
-"""Compilation of the kernels: once, beforehand, and never from stale machine code."""
+"""Kernels are compiled once, before their first call, and never loaded from outdated machine code."""
 
 import errno
 import os

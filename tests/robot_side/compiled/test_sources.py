@@ -1,4 +1,4 @@
-"""Key of the cache on disk: every change in a kernel's sources changes it."""
+"""Key of a kernel's machine code on disk: every change in the kernel's sources changes the key."""
 
 import ast
 import importlib
@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import robot_side
-import robot_side.parts  # Before a test starts: a library of the simulation starts a process at its import.
+import robot_side.parts  # Imported before any test, because a library of the simulation starts a process when imported.
 from robot_side.compiled import sources as kernel_sources
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.sources import digest, sources
@@ -85,7 +85,7 @@ print(*result, clip.cache_hits)
 
 @pytest.mark.processes
 def test_no_stale_machine_code_runs_when_a_file_elsewhere_changes(tmp_path: Path) -> None:
-    # Numba's own key is the kernel's file alone.
+    # Numba's own key would depend on the kernel's file alone.
     (tmp_path / "deeper").mkdir()
     (tmp_path / "clip.py").write_text(_KERNEL)
 

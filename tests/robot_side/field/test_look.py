@@ -1,4 +1,4 @@
-"""D_σ of each sphere against eq. 3-10 in NumPy, and the parts of a scene that a look examines."""
+"""D_σ of each sphere against eq. 3-10 in NumPy, and which parts of a scene a look examines."""
 
 import dataclasses
 import math
@@ -35,7 +35,7 @@ def any_pose(rng: np.random.Generator, spheres: int, joints: int) -> GripperPose
 
 
 def sigmas(by: Ahead, pose: GripperPose, looked: Along) -> FloatArray:
-    """Return each sphere's inflation, and D_σ (m, 2)."""
+    """Return each sphere's inflation I and D_σ, in this order (m, 2)."""
     look(pose, EMPTY, looked, by=by)
     return np.hstack([by.scratch.inflation_m, by.scratch.sigma_m])[: len(pose.sphere_radii_m)]
 
@@ -81,7 +81,7 @@ def test_the_largest_of_the_enlargements_is_told() -> None:
 
 @pytest.mark.parametrize("p", [0.9, 0.99])
 def test_it_covers_the_drawn_errors_with_probability_p(p: float) -> None:
-    """Draw true gripper and true object many times: the gap closes by more than D_σ in 1 - P of them."""
+    """Draw the true positions of gripper and object many times: in a share P the gap is smaller by at most D_σ."""
     rng = np.random.default_rng(5)
     known = Uncertainty(p, (0.001, -0.002, 0.0005), 0.002, (0.0005, 0.001, -0.001))
     jacobian, encoder_sigma = rng.normal(size=(6, 6)), np.full(6, 1e-3)
@@ -92,7 +92,7 @@ def test_it_covers_the_drawn_errors_with_probability_p(p: float) -> None:
     draws = 200_000
     covariance = position_covariance(pose.sphere_jacobians, encoder_sigma)[0]
     true_less_estimated = rng.multivariate_normal(known.kinematic_mean_m, covariance, draws)
-    # e_c is true less perceived: an object that errs along the direction is farther than it seems.
+    # e_c is the true minus the perceived position: an object with e_c along the direction is farther than it seems.
     camera_error = rng.normal(known.camera_mean_m, known.camera_sd_m, (draws, 3))
     closing = (true_less_estimated - camera_error) @ direction
     assert (closing <= distance).mean() == pytest.approx(p, abs=4.0 * math.sqrt(p * (1.0 - p) / draws))
@@ -114,7 +114,7 @@ def test_what_is_far_beside_or_behind_costs_no_overlap() -> None:
 
 
 def test_a_scene_of_many_far_things_is_as_quickly_told_as_one() -> None:
-    """Only objects that may shorten a distance are computed: those behind the nearest wall cost nothing."""
+    """Overlaps are computed only for objects that may shorten an onset distance: those behind the wall cost nothing."""
     wall = Scene().add().box([0.0, 0.0, 0.15], [0.3, 0.3, 0.01])
     looked = along(AHEAD, 0.007, reach_m=0.3)
     expected = look(gripper_pose(), wall.objects(), looked)

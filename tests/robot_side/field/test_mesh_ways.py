@@ -1,4 +1,4 @@
-"""First contact of a moving sphere with closed meshes of any form, against the definition."""
+"""First contacts and onset distances of a moving sphere with closed meshes of any form, against the definition."""
 
 import itertools
 
@@ -53,7 +53,7 @@ def any_mesh(rng: np.random.Generator) -> Mesh:
 @settings(derandomize=True, deadline=None, max_examples=60)
 @given(seed=seeds)
 def test_the_ways_to_a_mesh_are_those_of_the_definition(seed: int) -> None:
-    """The sphere starts before it, in its dents, in its cavity, or overlapping it."""
+    """The sphere starts before the mesh, in one of its dents, in its cavity, or overlapping it."""
     rng = np.random.default_rng(seed)
     mesh, radius, inflated = any_mesh(rng), float(rng.uniform(0.004, 0.015)), float(rng.uniform(0.0, 0.01))
     rotation, start = random_rotation(rng), rng.uniform(-0.06, 0.06, 3)
@@ -78,7 +78,7 @@ def test_a_sphere_in_a_cavity_meets_its_far_wall() -> None:
         assert first_contact_m(objects, np.zeros(3), 0.004, rotation @ axis, REACH_M + MARGIN_M) == pytest.approx(
             0.011, abs=1e-12
         )
-    # Entirely within the block, the sphere overlaps.
+    # A sphere that starts entirely within the block's material overlaps at once.
     assert first_contact_m(objects, rotation @ [0.0, 0.0, 0.03], 0.004, rotation @ AHEAD, REACH_M + MARGIN_M) == 0.0
 
 
@@ -86,7 +86,7 @@ def test_walls_that_lean_in_are_entered_and_walls_that_lead_away_are_not() -> No
     for degrees, sign in itertools.product((0.05, 0.3, 2.0), (1.0, -1.0)):
         angle = sign * np.radians(degrees)
         turned = np.array([[np.cos(angle), 0.0, -np.sin(angle)], [0.0, 1.0, 0.0], [np.sin(angle), 0.0, np.cos(angle)]])
-        # Beside a plate of 20 mm that extends a metre; its side is 0.1 mm beyond the radius.
+        # The sphere starts 0.1 mm beside a plate 20 mm thick and 1 m long.
         plate = Scene().add().mesh(Mesh(CUBE_CORNERS * [0.01, 0.5, 0.5], CUBE_TRIANGLES), [0.0, 0.0, 0.0], turned)
         start = turned @ [-0.01 - 0.008 - 1e-4, 0.0, 0.0]
         found = first_contact_m(plate.objects(), start, 0.008, AHEAD, REACH_M + MARGIN_M)

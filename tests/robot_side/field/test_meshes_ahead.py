@@ -1,4 +1,4 @@
-"""Meshes, convex or not, have the contact distances of their solids."""
+"""A solid has the same onset distances as a mesh, convex or not, and as primitives."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_a_box_told_as_a_mesh_has_its_ways(seed: int) -> None:
 
 
 def slot(half_width_m: float, rotation: FloatArray) -> tuple[PerceivedObjects, PerceivedObjects]:
-    """Return a U with a slot of 100 mm depth that opens at the origin: as a non-convex mesh, and as three boxes."""
+    """Return a U twice, as a non-convex mesh and as three boxes. Its slot is 100 mm deep and opens at the origin."""
     places, tetrahedra = grid_tetrahedra(3)
     cells = np.floor(places[tetrahedra].mean(axis=1))
     in_slot = (cells[:, 0] == 1.0) & (cells[:, 2] <= 1.0)
@@ -51,7 +51,7 @@ def slot(half_width_m: float, rotation: FloatArray) -> tuple[PerceivedObjects, P
 @pytest.mark.parametrize("inflated_m", [0.0, 0.0029, 0.007])
 @pytest.mark.parametrize("start_m", [-0.03, 0.02])
 def test_a_slot_told_as_one_mesh_has_the_ways_of_its_parts(gap_m: float, inflated_m: float, start_m: float) -> None:
-    """The sphere starts before it or in it, grazes its sides, or is just off them or overlaps both."""
+    """The sphere starts before the slot or in it. It is just off the slot's sides, grazes them, or overlaps both."""
     rotation = random_rotation(np.random.default_rng(1))
     mesh, boxes = slot(RADIUS_M + gap_m, rotation)
     pose = ball_pose(tool_position_m=start_m * rotation @ AHEAD)
@@ -63,7 +63,7 @@ def test_a_slot_told_as_one_mesh_has_the_ways_of_its_parts(gap_m: float, inflate
 
 @pytest.mark.parametrize("inflated_m", [0.0, 0.007])
 def test_jammed_between_the_sides_of_a_slot_its_bottom_is_still_ahead(inflated_m: float) -> None:
-    """A mesh that the uninflated sphere overlaps, too, has no rise for a long distance."""
+    """Even the uninflated sphere overlaps the mesh, so the overlap does not rise for a long distance."""
     mesh, boxes = slot(RADIUS_M - 0.001, np.eye(3))
     pose, looked = ball_pose(tool_position_m=0.02 * AHEAD), along(AHEAD, inflated_m, reach_m=0.2)
     expected = ways_of(pose, boxes, looked)
@@ -83,7 +83,7 @@ def test_ways_shorten_towards_a_capsule_that_is_ahead_alone() -> None:
     pose = gripper_pose([0.3, 0.1, 0.2], rotation)
     approach = rotation[:, 2]
     front_m = float(((pose.sphere_centers_m - pose.tool_position_m) @ approach + pose.sphere_radii_m).max())
-    # Its axis is across the gap between the fingers, so that both meet it.
+    # The capsule's axis lies across the gap between the fingers, so that both fingers meet it.
     turned = np.column_stack([rotation[:, 1], approach, rotation[:, 0]])
     for gap_m in (0.05, 0.01, 0.006, 0.0025):
         there = pose.tool_position_m + (front_m + 0.03 + gap_m) * approach
@@ -111,7 +111,7 @@ def test_meshes_that_are_far_cost_no_overlap() -> None:
 
 
 def test_beside_a_mesh_that_is_overlapped_nothing_is_worked_out() -> None:
-    """No triangle within the reach faces the motion, so that no overlap can rise."""
+    """No triangle within the examined distance faces the motion, so no overlap can rise and none is computed."""
     box = Mesh(CUBE_CORNERS * [0.02, 0.4, 0.4], CUBE_TRIANGLES)
     pose = gripper_pose()
     side_m = float((pose.sphere_centers_m[:, 0] + pose.sphere_radii_m).max())
@@ -122,7 +122,7 @@ def test_beside_a_mesh_that_is_overlapped_nothing_is_worked_out() -> None:
 
 
 def test_along_a_convex_mesh_that_is_overlapped_little_is_worked_out() -> None:
-    """The near end rises in few spheres; a sphere whose overlap does not rise now never rises."""
+    """Only few spheres' overlaps rise, at the box's near end. With a convex mesh the others' never rise again."""
     box = Mesh(CUBE_CORNERS * [0.02, 0.4, 0.1], CUBE_TRIANGLES)
     pose = gripper_pose()
     side_m = float((pose.sphere_centers_m[:, 0] + pose.sphere_radii_m).max())

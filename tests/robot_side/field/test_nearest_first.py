@@ -13,14 +13,14 @@ from robot_side.compiled.stack import on_stack
 from robot_side.field.nearest_first import drop_first, push
 
 DROP = math.nan
-"""Mark in place of a key: remove the first."""
+"""Stands in the list of keys for the order to remove the first item"""
 MOST = 60
 _heap, _items = on_stack(2 * MOST), on_stack(2 * MOST, dtype=np.int64)
 
 
 @compiled(input_array(1), output_indices())
 def _dropped(keys: FloatArray, dropped: IntArray) -> None:
-    """Push and drop; write the dropped items in order."""
+    """Push each key and drop the first item at each `DROP`; write the dropped items in order."""
     heap, items, count, drops = _heap(), _items(), 0, 0
     for item in range(keys.size):
         if not math.isnan(keys[item]):

@@ -1,4 +1,4 @@
-"""Σ V_ij of many spheres and all objects, against the overlaps one by one."""
+"""Σ V_ij of many spheres with all objects, against overlaps that are computed one by one."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Contact distances to primitives, against their definition."""
+"""Onset distances to primitives, against their definition."""
 
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ def any_scene(rng: np.random.Generator, kinds: tuple[str, ...]) -> PerceivedObje
 
 
 def compared(kinds: tuple[str, ...], scenes: range, spheres: int) -> FloatArray:
-    """Return the errors of the distances, of those known in full."""
+    """Return the errors of the onset distances in random scenes, of those that are known in full."""
     by, errors = Ahead(np.zeros(6)), []
     for seed in scenes:
         rng = np.random.default_rng(seed)
@@ -78,7 +78,7 @@ def test_the_ways_to_objects_of_all_kinds_are_those_of_the_definition() -> None:
 @pytest.mark.parametrize("degrees", [0.3, 0.5, 1.0, 2.0, 5.0])
 @pytest.mark.parametrize("gap_m", [0.0005, 0.003, 0.0065, 0.008, 0.012])
 def test_a_graze_is_followed_however_long_it_is(inflated_m: float, degrees: float, gap_m: float) -> None:
-    """Half a metre along a wall that hardly leans in; contacts of the uninflated sphere count meanwhile."""
+    """The sphere goes half a metre along a wall that hardly leans in. The uninflated sphere's contacts count, too."""
     angle = np.radians(degrees)
     wall = Scene().add().half_space([np.cos(angle), 0.0, -np.sin(angle)], -RADIUS_M - gap_m).objects()
     found = judged(ball_pose(), wall, along(AHEAD, inflated_m, reach_m=0.5))
@@ -100,6 +100,6 @@ def test_nothing_is_met_beyond_the_reach_nor_behind(kind: str) -> None:
     add[kind]()
     for sign, reach, met in ((1.0, 0.181, True), (1.0, 0.179, False), (-1.0, 1.0, False)):
         direction = np.array([0.0, 0.0, sign])
-        # An object that is full within the margin beyond the reach is felt within the reach.
+        # Strengths begin up to a margin before the contact. So an object up to a margin beyond the reach is still met.
         found = look(ball_pose(0.01), scene.objects(), along(direction, reach_m=reach - MARGIN_M + 0.01))
         assert bool(found.counts[Count.PAIRS] > 0) is met

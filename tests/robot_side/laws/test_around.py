@@ -1,4 +1,4 @@
-"""Map from around: distances wherever sticks may take the gripper, and the times of its looks."""
+"""Map of onset distances around the gripper: distances from wherever sticks may take it, and when looks are made."""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -32,7 +32,7 @@ from tests.helpers.perceived_scenes import Scene
 LOOP_S = 0.2
 FULL_S = LOOP_S + HORIZON_S + FULL_SPEED_M_S / ACCELERATION_M_S2
 RIGHT, UP, LEFT, DOWN = (slice(1 + 5 * side, 4 + 5 * side) for side in range(4))
-"""The three probes across of each side"""
+"""The three probes of each direction to which a stick moves the gripper across, without turning it"""
 HALF, TURNED = [4, 9, 14, 19], [5, 10, 15, 20]
 WALL = walls(0.1)
 
@@ -81,14 +81,15 @@ def test_a_wall_is_as_far_from_every_probe_across_and_nearer_or_farther_in_a_tur
     for onsets_m, ahead_m in ((told.r2_m, 0.08), (told.l2_m, 0.05)):
         across = np.delete(np.array(onsets_m), [*HALF, *TURNED])
         np.testing.assert_allclose(across, ahead_m - SIGMA_M, atol=3e-3)
-        # A ball that turns about itself moves along the chord, half the turn aside: by 1/cos farther, on an arc.
+        # The look goes along the chord, aside by half of the turn, so the wall is farther by 1/cos. The distance is
+        # that along the arc, which is longer than the chord.
         for probes, half in ((HALF, 0.125 * FULL_S), (TURNED, 0.25 * FULL_S)):
             farther = (ahead_m - SIGMA_M) / np.cos(half) * half / np.sin(half)
             np.testing.assert_allclose(np.array(onsets_m)[probes], farther, atol=3e-3)
 
 
 def test_each_side_is_where_a_stick_leads_there() -> None:
-    """The tool's x points to the right, y down."""
+    """The tool's x axis points to the right, its y axis down."""
     aside_m = STICK_SPEED_M_S * FULL_S
     for side, x_m, y_m in ((RIGHT, 1, 0), (UP, 0, -1), (LEFT, -1, 0), (DOWN, 0, 1)):
         near = np.array(around(asking(), post(x_m * aside_m, y_m * aside_m)).r2_m) < 0.06
@@ -97,7 +98,10 @@ def test_each_side_is_where_a_stick_leads_there() -> None:
 
 
 def test_what_is_under_way_is_gone_by_the_time_that_a_probe_is_reached(law: SweptLaw) -> None:
-    """At 0.2 m/s, 40 mm are under way: nearer objects aside are passed before the stick gets there."""
+    """At 0.2 m/s, commands under way still move the gripper by 40 mm.
+
+    So it passes nearer objects at its side before the stick takes it there.
+    """
     aside_m = STICK_SPEED_M_S * FULL_S
     forth = np.array([0.0, 0.0, 0.2, 0.0, 0.0, 0.0])
     still = around(law, post(aside_m, 0.0, 0.03))
@@ -136,7 +140,7 @@ def test_at_rest_nothing_is_looked_at_from_around_and_in_motion_one_look_a_tick(
     looks(law, 500, still, 0.0)
     resting = looks(law, 1000, still, 0.5)
     moving = looks(law, 1000, forth, 1.5)
-    # R2 and L2 are looked along a hundred times a second each.
+    # Looks along R2 and L2 are made a hundred times a second each.
     assert resting == pytest.approx(200, abs=4)
     assert moving - resting == pytest.approx(PROBES * (1.0 + 0.25) / PERIOD_S, rel=0.1)
 
@@ -166,7 +170,7 @@ def test_what_has_just_appeared_straight_ahead_is_in_the_next_map(law: SweptLaw)
     told = told_by(law, ball_pose())
     assert told is not None
     assert told.r2_m[0] < 0.05
-    assert told.r2_m[1:].max() > 0.09  # From before.
+    assert told.r2_m[1:].max() > 0.09  # From looks before the wall came nearer.
 
 
 def test_what_is_held_or_ignored_shortens_no_way_by_moving(law: SweptLaw) -> None:
@@ -197,7 +201,7 @@ def test_what_comes_nearer_shortens_every_way_by_what_it_covers_until_it_is_told
     first, last = told[10], told[19]
     assert first is not None
     assert last is not None
-    # Probes are looked from every 250 ms, in turns; the camera's newest frame is 33 ms old.
+    # Each probe has a look every 250 ms, in turns; the camera's newest frame is 33 ms old.
     np.testing.assert_allclose(last.r2_m - first.r2_m, -9 * 0.033 * comes_m_s, atol=0.0045)
     np.testing.assert_array_equal(last.l2_m, first.l2_m)
 
@@ -222,7 +226,7 @@ def test_there_is_no_map_for_an_operator_who_is_not_heard_of(law: SweptLaw, loop
 
 
 def test_a_map_of_before_is_withheld_and_the_robot_side_follows_the_path_itself(law: SweptLaw) -> None:
-    """After another T, P or role, and after a time in which the robot side compensated."""
+    """The map is withheld after a change of P, and while the robot side compensates the delay."""
     drifting = np.array([0.1, 0.0, 0.2, 0.0, 0.0, 0.0])
     looks(law, 300, drifting, 0.0)
     assert law.around(ball_pose()) is not None
@@ -247,7 +251,7 @@ def test_errors_of_the_prediction_shorten_these_ways_too() -> None:
 
 
 def test_explaining_a_moment_before_a_grip_changes_nothing() -> None:
-    """A map's validity restarts once an object is held; people's explanations are older than the newest tick."""
+    """A map's validity restarts once an object is held. An explanation of an earlier tick must not restart it again."""
     until_s = []
     for explains in (True, False):
         law, before = asking(), situation(ball_pose(), post(0.05, 0.0), loop_age_s=LOOP_S)
@@ -256,7 +260,7 @@ def test_explaining_a_moment_before_a_grip_changes_nothing() -> None:
         law.sense(held, 0.1)
         if explains:
             law.explain("r2", before, sensed)
-        # Shorter by less than would ask for another map.
+        # The loop age is shorter, but by too little to make the map invalid.
         law.sense(replace(held, loop_age_s=0.99 * LOOP_S), 0.2)
         until_s.append(float(law.memory.state["until"][0]))
     assert until_s[0] == until_s[1] == pytest.approx(FULL_S)

@@ -1,4 +1,4 @@
-"""Contact distances kept from the looks of the last tenth of a second, against plain lists of them."""
+"""Onset distances kept from the looks of the last tenth of a second, against a memory of plain lists."""
 
 from dataclasses import dataclass, replace
 
@@ -36,7 +36,7 @@ from tests.helpers.perceived_scenes import random_rotation
 
 @dataclass
 class Look:
-    """One look's result."""
+    """Result of one look, for comparison."""
 
     place: int
     at_s: float
@@ -53,7 +53,7 @@ class Look:
 
 
 class Kept:
-    """Memory of the law as plain lists."""
+    """The law's memory of looks, as plain lists, for comparison."""
 
     def __init__(self) -> None:
         self.sides: list[list[Look]] = [[], [], []]

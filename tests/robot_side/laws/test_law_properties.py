@@ -1,4 +1,4 @@
-"""Promises of the law for any field: first and full strength, and distances by position and uncertainty."""
+"""Properties of every field: where first and full strength begin, and effects of position and uncertainty."""
 
 from itertools import pairwise
 
@@ -19,7 +19,7 @@ from tests.helpers.perceived_scenes import Scene, random_rotation, random_scene
 
 INFLATED_M = 0.007
 FREE_M = 0.07
-"""Contact distance d, in metres"""
+"""Contact distance d of the objects ahead, in metres"""
 FINGERTIP_X_M = 0.0485
 GRIPPER = gripper_pose()
 seeds = st.integers(0, 2**32 - 1)
@@ -36,7 +36,7 @@ def thing(kind: str, face_m: float, x_m: float = 0.0, rotation: FloatArray | Non
     if kind == "half-space":
         return scene.half_space(-turned @ AHEAD, -face_m).objects()
     if kind == "cable":
-        # Along its mesh's z, which is laid across.
+        # The mesh's z axis is laid across the path.
         across = turned @ np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
         mesh = Mesh(*capsule_mesh(0.001, 0.1, 24)[:2])
         return scene.mesh(mesh, turned @ [x_m, 0.0, face_m + 0.001], across).objects()
@@ -79,7 +79,7 @@ def test_a_wall_that_is_touched_exactly_without_any_doubt_is_felt() -> None:
 @pytest.mark.parametrize("degrees", [2, 5, 10, 15, 20, 30, 45, 60, 89])
 @pytest.mark.parametrize("gap_m", [0.0005, 0.003, 0.0065])
 def test_a_wall_that_leans_into_the_way_is_full_before_it_is_touched(degrees: int, gap_m: float) -> None:
-    """The inflated sphere is in it from the start; only the growth counts, and the uninflated sphere."""
+    """The inflated sphere overlaps the wall from the start. The overlap's growth and the uninflated sphere count."""
     angle = np.radians(degrees)
     wall = Scene().add().half_space([np.cos(angle), 0.0, -np.sin(angle)], -RADIUS_M - gap_m).objects()
     onsets = ways_of(ball_pose(), wall, along(AHEAD, INFLATED_M))
@@ -87,7 +87,10 @@ def test_a_wall_that_leans_into_the_way_is_full_before_it_is_touched(degrees: in
 
 
 def test_a_graze_is_felt_by_its_share_of_the_least_volume() -> None:
-    """A hair through a fingertip's sphere is less than a slice of 0.5 mm of it; so is a hair's breadth of an edge."""
+    """A hair through a fingertip's sphere has less volume than V_min, a cap of 0.5 mm: only weak strengths are felt.
+
+    An edge that a sphere overlaps by 0.05 mm is not felt at all, one of 2 mm in full.
+    """
     radius_m = RADIUS_M + INFLATED_M
     least_m3 = np.pi * radius_m * LEAST_DEPTH_M**2
     onsets = ways_of(ball_pose(), thing("0.4 mm rod", radius_m + FREE_M), along(AHEAD, INFLATED_M))
@@ -124,7 +127,7 @@ def test_a_ball_that_the_inflated_sphere_has_swallowed_is_felt(gap_m: float) -> 
 @repeatable
 @given(seed=seeds, ahead_m=st.floats(0.0, 0.05))
 def test_ways_fall_by_just_as_much_as_the_gripper_goes_ahead(seed: int, ahead_m: float) -> None:
-    """Streamed distances are shortened by this motion between two looks, until the contact."""
+    """Between two looks the law subtracts the gripper's motion from the distances: this holds up to the contact."""
     rng = np.random.default_rng(seed)
     direction, scene = rng.normal(size=3), Scene()
     direction /= np.linalg.norm(direction)
@@ -176,7 +179,10 @@ def test_moving_and_turning_everything_changes_no_way(seed: int) -> None:
 @repeatable
 @given(seed=seeds)
 def test_the_field_is_the_least_over_objects_and_spheres(seed: int) -> None:
-    """No object and no sphere ever lengthens a distance; nothing passed over for speed was needed."""
+    """The field of all equals the shortest distances of each object alone and of each sphere alone.
+
+    So no object or sphere lengthens a distance, and nothing is left out wrongly for speed.
+    """
     rng = np.random.default_rng(seed)
     objects, pose = random_scene(rng, 3, 0.15), any_gripper(rng)
     direction = rng.normal(size=3)
@@ -208,7 +214,7 @@ def test_more_probability_and_more_doubt_shorten_all_ways() -> None:
     ]
     for before, after in pairwise(fields):
         assert (after < before).all()
-    # Each distance by the spheres' growth, but for the way a larger sphere enters.
+    # Each distance is shorter by the growth of the spheres, apart from the other curvature of a larger sphere.
     np.testing.assert_allclose(fields[2] - fields[3], 1.33 * 0.003, atol=3e-4)
 
 

@@ -1,4 +1,4 @@
-"""Objects beside, behind, between or along are not felt, however near; an object ahead is, at its own distance."""
+"""Objects beside the path or behind are not felt, however near; an object ahead is felt, at its own distance."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,10 @@ repeatable = settings(derandomize=True, deadline=None, max_examples=40)
 
 
 def bench(made_of: str, top_m: float, rotation: FloatArray) -> PerceivedObjects:
-    """Return a bench of 0.8 x 0.8 m, 40 mm thick, its top `top_m` along x: one solid in several descriptions."""
+    """Return a bench of 0.8 x 0.8 m, 40 mm thick, with its top at `top_m` along x.
+
+    The same solid can be made of different primitives.
+    """
     center, half = np.array([top_m + 0.02, 0.0, 0.1]), np.array([0.02, 0.4, 0.4])
     halves = [(center + side * np.array([0.0, 0.0, 0.2]), half * [1.0, 1.0, 0.5]) for side in (-1.0, 1.0)]
     scene = Scene().add()
@@ -72,7 +75,7 @@ def test_towards_a_bench_all_ways_are_equal_however_it_is_told(made_of: str, gap
 @repeatable
 @given(seed=seeds, gap_m=st.floats(0.0, 0.03))
 def test_surfaces_beside_the_way_are_not_felt_in_either_direction(seed: int, gap_m: float) -> None:
-    """Planes, boxes and rods along the path, all about it, no nearer than the gripper is wide."""
+    """Planes, boxes and rods lie along the path on all sides, and the gripper just fits between them."""
     rng = np.random.default_rng(seed)
     scene, width_m = Scene(), float(rng.uniform(0.005, 0.05))
     for _ in range(5):
@@ -83,7 +86,7 @@ def test_surfaces_beside_the_way_are_not_felt_in_either_direction(seed: int, gap
         scene.add().half_space(-away, -nearest)
         half = np.array([*rng.uniform(0.001, 0.05, 2), 1.0])
         scene.add().box((nearest + half[0]) * away, half, turned)
-    # Every sphere just touches the hull of the gripper, anywhere along it.
+    # Every sphere just touches the cylinder of the gripper's width from inside, anywhere along it.
     angles, radii = rng.uniform(0.0, 2.0 * np.pi, 6), rng.uniform(0.3, 1.0, 6) * width_m
     centers = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1) * (width_m - radii)[:, None]
     pose = free_pose(centers + rng.uniform(-0.1, 0.1, (6, 1)) * AHEAD, radii)
@@ -94,7 +97,7 @@ def test_surfaces_beside_the_way_are_not_felt_in_either_direction(seed: int, gap
 @pytest.mark.parametrize("kind", ["wall", "half-space", "ball", "tetrahedron", "mesh"])
 @pytest.mark.parametrize("depth_m", [-0.01, 0.0, 0.005, 0.012, 0.03])
 def test_the_way_back_out_is_free(kind: str, depth_m: float) -> None:
-    """From before a wall, at it and from within: nothing gets worse."""
+    """The sphere starts before an object, at it or in it. Going back makes nothing worse, so nothing is felt."""
     face_m = RADIUS_M - depth_m
     scene = Scene().add()
     if kind == "wall":
@@ -114,7 +117,7 @@ def test_the_way_back_out_is_free(kind: str, depth_m: float) -> None:
 @pytest.mark.parametrize("made_of", ["boxes", "tetrahedra"])
 @pytest.mark.parametrize("inside_m", [-0.004, 0.0, 0.006, 0.02])
 def test_a_seam_within_an_object_is_no_surface(made_of: str, inside_m: float) -> None:
-    """Two blocks side by side across the path, with the sphere `inside_m` deep in them."""
+    """The sphere moves along the face of two blocks, one behind the other, `inside_m` deep in them, past their seam."""
     scene, half = Scene().add(), np.array([0.1, 0.2, 0.05])
     center = np.array([RADIUS_M + 0.1 - inside_m, 0.0, 0.0])
     for place in (-0.05, 0.05):
@@ -130,7 +133,7 @@ def test_a_seam_within_an_object_is_no_surface(made_of: str, inside_m: float) ->
 @pytest.mark.parametrize("side_gap_m", [0.0005, 0.002, 0.0069, 0.01])
 @pytest.mark.parametrize("seamless", [True, False])
 def test_inside_a_u_the_way_is_the_one_to_its_bottom(side_gap_m: float, seamless: bool) -> None:
-    """The inflated sphere is in both sides from the start, and they are one object with the bottom."""
+    """The inflated sphere overlaps both sides of the U from the start; sides and bottom are one object."""
     free_m = 0.06
     bottom_m = RADIUS_M + INFLATED_M + free_m
     alone = ways_of(ball_pose(), Scene().add().half_space(-AHEAD, -bottom_m).objects(), along(AHEAD, INFLATED_M))
@@ -141,7 +144,7 @@ def test_inside_a_u_the_way_is_the_one_to_its_bottom(side_gap_m: float, seamless
         scene.box([side * (side_m + 0.02), 0.0, bottom_m + (0.02 if seamless else 0.0) - length], [0.02, 0.1, length])
     scene.box([0.0, 0.0, bottom_m + 0.01], [side_m + (0.0 if seamless else 0.04), 0.1, 0.01])
     onsets = ways_of(ball_pose(), scene.objects(), along(AHEAD, INFLATED_M))
-    # A narrow U exposes less of the bottom, so that strengths are due a little earlier.
+    # A narrow U exposes less of the bottom, so that weak strengths begin a little earlier.
     assert free_m - 0.012 < onsets[0] <= alone[0] + 1e-5
     assert free_m - 0.0015 < onsets[7] <= free_m
 

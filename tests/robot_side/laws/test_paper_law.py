@@ -1,4 +1,4 @@
-"""The paper's law: D_incr as printed, one total overlap, one stiffness for both triggers."""
+"""The paper's own law: D_incr as the paper has it, one total overlap, and one stiffness for both triggers."""
 
 import dataclasses
 import math
@@ -38,7 +38,7 @@ def ball_volume(radius_m: float) -> float:
 
 
 def test_the_enlargement_is_as_printed() -> None:
-    """|μ_ee| + √3 |μ_c| for equal axes, Σ's trace, and |v| t_d, whatever the direction."""
+    """D_incr has |μ_ee| + √3 |μ_c| (for equal axes), the trace of Σ, and |v| t_d, whatever the direction."""
     pose = free_pose([[0.0, 0.0, 0.0], [0.0, 0.0, 0.3]], [0.01, 0.02])
     rates = np.array([0.1, 0.0, 0.2, 0.0, 1.0, 0.0])
     known = {"camera_mean_m": (-0.002,) * 3, "kinematic_mean_m": (0.001, -0.002, 0.002), "probability": 0.95}

@@ -1,4 +1,4 @@
-"""Objects that drift, turning, fingers or their own motion bring into the path are felt before they are there."""
+"""Objects that come into the path by a drift, a turn, the fingers or their own motion are felt before."""
 
 from dataclasses import replace
 
@@ -38,12 +38,12 @@ STOPPING_S = LOOP_S + HORIZON_S + FULL_SPEED_M_S / ACCELERATION_M_S2
 
 
 def post(x_m: float, z_m: float, half_m: float = 0.01) -> PerceivedObjects:
-    """Return an upright post at this place beside and ahead of the tool's point."""
+    """Return a post along y, `x_m` beside and `z_m` ahead of the tool's point, `2 half_m` thick."""
     return Scene().add().box([x_m, 0.0, z_m], [half_m, 0.3, half_m]).objects()
 
 
 def first_ways(objects: PerceivedObjects, velocity: list[float], turning: list[float]) -> tuple[FloatArray, FloatArray]:
-    """Return L2's and R2's distances of full strength for a ball that moves at these velocities."""
+    """Return L2's and R2's fast onset distances, (8,) each, for a ball that moves and turns at these velocities."""
     rates = np.array([*velocity, *turning])
     sensed = swept().sense(situation(ball_pose(), objects, joint_velocities_rad_s=rates, loop_age_s=LOOP_S), 0.0)
     return np.array(sensed.l2.fast_m), np.array(sensed.r2.fast_m)
@@ -59,7 +59,7 @@ def test_a_post_beside_the_path_is_felt_only_in_a_drift_towards_it() -> None:
         assert felt(post(x_m, 0.08), [0.1, 0.0, 0.2])
         assert not felt(post(x_m, 0.08), [-0.1, 0.0, 0.2])
         assert not felt(post(x_m, 0.08), [0.0, 0.1, 0.2])
-    # Farther than the tool gets before it stops.
+    # This post is farther aside than the tool drifts before it stops.
     assert not felt(post(0.1 * STOPPING_S + 0.04, 0.08), [0.1, 0.0, 0.2])
 
 
@@ -69,7 +69,7 @@ def test_a_thin_post_is_not_passed_over_between_two_places() -> None:
 
 
 def test_a_post_that_a_turn_brings_into_the_way_is_felt() -> None:
-    """A turn about y by ω moves objects ahead along z towards +x."""
+    """A turn about +y swings the tool's approach axis z towards +x, so that a post at +x comes into the path."""
     assert not felt(post(0.045, 0.09), [0.0, 0.0, 0.2])
     assert felt(post(0.045, 0.09), [0.0, 0.0, 0.2], [0.0, 1.0, 0.0])
     assert not felt(post(0.045, 0.09), [0.0, 0.0, 0.2], [0.0, -1.0, 0.0])
@@ -107,7 +107,7 @@ def test_what_comes_nearer_shortens_its_ways_by_what_it_covers_until_the_arm_sta
 
 
 def test_it_is_felt_from_beyond_the_reach() -> None:
-    """A fixed object there is not felt: the arm never gets so far."""
+    """A wall beyond the examined distance is felt if it comes nearer. A fixed one is not: the arm stops before it."""
     far_m = FULL_SPEED_M_S * STOPPING_S + 0.15
     still, nearing = (
         first_ways(moving_wall(far_m, [0.0, 0.0, -speed]), [0.0] * 3, [0.0] * 3)[1] for speed in (0.0, 0.4)
@@ -134,7 +134,7 @@ def test_velocities_that_cannot_be_are_refused(velocities: FloatArray) -> None:
 
 
 def test_what_the_fingers_close_towards_is_felt() -> None:
-    """Two fingers 80 mm apart close at 70 mm/s; a rod is 20 mm ahead of them, 20 mm inwards."""
+    """Two fingers 80 mm apart close at 70 mm/s. A rod is 20 mm ahead of them and 20 mm inwards of one."""
     objects, law = post(0.02, 0.03, half_m=0.003), swept()
     for tick in range(12):
         time_s = tick * FIELD_PERIOD_S
@@ -181,7 +181,7 @@ def test_no_sphere_goes_farther_between_two_places_than_the_spacing() -> None:
             continue
         assert when_s[-1] == pytest.approx(0.8)
         centers = [pose.sphere_centers_m, *(moved(kept, pose, one_s)[2] for one_s in when_s)]
-        # Along an arc the chord is shorter, and the arc about a moving point a little longer, than computed.
+        # On an arc, places are nearer to each other than computed. About a moving point, the arc is a little longer.
         assert max(np.linalg.norm(np.diff(centers, axis=0), axis=2).ravel()) <= 1.02 * SPACING_M
 
 
@@ -195,7 +195,7 @@ def test_there_are_no_more_than_eight_places_however_far_apart_they_are() -> Non
 
 @pytest.mark.parametrize("speed_m_s", [1e-15, 0.05])
 def test_a_mesh_that_moves_is_felt_like_a_box_that_does(speed_m_s: float) -> None:
-    """Measured velocities are hardly ever exactly 0."""
+    """A nearly fixed mesh counts as moving, as measured velocities are hardly ever exactly 0."""
     wall = (
         Scene()
         .add()
@@ -209,7 +209,7 @@ def test_a_mesh_that_moves_is_felt_like_a_box_that_does(speed_m_s: float) -> Non
 
 
 def exponential(turn: FloatArray, way_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return rotation (3, 3) and displacement (3,) of a point that moves by `way_m` in its frame and turns."""
+    """Return rotation (3, 3) and displacement (3,) of a frame that moves by `way_m`, in itself, and turns by `turn`."""
     twist = np.zeros((4, 4))
     twist[:3, :3], twist[:3, 3] = np.cross(turn, np.eye(3)).T, way_m
     moved_by = expm(twist)
@@ -266,7 +266,10 @@ def test_what_is_known_of_the_fingers_stays_when_more_objects_come() -> None:
 
 
 def way_in_small_steps_m(pose: GripperPose, objects: PerceivedObjects, twist: FloatArray, loop_s: float) -> float:
-    """Return R2's distance of full strength along the true screw motion, every 10 ms; twist (6,) with the approach."""
+    """Return R2's onset distance of full strength along the true screw motion, with a look every 10 ms.
+
+    twist (6,): the tool's linear velocity, with its part along the approach axis, and angular velocity.
+    """
     axis, ahead_m_s = pose.tool_rotation[:, 2], float(twist[:3] @ pose.tool_rotation[:, 2])
     across, turning = twist[:3] - ahead_m_s * axis, twist[3:]
     looking, table, nearest_m = Ahead(np.zeros(6)), scene_table(objects), np.inf
@@ -291,9 +294,10 @@ def way_in_small_steps_m(pose: GripperPose, objects: PerceivedObjects, twist: Fl
 @settings(derandomize=True, deadline=None, max_examples=12)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_ways_along_the_path_are_those_of_small_steps(seed: int) -> None:
-    """A wall is at most 0.5 mm later. Narrow objects may be between two places, 15 mm apart: their edge is later.
+    """Full strength before a wall begins at most 0.5 mm later than with small steps, before a ball at most 2 mm later.
 
-    Each place covers the half step before it, too: objects met then are earlier.
+    A ball may lie between two places, which are up to 15 mm apart. Full strength may also begin up to 2 mm earlier, as
+    each place represents the path from half a step before it.
     """
     rng, loop_s = np.random.default_rng(seed), 0.4
     pose, scene = gripper_pose(), Scene().add()

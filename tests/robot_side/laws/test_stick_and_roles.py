@@ -1,4 +1,4 @@
-"""The stick's rumble, and the effects of roles and of a held object on the stream."""
+"""The stick's rumble, and how roles and a held object change the fields."""
 
 import math
 
@@ -22,7 +22,7 @@ LOOP_AGE_S = 0.1
 
 
 def reached_m(deflection: float, loop_age_s: float = LOOP_AGE_S) -> float:
-    """D = u (t_d + h) + u²/2a (eq. 8)"""
+    """Return the stopping distance D = u (t_d + h) + u²/2a (eq. 8)."""
     speed = STICK_SPEED_M_S * deflection
     return speed * (loop_age_s + HORIZON_S) + speed * speed / (2.0 * ACCELERATION_M_S2)
 
@@ -58,7 +58,7 @@ def test_it_rumbles_for_what_lies_where_the_stick_leads_and_for_nothing_else(
     assert rumble(wall_to(towards, 0.02), lateral) == 1.0
     for elsewhere in (-towards, AHEAD, -AHEAD, np.cross(AHEAD, towards)):
         assert rumble(wall_to(elsewhere, 0.002), lateral) == 0.0
-    # In the tool's frame, not the world's.
+    # The stick's directions are those of the tool's frame, not the world's.
     rotation = random_rotation(np.random.default_rng(1))
     turned = Scene().add().half_space(-rotation @ towards, -RADIUS_M - 0.02).objects()
     assert Senses().sense(ball_pose(tool_rotation=rotation), turned, lateral=lateral).rumble == 1.0
@@ -71,7 +71,7 @@ def test_it_is_the_strength_at_what_a_reaction_and_the_loop_age_take_in_eighths(
         found = [rumble(wall_to(RIGHT, gap), (1.0, 0.0), loop_age_s) for gap in gaps]
         assert found == sorted(found, reverse=True)
         assert {8.0 * value for value in found} == set(range(9))
-        # The first strength is due 9 mm or more before the contact distance; the last within 3 mm of it.
+        # The first strength begins 9 mm or more before the contact distance, the last less than 3 mm before it.
         assert found[int(np.searchsorted(gaps, here))] == 1.0
         assert 0.009 < gaps[int(np.argmin(found))] - here < 0.012
 
@@ -113,7 +113,7 @@ def test_a_support_is_to_be_touched_only_while_something_is_held() -> None:
     assert support.r2 == obstacle.r2
     assert placing.r2.fast_m == obstacle.r2.fast_m
     assert placing.r2.slow_m == one(Role.TARGET).r2.slow_m
-    # An obstacle stays one, whatever is held.
+    # An obstacle stays an obstacle, whatever is held.
     assert one(Role.OBSTACLE, held=1).r2 == obstacle.r2
 
 
@@ -123,7 +123,7 @@ def test_what_is_ignored_is_not_felt() -> None:
 
 
 def test_toggling_the_target_changes_only_what_it_must() -> None:
-    """Fast distances never change; slow ones shorten at once and lengthen after 0.1 s."""
+    """When the target changes, fast onset distances stay. Slow ones shorten at once, or lengthen after 0.1 s."""
     senses = Senses(step_s=0.001)
     frames = {
         role: Scene().add(role).box([0.0, 0.0, 0.15], [0.2, 0.2, 0.05]).objects()
@@ -151,13 +151,13 @@ def test_the_held_object_is_no_danger_to_what_holds_it() -> None:
 
 
 def test_what_the_held_object_comes_near_is_felt() -> None:
-    """A rod that sticks out ahead of the fingers meets a wall far from them."""
+    """A held rod that protrudes ahead of the fingers meets a wall that is far from the fingers."""
     pose = gripper_pose()
     scene = Scene().add(Role.TARGET).box([0.0, 0.0, 0.08], [0.01, 0.01, 0.1])
     with_wall = scene.add().half_space([0.0, 0.0, -1.0], -0.22).objects()
     whole = with_held(pose, grip(with_wall, 0, pose))
     carried = Senses().sense(whole, with_wall, held=0, gap_m=0.02)
-    # The rod's cover stands out by 3 mm at most.
+    # The rod's cover protrudes by 3 mm at most.
     free_m = 0.22 - 0.18 - SIGMA_M
     assert free_m - 0.003 - 0.012 < carried.r2.fast_m[0] < free_m - 0.009
     empty = Senses().sense(pose, with_wall, held=0, gap_m=0.02)
@@ -171,5 +171,5 @@ def test_towards_the_target_a_finger_is_enlarged_by_half_the_gap_at_most(gap_m: 
     senses = Senses()
     senses.sense(fingers, target, gap_m=gap_m)
     assert senses.law.summary()["limited"] == limited
-    # The gap of the built-in gripper, open, limits nothing here.
+    # The gap of the built-in gripper, which is open, limits no inflation here.
     assert 0.5 * OPENING_M > SIGMA_M

@@ -1,4 +1,4 @@
-"""The swept law's stream: its horizon, its own displacement, and eq. 9-10 as it applies them."""
+"""The swept law's fields: their horizon, the displacement that the law computes itself, and its use of eq. 9-10."""
 
 import dataclasses
 import math
@@ -59,7 +59,7 @@ def test_ways_end_at_the_horizon(loop_age_s: float) -> None:
 
 
 def test_nothing_is_claimed_of_what_has_not_been_looked_at() -> None:
-    """The loop age may jump up, and the tool move, between two looks."""
+    """Between two looks the loop age may jump up, and the tool may move. What lies beyond is unknown."""
     senses = Senses(step_s=0.001)
     near = senses.sense(at(0.0), walls(0.2), loop_age_s=0.1)
     jumped = senses.sense(at(0.004), walls(0.2), loop_age_s=1.0)
@@ -75,7 +75,7 @@ def test_nothing_is_claimed_of_what_has_not_been_looked_at() -> None:
 
 
 def test_the_ways_are_the_same_at_every_loop_age() -> None:
-    """The delay moves the gripper along the path, whichever side compensates; it does not enlarge the gripper."""
+    """The delay moves the gripper along the path. It does not enlarge the gripper, so the distances are the same."""
     expected = Senses().sense(GRIPPER, walls(0.05, front_m=FRONT_M), loop_age_s=0.0)
     for loop_age_s in (0.05, 0.2, 0.8):
         ahead = moving(0.2 * AHEAD)
@@ -125,10 +125,10 @@ def test_the_stiffness_is_that_of_the_fast_list_at_the_displacement() -> None:
 
 
 def test_a_camera_that_sees_things_too_near_lengthens_the_ways_on_its_side_and_shortens_the_others() -> None:
-    """μ_c is true minus perceived: with 5 mm along the approach, every object is 5 mm farther ahead."""
+    """μ_c is the mean of true minus perceived position: with 5 mm along the approach, objects are 5 mm farther."""
     rotation = random_rotation(np.random.default_rng(2))
     approach = rotation[:, 2]
-    # A large sphere enters a wall as a larger one does.
+    # With a sphere this large, inflation hardly changes how its overlap with a wall grows.
     pose = ball_pose(0.1, tool_rotation=rotation)
     scene = Scene()
     for side in (-1.0, 1.0):
@@ -139,7 +139,7 @@ def test_a_camera_that_sees_things_too_near_lengthens_the_ways_on_its_side_and_s
     )
     np.testing.assert_allclose(np.array(known.r2.fast_m) - plain.r2.fast_m, 0.005, atol=1e-4)
     np.testing.assert_allclose(np.array(known.l2.fast_m) - plain.l2.fast_m, -0.005, atol=1e-4)
-    # An arm 5 mm farther along than estimated is the same from the other side.
+    # An arm 5 mm less far along the approach than estimated has the same effect.
     arm = Senses(swept(kinematic_mean_m=tuple(-0.005 * approach), camera_sd_m=0.01)).sense(pose, scene.objects())
     np.testing.assert_allclose(arm.r2.fast_m, known.r2.fast_m, atol=1e-9)
     np.testing.assert_allclose(arm.l2.fast_m, known.l2.fast_m, atol=1e-9)
@@ -156,7 +156,7 @@ def test_prediction_errors_are_those_of_the_predicting_side() -> None:
     np.testing.assert_allclose(exact - onsets(missed, compensation="operator"), 0.001, atol=1e-4)
     robot = 2.3263478740408408 * math.hypot(0.003, 0.02)
     np.testing.assert_allclose(exact - onsets(missed, compensation="robot"), robot - SIGMA_M, atol=6e-4)
-    # Without a table, a fifth of full speed's displacement in the loop age.
+    # Without a table, a fifth of the displacement at full speed in the loop age is added.
     np.testing.assert_allclose(exact - onsets(PredictionErrors()), 0.2 * FULL_SPEED_M_S * 0.2, atol=3e-4)
 
 

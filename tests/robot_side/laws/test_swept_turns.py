@@ -1,4 +1,4 @@
-"""Times of the swept law's looks, tick by tick in virtual time, and the validity of results in between."""
+"""When the swept law makes looks, tick by tick in virtual time, and which onset distances are valid in between."""
 
 from dataclasses import replace
 from typing import Any
@@ -19,7 +19,7 @@ from tests.helpers.perceived_scenes import Scene
 
 
 class Watched:
-    """Law used tick by tick, and its looks in each tick."""
+    """A law that is used tick by tick, with a record of the looks in each tick."""
 
     def __init__(self) -> None:
         self.law = swept()
@@ -27,7 +27,7 @@ class Watched:
         self.now_s = 7.0
 
     def tick(self, step_s: float, count: int, **changes: Any) -> list[int]:
-        """Tick; return the number of looks in each tick."""
+        """Run `count` ticks, `step_s` apart; return the number of looks in each."""
         numbers = []
         for _ in range(count):
             self.now_s += step_s
@@ -59,7 +59,7 @@ def test_fields_are_looked_at_in_turns_a_hundred_times_a_second(watched: Watched
     for side in sides:
         pauses_s = watched.pauses_s(side)
         assert len(pauses_s) >= 18
-        # The first pause is longer by a measuring tick, and by one for each side before it.
+        # The first pause is longer by the tick that measures the motion, and by one tick for each side before this one.
         assert pauses_s[0] <= FIELD_PERIOD_S + 0.003 + 1e-9
         np.testing.assert_allclose(pauses_s[1:], FIELD_PERIOD_S, atol=1e-9)
 
@@ -112,7 +112,7 @@ def test_ways_are_shortened_by_what_the_tool_has_moved_along() -> None:
 
 
 def test_a_way_that_was_found_holds_for_a_tenth_of_a_second_and_a_new_one_at_once() -> None:
-    """Strength rises at once and falls slowly: when an object is just passed, noise must not make strength flicker."""
+    """Strength rises at once and falls slowly, so that noise causes no flicker where an object is just passed."""
     senses = Senses(step_s=0.01)
     near, far = walls(0.05), walls(0.09)
     there = senses.sense(at(0.0), near).r2.fast_m

@@ -1,4 +1,4 @@
-"""Objects to be touched: a target, or a support while something is held. Slow zones feel them less, and later."""
+"""Objects to be touched: a target, or a support while something is held. Slow zones get less strength, and later."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def test_an_obstacle_is_the_same_in_both_lists() -> None:
 def test_it_is_in_the_fast_list_like_an_obstacle_and_in_the_slow_one_at_most_half_as_strong(object_class: int) -> None:
     obstacle, touched = one(OBSTACLE), one(object_class)
     np.testing.assert_array_equal(touched.fast_m, obstacle.fast_m)
-    # At its expected place: w + D_σ(P) - D_σ(0.5).
+    # At its expected position: the fast onset distance plus D_σ(P) - D_σ(0.5).
     expected = obstacle.fast_m[:TOUCH_STRENGTH] + INFLATED_M - MEAN_M
     np.testing.assert_allclose(touched.slow_m[:TOUCH_STRENGTH], expected, atol=1e-12)
     assert TOUCH_STRENGTH == 4
@@ -69,7 +69,7 @@ def test_what_stands_before_or_behind_it_stays_in_the_slow_list() -> None:
     first, last = (
         look(ball_pose(), objects, DOUBTFUL, classes=classes) for classes in ([OBSTACLE, TARGET], [TARGET, OBSTACLE])
     )
-    # Behind an obstacle a target changes nothing; an obstacle behind a target is full in its own place.
+    # A target behind an obstacle changes nothing. An obstacle behind a target has full strength at its own distance.
     np.testing.assert_allclose(first.slow_m, first.fast_m, atol=EQUAL_M)
     alone = look(ball_pose(), objects, DOUBTFUL, classes=[SKIPPED, OBSTACLE])
     np.testing.assert_allclose(last.slow_m[4:], alone.slow_m[4:], atol=EQUAL_M)
@@ -98,7 +98,10 @@ def test_both_lists_are_the_least_over_spheres_that_err_differently(seed: int) -
 
 
 def test_a_better_known_sphere_may_touch_first_though_felt_last() -> None:
-    """An outer sphere may err by 20 mm, as the tool may turn; the one on the axis is exactly 3 mm farther ahead."""
+    """An outer sphere's position may err by 20 mm, as the tool's angle may err. One on the axis is known exactly.
+
+    The sphere on the axis lies 3 mm farther ahead.
+    """
     outer, middle = ([0.2, 0.0, 0.0], [0.0, 0.0, 0.003])
     turning = Ahead(np.array([0.0, 0.0, 0.0, 0.0, 0.1 / QUANTILE, 0.0]))
     looked = along(AHEAD, 0.0, quantile=QUANTILE)
@@ -116,7 +119,7 @@ def test_a_better_known_sphere_may_touch_first_though_felt_last() -> None:
 
 
 def fingers_about(object_class: int, widest_m: float, inflated_m: float = 0.02) -> Field:
-    """Look with two fingertips towards a block between them, and a palm behind it."""
+    """Return the field towards a block for two fingertips that will pass it on both sides, and a palm behind them."""
     pose = free_pose([[0.03, 0.0, 0.0], [-0.03, 0.0, 0.0], [0.0, 0.0, -0.1]], [0.008] * 3, [True, True, False])
     block = Scene().add().box([0.0, 0.0, 0.05], [0.015, 0.02, 0.02]).objects()
     return look(pose, block, along(AHEAD, inflated_m), classes=[object_class], widest_m=widest_m)
@@ -127,11 +130,11 @@ def test_towards_the_target_a_finger_is_enlarged_by_at_most_half_the_gap_and_tha
     assert free.counts[Count.LIMITED] == 0
     limited = fingers_about(TARGET, 0.004)
     assert limited.counts[Count.LIMITED] == 2
-    # The fingers pass it, 7 mm to each side: the palm alone meets it, with its full enlargement.
+    # The fingers pass the block, 7 mm to each side. Only the palm meets it, with its full inflation.
     assert free.fast_m[0] < 0.0 < limited.fast_m[0]
     face_m = 0.03 + 0.1 - 0.008 - 0.02
     assert face_m - 0.012 < limited.fast_m[0] < limited.fast_m[7] <= face_m
-    # A limit that does not bind is not counted.
+    # A limit above the inflation has no effect and is not counted.
     loose = fingers_about(TARGET, 0.021)
     assert loose.counts[Count.LIMITED] == 0
     np.testing.assert_array_equal(loose.fast_m, free.fast_m)
@@ -146,7 +149,7 @@ def test_towards_anything_else_it_is_never_reduced(object_class: int) -> None:
 
 
 def test_a_limited_finger_still_meets_what_is_ahead_of_it() -> None:
-    """The expected place follows the limited enlargement; the palm is not limited."""
+    """Slow onset distances take the expected position: they are later by the limited inflation minus D_σ(0.5)."""
     pose = free_pose([[0.0, 0.0, 0.0]], [0.008], [True])
     looked = along(AHEAD, 0.001, variance_m2=1e-4, quantile=2.0)
     found = look(pose, WALL, looked, classes=[TARGET], widest_m=0.004)
@@ -156,7 +159,7 @@ def test_a_limited_finger_still_meets_what_is_ahead_of_it() -> None:
 
 
 def test_a_target_drawn_in_between_the_fingers_ends_before_the_palm() -> None:
-    """The trigger's free travel is the remaining depth: the sides are not felt."""
+    """R2 is free up to the palm, as far as the block still goes in: its sides, between the fingers, are not felt."""
     pose = gripper_pose()
     palm_m = -0.105 + 0.040 + 0.003
     left = []

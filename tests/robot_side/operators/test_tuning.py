@@ -87,7 +87,7 @@ def test_without_permission_nothing_is_tuned_and_that_is_said_once() -> None:
         tune(bench, owner, number, 0.5)
     tuning = bench.robot.session.tuning
     assert (tuning.probability, tuning.refused) == (0.99, 3)
-    assert tuning.take_notes() == ["tuning refused: valid with: --permit-tuning"]
+    assert tuning.take_notes() == ["tuning refused: the robot side permits it with --permit-tuning"]
     assert bench.robot.summary()["lease"]["tuning"] == {"permitted": False, "granted": [], "refused": 3}
 
 

@@ -1,4 +1,4 @@
-"""Arguments of the public functions: shapes, broadcasting, errors; and the unchecked kernels beneath."""
+"""Arguments of the public functions: shapes, broadcasting and errors; and those of the unchecked kernels."""
 
 import re
 from collections.abc import Callable
@@ -164,7 +164,7 @@ def test_what_is_refused(kind: str, name: str, value: object, said: str) -> None
 def test_rotations_are_orthonormal_to_a_millionth_and_no_further(sign: float) -> None:
     arguments = {**CALLS["box"][1], "centers": np.zeros((2, 3))}
     shear = sign * np.eye(3, k=2)
-    # Two numbers off the diagonal of QᵀQ are the shear, and the others almost 0.
+    # Two numbers off the diagonal of QᵀQ are the shear; all others of QᵀQ - I are almost 0.
     for share, refused in ((0.98, False), (0.999, False), (1.001, True)):
         turned = np.array([np.eye(3), np.eye(3) + share * 1e-6 / np.sqrt(2.0) * shear])
         if refused:

@@ -1,4 +1,4 @@
-"""Blocks, lanes and threads: the grouping of pairs changes no result."""
+"""How pairs are grouped into blocks, lanes and threads changes no result."""
 
 import subprocess
 import sys
@@ -85,7 +85,7 @@ def test_the_ways_are_counted(pairs: Pairs, make: Callable[[int], Arrays]) -> No
     volumes, _, areas = pairs(centers, radii, *solids, counts=counts)
     cut = int(((volumes > 0.0) & (areas > 0.0) & (areas < 12.56 * radii**2)).sum())
     assert counts.pairs == 2000
-    # The bounds keep every pair that is cut, and few others.
+    # The bounds leave every pair whose surfaces cut to the lanes, and few others.
     assert cut <= 2000 - counts.early <= 1.2 * cut
     assert 0 <= counts.precise <= 0.02 * cut
 

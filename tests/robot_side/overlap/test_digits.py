@@ -27,7 +27,7 @@ from robot_side.overlap.digits.expansion import determinant, exact_power
 from robot_side.overlap.digits.precise_arctangent import NO_TURN, arctangent, turned, whole_angle
 
 ROUNDING = Fraction(1, 2**103)
-"""Error bound promised by `double_double`."""
+"""Error bound of a result, as `double_double` documents it"""
 
 
 def _numbers() -> st.SearchStrategy[DoubleDouble]:
@@ -124,7 +124,7 @@ def test_determinants_and_powers_are_0_only_where_they_are() -> None:
     for case in range(60):
         rows = rng.normal(size=(3, 3, 2)) * [1.0, 2.0**-60]
         if case % 3:
-            # A combination of the others, off by its rounding, or exactly.
+            # The third vector is a combination of the other two, exactly or with a rounding error.
             rows[..., 1] = 0.0
             rows = np.round(rows, 1) if case % 3 == 1 else np.ldexp(np.round(rows * 256), -8)
             rows[2] = rows[0] * 0.7 - rows[1] if case % 3 == 1 else rows[0] * 3.0 - rows[1]
@@ -185,7 +185,7 @@ def test_every_direction_is_right_to_the_last_digits() -> None:
 @settings(derandomize=True, deadline=None)
 @given(st.floats(-1e150, 1e150), st.floats(-1e150, 1e150))
 def test_an_angle_is_the_librarys_and_odd(sine: float, cosine: float) -> None:
-    # A zero sine has no sign here.
+    # Here the sign of a zero sine has no effect.
     expected = math.atan2(sine + 0.0, cosine) if sine or cosine else 0.0
     found = angles(np.array([sine, -sine]), np.array([cosine, cosine]))
     assert found[0] == pytest.approx(expected, rel=5e-16, abs=1e-300)

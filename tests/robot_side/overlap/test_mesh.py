@@ -1,4 +1,4 @@
-"""Closed meshes equal the oracle, in positions where overlap algorithms fail."""
+"""Overlaps with closed meshes equal the oracle's, in positions where overlap algorithms usually fail."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,8 @@ from robot_side.overlap import Mesh
 from tests.helpers.meshes import CUBE_CORNERS, CUBE_TRIANGLES, grid_tetrahedra, round_mesh, surface_of
 
 WORST = 1e-15
-"""Limit as a share of the sphere's volume, surface and, for the gradient, great circle."""
+"""Largest error of a volume as a share of the sphere's, and of an area as a share of the sphere's surface. A gradient
+may have an error of twice this share of the great circle."""
 
 Rng = np.random.Generator
 
@@ -25,7 +26,7 @@ def assert_exact(vertices: FloatArray, triangles: IntArray, centers: FloatArray,
 
 
 def positions(rng: Rng, vertices: FloatArray, triangles: IntArray, count: int) -> tuple[FloatArray, FloatArray]:
-    """Draw spheres anywhere, with their centre on a corner, edge or face, or with their surface through one."""
+    """Draw spheres of three kinds: anywhere; centred on a corner, edge or face; or with such a point on the surface."""
     centers, radii = np.empty((count, 3)), np.empty(count)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     for number in range(count):
@@ -74,7 +75,7 @@ def test_a_narrow_slit_and_a_thin_plate_through_the_centre() -> None:
 
 @pytest.mark.parametrize("length", [3.0, 10.0, 200.0, 1e4, 1e6])
 def test_triangles_much_larger_than_the_sphere(length: float) -> None:
-    """A plate of two triangles on each side, spheres of about its thickness anywhere on it."""
+    """The mesh is a plate with two triangles on each side; spheres about as large as it is thick lie all over it."""
     rng, count = np.random.default_rng(5), 24
     centers = rng.uniform(-1.0, 1.0, (count, 3)) * [length, length, 1.3]
     centers[::3, 0] = length + rng.uniform(-1.0, 1.0, count // 3)
@@ -112,7 +113,7 @@ def test_relabelling_and_splitting_change_nothing() -> None:
     relabelled = Mesh(vertices[order], np.roll(place[triangles[rows]], 1, axis=1))
     sphere = 4.0 / 3.0 * np.pi * radii**3
     assert (np.abs(relabelled.overlap(centers, radii) - expected) <= WORST * sphere).all()
-    # Triangles with separate vertices: equal places are found.
+    # Each triangle has its own vertices; those with equal coordinates are merged.
     apart = Mesh(vertices[triangles].reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3))
     assert (np.abs(apart.overlap(centers, radii) - expected) <= WORST * sphere).all()
 

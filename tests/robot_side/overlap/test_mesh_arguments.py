@@ -1,4 +1,4 @@
-"""Accepted meshes, and the errors for others."""
+"""Which meshes are accepted, and the errors for all others."""
 
 import re
 
@@ -74,7 +74,7 @@ def test_what_is_unusual_but_closed_is_accepted() -> None:
     hollow = Mesh(two(0.0, 0.5), CUBE_AND_HOLE)
     assert hollow.volume_m3 == 7.0
     assert hollow.overlap([0.0, 0.0, 0.0], 0.5) == 0.0
-    # A vertex within an edge makes a triangle without area; one with a corner twice is left out.
+    # A vertex within an edge makes a triangle without area, which is kept. A triangle with a corner twice is left out.
     split = np.concatenate([CUBE_CORNERS, [[-1.0, -1.0, 0.0]]])
     first = [[0, 8, 3], [8, 1, 3], [0, 1, 8], [5, 5, 2]]
     whole = Mesh(split, np.concatenate([first, CUBE_TRIANGLES[1:]]))

@@ -1,4 +1,4 @@
-"""Winding number and nearest point of placed meshes against slow sums over every triangle."""
+"""Winding number and nearest point of placed meshes, against slow computations with every triangle."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ Surface = tuple[FloatArray, IntArray]
 
 
 def slow_winding(vertices: FloatArray, triangles: IntArray, points: FloatArray) -> FloatArray:
-    """Sum the solid angles (n,) of all triangles, by their spherical triangles' angles (L'Huilier's theorem)."""
+    """Return winding numbers from the solid angles of all triangles, as spherical triangles by L'Huilier's theorem."""
     total = np.zeros(len(points))
     for triangle in triangles:
         sides = vertices[triangle] - points[:, None]
@@ -51,7 +51,7 @@ def test_inside_and_outside_are_told_apart_everywhere() -> None:
     for number in range(14):
         vertices, triangles = round_mesh(5) if number == 0 else torus(9, 4) if number == 1 else random_surface(rng)
         points = rng.uniform(vertices.min(axis=0) - 0.3, vertices.max(axis=0) + 0.3, (1600, 3))
-        # Near corners, edges and faces, and on lines through corners, the nearest feature is in doubt.
+        # Near corners, edges and faces, and in line with corners, rounding may choose another nearest feature.
         corners = vertices[triangles[rng.integers(len(triangles), size=900)]]
         weights = rng.dirichlet(np.full(3, 0.2), 900)
         points[:900] = np.einsum("nv,nvi->ni", weights, corners) + 1e-3 * rng.normal(size=(900, 3))

@@ -1,4 +1,4 @@
-"""Meshes about round solids: closed, never smaller, and larger by at most their stated excess."""
+"""Meshes around round solids are closed, contain the solid, and are larger by their stated excess at most."""
 
 from collections.abc import Callable
 
@@ -43,7 +43,10 @@ SHAPES: dict[str, tuple[Callable[[int], ShapeMesh], float, Callable[[FloatArray]
 
 
 def _outside_ellipsoid(point: FloatArray) -> float:
-    """Return the distance; at the surface's nearest point the normal leads to `point`: x_i = a_i² p_i / (a_i² + t)."""
+    """Return the distance of `point` from the ellipsoid. The normal at the nearest point x leads to the point p.
+
+    So x_i = a_i² p_i / (a_i² + t).
+    """
 
     def excess(t: float) -> float:
         return float(((AXES * point / (AXES**2 + t)) ** 2).sum()) - 1.0
@@ -73,7 +76,7 @@ def test_the_solid_lies_within_and_the_excess_is_as_stated(name: str, fineness: 
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     offsets = np.sum(normals * corners[:, 0], axis=1)
     assert (points @ normals.T - offsets).max() < 1e-12
-    # A convex mesh's distance from the solid is convex, so that a vertex stands out farthest.
+    # The distance from a convex solid is a convex function, so a vertex of the mesh protrudes farthest.
     farthest_m = max(OUTSIDE[name](vertex) for vertex in vertices[:: max(1, len(vertices) // 100)])
     assert farthest_m <= stands_out_m * (1.0 + 1e-9)
     assert farthest_m > 0.2 * stands_out_m

@@ -1,7 +1,7 @@
-"""Every kind of solid equals the oracle, in every class where algorithms fail and in every layout.
+"""Overlaps with every kind of solid equal the oracle's, in all classes where algorithms fail, however computed.
 
-Errors are shares of the sphere's volume, great circle and surface. The hard counts of `feelahead bench overlap`, of
-forbidden results, are checked over a few thousand pairs more.
+Errors are shares of the sphere's volume (volumes), great circle (gradients) and surface (areas). A few thousand more
+pairs are searched for results that `feelahead bench overlap` counts as forbidden.
 """
 
 import itertools
@@ -53,7 +53,7 @@ PUBLIC: dict[Solid, Callable[..., Overlaps]] = {
 
 
 def precise_overlaps(pairs: Pairs) -> Overlaps:
-    """Compute all rows by the compensated forms."""
+    """Return the overlaps of all pairs, computed by the precise forms."""
     count = len(pairs)
     results = np.full(count, np.nan), np.full((count, 3), np.nan), np.full(count, np.nan)
     kernel = precise_boxes if pairs.solid == "box" else precise_tetrahedra
@@ -62,7 +62,7 @@ def precise_overlaps(pairs: Pairs) -> Overlaps:
 
 
 def mesh_overlaps(pairs: Pairs) -> Overlaps:
-    """Compute the same solids as closed meshes, oriented outward."""
+    """Return the overlaps with the same solids as closed meshes, oriented outward."""
     found = []
     for row, corners in enumerate(pairs.corners):
         edges = corners[[4, 2, 1] if pairs.solid == "box" else [1, 2, 3]] - corners[0]
@@ -74,13 +74,13 @@ def mesh_overlaps(pairs: Pairs) -> Overlaps:
 
 
 def layouts(name: str, pairs: Pairs) -> Iterator[tuple[str, Overlaps, IntArray]]:
-    """Yield all layouts of the same overlaps, with their rows."""
+    """Yield the same overlaps as computed in each way: its name, the overlaps, and the numbers of the pairs."""
     every = np.arange(len(pairs))
     yield "checked", PUBLIC[pairs.solid](*pairs.arguments, gradient=True), every
     yield "kernel", kernel_overlaps(pairs), every
     if pairs.solid in ("tetrahedron", "box"):
         yield "precise", precise_overlaps(pairs), every
-        # The corners of a turned box are rounded, so that its mesh is another solid. A flat solid is no mesh.
+        # A turned box has rounded corners, so its mesh would be another solid. A flat solid is not accepted as a mesh.
         solid = pairs.solid_volumes > 1e-9 * np.ptp(pairs.corners, axis=1).max(axis=1) ** 3
         if solid.any() and (pairs.solid == "tetrahedron" or "grid" in name):
             yield "mesh", mesh_overlaps(pairs[np.flatnonzero(solid)]), np.flatnonzero(solid)
@@ -95,7 +95,7 @@ def assert_equal_to_the_oracle(name: str, pairs: Pairs) -> list[Truth]:
         assert found.area.max() <= (2.0 * WORST if layout == "precise" else WORST), layout
         # The meshes' relative error has a separate bound, in test_mesh.
         if layout != "mesh" and any(f"depth {depth}," in name for depth in DEPTHS):
-            # Only caps that deep are left to the vector lanes.
+            # Of the pairs of small depth, only caps of this depth are computed by the vectorised lanes.
             lanes = layout != "precise" and "face depth 1e-3" in name
             assert found.relative[found.shares > 0.0].max(initial=0.0) <= (1e-9 if lanes else 1e-12), layout
             assert found.direction.max() <= (1e-9 if lanes else 1e-14), layout
@@ -164,7 +164,7 @@ def test_caps_and_lenses_are_relatively_exact(depth: float, ratio: float) -> Non
             ],
         ),
         (
-            # The planes of this needle's long faces round by more than they are apart.
+            # The long faces of this needle are closer together than the rounding errors of their planes.
             [2.75, -0.5625, 0.5],
             0.125,
             [
@@ -227,7 +227,7 @@ def test_what_must_never_happen_does_not(solid: str) -> None:
 
 @both
 def test_zeros_are_exact_where_nothing_is_shared(solid: Solid) -> None:
-    """Grid-aligned pairs, with every kind of contact and with solids without volume."""
+    """The pairs are aligned with a grid: with every kind of contact, and some solids without volume."""
     rng = np.random.default_rng(11)
     centers, radii = rng.integers(-5, 6, (1000, 3)), rng.integers(1, 8, 1000)
     shape: tuple[np.ndarray, ...] = (rng.integers(-4, 5, (1000, 4, 3)),)

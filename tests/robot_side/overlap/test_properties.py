@@ -1,4 +1,4 @@
-"""Invariants of every overlap: bounds, additivity, invariances, monotonicity."""
+"""Properties of every overlap: bounds, additivity, invariance and monotonicity."""
 
 import itertools
 
@@ -21,14 +21,14 @@ half_sizes = arrays.arrays(np.float64, 3, elements=st.floats(0.0, 3.0) | st.inte
 seeds = st.integers(0, 2**32 - 1)
 
 SUBNORMAL = 1e-300
-"""Volume in m³ below which digits are lost, near the least doubles."""
+"""Volume in m³ below which digits are lost, because doubles that small are subnormal"""
 
 SIZE = 16.0
-"""Upper bound of the distance between any two of these points, in metres."""
+"""Upper bound of the distance between any two points that are drawn, in metres"""
 
 
 def rounding(radius: float) -> float:
-    """Return the documented error in m³: 1e-15 of the sphere, more for solids that are larger."""
+    """Return the allowed error of a volume in m³: 1e-15 of the sphere's, or more if SIZE is larger than the radius."""
     return 1e-15 * 4.2 * radius**2 * max(radius, SIZE)
 
 
@@ -53,16 +53,16 @@ def test_a_tetrahedron_bounds_its_overlap_and_is_the_sum_of_its_parts(
     assert areas.min() >= 0.0
     assert areas.max() <= 4.0 * np.pi * radius**2 * (1.0 + 1e-15)
     assert np.linalg.norm(gradients, axis=1).max() <= np.pi * radius**2 * (1.0 + 1e-14) + 1e-15 * SIZE * radius
-    # Vertices may come in any order.
+    # The order of the vertices has no effect.
     assert np.ptp(volumes) <= rounding(radius)
     assert np.ptp(gradients, axis=0).max() <= 2e-15 * 4.0 * max(radius, SIZE) * radius
     assert np.ptp(areas) <= 1e-15 * 13.0 * max(radius, SIZE) * radius
-    # Its parts add up. The cut is rounded, which moves the parts' faces equally.
+    # The parts of a cut tetrahedron add up. The cut is rounded, which moves the common face of both parts equally.
     cut = (1.0 - share) * vertices[2] + share * vertices[3]
     parts = np.stack([[*vertices[:3], cut], [vertices[0], vertices[1], cut, vertices[3]]])
     moved = 1e-15 * SIZE * 2.0 * np.pi * radius**2
     assert abs(volumes[0] - sphere_tetrahedron(center, radius, parts).sum()) <= 2.0 * rounding(radius) + moved
-    # A larger sphere overlaps no less.
+    # A larger sphere's overlap is not smaller.
     small, large = sphere_tetrahedron(center, sorted((radius, other)), vertices)
     assert small <= large + rounding(max(radius, other))
 
@@ -113,7 +113,7 @@ def test_powers_of_two_scale_exactly(
         ),
     )
     for plain, scaled in pairs:
-        # Subnormal products of the tiniest coordinates are the only ones that do not scale.
+        # All results scale exactly, except for subnormal products of the smallest coordinates.
         assert scaled == np.float64(factor**3) * plain or plain < 1e-200
 
 
@@ -151,7 +151,7 @@ def test_every_valid_input_gives_finite_results(
 
 
 def test_a_tetrahedron_that_is_nothing_beside_its_sphere_is_whole() -> None:
-    """Found by hypothesis: products of such lengths overflow and vanish in between."""
+    """The lengths, found by hypothesis, have products that overflow or become 0 during the computation."""
     least = 6.13479543e-122
     vertices = np.full((4, 3), least)
     vertices[0, 0], vertices[1, 1], vertices[2, 2] = 0.0, 1.43633914e-60, 1.0

@@ -79,7 +79,7 @@ def test_other_objects_than_the_movers_are_refused() -> None:
     with pytest.raises(ValueError, match=r"roles holds 0; valid: one for each"):
         movers.frame(0.0, movers.at_first, ())
     for things in ([4, 0], [0, 0], [-1], [len(first.names)]):
-        with pytest.raises(ValueError, match="rising places"):
+        with pytest.raises(ValueError, match="rising indices"):
             Movers(first, np.array(things))
     with pytest.raises(ValueError, match="complete frame"):
         Movers(movers.frame(0.0, movers.at_first, first.roles), np.array([0]))

@@ -273,7 +273,7 @@ def test_a_port_that_is_taken_is_said() -> None:
     [
         (
             "raise ModuleNotFoundError('No module', name='viser')",
-            "no console: viser is not installed on this machine; valid: pip install '.[operator]' in the clone",
+            "no console: viser is not installed; install it in the clone: pip install '.[operator]'",
         ),
         (
             # As another version of viser, which opens its server differently, would do.

@@ -18,7 +18,7 @@ LIMIT_S = 60.0
 
 
 class OnTerminal:
-    """Command that runs on a pseudo-terminal of its own, of 80 x 24 characters."""
+    """Command that runs on its own pseudo-terminal, of 80 x 24 characters."""
 
     def __init__(self, command: Sequence[str]) -> None:
         self.ours, self.theirs = pty.openpty()

@@ -222,11 +222,11 @@ REFUSED: list[tuple[dict[str, str] | str, str | None, str]] = [
     ({"arm_actuators": "", "gripper_actuators": ""}, "tcp", "no actuators"),
     ({"arm_actuators": MOTORS.split("/>")[0] + "/>"}, "tcp", "arm's joint 'elbow' has no actuator of its own: nothing"),
     ({"arm_actuators": MUSCLE}, "tcp", "'pull' of joint 'elbow' is of an unsupported kind; valid: position"),
-    ({"world": '<site name="corner"/>'}, "corner", "'corner' hangs on no joint"),
+    ({"world": '<site name="corner"/>'}, "corner", "no joint moves 'corner'"),
     (
         {"world": '<body mocap="true"><geom size="1"/><site name="grip"/></body>'},
         "grip",
-        "no joint: a mocap body carries it",
+        "no joint moves 'grip': a mocap body carries it",
     ),
     ({"wrist": BALL_JOINT}, "end", "joint 'b' is ball: no single motor moves such a joint; valid: hinge or slide"),
     (NO_BASE.format(joint="<freejoint/>", more=""), "end", "of body 'arm' is free: the robot's base must stand fixed"),

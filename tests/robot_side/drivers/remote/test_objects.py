@@ -96,7 +96,7 @@ def test_a_role_is_changed_from_the_next_frame_on() -> None:
 @pytest.mark.parametrize(
     ("things", "fields", "says"),
     [
-        ([CUP, CUP], {}, "'cup' is there 2 times; valid: once"),
+        ([CUP, CUP], {}, "'cup' occurs 2 times; valid: once"),
         ([{"name": "cup"}], {}, "'cup' has 0 shapes; valid: 1 of sphere, box"),
         ([CUP | {"box": [1, 1, 1]}], {}, "'cup' has 2 shapes"),
         ([CUP | {"quaternion": [1, 1, 0, 0]}], {}, "quaternion = (1.0, 1.0, 0.0, 0.0); valid: of length 1"),
@@ -129,7 +129,7 @@ def test_a_silence_is_told_and_what_was_seen_last_holds_on() -> None:
     assert sender.objects.perceive(sender.now_s) is frame
     assert "the newest frame is 0.6 s old" in sender.notes[-1]
     sender.says(CUP, peer=b"restarted", sequence=0)
-    assert "come again" in sender.notes[-1]
+    assert "arrive again" in sender.notes[-1]
 
 
 def test_nothing_is_perceived_before_the_first_frame() -> None:

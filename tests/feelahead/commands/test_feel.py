@@ -1,0 +1,238 @@
+"""`feelahead feel`: patterns in the hand, and the measurement of forces, with a simulated or a played controller."""
+
+import contextlib
+import os
+import pty
+import signal
+import subprocess
+import sys
+import termios
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import feelahead.commands.feel.command
+from common.errors import ConfigurationError
+from feelahead.commands.feel.command import feel
+from feelahead.commands.feel.loop import typing
+from feelahead.commands.feel.patterns import STAGES, Stage, Walk
+from feelahead.main import command
+from operator_side.calibration.force_measurement import ForceMeasurement
+from operator_side.calibration.forces import ControllerForces, TriggerForces, forces_path, load_forces, write_forces
+from operator_side.controller.feel import FREE_TRIGGER, MAX_STRENGTH, RELEASED
+from operator_side.controller.state import ControllerState
+from operator_side.dualsense.reports.input_report import build_input_report
+from operator_side.dualsense.reports.output_report import parse_output_report
+from operator_side.dualsense.simulated.controller import SIMULATED_ADDRESS
+from tests.helpers.fake_hid import ADDRESS, FakeBackend, FakeHandle
+from tests.helpers.python_process import LIMIT_S
+from tests.helpers.repository import ROOT
+
+REPORT_LENGTH = 48
+FORCES = TriggerForces(tuple(2.0 + 0.3 * strength for strength in range(9)))
+
+
+@pytest.fixture(autouse=True)
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    return tmp_path / "config"
+
+
+def test_the_patterns_are_walked_through_and_a_key_stays_in_one() -> None:
+    walk = Walk()
+    seen: list[Stage] = []
+    while walk.rounds == 0:
+        walk.advance(len(seen) * 0.5)
+        seen.append(walk.stage)
+    assert list(dict.fromkeys(seen)) == list(STAGES)
+    walk.choose("ramp")
+    walk.skip()
+    assert walk.stage.strengths == (1,) * 10
+    walk.choose("strengths")
+    for now_s in range(100):
+        walk.advance(float(now_s))
+        assert walk.stage.pattern == "strengths"
+
+
+def test_a_story_tells_what_is_written_and_where_a_pull_met_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert command(["feel", "--device", "simulated"]) == 0
+    said = capsys.readouterr().out
+    for stage in STAGES:
+        assert f"{stage.words}: {' '.join(map(str, stage.strengths))}\n" in said
+    # 3.7 N pass a free trigger, and stand where the wall begins.
+    assert "R2 was pulled to 1.00: zone 7, strength 0\n" in said
+    assert "R2 was pulled to 0.53: zone 4, strength 8\n" in said
+    assert command(["feel", "--device", "simulated", "--pattern", "wall", "--duration", "9"]) == 0
+    said = capsys.readouterr().out
+    assert "a wall at the middle" in said
+    assert "free" not in said
+
+
+def test_measured_forces_are_shown_beside_the_strengths(capsys: pytest.CaptureFixture[str]) -> None:
+    write_forces(forces_path(SIMULATED_ADDRESS), SIMULATED_ADDRESS, ControllerForces(r2=FORCES))
+    assert command(["feel", "--device", "simulated"]) == 0
+    assert "strength 5 of 8 everywhere (R2 2.0 +1.5 N): 5 5" in capsys.readouterr().out
+    forces_path(SIMULATED_ADDRESS).write_text("version = 7")
+    with pytest.raises(ConfigurationError, match="feelahead feel --measure"):
+        command(["feel", "--device", "simulated"])
+
+
+def test_a_simulated_measurement_is_stored_only_where_asked_for(
+    tmp_path: Path, own_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(["feel", "--measure", "--device", "simulated"]) == 0
+    said = capsys.readouterr().out
+    assert "strengths 1 to 8 add 0.3 0.5 0.8 1.0 1.3 1.5 1.8 2.0 N" in said
+    assert "--strongest-effect 2.0" in said
+    assert "nothing was stored" in said
+    assert not own_folder.exists()
+    assert command(["feel", "--measure", "--device", "simulated", "--out", str(tmp_path / "mine.toml")]) == 0
+    assert "[r2]" in (tmp_path / "mine.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        (["--controller", "mine"], "--controller = 'mine'; valid: six pairs"),
+        (["--controller", ADDRESS, "--device", "simulated"], "--controller with --device simulated; valid"),
+        (["--measure", "--pattern", "wall"], "--measure with --pattern"),
+        (["--out", "mine.toml"], "--out without --measure; valid: both"),
+        (["--duration", "0"], "--duration"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(flags: list[str], said: str) -> None:
+    with pytest.raises(ConfigurationError, match=said):
+        command(["feel", *flags])
+
+
+def test_keys_are_taken_one_by_one_and_the_terminal_is_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    person, terminal = pty.openpty()
+    before = termios.tcgetattr(terminal)
+    with os.fdopen(terminal) as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        with typing(keys=True) as typed:
+            assert typed() == ""
+            os.write(person, b"2 ")
+            assert typed() == "2 "
+            assert not termios.tcgetattr(terminal)[3] & termios.ECHO
+        assert termios.tcgetattr(terminal) == before
+        os.close(person)
+        with typing(keys=False) as typed:
+            assert typed() is None
+
+
+# A real controller to hidapi
+
+
+class Played:
+    """Controller whose R2 follows a clock of its own."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.handle, self.now_s = FakeHandle(), 0.0
+        self.backend = FakeBackend({0x0CE6: {b"/dev/hidraw93": self.handle}})
+        self.travel: Callable[[float], float] = lambda _: 0.0
+        self.at_turn: Callable[[], None] = lambda: None
+        monkeypatch.setattr(feelahead.commands.feel.command, "MonotonicClock", lambda: self)
+        monkeypatch.setattr(feelahead.commands.feel.command, "ReleaseGuard", contextlib.nullcontext)
+        monkeypatch.setattr("feelahead.commands.feel.loop.time.sleep", lambda _: None)
+
+    def now(self) -> float:
+        self.now_s += 0.004
+        self.at_turn()
+        self.handle.waiting = [build_input_report(ControllerState(r2=self.travel(self.now_s)))]
+        return self.now_s
+
+
+@pytest.fixture
+def played(monkeypatch: pytest.MonkeyPatch) -> Played:
+    return Played(monkeypatch)
+
+
+@pytest.mark.parametrize("way", ["duration", "signal", "error"])
+def test_a_wall_is_written_and_taken_back_however_it_ends(played: Played, way: str) -> None:
+    def at_turn() -> None:
+        if way != "duration" and played.handle.written:
+            if way == "error":
+                raise RuntimeError("as no clock should")
+            signal.raise_signal(signal.SIGINT)
+
+    played.at_turn = at_turn
+    flags = ["--pattern", "wall", *(["--duration", "100"] if way == "duration" else [])]
+    if way == "error":
+        with pytest.raises(RuntimeError):
+            feel(flags, played.backend)
+    else:
+        assert feel(flags, played.backend) == 0
+    wall, released = map(parse_output_report, played.handle.written)
+    assert wall.l2 == wall.r2 == (0, 0, 0, 0, *(6 * (MAX_STRENGTH,)))
+    assert released == RELEASED
+    assert played.handle.closed == played.handle.times_opened
+
+
+def test_it_waits_for_the_controller_that_was_asked_for_and_names_the_others(
+    played: Played, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # Each look opens and closes it twice; the note of the first two was shown before the third.
+    played.at_turn = lambda: signal.raise_signal(signal.SIGINT) if played.handle.closed >= 6 else None
+    assert feel(["--controller", "aa:bb:cc:dd:ee:ff"], played.backend) == 0
+    assert f"aa:bb:cc:dd:ee:ff is not there, only: {ADDRESS}; waiting for one" in capsys.readouterr().out
+    assert played.handle.written == []
+
+
+def test_a_measurement_is_stored_for_the_controller_beside_the_other_triggers(
+    played: Played, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_forces(forces_path(ADDRESS), ADDRESS, ControllerForces(l2=FORCES))
+    played.travel = lambda now_s: 0.6 * (now_s % 2.0 > 1.0)
+    measured = ForceMeasurement("r2")
+
+    def lines() -> str:
+        return f"{200 + 30 * measured.strength}\n" if measured.yielded else ""
+
+    monkeypatch.setattr(feelahead.commands.feel.command, "ForceMeasurement", lambda _: measured)
+    monkeypatch.setattr(feelahead.commands.feel.command, "typing", lambda **_: contextlib.nullcontext(lines))
+    assert feel(["--measure"], played.backend) == 0
+    forces = load_forces(ADDRESS)
+    assert forces.l2 == FORCES
+    assert forces.r2 is not None
+    assert forces.r2.pulls_n == pytest.approx([(200 + 30 * strength) * 9.80665e-3 for strength in range(9)], abs=1e-3)
+    assert f"stored: {forces_path(ADDRESS)}" in capsys.readouterr().out
+    assert parse_output_report(played.handle.written[-1]) == RELEASED
+
+
+def test_a_measurement_that_is_given_up_stores_nothing(
+    played: Played, own_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(feelahead.commands.feel.command, "typing", lambda **_: contextlib.nullcontext(lambda: None))
+    assert feel(["--measure"], played.backend) == 1
+    assert "given up: nothing was stored" in capsys.readouterr().out
+    assert not own_folder.exists()
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP, signal.SIGKILL])
+def test_the_triggers_are_released_however_its_process_ends(tmp_path: Path, number: signal.Signals) -> None:
+    os.mkfifo(tmp_path / "hidraw3")
+    (tmp_path / "plugged").touch()
+    controller = os.open(tmp_path / "hidraw3", os.O_RDWR)
+    program = [sys.executable, str(ROOT / "tests/helpers/plugged_operator.py"), str(tmp_path)]
+    with subprocess.Popen(
+        [*program, "feel", "--pattern", "wall"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        start_new_session=True,
+    ) as process:
+        try:
+            assert max(parse_output_report(os.read(controller, REPORT_LENGTH)).r2 or ()) == MAX_STRENGTH
+            assert process.stdout is not None
+            # This test itself is a second writer.
+            expected = f"({os.getpid()}) holds the controller open for writing, too".encode()
+            assert any(expected in line for line in process.stdout)
+            process.send_signal(number)
+            assert process.wait(LIMIT_S) == (-9 if number is signal.SIGKILL else 0)
+            assert parse_output_report(os.read(controller, REPORT_LENGTH)).r2 == FREE_TRIGGER
+        finally:
+            process.kill()
+            os.close(controller)
