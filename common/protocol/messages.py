@@ -21,7 +21,6 @@ from common.protocol.session import SessionState
 
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
-
 MotionState = Literal["disarmed", "armed", "stopped"]
 OnsetDistances = tuple[float, float, float, float, float, float, float, float]
 Compensation = Literal["operator", "robot"]
@@ -203,8 +202,9 @@ class LeaseNotice(Message, frozen=True, tag="lease"):
     """Present probability P of eq. 10."""
     tuned: _Number = 0
     """Number of the receiver's newest Tune that arrived, granted or not."""
-    marked: tuple[_Number, _Words] = (0, "")
-    """Number of the receiver's newest Mark that arrived, and why it was refused; empty if it was accepted."""
+    marked: _Number = 0
+    mark_refused: _Words = ""
+    """Why the receiver's newest Mark, of the number `marked`, was refused; empty if it was accepted."""
 
 
 class LinkReport(Message, frozen=True, tag="report"):

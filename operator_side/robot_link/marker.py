@@ -53,7 +53,7 @@ class Marker:
         elif kind not in ("start", "reset") and not self._open:
             self._refuse(kind, "no episode has begun; valid after: start")
         else:
-            self._number = max(self._number, lease.marked[0]) + 1
+            self._number = max(self._number, lease.marked) + 1
             self._waiting.append((self._number, kind, now_s))
             if kind != "reset":
                 self._count(kind, now_s)
@@ -70,13 +70,12 @@ class Marker:
 
     def follow(self, notice: LeaseNotice, now_s: float) -> None:
         """Take a notice, which may answer the oldest mark."""
-        number, refused = notice.marked
-        if not self._waiting or number != self._waiting[0][0]:
+        if not self._waiting or notice.marked != self._waiting[0][0]:
             return
         kind = self._waiting.popleft()[1]
         self._sent_s = -math.inf
-        if refused:
-            self._refuse(kind, refused)
+        if notice.mark_refused:
+            self._refuse(kind, notice.mark_refused)
         elif kind == "reset":
             self._count(kind, now_s)
 

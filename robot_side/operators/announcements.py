@@ -98,7 +98,8 @@ class Announcements:
             may_tune=self._tuning.permitted,
             probability=self._tuning.probability,
             tuned=participant.tuned,
-            marked=participant.marked,
+            marked=participant.marked[0],
+            mark_refused=participant.marked[1],
         )
         _, *said = msgspec.structs.astuple(notice)
         self._answers.append(Answer(participant.peer, encode(notice), everywhere=said != participant.noticed))

@@ -214,7 +214,8 @@ EVERYDAY: tuple[AnyMessage, ...] = (
         True,
         0.99,
         12,
-        (12, "only the owner may"),
+        12,
+        "only the owner may",
     ),
     control.LinkReport(
         FULL, 123456.7, 1234.5, 0.123, "30 Hz, quality 75, size 0.5", "pictures 12 (rate), scene 3 (queue)"

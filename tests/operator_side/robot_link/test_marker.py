@@ -39,7 +39,9 @@ class Desk(Bench):
 
     def tell(self) -> None:
         notice = LeaseNotice(self.robot.stamp(self.now_s), session=self.session, why="", token=7, waiting=0)
-        self.side.receive(encode(msgspec.structs.replace(notice, marked=self.answer)), self.now_s)
+        self.side.receive(
+            encode(msgspec.structs.replace(notice, marked=self.answer[0], mark_refused=self.answer[1])), self.now_s
+        )
 
     def marks(self, for_s: float, *buttons: Button) -> list[tuple[int, EpisodeMark]]:
         """Hold the buttons for `for_s`; return the marks sent meanwhile."""

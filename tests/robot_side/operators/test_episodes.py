@@ -31,7 +31,7 @@ def mark(bench: Bench, operator: Operator, number: int, kind: EpisodeMark) -> tu
     bench.robot.receive(operator.peer, encode(Mark(operator.link.stamp(bench.now_s), number, kind)), bench.now_s)
     bench.tick()
     assert operator.notice is not None
-    return operator.notice.marked
+    return operator.notice.marked, operator.notice.mark_refused
 
 
 def test_the_owners_marks_count_once_each_and_are_answered_at_once() -> None:
