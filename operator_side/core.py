@@ -31,6 +31,7 @@ from operator_side.hands.newest import Hands
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.robot_link.commanding import HEARTBEAT_PERIOD_S, STOPPING, Commands, ToRobot
 from operator_side.robot_link.lease_state import LeaseState
+from operator_side.robot_link.marker import Marker
 from operator_side.robot_link.newest import STIFFNESS_EXPIRES_S, NewestStiffness, overtakes
 from operator_side.robot_link.tuner import Tuner
 
@@ -84,6 +85,7 @@ class OperatorSide:
         self._listeners = tuple(listeners)
         self._blindness = Blindness()
         self._standing = LeaseState()
+        self.marker = Marker(self._standing, self._hear)
 
     @property
     def lease(self) -> LeaseNotice | None:
@@ -122,6 +124,7 @@ class OperatorSide:
         arrival = self.link.arrived(message, now_s)
         if self.link.peer_epoch != known_epoch:
             self._standing.forget()
+            self.marker.forget()
         if isinstance(message, StiffnessUpdate):
             self._feel(message, arrival, now_s)
         elif isinstance(message, LeaseNotice) and arrival.fresh:
@@ -143,6 +146,7 @@ class OperatorSide:
         if not self._standing.owns:
             self._blindness.end()
             self.commands.stop_button.forget()
+        self.marker.follow(notice, now_s)
 
     def receive_view(self, payload: bytes, now_s: float) -> None:
         """Take one view payload; keep it if it is the newest telemetry of the robot side's present epoch."""
@@ -160,7 +164,9 @@ class OperatorSide:
     def read_state(self, state: ControllerState, now_s: float) -> None:
         """Take one state of the controller."""
         self._hear("state", state, now_s)
-        self._blindness.see_hands(released=self.hands.read(state, now_s).triggers_released)
+        intent = self.hands.read(state, now_s)
+        self._blindness.see_hands(released=intent.triggers_released)
+        self.marker.press(intent.mark, now_s)
 
     def tune(self, probability: float | None, link: str | None, now_s: float) -> None:
         """Take a tuning request for another P, another emulated link, or both; None leaves a value unchanged."""
@@ -211,6 +217,8 @@ class OperatorSide:
             messages += self.commands.hello(now_s)
         if (tune := self.tuner.due(self.lease, self.link, now_s)) is not None:
             messages.append(ToRobot(encode(tune)))
+        if (mark := self.marker.due(self.link, now_s)) is not None:
+            messages.append(ToRobot(encode(mark)))
         for one in self._listeners:
             one.on_motion(messages, now_s)
         return messages
@@ -285,6 +293,7 @@ class OperatorSide:
             "lease_states": self._standing.history,
             "stops_pressed_elsewhere": self.commands.stop_button.presses,
             "tuning": self.tuner.summary(),
+            "episodes": self.marker.summary(),
             "zones": self.haptics.rendering.zones(),
             "rendering": self.haptics.summary() | {"blind": self._blindness.times},
             "delay_ms": {

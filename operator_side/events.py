@@ -6,9 +6,10 @@ from typing import Literal
 from operator_side.controller.feel import Feel
 from operator_side.robot_link.commanding import ToRobot
 
-Input = Literal["received", "seen", "state", "tuned", "calibrated", "found", "lost", "stopped"]
+Input = Literal["received", "seen", "state", "tuned", "calibrated", "found", "lost", "stopped", "marked", "episode"]
 """Kind of an input, in the order above: a control payload; a view payload; a controller's state; a tuning request; a
-calibration; a controller found; a controller lost; an emergency stop pressed elsewhere than on the controller."""
+calibration; a controller found; a controller lost; an emergency stop pressed elsewhere than on the controller; a mark
+of an episode made elsewhere than there; a mark that counts, which follows from the others."""
 
 
 class Listener:

@@ -29,6 +29,8 @@ _KINDS: Final[dict[Input, Kind]] = {
     "found": Kind.FOUND,
     "lost": Kind.LOST,
     "stopped": Kind.STOPPED,
+    "marked": Kind.MARKED,
+    "episode": Kind.EPISODE,
 }
 
 

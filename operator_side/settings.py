@@ -28,6 +28,8 @@ class OperatorSettings(SideOptions):
     moves only while L1 is held. Options arms it, with both triggers released. R2 advances, L2 retreats, the left stick
     moves across, the right stick turns. Cross closes the gripper, square opens it, triangle changes the target, circle
     stops everything, and create hands the robot over to the observer that has waited longest.
+    In a recording the directional pad marks episodes: up starts one, right is success, left failure, down discards it.
+    R3 puts a simulated scene back, disarmed.
     """
 
     connect: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT")] = "tcp://127.0.0.1:5555"

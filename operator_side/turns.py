@@ -180,7 +180,7 @@ class OperatorTurns:
         return self._viewing.has_shown_picture or waited_s >= self._person_waits_s
 
     def _say_what_is_new(self) -> None:
-        for text in self._connection.take_notes():
+        for text in (*self._connection.take_notes(), *self._core.marker.take_notes()):
             self.note(text)
 
     def _surroundings(self, now_s: float) -> Surroundings:

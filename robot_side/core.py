@@ -94,6 +94,11 @@ class RobotSide:
         """Take one control payload from `peer`; drop a payload that is invalid, late, or not the operator's."""
         self._heard.on_received(peer, payload, now_s)
         self.session.receive(peer, payload, now_s)
+        for mark in self.session.episodes.take_accepted():
+            if mark == "reset":
+                self.grip.let_go()
+                self.sight.see(now_s)
+            self._heard.on_episode(mark, now_s)
 
     def tick(self, now_s: float) -> list[Outgoing]:
         """Run the pipeline once at `now_s`; return the messages to send. Listeners receive a failed tick, too."""
@@ -225,6 +230,7 @@ class RobotSide:
                 "stale": self.session.stale,
             },
             "lease": self.session.summary(),
+            "episodes": self.session.episodes.summary(),
             "delay_ms": {"to_robot": self.session.link.delay.summary_ms()},
             "gaps": {"to_robot": self.session.link.gaps},
             "driving_delay_ms": {"to_robot": self.session.driving_delay.summary_ms()},

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Final, Literal, NamedTuple, get_args
 
 from common.arrays import FloatArray
+from common.episode import EpisodeMark
 from robot_side.arm.port import ArmState
 from robot_side.laws.law import Situation
 from robot_side.laws.sensed import Sensed
@@ -56,6 +57,9 @@ class Listener:
     def on_received(self, peer: bytes, payload: bytes, now_s: float) -> None:
         """Take a control payload, before it is validated."""
 
+    def on_episode(self, mark: EpisodeMark, now_s: float) -> None:
+        """Take an accepted mark of an episode; after `reset` the scene is as at its start."""
+
     def on_step(self, step: Step) -> None:
         """Take the step of the turn that begins now, one of `steps`."""
 
@@ -72,9 +76,9 @@ class Listeners(Listener):
     def __init__(self, listeners: Sequence[Listener]) -> None:
         own: Final = {
             name: [getattr(one, name) for one in listeners if getattr(type(one), name) is not getattr(Listener, name)]
-            for name in ("on_received", "on_tick", "on_sent")
+            for name in ("on_received", "on_episode", "on_tick", "on_sent")
         }
-        self._received, self._ticks, self._sent = (tuple(found) for found in own.values())
+        self._received, self._episodes, self._ticks, self._sent = (tuple(found) for found in own.values())
         self._steps: dict[str, list[Callable[[Step], None]]] = {name: [] for name in get_args(Step)}
         for one in listeners:
             for name in one.steps:
@@ -84,6 +88,11 @@ class Listeners(Listener):
         """Pass the event on to the listeners."""
         for hear in self._received:
             hear(peer, payload, now_s)
+
+    def on_episode(self, mark: EpisodeMark, now_s: float) -> None:
+        """Pass it on."""
+        for hear in self._episodes:
+            hear(mark, now_s)
 
     def on_step(self, step: Step) -> None:
         """Pass the event on to the listeners."""

@@ -34,6 +34,7 @@ from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.kept_covers import SearchNotes
 from robot_side.laws.explanation import Explains
 from robot_side.laws.named import LAWS
+from robot_side.operators.episodes import Episodes
 from robot_side.operators.operator_session import OperatorSession
 from robot_side.operators.safety import Safety
 from robot_side.operators.tuning import Tuning
@@ -125,6 +126,7 @@ def build_parts(
         say(text)
     searching = None if announce is None else SearchNotes(announce)
     kinematics = MujocoKinematics(scene, settings.cover_m, searching)
+    camera = _camera(settings, scene, int(camera_noise))
     seen_elsewhere = None if beside is None else beside.objects(settings.roles, settings.camera.sd_m)
     # Before the first tick, as a search for spheres takes far longer than one.
     first = _as_loaded(scene, scene.roles) if settings.objects is None else perceived([], [], 0.0)
@@ -145,7 +147,7 @@ def build_parts(
     return SceneParts(
         arm=arm,
         kinematics=kinematics,
-        camera=seen_elsewhere or _camera(settings, scene, int(camera_noise)),
+        camera=seen_elsewhere or camera,
         law=law,
         explains=law,
         surroundings=surroundings,
@@ -154,6 +156,7 @@ def build_parts(
             Safety(settings.safety),
             settings.seed,
             Tuning(settings.probability, law.expect if settings.permit_tuning else None),
+            _episodes(settings, arm, camera),
         ),
         loop_age=LoopAge(settings.assumed_delay_s),
         limits=joint_limits,
@@ -167,6 +170,19 @@ def build_parts(
         seed=settings.seed,
         notes=(*notes, *late),
     )
+
+
+def _episodes(settings: RobotSettings, arm: MujocoArm | RemoteArm, camera: MujocoCamera) -> Episodes:
+    """Return the judge of marks: a driver's arm does not go home by itself, nor do objects that are seen elsewhere."""
+    beside = [f"--{what}" for what in ("arm", "objects") if getattr(settings, what) is not None]
+    if beside or not isinstance(arm, MujocoArm):
+        return Episodes(refuses=f"{' and '.join(beside)}: a driver's things stay; valid: all simulated")
+
+    def put_back() -> None:
+        arm.put_back()
+        camera.put_back()
+
+    return Episodes(put_back)
 
 
 def _arm(

@@ -98,8 +98,8 @@ class RobotTurns:
             self._sockets.refresh_keys()
             for text in self._sockets.news():
                 process.note(text)
-        tuning = self._core.session.tuning
-        for text in tuning.take_notes():
+        tuning, episodes = self._core.session.tuning, self._core.session.episodes
+        for text in (*tuning.take_notes(), *episodes.take_notes()):
             process.note(text)
         if (words := tuning.take_link()) is not None:
             self._sending.tune(words)

@@ -20,6 +20,7 @@ from common.protocol.messages import (
     Hello,
     LeaseNotice,
     LinkReport,
+    Mark,
     Message,
     MotionCommand,
     MotionState,
@@ -88,7 +89,7 @@ class TelemetryOnWire(Message, frozen=True, tag="telemetry"):
     field: bytes
 
 
-AnyOnWire = Hello | MotionCommand | Watch | Tune | LeaseNotice | LinkReport | StiffnessOnWire | TelemetryOnWire
+AnyOnWire = Hello | MotionCommand | Watch | Tune | Mark | LeaseNotice | LinkReport | StiffnessOnWire | TelemetryOnWire
 
 
 def packed(message: Message) -> Message:
@@ -102,7 +103,7 @@ def packed(message: Message) -> Message:
 
 def unpacked(
     message: AnyOnWire,
-) -> Hello | MotionCommand | Watch | Tune | LeaseNotice | LinkReport | StiffnessUpdate | Telemetry:
+) -> Hello | MotionCommand | Watch | Tune | Mark | LeaseNotice | LinkReport | StiffnessUpdate | Telemetry:
     """Return the unpacked form of a received message; raises ValueError or struct.error for an invalid binary field."""
     if isinstance(message, StiffnessOnWire):
         return _unpack_stiffness(message)

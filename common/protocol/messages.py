@@ -1,6 +1,6 @@
 """Messages of the link, frozen; validated when made and when decoded.
 
-    operator ── Hello, MotionCommand, Watch, Tune ──▶ robot     control, ROUTER/DEALER
+    operator ── Hello, MotionCommand, Watch, Tune, Mark ──▶ robot   control, ROUTER/DEALER
     robot ── Hello, LeaseNotice, LinkReport, StiffnessUpdate ──▶ operator   control
     robot ── Telemetry ──▶ viewers                          view, PUB/SUB; view_messages.py has the others
 
@@ -14,13 +14,13 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from common.episode import EpisodeMark
 from common.limits import Finite, Share, check_limits
 from common.protocol.around import Around
 from common.protocol.session import SessionState
 
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
-
 MotionState = Literal["disarmed", "armed", "stopped"]
 OnsetDistances = tuple[float, float, float, float, float, float, float, float]
 Compensation = Literal["operator", "robot"]
@@ -176,6 +176,13 @@ class Tune(Message, frozen=True, tag="tune"):
     """Emulation of the link in both directions, in netem's words; empty for no emulation, None for no change."""
 
 
+class Mark(Message, frozen=True, tag="mark"):
+    """Numbered mark of an episode; `reset` asks for the scene to be put back. Repeated until a notice answers it."""
+
+    number: Annotated[int, Meta(ge=1, le=_LARGEST)]
+    kind: EpisodeMark
+
+
 class LeaseNotice(Message, frozen=True, tag="lease"):
     """Session state, at the robot side, of the operator who receives the notice; repeated in case a notice is lost."""
 
@@ -195,6 +202,9 @@ class LeaseNotice(Message, frozen=True, tag="lease"):
     """Present probability P of eq. 10."""
     tuned: _Number = 0
     """Number of the receiver's newest Tune that arrived, granted or not."""
+    marked: _Number = 0
+    mark_refused: _Words = ""
+    """Why the receiver's newest Mark, of the number `marked`, was refused; empty if it was accepted."""
 
 
 class LinkReport(Message, frozen=True, tag="report"):
@@ -213,13 +223,8 @@ class LinkReport(Message, frozen=True, tag="report"):
 
     def values(self) -> dict[str, float | str | None]:
         """Return the report as fields of a status (common/status)."""
-        return {
-            "rate_kbit_s": self.rate_kbit_s,
-            "queue_ms": self.queue_ms,
-            "lost_percent": None if self.lost is None else 100.0 * self.lost,
-            "pictures": self.pictures,
-            "held_back": self.held_back,
-        }
+        shown = {name: getattr(self, name) for name in ("rate_kbit_s", "queue_ms", "pictures", "held_back")}
+        return shown | {"lost_percent": None if self.lost is None else 100.0 * self.lost}
 
 
 class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -302,4 +307,4 @@ class Telemetry(Message, frozen=True, tag="telemetry", array_like=False):
     r2: Share
 
 
-AnyMessage = Hello | MotionCommand | Watch | Tune | LeaseNotice | LinkReport | StiffnessUpdate | Telemetry
+AnyMessage = Hello | MotionCommand | Watch | Tune | Mark | LeaseNotice | LinkReport | StiffnessUpdate | Telemetry

@@ -7,6 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import msgspec
 
+from common.episode import EpisodeMark
 from common.errors import RemoteProtocolError
 from common.protocol.codec import decode, decode_view
 from common.protocol.messages import MotionCommand, StiffnessUpdate, Telemetry
@@ -54,6 +55,8 @@ class Decoder:
         if entry.kind in (Kind.SENT, Kind.RECEIVED):
             rest = split_text(entry.content)[1]
             yield from self._message(entry, split_text(rest)[1] if entry.kind == Kind.SENT else rest)
+        elif entry.kind == Kind.EPISODE and (self.alone or self._side == "operator"):
+            yield _shown("/episode", entry.now_s, {"time_s": entry.now_s, "side": self._side}, _mark(entry))
         elif entry.kind == Kind.FRAME:
             self._frame_s = struct.unpack_from("<d", entry.content)[0]
         elif entry.kind in (Kind.TICK, Kind.MOTION) and entry.now_s >= self._ages_s + AGES_PERIOD_S - 1e-6:
@@ -91,6 +94,10 @@ class Decoder:
     def _since_ms(self, now_s: float, sent_s: float) -> float:
         """Return the time from the other side's stamp `sent_s` to `now_s`, in milliseconds."""
         return 1e3 * (now_s - (sent_s - self.offset_s))
+
+
+def _mark(entry: Entry) -> dict[str, Any]:
+    return {"mark": msgspec.json.decode(entry.content, type=EpisodeMark)}
 
 
 def view_message(payload: bytes) -> AnyViewMessage | Telemetry | None:

@@ -63,6 +63,10 @@ class Kind(IntEnum):
     """The controller's state (operator_side/controller/state.py), in MessagePack."""
     TOLD = 18
     """The effects sent to the controller (operator_side/controller/feel.py), in MessagePack."""
+    EPISODE = 19
+    """A mark of an episode counts (EpisodeMark of common/episode.py), as JSON; follows from other inputs."""
+    MARKED = 20
+    """A mark was made away from the controller, as JSON."""
 
 
 class Entry(NamedTuple):

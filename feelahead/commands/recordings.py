@@ -43,18 +43,20 @@ class ReplaySettings(Limited):
 
 
 @dataclass(frozen=True)
-class ExportSettings:
+class ExportSettings(Limited):
     """Turn a recording into files that other programs read.
 
     csv, parquet: a folder with a file for each topic at its original rate, and a file `joined` with all topics at
     100 Hz.
-    lerobot: a LeRobot dataset, v3.0, of one episode at 30 Hz.
+    lerobot: a LeRobot dataset, v3.0, at the pictures' own rate, or --fps, cut into the marked episodes.
     """
 
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
     """The recording."""
     format: Literal["csv", "parquet", "lerobot"] = "csv"
     """Format of the files."""
+    fps: Annotated[int, Meta(ge=1, le=1000)] | None = None
+    """Frames a second, for lerobot only; by default the median rate of the pictures, at most 30."""
     out: Path | None = None
     """Folder for the files, new or empty; unless given, a folder beside the recording, named after the recording."""
 
@@ -130,25 +132,30 @@ def _check(recording: Recording) -> int:
 def export(arguments: Sequence[str]) -> int:
     """Export a recording."""
     settings = parse_settings(ExportSettings, "feelahead export", arguments)
+    if settings.fps is not None and settings.format != "lerobot":
+        raise ConfigurationError(f"--fps {settings.fps}: valid with: --format lerobot")
     with _recording(settings.file) as recording:
         if settings.format != "csv":
             require_packages(f"--format {settings.format}", "pyarrow", extra="experiments")
         beside = recording.path.with_name(f"{recording.path.stem}-{settings.format}")
         folder = _empty_folder(settings.out or beside)
-        said = _export(settings.format, recording, folder)
+        said = _export(settings, recording, folder)
     sys.stdout.write(f"{folder}: {said}\n")
     return 0
 
 
-def _export(kind: str, recording: Recording, folder: Path) -> str:
-    """Write the files of the format `kind` into `folder`; return a description of them in words."""
+def _export(settings: ExportSettings, recording: Recording, folder: Path) -> str:
+    """Write the files into `folder`; return a description of them in words."""
+    from feelahead.recordings.demonstrations import read_demonstrations  # noqa: PLC0415
     from feelahead.recordings.lerobot import export_lerobot  # noqa: PLC0415
     from feelahead.recordings.tables import export_csv, export_parquet, read_tables  # noqa: PLC0415
 
     tables = read_tables(recording)
-    if kind == "lerobot":
-        return f"1 episode, {export_lerobot(recording, tables, folder)} frames"
-    return ", ".join((export_csv if kind == "csv" else export_parquet)(tables, folder))
+    if settings.format == "lerobot":
+        frames = read_demonstrations(recording, tables, settings.fps)
+        export_lerobot(recording, frames, folder)
+        return frames.words()
+    return ", ".join((export_csv if settings.format == "csv" else export_parquet)(tables, folder))
 
 
 def _empty_folder(path: Path) -> Path:

@@ -1,4 +1,4 @@
-"""Export of a recording as one episode of a LeRobot dataset, v3.0, for learning from demonstrations.
+"""Export of a recording's episodes as a LeRobot dataset, v3.0, for learning from demonstrations.
 
 data/chunk-000/file-000.parquet            one row for each frame, pictures as encoded bytes
 meta/info.json, stats.json, tasks.parquet
@@ -9,106 +9,82 @@ import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
 from common.arrays import FloatArray
-from common.errors import ConfigurationError
-from common.protocol.view_messages import VIEW_NAMES
-from common.recording.images import read_image
 from common.recording.reading import Recording
-from feelahead.recordings.tables import Table, Tables
+from feelahead.recordings.demonstrations import Demonstrations, Episode, Picture
 
-FRAMES_HZ: Final = 30
 _VERSION: Final = "v3.0"
 _FILE: Final = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 _TASK: Final = "reach the target, grasp it, lift it and set it down"
-_STRENGTHS: Final = 8
-_ZONES: Final = 10
 _SAMPLED_PICTURES: Final = 20
 """About the maximum number of pictures from which the statistics are computed."""
 _ENLARGED_QUALITY: Final = 90
-_ACTION: Final = {
-    "l2": "command.l2",
-    "r2": "command.r2",
-    "lateral_right": "command.lateral.0",
-    "lateral_up": "command.lateral.1",
-    "turning_right": "command.turning.0",
-    "turning_up": "command.turning.1",
-    "gripper": "command.gripper",
-}
 
 
-class Picture(NamedTuple):
-    """One picture of a camera."""
-
-    time_s: float
-    """Time since the recording began"""
-    jpeg: bytes
-
-
-def export_lerobot(recording: Recording, tables: Tables, folder: Path) -> int:
-    """Write the dataset into `folder`; return the number of frames.
-
-    Raises ConfigurationError if the recording has no states of the arm or no commands.
-    """
+def export_lerobot(recording: Recording, frames: Demonstrations, folder: Path) -> None:
+    """Write the dataset into `folder`."""
     import pyarrow  # noqa: PLC0415
     from pyarrow import parquet  # noqa: PLC0415
 
-    joined = tables.joined(FRAMES_HZ)
-    seen = {view: pictures(recording, view) for view in VIEW_NAMES}
-    vectors = _vectors(joined)
-    first = _first_whole_row(vectors, {view: found for view, found in seen.items() if found}, joined)
-    times_s = np.array(joined.times_s[first:])
-    count = len(times_s)
+    values: dict[str, Any] = {name: vector.values for name, vector in frames.vectors.items()}
+    values |= _counters(frames)
     features: dict[str, Any] = {}
     columns: dict[str, Any] = {}
-    stats: dict[str, Any] = {}
-    for name, parts in vectors.items():
-        values = np.stack([joined.numbers(column)[first:] for column in parts.values()], axis=1).astype(np.float32)
-        # The format allows no gaps: a column with gaps, such as the stiffness, repeats its last value.
-        values = _held(values)
-        features[name] = {"dtype": "float32", "shape": [len(parts)], "names": list(parts)}
-        columns[name] = pyarrow.FixedSizeListArray.from_arrays(pyarrow.array(values.ravel()), len(parts))
-        stats[name] = _statistics(values.astype(np.float64))
-    for view, found in seen.items():
-        if found:
-            shown, (width, height) = _of_one_size(_newest(found, times_s))
-            key = f"observation.images.{view}"
-            features[key] = {"dtype": "image", "shape": [height, width, 3], "names": ["height", "width", "channels"]}
-            columns[key] = pyarrow.array(
-                [{"bytes": picture.jpeg, "path": f"frame-{row:06d}.jpg"} for row, picture in enumerate(shown)],
-                type=pyarrow.struct([("bytes", pyarrow.binary()), ("path", pyarrow.string())]),
-            )
-            stats[key] = _picture_statistics(shown)
-    counters: dict[str, Any] = {
-        "timestamp": (np.arange(count) / FRAMES_HZ).astype(np.float32),
-        "frame_index": np.arange(count, dtype=np.int64),
-        "episode_index": np.zeros(count, dtype=np.int64),
-        "index": np.arange(count, dtype=np.int64),
-        "task_index": np.zeros(count, dtype=np.int64),
-    }
-    for name, values in counters.items():
-        features[name] = {"dtype": str(values.dtype), "shape": [1], "names": None}
-        columns[name] = pyarrow.array(values)
-        stats[name] = _statistics(values[:, None].astype(np.float64))
+    for name, column in values.items():
+        parts = frames.vectors[name].names if name in frames.vectors else None
+        features[name] = {"dtype": str(column.dtype), "shape": [1], "names": None}
+        columns[name] = pyarrow.array(column.ravel())
+        if parts is not None:
+            features[name] |= {"shape": [len(parts)], "names": list(parts)}
+            columns[name] = pyarrow.FixedSizeListArray.from_arrays(columns[name], len(parts))
+    seen: dict[str, list[Picture]] = {}
+    for view, pictures in frames.shown.items():
+        key = f"observation.images.{view}"
+        seen[key], (width, height) = _of_one_size(pictures)
+        features[key] = {"dtype": "image", "shape": [height, width, 3], "names": ["height", "width", "channels"]}
+        columns[key] = pyarrow.array(
+            [{"bytes": picture.jpeg, "path": f"frame-{row:06d}.jpg"} for row, picture in enumerate(seen[key])],
+            type=pyarrow.struct([("bytes", pyarrow.binary()), ("path", pyarrow.string())]),
+        )
+
+    def stats(first: int, end: int) -> dict[str, Any]:
+        numbers = {name: _statistics(column[first:end].astype(np.float64)) for name, column in values.items()}
+        return numbers | {key: _picture_statistics(shown[first:end]) for key, shown in seen.items()}
+
     table = pyarrow.table(columns)
     hints = {"info": {"features": {name: _hint(feature) for name, feature in features.items()}}}
     table = table.replace_schema_metadata({"huggingface": json.dumps(hints)})
     parquet.write_table(table, _made(folder / "data" / _first_file()), compression="snappy")
     parquet.write_table(_tasks(pyarrow), _made(folder / "meta" / "tasks.parquet"))
-    parquet.write_table(pyarrow.table(_episode(count, stats)), _made(folder / "meta" / "episodes" / _first_file()))
-    (folder / "meta" / "info.json").write_text(json.dumps(_info(recording, features, count), indent=4) + "\n")
-    (folder / "meta" / "stats.json").write_text(json.dumps(stats, indent=4) + "\n")
-    return count
+    rows = [_episode(number, one, stats(one.first, one.end)) for number, one in enumerate(frames.episodes)]
+    parquet.write_table(pyarrow.Table.from_pylist(rows), _made(folder / "meta" / "episodes" / _first_file()))
+    info = _info(recording, features, frames)
+    (folder / "meta" / "info.json").write_text(json.dumps(info, indent=4) + "\n")
+    (folder / "meta" / "stats.json").write_text(json.dumps(stats(0, len(frames.times_s)), indent=4) + "\n")
 
 
-def pictures(recording: Recording, view: str) -> list[Picture]:
-    """Return all pictures of the camera `view`, in order of time."""
-    first_ns = recording.began_ns()
-    messages = recording.messages([f"/camera/{view}"])
-    return [Picture(1e-9 * (message.log_ns - first_ns), read_image(message.content).jpeg) for message in messages]
+def _counters(frames: Demonstrations) -> dict[str, Any]:
+    """Return the columns (n, 1) that number the frames, and say where episodes end and succeed if anybody said."""
+    count = len(frames.times_s)
+    lengths = [one.end - one.first for one in frames.episodes]
+    within = np.concatenate([np.arange(length) for length in lengths])
+    counters = {
+        "timestamp": (within / frames.rate_hz).astype(np.float32),
+        "frame_index": within,
+        "episode_index": np.repeat(np.arange(len(lengths)), lengths),
+        "index": np.arange(count),
+        "task_index": np.zeros(count, dtype=np.int64),
+    }
+    if any(one.success is not None for one in frames.episodes):
+        done, success = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+        done[[one.end - 1 for one in frames.episodes]] = True
+        success[[one.end - 1 for one in frames.episodes if one.success]] = True
+        counters |= {"next.done": done, "next.success": success}
+    return {name: values[:, None] for name, values in counters.items()}
 
 
 def _of_one_size(shown: list[Picture]) -> tuple[list[Picture], tuple[int, int]]:
@@ -129,64 +105,6 @@ def _of_one_size(shown: list[Picture]) -> tuple[list[Picture], tuple[int, int]]:
         one.resize(largest).save(enlarged, "JPEG", quality=_ENLARGED_QUALITY)
         alike.append(picture._replace(jpeg=enlarged.getvalue()))
     return alike, largest
-
-
-def _vectors(joined: Table) -> dict[str, dict[str, str]]:
-    """Return for each feature of the dataset its parts, and the joined table's column for each part."""
-    joints = [column for column in joined.columns() if column.startswith("arm.position_rad.")]
-    if not joints or "command.r2" not in joined.columns():
-        raise ConfigurationError(
-            "--format lerobot: arm states or commands are missing; valid: a recording of both sides"
-        )
-    state = {f"joint_{index}_rad": column for index, column in enumerate(joints)}
-    velocity = {f"joint_{index}_rad_s": f"arm.velocity_rad_s.{index}" for index in range(len(joints))}
-    vectors = {
-        "observation.state": state | {"gripper_opening_m": "arm.gripper_opening_m"},
-        "observation.velocity": velocity,
-        "action": _ACTION,
-    }
-    if "stiffness.r2.stiffness" in joined.columns():
-        vectors["observation.stiffness"] = {f"{side}_stiffness": f"stiffness.{side}.stiffness" for side in ("l2", "r2")}
-        vectors["observation.onset_distances"] = {
-            f"{side}_{kind}_{strength + 1}_m": f"stiffness.{side}.{kind}_m.{strength}"
-            for side in ("l2", "r2")
-            for kind in ("fast", "slow")
-            for strength in range(_STRENGTHS)
-        }
-    if "felt.r2.0" in joined.columns():
-        vectors["observation.felt"] = {
-            f"{side}_zone_{zone}": f"felt.{side}.{zone}" for side in ("l2", "r2") for zone in range(_ZONES)
-        }
-    return vectors
-
-
-def _first_whole_row(vectors: Mapping[str, Mapping[str, str]], seen: Mapping[str, list[Picture]], joined: Table) -> int:
-    """Return the first row from which every required column has a value and every camera a picture."""
-    needed = [*vectors["observation.state"].values(), *vectors["action"].values()]
-    if "observation.stiffness" in vectors:
-        needed += vectors["observation.stiffness"].values()
-    begins = [int(np.argmax(np.isfinite(joined.numbers(column)))) for column in needed]
-    begins += [int(np.searchsorted(np.array(joined.times_s), found[0].time_s)) for found in seen.values()]
-    first = max(begins)
-    if first >= len(joined.times_s):
-        raise ConfigurationError(
-            "--format lerobot: the recording ends before it has every required value; valid: a longer one"
-        )
-    return first
-
-
-def _held(values: Any) -> Any:
-    """Fill each gap with the last value before it, or with 0 if there is none."""
-    filled = values.copy()
-    rows = np.where(np.isfinite(filled), np.arange(len(filled))[:, None], -1)
-    newest = np.maximum.accumulate(rows, axis=0)
-    filled = np.take_along_axis(filled, np.maximum(newest, 0), axis=0)
-    return np.where(newest >= 0, filled, 0.0).astype(np.float32)
-
-
-def _newest(found: list[Picture], times_s: FloatArray) -> list[Picture]:
-    rows = np.searchsorted([picture.time_s for picture in found], times_s + 1e-9, side="right") - 1
-    return [found[max(0, row)] for row in rows]
 
 
 def _statistics(values: FloatArray) -> dict[str, Any]:
@@ -232,27 +150,27 @@ def _tasks(pyarrow: Any) -> Any:
     return table.replace_schema_metadata({"pandas": json.dumps(frame)})
 
 
-def _episode(count: int, stats: Mapping[str, Any]) -> dict[str, list[Any]]:
-    row: dict[str, Any] = {"episode_index": 0, "tasks": [_TASK], "length": count}
-    row |= {"data/chunk_index": 0, "data/file_index": 0, "dataset_from_index": 0, "dataset_to_index": count}
+def _episode(number: int, episode: Episode, stats: Mapping[str, Any]) -> dict[str, Any]:
+    row: dict[str, Any] = {"episode_index": number, "tasks": [_TASK], "length": episode.end - episode.first}
+    row |= {"data/chunk_index": 0, "data/file_index": 0}
+    row |= {"dataset_from_index": episode.first, "dataset_to_index": episode.end, "success": episode.success}
     row |= {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
-    row |= {f"stats/{name}/{figure}": value for name, found in stats.items() for figure, value in found.items()}
-    return {name: [value] for name, value in row.items()}
+    return row | {f"stats/{name}/{figure}": value for name, found in stats.items() for figure, value in found.items()}
 
 
-def _info(recording: Recording, features: Mapping[str, Any], count: int) -> dict[str, Any]:
+def _info(recording: Recording, features: Mapping[str, Any], frames: Demonstrations) -> dict[str, Any]:
     settings = recording.headers.get("robot", {}).get("settings", {})
     return {
         "codebase_version": _VERSION,
         "robot_type": Path(settings["model"]).stem if settings.get("model") else "feelahead",
-        "total_episodes": 1,
-        "total_frames": count,
+        "total_episodes": len(frames.episodes),
+        "total_frames": len(frames.times_s),
         "total_tasks": 1,
         "chunks_size": 1000,
         "data_files_size_in_mb": 100,
         "video_files_size_in_mb": 500,
-        "fps": FRAMES_HZ,
-        "splits": {"train": "0:1"},
+        "fps": frames.rate_hz,
+        "splits": {"train": f"0:{len(frames.episodes)}"},
         "data_path": f"data/{_FILE}.parquet",
         "video_path": None,
         "features": features,

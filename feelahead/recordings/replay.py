@@ -121,6 +121,7 @@ _INPUTS: Final[Mapping[int, Callable[[OperatorSide, bytes, float], object]]] = {
     Kind.LOST: lambda core, _, now_s: core.controller_lost(now_s),
     Kind.WATCHED: lambda core, _, now_s: core.link.stamp(now_s),
     Kind.STOPPED: lambda core, _, now_s: core.press_stop(now_s),
+    Kind.MARKED: lambda core, content, now_s: core.marker.mark(msgspec.json.decode(content), now_s),
     Kind.TUNED: lambda core, content, now_s: core.tune(**msgspec.json.decode(content), now_s=now_s),
 }
 """For each kind of entry, the call that gives the recorded input to the operator side's core."""

@@ -27,7 +27,7 @@ _STAMPS: Final = ("time_s", "now_s", "sent_s", "sequence", "side")
 """Columns that the joined table leaves out."""
 _TOPICS: Final = (
     *("/stiffness", "/command", "/ages", "/telemetry", "/enlargement", "/overlap"),
-    *("/robot/status", "/operator/status", "/operator/facts"),
+    *("/robot/status", "/operator/status", "/operator/facts", "/episode"),
 )
 _JOINED: Final = (
     *("stiffness", "command", "felt", "controller", "arm"),

@@ -5,6 +5,7 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Final
 
+from common.episode import EpisodeMark
 from operator_side.controller.state import Button
 
 
@@ -18,6 +19,11 @@ class Action(Enum):
     OPEN_GRIPPER = "open the gripper while held"
     NEXT_TARGET = "next target"
     HAND_OVER = "hand the robot over to the observer that has waited longest"
+    START = "episode: start"
+    SUCCESS = "episode: success"
+    FAILURE = "episode: failure"
+    DISCARD = "episode: discard"
+    RESET = "put the scene back (disarmed, simulation only)"
 
 
 BUTTON_OF: Final[Mapping[Action, Button]] = MappingProxyType(
@@ -29,9 +35,24 @@ BUTTON_OF: Final[Mapping[Action, Button]] = MappingProxyType(
         Action.OPEN_GRIPPER: Button.SQUARE,
         Action.NEXT_TARGET: Button.TRIANGLE,
         Action.HAND_OVER: Button.CREATE,
+        Action.START: Button.UP,
+        Action.SUCCESS: Button.RIGHT,
+        Action.FAILURE: Button.LEFT,
+        Action.DISCARD: Button.DOWN,
+        Action.RESET: Button.R3,
     }
 )
 """Button for each action, with the sides not swapped."""
+MARKS: Final[Mapping[Action, EpisodeMark]] = MappingProxyType(
+    {
+        Action.START: "start",
+        Action.SUCCESS: "success",
+        Action.FAILURE: "failure",
+        Action.DISCARD: "discard",
+        Action.RESET: "reset",
+    }
+)
+"""Mark of an episode for each action that makes one."""
 _SWAPPED_BUTTON_OF: Final[Mapping[Action, Button]] = MappingProxyType({**BUTTON_OF, Action.RUN: Button.R1})
 
 

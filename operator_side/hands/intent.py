@@ -3,8 +3,9 @@
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
+from common.episode import EpisodeMark
 from operator_side.controller.state import ControllerState, Stick
-from operator_side.hands.button_map import Action, button_of
+from operator_side.hands.button_map import MARKS, Action, button_of
 from operator_side.hands.travel_calibration import TravelCalibration
 
 _DEFAULT_CALIBRATION: Final = TravelCalibration()
@@ -28,6 +29,8 @@ class OperatorIntent:
     next_target: bool = False
     """True while the button is held; each change from false to true selects the next target."""
     hand_over: bool = False
+    mark: EpisodeMark | None = None
+    """Mark of an episode whose button is held; each change to another one but None makes that mark"""
     gripper: Literal[-1, 0, 1] = 0
     """-1 opens the gripper, 1 closes it, 0 leaves it, also while both buttons are held."""
     raw: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
@@ -72,6 +75,7 @@ def operator_intent(
         emergency_stop=Action.EMERGENCY_STOP in held,
         next_target=Action.NEXT_TARGET in held,
         hand_over=Action.HAND_OVER in held,
+        mark=next((mark for action, mark in MARKS.items() if action in held), None),
         gripper=gripper,
         raw=(state.l2, state.r2),
     )

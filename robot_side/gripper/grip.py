@@ -30,6 +30,10 @@ class Grip:
         """Index of the held object among the perceived objects; None if nothing is held."""
         return None if self.held is None else self.held.index
 
+    def let_go(self) -> None:
+        """Hold nothing."""
+        self.held, self.touchdown = None, Touchdown()
+
     def follow(self, objects: PerceivedObjects, pose: GripperPose, state: ArmState, rises_m_s: float) -> None:
         """Detect grip, release and touchdown of an object.
 
@@ -38,7 +42,7 @@ class Grip:
         if state.gripper_holding:
             self._held_s = state.time_s
         if self.held is not None and state.time_s - self._held_s > _LET_GO_S:
-            self.held, self.touchdown = None, Touchdown()
+            self.let_go()
         elif self.held is None and state.gripper_holding:
             index = gripped_object(self._surroundings.see(objects), pose.tool_position_m, state.gripper_opening_m)
             if index is not None:

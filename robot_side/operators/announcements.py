@@ -38,7 +38,7 @@ class Announcements:
         self._answers: list[Answer] = []
         self._answered_stranger_s = -math.inf
         self._noticed_s = -math.inf
-        self._noticed: list[tuple[int, SessionState, int]] = []
+        self._noticed: list[tuple[int, SessionState, int, tuple[int, str]]] = []
         self._noticed_token = 0
 
     def stamp(self, now_s: float, link: LinkEnd | None = None) -> Header:
@@ -74,7 +74,7 @@ class Announcements:
 
     def take(self, now_s: float) -> list[Answer]:
         """Return the answers to send now. Lease notices for all are added when one changed, and every 0.1 s."""
-        standing = [(one.epoch, one.session.state, one.tuned) for one in self._lease.present()]
+        standing = [(one.epoch, one.session.state, one.tuned, one.marked) for one in self._lease.present()]
         changed = standing != self._noticed or self._lease.token != self._noticed_token
         if changed or now_s - self._noticed_s >= _NOTICE_PERIOD_S:
             self._noticed_s, self._noticed, self._noticed_token = now_s, standing, self._lease.token
@@ -98,6 +98,8 @@ class Announcements:
             may_tune=self._tuning.permitted,
             probability=self._tuning.probability,
             tuned=participant.tuned,
+            marked=participant.marked[0],
+            mark_refused=participant.marked[1],
         )
         _, *said = msgspec.structs.astuple(notice)
         self._answers.append(Answer(participant.peer, encode(notice), everywhere=said != participant.noticed))

@@ -32,6 +32,8 @@ class Participant:
         """Content of the last lease notice sent to this operator"""
         self.tuned = 0
         """Number of its newest request to tune"""
+        self.marked = 0, ""
+        """Number of its newest mark of an episode, and why that was refused; empty if it was accepted"""
 
     @property
     def state(self) -> SessionState:

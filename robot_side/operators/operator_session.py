@@ -8,11 +8,12 @@ from common.errors import OtherVersionError, RemoteProtocolError
 from common.peer_name import key_part
 from common.protocol.codec import decode
 from common.protocol.link_end import Arrival, LinkEnd
-from common.protocol.messages import Header, Hello, MotionCommand, Tune, Watch
+from common.protocol.messages import Header, Hello, Mark, MotionCommand, Tune, Watch
 from common.protocol.session import SessionEvent, SessionState
 from common.silence import counted_s
 from common.statistics import RunningStatistics
 from robot_side.operators.announcements import Announcements, Answer
+from robot_side.operators.episodes import Episodes
 from robot_side.operators.lease import MOST_OBSERVERS, Lease, Participant
 from robot_side.operators.safety import Permission, Safety
 from robot_side.operators.tuning import Tuning
@@ -32,11 +33,17 @@ class OperatorSession:
     """One owner and its observers: admits peers, and judges the order and validity of their messages."""
 
     def __init__(
-        self, new_link: Callable[[], LinkEnd], safety: Safety, seed: int = 0, tuning: Tuning | None = None
+        self,
+        new_link: Callable[[], LinkEnd],
+        safety: Safety,
+        seed: int = 0,
+        tuning: Tuning | None = None,
+        episodes: Episodes | None = None,
     ) -> None:
         """new_link: makes our end of the link to one more operator; all ends share our epoch."""
         self.safety = safety
         self.tuning = tuning or Tuning()
+        self.episodes = episodes or Episodes()
         self.lease = Lease(safety)
         self.rejected = 0
         """Number of payloads that were no valid message, or came from a peer that was not admitted"""
@@ -96,7 +103,7 @@ class OperatorSession:
             self.rejected += 1
             return
         from_robot = isinstance(message, Hello) and message.side == "robot"
-        if from_robot or not isinstance(message, Hello | MotionCommand | Tune | Watch):
+        if from_robot or not isinstance(message, Hello | MotionCommand | Tune | Mark | Watch):
             self.rejected += 1
             return
         participant = self.lease.find(message.header.epoch) or self._admit(peer, message, now_s)
@@ -120,12 +127,16 @@ class OperatorSession:
         elif arrival.fresh:
             self._follow(participant, message, now_s)
 
-    def _follow(self, participant: Participant, message: Hello | Tune | Watch, now_s: float) -> None:
+    def _follow(self, participant: Participant, message: Hello | Tune | Mark | Watch, now_s: float) -> None:
         """Process a message that is no motion command."""
         if isinstance(message, Watch):
             self.watchers.heard(participant.epoch, message, now_s)
         elif isinstance(message, Hello):
             self._announcements.answer(participant, now_s)
+        elif isinstance(message, Mark):
+            if message.number > participant.marked[0]:
+                owns, armed = participant is self.lease.owner, self.safety.state == "armed"
+                participant.marked = message.number, self.episodes.take(message.kind, owns=owns, armed=armed)
         elif message.number > participant.tuned:
             participant.tuned = message.number
             granted = self.tuning.take(message, now_s, owns=participant is self.lease.owner)
@@ -199,7 +210,9 @@ class OperatorSession:
             "tuning": self.tuning.summary(),
         }
 
-    def _admit(self, peer: bytes, message: Hello | MotionCommand | Tune | Watch, now_s: float) -> Participant | None:
+    def _admit(
+        self, peer: bytes, message: Hello | MotionCommand | Tune | Mark | Watch, now_s: float
+    ) -> Participant | None:
         """Admit a new epoch, which only a Hello can begin; None if the epoch is refused."""
         epoch = message.header.epoch
         if self.lease.has_ended(epoch):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from common.arrays import FloatArray
+from common.episode import EpisodeMark
 from common.roles import Role
 from common.statistics import BLOCK, RunningStatistics
 from robot_side.events import Listener, Tick
@@ -78,6 +79,13 @@ class RunFigures(Listener):
         if self._start_s is None:
             self._start_s = tick.now_s
         self._unread.append(tick)
+
+    def on_episode(self, mark: EpisodeMark, now_s: float) -> None:
+        """Forget what was lifted and placed once the scene was put back."""
+        del now_s
+        if mark == "reset":
+            self._read()
+            self._placing, self._held = Placing(), False
 
     def on_sent(self, now_s: float) -> None:
         """Evaluate the stored ticks in blocks, which is cheaper than one by one, and observe the truth."""

@@ -7,6 +7,9 @@ import struct
 from collections.abc import Callable
 from typing import Any, Final
 
+import msgspec
+
+from common.episode import EpisodeMark
 from common.recording.entries import Kind, entry, text
 from common.recording.provenance import provenance
 from robot_side.arm.port import ArmState
@@ -27,7 +30,11 @@ class Recorder(Listener):
 
     def on_received(self, peer: bytes, payload: bytes, now_s: float) -> None:
         """Note a payload."""
-        self._note((now_s, peer, payload))
+        self._note((Kind.RECEIVED, now_s, peer, payload))
+
+    def on_episode(self, mark: EpisodeMark, now_s: float) -> None:
+        """Note a mark of an episode."""
+        self._note((Kind.EPISODE, now_s, mark))
 
     def on_tick(self, tick: Tick) -> None:
         """Note a tick, even a failed one."""
@@ -50,8 +57,9 @@ class RobotEncoder:
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
         """Return the time of a note, and its entries; telemetry is given to `views`."""
         if not isinstance(noted, Tick):
-            now_s, peer, payload = noted
-            return now_s, entry(Kind.RECEIVED, now_s, text(peer), payload)
+            kind, now_s, *content = noted
+            parts = [msgspec.json.encode(*content)] if kind == Kind.EPISODE else [text(content[0]), content[1]]
+            return now_s, entry(kind, now_s, *parts)
         now_s, state, frame, sent_s, outgoing, _ = noted
         parts = []
         if state is not None and state is not self._state:

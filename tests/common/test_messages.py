@@ -203,8 +203,19 @@ EVERYDAY: tuple[AnyMessage, ...] = (
     MotionCommand(FULL, 0.51, 0.13, (0.1, -0.1), (0.2, -0.3), 1.0, run=True, token=70000, compensation="operator"),
     control.Watch(FULL, overview=True, first_person=True, scene=True),
     control.Tune(FULL, 12, 0.995, "delay 50ms 10ms distribution normal loss 1%"),
+    control.Mark(FULL, 12, "success"),
     control.LeaseNotice(
-        FULL, SessionState.STOPPED_READY, "the operator side began a new epoch", 70000, 8, 3, True, 0.99, 12
+        FULL,
+        SessionState.STOPPED_READY,
+        "the operator side began a new epoch",
+        70000,
+        8,
+        3,
+        True,
+        0.99,
+        12,
+        12,
+        "only the owner may",
     ),
     control.LinkReport(
         FULL, 123456.7, 1234.5, 0.123, "30 Hz, quality 75, size 0.5", "pictures 12 (rate), scene 3 (queue)"

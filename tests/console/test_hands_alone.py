@@ -74,6 +74,22 @@ def test_every_key_does_what_it_says(browser: Browser) -> None:
             assert moved <= {name}
 
 
+def test_keys_mark_episodes_in_any_state_and_drive_nothing(browser: Browser) -> None:
+    """Each press is one mark, also of a page that only watches; hold-to-run goes on beside it."""
+    marks = "window.sent.map(([, text]) => JSON.parse(text).mark).filter((mark) => mark)"
+    with hands_alone(browser) as alone:
+        keyboard = alone.page.raw.keyboard
+        keyboard.press("KeyN")
+        assert alone.page.ask(marks) == ["start"]
+        alone.run()
+        alone.page.ask("window.sent.splice(0)")
+        for code in ("KeyY", "KeyX", "KeyU", "KeyB"):
+            keyboard.press(code)
+        assert alone.page.ask(marks) == ["success", "failure", "discard", "reset"]
+        alone.let_pass(0.1)
+        assert alone.runs
+
+
 def _parts(value: object) -> tuple[float, ...]:
     return tuple(map(float, value)) if isinstance(value, Iterable) else (float(value),)  # type: ignore[arg-type]
 

@@ -95,7 +95,7 @@ ARROWS = """
     operator_side/dualsense/uhid: common common/realtime operator_side/dualsense/reports
         operator_side/dualsense/simulated
     operator_side/evdev: common operator_side/controller
-    operator_side/hands: operator_side/controller
+    operator_side/hands: common operator_side/controller
     operator_side/robot_link: common common/emulation common/protocol common/rate common/sockets common/status
         operator_side/hands
     operator_side/events.py: operator_side/controller operator_side/robot_link

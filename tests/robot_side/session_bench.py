@@ -13,6 +13,7 @@ from common.protocol.messages import (
     Hello,
     LeaseNotice,
     LinkReport,
+    Mark,
     MotionCommand,
     StiffnessUpdate,
     Telemetry,
@@ -161,7 +162,7 @@ class Bench:
                 if isinstance(message, Telemetry):
                     self.views.append(message)
                 elif (operator := self.operators.get(outgoing.peer)) is not None and not isinstance(
-                    message, MotionCommand | Watch | Tune | LinkReport
+                    message, MotionCommand | Watch | Tune | Mark | LinkReport
                 ):
                     operator.take(message, self.now_s)
             self.robot.observe(self.now_s)

@@ -15,6 +15,7 @@ from typing import Final
 
 import msgspec
 
+from common.episode import EpisodeMark
 from common.status.codes import Doing
 from operator_side.core import OperatorSide
 from operator_side.viewing.facts import HandsFacts
@@ -26,7 +27,7 @@ SILENCE_S: Final = 0.15
 REST_S: Final = 1.0
 """Seconds for which all keys must be up before hold-to-run counts."""
 _MOST_WISHES: Final = 16
-"""Maximum number of tuning requests kept between two turns of the loop."""
+"""Maximum number of tuning requests, and of marks, kept between two turns of the loop."""
 
 
 class DrivingPage:
@@ -58,6 +59,7 @@ class DrivingPage:
         self._giving_back: set[int] = set()
         self._give_back = False
         self.wishes: deque[TuneWish] = deque(maxlen=_MOST_WISHES)
+        self._marks: deque[EpisodeMark] = deque(maxlen=_MOST_WISHES)
 
     @property
     def driver(self) -> str | None:
@@ -74,6 +76,8 @@ class DrivingPage:
             return
         if message.tune is not None:
             self.wishes.append(message.tune)
+        if message.mark is not None:
+            self._marks.append(message.mark)
         if message.hands is not None:
             self._take(page, message.hands, now_s)
 
@@ -116,13 +120,15 @@ class DrivingPage:
         return given
 
     def follow(self, core: OperatorSide, now_s: float) -> None:
-        """Apply the pages' emergency stops and tuning requests; call it in every turn of the loop."""
+        """Apply the pages' emergency stops, tuning requests and marks; call it in every turn of the loop."""
         self.pictures.follow(core, None if self._newest is None else self._newest.shown_s, now_s)
         if self.stopping(now_s):
             core.press_stop(now_s)
         while self.wishes:
             wish = self.wishes.popleft()
             core.tune(wish.probability, wish.link, now_s)
+        while self._marks:
+            core.marker.mark(self._marks.popleft(), now_s)
 
     def facts(self, core: OperatorSide, now_s: float, *, person: bool) -> HandsFacts:
         """Return the facts for the pages. person: whether they may hand the controls back to a scripted person."""

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from common.episode import EpisodeMark
 from common.limits import Finite, Share
 
 Deflection = tuple[Annotated[float, Meta(ge=-1.0, le=1.0)], Annotated[float, Meta(ge=-1.0, le=1.0)]]
@@ -65,7 +66,8 @@ class TuneWish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class PageMessage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Message of a page: inputs, a tuning request, or both."""
+    """Message of a page: inputs, a tuning request, a mark of an episode, or several of them."""
 
     hands: PageHands | None = None
     tune: TuneWish | None = None
+    mark: EpisodeMark | None = None

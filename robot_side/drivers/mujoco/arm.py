@@ -112,6 +112,11 @@ class MujocoArm:
             np.array([(limits.velocity_rad_s, limits.acceleration_rad_s2, limits.deceleration_rad_s2)], LIMITS),
         )
         self._addresses = PLANT.bundle(self._plant)
+        self._start = mujoco.MjData(model)
+        mujoco.mj_copyData(self._start, model, data)
+        self._started = [
+            (array, array.copy()) for array in (self._plant.joints, self._plant.drives, self._plant.grippers)
+        ]
 
     @property
     def joint_count(self) -> int:
@@ -133,6 +138,18 @@ class MujocoArm:
         """
         if self._gripper is not None:
             self._gripper.command(closing, valid_until_s)
+
+    def put_back(self) -> None:
+        """Put the arm, the gripper and all objects back to their start, at rest; commands so far have expired."""
+        data, time_s = self._data, self._data.time
+        mujoco.mj_copyData(data, self._model, self._start)
+        data.time = time_s
+        for array, start in self._started:
+            array[:] = start
+        self._reference.expire()
+        if self._gripper is not None:
+            self._gripper.command(0.0, self._time_s)
+        self._state = None
 
     def give_way(self, clock: Clock) -> None:
         """Limit each later call of `state` to LONGEST_TURN_S and one step, by `clock`.

@@ -93,6 +93,10 @@ class MujocoCamera:
             self._newest = self._frame(now_s)
         return self._newest
 
+    def put_back(self) -> None:
+        """Forget the frames so far, as the objects were put back: a jump is no motion."""
+        self._newest, self._velocities = None, ObjectVelocities()
+
     def _frame(self, now_s: float) -> PerceivedObjects:
         data, offsets_m = self._scene.data, self._error.next_frame()
         if self._moving is None:

@@ -101,6 +101,10 @@ class JointReference:
             raise ValueError("joint_velocity_rad_s holds NaN or infinity; valid: finite numbers")
         self._valid_until_s = valid_until_s
 
+    def expire(self) -> None:
+        """Forget the command; the next step is not its end."""
+        self._valid_until_s, self._following = -math.inf, False
+
     def follows(self, time_s: float) -> tuple[bool, bool]:
         """Return whether there is a command to follow at `time_s`, and whether it has expired since the last call."""
         before, self._following = self._following, time_s < self._valid_until_s

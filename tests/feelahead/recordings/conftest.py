@@ -1,13 +1,14 @@
 """One recorded run of both sides in virtual time, for all tests that need a recording."""
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 from PIL import Image
 
+from common.episode import EpisodeMark
 from common.protocol.codec import encode
 from common.protocol.messages import Header
 from common.protocol.view_messages import VideoFrame
@@ -30,8 +31,14 @@ _FLUSH_BLOCKS = 15
 WALL_OFFSET_S = 1.7e9
 
 
-def record_loopback(path: Path, duration_s: float, **settings: Any) -> None:
-    """Record a run of the scripted person. settings: further settings, given to both sides."""
+def record_loopback(
+    path: Path,
+    duration_s: float,
+    doing: Mapping[float, Callable[[Loopback, float], None]] | None = None,
+    **settings: Any,
+) -> None:
+    """Record the scripted person's run; `settings` are both sides'. doing: done from that time on, in seconds."""
+    left = dict(doing or {})
     robot, operator = RobotSettings(**settings), OperatorSettings(**settings)
     notes: dict[str, list[Any]] = {"robot": [], "operator": []}
     run = Loopback(
@@ -54,6 +61,8 @@ def record_loopback(path: Path, duration_s: float, **settings: Any) -> None:
         content.take(source, HEADER + as_json({"side": side, **headers[side]}))
     for number in range(round(duration_s / _BLOCK_S)):
         now_s = (number + 1) * _BLOCK_S
+        for due_s in [due_s for due_s in left if due_s < now_s]:
+            left.pop(due_s)(run, now_s - _BLOCK_S)
         run.run_until(now_s)
         for source, side in enumerate(notes):
             views: list[bytes] = []
@@ -90,8 +99,14 @@ def jpeg(value: int) -> bytes:
 
 @pytest.fixture
 def with_pictures(run: Recording, tmp_path: Path) -> tuple[Recording, list[bytes]]:
-    """Return a copy of `run` with pictures of a camera at 10 Hz, and these pictures."""
-    path = tmp_path / "pictures.mcap"
+    """Return the same run with a camera: its messages again, and pictures at 10 Hz, captured 20 ms before."""
+    return record_pictures(run, tmp_path / "pictures.mcap")
+
+
+def record_pictures(
+    run: Recording, path: Path, marks: Sequence[tuple[float, EpisodeMark]] = ()
+) -> tuple[Recording, list[bytes]]:
+    """Record the run's messages again into `path`, with pictures, and with marks of episodes at these times."""
     file = RecordingFile(path, 0.0)
     content = Content(file)
     content.take(0, HEADER + as_json({"side": "robot", **run.headers["robot"]}))
@@ -102,11 +117,13 @@ def with_pictures(run: Recording, tmp_path: Path) -> tuple[Recording, list[bytes
         now_s = 1e-9 * (message.log_ns - began_ns)
         if now_s >= next_s:
             header = Header(epoch=1, sequence=len(payloads) + 1, sent_s=now_s)
-            frame = VideoFrame(header, "overview", now_s, 32, 24, jpeg(10 * len(payloads) % 256))
+            frame = VideoFrame(header, "overview", now_s - 0.02, 32, 24, jpeg(10 * len(payloads) % 256))
             payloads.append(encode(frame))
             content.take(0, VIEW + stamped(now_s) + payloads[-1])
             next_s += 0.1
         file.write(message.topic, now_s, message.content)
+    for time_s, mark in marks:
+        file.write("/episode", time_s, as_json({"time_s": time_s, "side": "robot", "mark": mark}))
     content.take(0, FACTS + stamped(now_s) + b'{"now_s":1.0}')
     file.close()
     return open_recording(path), payloads

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import itertools
 import json
 import shutil
 from pathlib import Path
@@ -11,12 +12,21 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from common.protocol.codec import decode_view
-from common.recording.reading import Recording
+from common.episode import EpisodeMark
+from common.errors import ConfigurationError
+from common.protocol.codec import decode_view, encode
+from common.protocol.messages import Header
+from common.protocol.view_messages import VideoFrame
+from common.recording.content import Content
+from common.recording.mcap_file import RecordingFile
+from common.recording.reading import Recording, open_recording
+from common.recording.wire import HEADER, STATUS, VIEW, as_json, stamped
 from feelahead.commands.recordings import export, plot
-from feelahead.recordings.lerobot import Picture, _of_one_size, pictures
+from feelahead.recordings.demonstrations import Picture, read_demonstrations, read_pictures
+from feelahead.recordings.lerobot import _of_one_size
 from feelahead.recordings.playback import Seen, seen
 from feelahead.recordings.tables import read_tables
+from tests.feelahead.recordings.conftest import record_pictures
 
 pyarrow = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -104,7 +114,7 @@ def test_lerobot_takes_pictures_as_they_are(with_pictures: tuple[Recording, list
     folder = exported(recording, "lerobot", tmp_path / "lerobot")
     data = parquet.read_table(folder / "data/chunk-000/file-000.parquet")
     first: Any = data.column("observation.images.overview")[0].as_py()
-    assert first["bytes"] in [picture.jpeg for picture in pictures(recording, "overview")]
+    assert first["bytes"] in [picture.jpeg for picture in read_pictures(recording)["overview"]]
     info = json.loads((folder / "meta/info.json").read_text())
     assert info["features"]["observation.images.overview"]["shape"] == [24, 32, 3]
     hints = json.loads(data.schema.metadata[b"huggingface"])["info"]["features"]
@@ -113,12 +123,98 @@ def test_lerobot_takes_pictures_as_they_are(with_pictures: tuple[Recording, list
     assert np.array(stats["mean"]).shape == (3, 1, 1)
 
 
+def test_lerobot_says_how_old_pictures_are_and_how_many_there_are(
+    with_pictures: tuple[Recording, list[bytes]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording, payloads = with_pictures
+    rows = {}
+    for rate, arguments in ((10, []), (30, ["--fps", "30"])):
+        out = tmp_path / str(rate)
+        assert export([str(recording.path), "--format", "lerobot", "--out", str(out), *arguments]) == 0
+        said = capsys.readouterr().out
+        assert f"{rate} Hz; overview: " in said  # without --fps the pictures' own
+        assert float(said.split(" distinct pictures, ")[1].split(" Hz")[0]) == pytest.approx(10.0, abs=0.2)
+        assert json.loads((out / "meta/info.json").read_text())["fps"] == rate
+        data = parquet.read_table(out / "data/chunk-000/file-000.parquet")
+        ages_s = np.array(data.column("observation.picture_age_s").to_pylist())[:, 0]
+        shown = [picture["bytes"] for picture in data.column("observation.images.overview").to_pylist()]
+        assert len(set(shown)) == pytest.approx(len(payloads), abs=3)
+        rows[rate] = shown, ages_s
+    shown, ages_s = rows[30]
+    # Captured 20 ms before it was sent, and shown until the next one: three frames.
+    assert 0.02 - 1e-3 <= ages_s.min() < 0.04
+    assert 0.08 < ages_s.max() < 0.13
+    again = np.array([one == other for one, other in itertools.pairwise(shown)])
+    np.testing.assert_allclose(np.diff(ages_s)[again], 1 / 30, atol=1e-4)
+    assert (np.diff(ages_s)[~again] < 0.0).all()
+
+
+def test_an_operator_side_alone_knows_by_its_clock_offset_how_old_a_picture_is(tmp_path: Path) -> None:
+    path = tmp_path / "operator.mcap"
+    file = RecordingFile(path, 0.0)
+    content = Content(file)
+    content.take(0, HEADER + as_json({"side": "operator"}))
+    for number, offset_s in enumerate((None, 500.0)):
+        now_s = 10.0 + number
+        content.take(0, STATUS + stamped(now_s) + as_json({"offset_s": offset_s}))
+        captured_s = now_s + 500.0 - 0.07  # on the robot side's clock; sent 20 ms later, 50 ms under way
+        frame = VideoFrame(Header(1, number + 1, captured_s + 0.02), "overview", captured_s, 32, 24, b"jpeg")
+        content.take(0, VIEW + stamped(now_s) + encode(frame))
+    file.close()
+
+    found = read_pictures(open_recording(path))["overview"]
+
+    # While the offset is unknown, only the time until it was sent counts.
+    assert [one.time_s - one.captured_s for one in found] == pytest.approx([0.02, 0.07], abs=1e-6)
+
+
+def test_lerobot_has_an_episode_for_each_that_was_marked_and_kept(
+    run: Recording,
+    with_pictures: tuple[Recording, list[bytes]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    whole = read_demonstrations(with_pictures[0], read_tables(with_pictures[0]))
+    assert [*whole.episodes] == [(0, len(whole.times_s), None)]
+    # Seconds after its first frame.
+    marks: list[tuple[float, EpisodeMark]] = [(0.5, "start"), (1.5, "success"), (1.6, "failure"), (2.0, "start")]
+    marks += [(2.4, "discard"), (2.5, "start"), (3.0, "failure"), (3.1, "reset"), (3.2, "start"), (3.6, "reset")]
+    path = tmp_path / "marked.mcap"
+    record_pictures(run, path, [(whole.times_s[0] + after_s, mark) for after_s, mark in (*marks, (3.8, "start"))])
+
+    assert export([str(path), "--format", "lerobot", "--out", str(tmp_path / "out")]) == 0
+
+    assert ": 4 episodes (1 success, 1 failure, 1 left out), " in capsys.readouterr().out
+    episodes = parquet.read_table(tmp_path / "out/meta/episodes/chunk-000/file-000.parquet").to_pylist()
+    assert [one["success"] for one in episodes] == [True, False, None, None]
+    assert [one["length"] for one in episodes[:3]] == pytest.approx([10, 5, 4], abs=1)
+    data = parquet.read_table(tmp_path / "out/data/chunk-000/file-000.parquet")
+    info = json.loads((tmp_path / "out/meta/info.json").read_text())
+    assert (info["total_episodes"], info["splits"]) == (4, {"train": "0:4"})
+    assert info["total_frames"] == data.num_rows == episodes[-1]["dataset_to_index"] < len(whole.times_s)
+    states = np.array(data.column("observation.state").to_pylist())
+    for number, one in enumerate(episodes):
+        rows = slice(one["dataset_from_index"], one["dataset_to_index"])
+        part = data.slice(rows.start, one["length"])
+        assert set(part.column("episode_index").to_pylist()) == {number}
+        assert part.column("frame_index").to_pylist() == list(range(one["length"]))
+        assert part.column("timestamp")[0].as_py() == 0.0
+        assert part.column("next.done").to_pylist() == [False] * (one["length"] - 1) + [True]
+        assert part.column("next.success")[-1].as_py() is (one["success"] is True)
+        np.testing.assert_allclose(one["stats/observation.state/mean"], states[rows].mean(axis=0), rtol=1e-5, atol=1e-7)
+
+
+def test_fps_is_for_lerobot_alone(run: Recording) -> None:
+    with pytest.raises(ConfigurationError, match="--fps 20: valid with: --format lerobot"):
+        export([str(run.path), "--fps", "20"])
+
+
 def test_pictures_that_a_narrow_link_made_smaller_are_enlarged() -> None:
     made = []
     for size in ((64, 48), (32, 24), (64, 48)):
         content = io.BytesIO()
         Image.new("RGB", size, (10, 200, 30)).save(content, "JPEG")
-        made.append(Picture(0.0, content.getvalue()))
+        made.append(Picture(0.0, content.getvalue(), 0.0))
 
     alike, size = _of_one_size(made)
 

@@ -1,15 +1,18 @@
 """Replays: the cores give the same bits, and playback shows the same at each time, by playing or by jumping."""
 
 import dataclasses
+import json
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 
+from common.episode import EpisodeMark
 from common.errors import ConfigurationError
 from common.protocol import codec
 from common.protocol.codec import PROTOCOL_VERSION, decode, encode
@@ -18,17 +21,19 @@ from common.protocol.messages import StiffnessUpdate
 from common.recording.entries import Entry, Kind, split_text
 from common.recording.reading import Recording, open_recording
 from common.silence import KEEP_ALIVE_S
+from feelahead.both_sides.loopback import Loopback
 from feelahead.commands.recordings import replay
 from feelahead.recordings import replay as replaying
 from feelahead.recordings.comparison import Comparison, recorded_entries
 from feelahead.recordings.controller import recorded_feel, recorded_state
 from feelahead.recordings.playback import Playback, Seen, seen
 from feelahead.recordings.replay import replay_operator, replay_robot
+from feelahead.recordings.tables import read_tables
 from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.reports.output_report import build_output_report
 from robot_side.compiled.warm_up import kernel_digests
 from robot_side.parts import build_parts
-from tests.feelahead.recordings.conftest import DURATION_S
+from tests.feelahead.recordings.conftest import DURATION_S, record_loopback
 
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("recorded run")]
 
@@ -46,6 +51,37 @@ def test_the_operator_side_sends_and_writes_the_same(run: Recording) -> None:
     assert compared.within
     told = [one for one in recorded_entries(run, "operator", []) if one.kind == Kind.TOLD]
     assert len(told) > 10  # The person felt something, or nothing was compared.
+
+
+def test_a_run_with_episodes_and_the_scene_put_back_is_made_again(tmp_path: Path) -> None:
+    def marks(kind: EpisodeMark) -> Callable[[Loopback, float], None]:
+        return lambda run, now_s: run.operator.marker.mark(kind, now_s)
+
+    path = tmp_path / "episodes.mcap"
+    doing = {
+        **{1.0: marks("start"), 2.4: marks("reset"), 2.5: lambda run, now_s: run.operator.press_stop(now_s)},
+        **{3.0: marks("failure"), 3.1: marks("reset"), 3.2: marks("start")},
+    }
+    record_loopback(path, 5.0, doing, link="delay 20ms 5ms", seed=3)
+    recording = open_recording(path)
+
+    robot, operator = replay_robot(recording), replay_operator(recording)
+
+    assert robot.made == robot.equal > 0
+    assert robot.others == robot.others_equal > 0
+    assert operator.made == operator.equal > 0
+    shown = [json.loads(message.content) for message in recording.messages(["/episode"])]
+    # The first reset was refused, as the arm was armed; the other one counts when the robot side says it is done.
+    assert [one["mark"] for one in shown] == ["start", "failure", "reset", "start"]
+    assert {one["side"] for one in shown} == {"operator"}
+    heard = [one for one in recorded_entries(recording, "robot", []) if one.kind == Kind.EPISODE]
+    assert [msgspec.json.decode(one.content) for one in heard] == [one["mark"] for one in shown]
+    arm = read_tables(recording).table("arm")
+    positions = np.stack([arm.numbers(f"position_rad.{joint}") for joint in range(6)], axis=1)
+    away = np.abs(positions - positions[0]).max(axis=1)
+    times_s = np.array(arm.times_s)
+    assert away[times_s < 3.1][-1] > 0.01
+    assert away[(times_s > 3.25) & (times_s < 3.4)].max() < 0.005
 
 
 def test_a_recording_of_reports_is_made_again_too(run: Recording, monkeypatch: pytest.MonkeyPatch) -> None:

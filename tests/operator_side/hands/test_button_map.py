@@ -34,6 +34,8 @@ def test_the_help_says_what_the_code_does(capsys: pytest.CaptureFixture[str]) ->
         "square opens it",
         "triangle changes the target",
         "create hands the robot over",
+        "up starts one, right is success, left failure, down discards it",
+        "r3 puts a simulated scene back, disarmed",
         "r2 advances",
         "l2 retreats",
         "the left stick moves across",

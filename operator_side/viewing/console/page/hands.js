@@ -6,7 +6,7 @@
 //
 // The operator side decides by the same rules whether inputs move the arm (operator_side/viewing/pages/driving_page.py);
 // the state here is only for display.
-import { atRest, both, Grips, Keys, readGamepads, REST } from "./inputs.js";
+import { atRest, both, Grips, Keys, MARK_OF, readGamepads, REST } from "./inputs.js";
 import { Doing, MotionState } from "./names.js";
 import { Panel } from "./panel.js";
 import { Tuning } from "./tuning.js";
@@ -108,6 +108,7 @@ export class Hands {
       this.#release("A browser shortcut was pressed."); // the browser may not report its release
       return;
     }
+    if (MARK_OF.has(event.code) && !event.repeat) this.#send({ mark: MARK_OF.get(event.code) });
     // Also while watching: a key that is already down when driving begins must come up first.
     if (!this.#keys.press(event.code) || this.#state === "watching") return;
     event.preventDefault(); // keys must not scroll the page, nor Space press a button

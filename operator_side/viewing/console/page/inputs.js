@@ -19,6 +19,14 @@ export const KEYS = [
   ["next_target", ["KeyT"], "next target"],
   ["hand_over", ["KeyH"], "hand the robot over"],
 ];
+export const MARKS = [
+  ["start", ["KeyN"], "episode: start"],
+  ["success", ["KeyY"], "success"],
+  ["failure", ["KeyX"], "failure"],
+  ["discard", ["KeyU"], "discard"],
+  ["reset", ["KeyB"], "put the scene back"],
+];
+export const MARK_OF = new Map(MARKS.flatMap(([mark, codes]) => codes.map((code) => [code, mark])));
 const DOES = new Map(KEYS.flatMap(([does, codes]) => codes.map((code) => [code, does])));
 const WORDS = { Space: "Space", ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRight: "→" };
 const LEVEL = /^(?:Digit|Numpad)([1-9])$/;

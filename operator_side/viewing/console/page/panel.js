@@ -1,5 +1,5 @@
 // Panel for driving: its texts, buttons and elements to hold.
-import { KEYS, keyWords } from "./inputs.js";
+import { KEYS, keyWords, MARKS } from "./inputs.js";
 import { make } from "./make.js";
 import { Doing, Hands, LinkState, MotionState, SessionState } from "./names.js";
 
@@ -51,7 +51,7 @@ export class Panel {
       place("pad", make("p", { id: "hands_gamepad" })),
       make("details", {}, make("summary", {}, "Keys"), keys));
     keyWords().then((word) => {
-      keys.replaceChildren(...KEYS.flatMap(([, codes, does]) => [
+      keys.replaceChildren(...[...KEYS, ...MARKS].flatMap(([, codes, does]) => [
         make("dt", {}, ...codes.flatMap((code, k) => [k ? " or " : "", make("kbd", {}, word(code))])), make("dd", {}, does),
       ]), make("dt", {}, make("kbd", {}, "1"), " … ", make("kbd", {}, "9")), make("dd", {}, "travel of keys"),
       make("dt", {}, make("kbd", {}, "Esc")), make("dd", {}, "emergency stop, for any driver"),

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from common.status.codes import Doing
 from operator_side.viewing.pages.driving_page import REST_S, SILENCE_S, DrivingPage
 from operator_side.viewing.pages.page_messages import PageHands, PageMessage
+from tests.operator_side.operator_bench import Bench
 from tests.operator_side.viewing.pages.talking_page import PERIOD_S, TalkingPage
 
 NO_HANDS: list[object] = [
@@ -36,6 +37,7 @@ NO_HANDS: list[object] = [
     {"tune": {"probability": math.nan}},
     {"tune": {"link": "x" * 201}},
     {"tune": {"delay": 1}},
+    {"mark": "done"},
 ]
 
 
@@ -240,3 +242,11 @@ def judge(pages: DrivingPage, heard: list[Heard], now_s: float) -> None:
     assert all(after.now_s - before.now_s <= SILENCE_S for before, after in pairwise(ours[rested:]))
     assert ours[began].now_s - ours[rested].now_s >= REST_S
     assert not any(one.hands.stop for one in heard if one.now_s > ours[began].now_s - REST_S)
+
+
+def test_any_page_marks_episodes() -> None:
+    pages, bench = DrivingPage(may_drive=False), Bench()
+    for mark in ("start", "success", "success"):
+        pages.receive(1, {"mark": mark}, bench.now_s)
+    pages.follow(bench.side, bench.now_s)
+    assert bench.side.summary()["episodes"] == {"start": 1, "success": 1}
