@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 from websockets.typing import Origin
@@ -88,7 +88,7 @@ def opened(address: str) -> Connection:
                 origin=Origin(re.sub(r"/[^/]*/$", "", address)),
                 max_size=None,
             )
-        except (OSError, ConnectionClosed):
+        except (OSError, WebSocketException):
             assert time.monotonic() < end_s
             continue
         page.send(json.dumps({"slow": True, "looks": True}))
