@@ -120,7 +120,7 @@ def _trigger(facts: OperatorFacts, name: str, cells: int) -> Group:
     travel, free = percent(number(trigger.travel), 3), percent(number(trigger.free))
     meets = (f"{trigger.meets} of 8", _FELT if trigger.meets else "")
     return Group(
-        _line((f"{name} {does}", _TITLE), f"  pulled {travel} %, free to {free} %"),
+        _line((f"{name} {does}", _TITLE), f" pulled {travel} %, free to {free} %"),
         _line("finger  ", ("━" * (reached - 1) + "┫" * (reached > 0), _PULL), (rest, _FAINT)),
         _line("zones   ", *((f"{zone or '.'}".ljust(cells), _FELT if zone else "") for zone in trigger.zones)),
         _line("meets   ", meets, f"  stiffness {_figure(trigger.stiffness)}"),

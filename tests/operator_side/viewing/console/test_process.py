@@ -265,7 +265,8 @@ def test_a_port_that_is_taken_is_said() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         notes = notes_of(Console("a test", port=port))
-    assert notes == [f"no console: --console-port {port}: Address already in use; valid: a free port, or 0 to choose one"]
+    said = f"no console: --console-port {port}: Address already in use; valid: a free port, or 0 to choose one"
+    assert notes == [said]
 
 
 @pytest.mark.parametrize(
