@@ -58,7 +58,7 @@ class CameraSettings:
 
     @property
     def mean_vector_m(self) -> Vector3:
-        """Mean error μ_c along each axis."""
+        """Mean error μ_c of an object's perceived position along each axis, in metres."""
         return self.mean_m if isinstance(self.mean_m, tuple) else (self.mean_m,) * 3
 
 

@@ -122,7 +122,7 @@ class EnlargementTerms(msgspec.Struct, frozen=True, array_like=True, forbid_unkn
     """Terms of eq. 8-10 along one trigger's direction, for the sphere of the gripper with the largest D_σ."""
 
     sigma_m: float
-    """D_σ (eq. 9-10)"""
+    """Enlargement D_σ in metres (eq. 9-10 of the paper)"""
     mean_m: float
     """Mean û·(μ_ee - μ_c) + μ_δ"""
     kinematic_sd_m: float

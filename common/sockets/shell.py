@@ -19,8 +19,8 @@ CONTROL_HIGH_WATER_MARK = 2
 """Length of the send queue of each control connection, in messages. Four connections take a burst of eight messages."""
 VIEW_HIGH_WATER_MARK = 8
 """Length of the view's queue at either side, in messages: enough for both cameras' pictures, the scene and the
-telemetry of one tick. ZeroMQ counts sent messages in steps of half the mark. With 4 the telemetry was lost, with 2 also
-the scene."""
+telemetry of one tick. ZeroMQ frees places only in steps of half the mark. A length of 4 lost the telemetry; 2 lost the
+scene, too."""
 CONTROL_UNSENT_BYTES = 1024
 """Maximum number of unsent bytes of each control connection in the kernel: a few messages."""
 VIEW_UNSENT_BYTES = 16 * 1024

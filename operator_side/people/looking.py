@@ -48,7 +48,7 @@ class StalledDescent:
         self._sank = False
 
     def see(self, height_m: float, slowest_m_s: float, look: Glance) -> bool:
-        """Take the height; return whether the object stands. Before that it sinks at least at `slowest_m_s`."""
+        """Take the height; return whether the object stands. A moving object sinks at `slowest_m_s` or faster."""
         self._heights.append((look.now_s, height_m))
         while self._heights[0][0] < look.now_s - _STANDS_S:
             self._heights.popleft()

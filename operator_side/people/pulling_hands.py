@@ -73,7 +73,7 @@ class PullingHands:
         return _DOING[self.phase]
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
-        """Operate the controller at `now_s`. Of the screen, only arming and holding count."""
+        """Operate the controller at `now_s`. Only the armed state and a held object are read from the screen."""
         del delay_s
         if self._since_s is None or screen is None:
             self._since_s = now_s

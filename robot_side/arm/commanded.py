@@ -46,7 +46,7 @@ def commanded(
     if math.isnan(told_m_s):
         if velocity.size != pose.tool_jacobian.shape[1]:
             raise ValueError(
-                f"joint_positions_rad has the shape {velocity.shape}; valid: {pose.tool_jacobian.shape[1:]}"
+                f"joint_positions_rad has the shape {joint_positions_rad.shape}; valid: {pose.tool_jacobian.shape[1:]}"
             )
         require_finite("tool_rotation", pose.tool_rotation)
         refuse(pose.tool_jacobian, np.array([*linear, *angular]), limits.velocity_rad_s)

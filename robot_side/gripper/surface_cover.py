@@ -199,7 +199,7 @@ def _onto_planes(points_m: FloatArray, images: FloatArray) -> FloatArray:
 
 
 def _first_images(points_m: FloatArray, normals: FloatArray, origin_m: FloatArray, images: FloatArray) -> Spheres:
-    """Return points (n, 3) and normals (n, 3) mirrored to the first side of every mirror plane, each point once."""
+    """Return points (n, 3) and normals (n, 3) mirrored to one side of each mirror plane, without duplicates."""
     points_m = points_m - origin_m
     for image in images[1:]:
         if np.isclose(np.trace(image), 1.0):

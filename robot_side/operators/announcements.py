@@ -49,7 +49,7 @@ class Announcements:
         return (link or self._link).stamp(now_s, next(self._sequence))
 
     def stamp_shown(self, now_s: float) -> Header:
-        """Return the next header of messages made between ticks; their sequence is separate from that of all others."""
+        """Return the header of the next message made between ticks; these have their own sequence numbers."""
         return self._link.stamp(now_s, next(self._shown))
 
     def answer(self, participant: Participant, now_s: float) -> None:

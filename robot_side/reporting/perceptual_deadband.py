@@ -183,7 +183,7 @@ def _due(
     full_rate: bool,
     now: float,
 ) -> bool:
-    """Return whether a message leaves, and update what the receiver computes; sent, numbers (NUMBERS,): of `Sensed`."""
+    """Return whether to send, and update what the receiver computes; `sent`, `numbers` (NUMBERS,): as in `Sensed`."""
     belief = beliefs[0]
     if belief.known == 1:
         acceleration = sent[R2 * NUMBERS_PER_SIDE + ACCELERATION]

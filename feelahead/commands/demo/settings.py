@@ -53,7 +53,7 @@ class DemoSettings(RunOptions):
     site_axis: Literal["x", "-x", "y", "-y", "z", "-z"] = "z"
     """Axis of the site along which R2 advances. The start names the axis that fits the fingers, if another one does."""
     realtime: bool = False
-    """Ask for real-time scheduling and locked memory for both sides; without the permission they run without."""
+    """Ask for real-time scheduling and locked memory for both sides; if that is not permitted, they run as usual."""
     console: bool = True
     """Serve the console, a page for the browser, at an address that is shown. From a terminal on a machine with a
     display the page opens by itself."""

@@ -67,7 +67,7 @@ class FeelSettings:
         check_choice(self.device, self.controller)
         require_output_file("--out", self.out)
         if self.measure and (self.pattern is not None or self.duration is not None):
-            raise ValueError("--measure with --pattern or --duration; valid: one of them")
+            raise ValueError("--measure excludes --pattern and --duration; valid: --measure alone, or without it")
         if self.out is not None and not self.measure:
             raise ValueError("--out without --measure; valid: both")
 

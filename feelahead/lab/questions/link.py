@@ -64,10 +64,10 @@ class Played:
 
 @dataclass(frozen=True)
 class LinkSweep(Played, Sweep):
-    """Measure the processor time of both sides' ends of the link at 1 kHz, in turns with bare ZeroMQ sockets.
+    """Measure the processor time of the link's two ends at 1 kHz, alternating with bare ZeroMQ sockets.
 
-    The ends have all work between law and controller. With --virtual: compare the model of a link with its
-    specification, and with a recording of the kernel's netem.
+    Each end does all the work between the control law and the controller. With --virtual: compare the model of a link
+    with its specification, and with a recording of the kernel's netem.
     """
 
     virtual: bool = False

@@ -33,7 +33,7 @@ GOOD_DIGITS = 30
 """Decimal digits that cancellation must leave."""
 _MOST_DIGITS = 2000
 _MOST_DIGITS_OF_MESHES = 120
-"""Limit for meshes, whose contact is not decided beforehand: a volume below 1e-90 of the sphere's may be nothing."""
+"""Share of the sphere's volume below which a mesh's overlap cannot be told from none: contact is not decided before."""
 
 Number = Any
 """Number of mpmath; the library is untyped."""

@@ -65,7 +65,7 @@ class Solids:
     def first_touch_m(
         self, centers: FloatArray, radii: FloatArray, things: IntArray, direction: FloatArray, end_m: FloatArray
     ) -> FloatArray:
-        """Return lower bounds (n,) of the distances at which spheres touch their objects, rough beyond `end_m`."""
+        """Return lower bounds (n,) of how far each sphere moves before it touches its object; rough beyond `end_m`."""
         moved_m = np.zeros(len(radii))
         going = np.arange(len(radii))
         for _ in range(_STEPS):

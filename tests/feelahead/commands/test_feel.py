@@ -96,7 +96,7 @@ def test_a_simulated_measurement_is_stored_only_where_asked_for(
     [
         (["--controller", "mine"], "--controller = 'mine'; valid: six pairs"),
         (["--controller", ADDRESS, "--device", "simulated"], "--controller with --device simulated; valid"),
-        (["--measure", "--pattern", "wall"], "--measure with --pattern"),
+        (["--measure", "--pattern", "wall"], "--measure excludes --pattern"),
         (["--out", "mine.toml"], "--out without --measure; valid: both"),
         (["--duration", "0"], "--duration"),
     ],
