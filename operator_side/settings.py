@@ -81,8 +81,6 @@ class OperatorSettings(SideOptions):
         check_limits(self)
         if self.tui and self.status != "line":
             raise ValueError(f"--tui and --status {self.status} exclude each other; valid: only one of them")
-        if self.device == "browser" and not self.console:
-            raise ValueError("--device browser is given without --console, so no page could drive; valid: both")
         check_choice(self.device, self.controller)
         if self.robot_key is not None and self.keys is None:
             raise ValueError(

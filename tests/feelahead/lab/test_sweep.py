@@ -262,7 +262,7 @@ def test_a_worker_that_is_killed_leaves_what_is_finished(tmp_path: Path, capsys:
     [line] = said.err.splitlines()
     assert re.fullmatch(
         r"feelahead try counting: a worker process ended unexpectedly \(killed, or out of memory\);"
-        r" \d+ runs are left; with --resume FILE.*",
+        r" \d+ runs are left; .*--resume FILE.*",
         line,
     )
 
@@ -280,7 +280,7 @@ def test_ctrl_c_ends_with_130_and_says_how_to_go_on(tmp_path: Path, expected: by
         _, complaint = driver.communicate(timeout=60.0)
     assert driver.returncode == 130
     [line] = complaint.splitlines()
-    goes_on = f"the same command with --resume {kept} goes on" if journal else "with --resume FILE.jsonl"
+    goes_on = f"to continue, run the same command with --resume {kept}" if journal else "with --resume FILE.jsonl"
     assert re.search(r": interrupted; \d+ of 12 runs are finished; \d+ runs are left; ", line)
     assert goes_on in line
     assert rows.exists()
@@ -377,7 +377,7 @@ def test_a_disk_that_takes_no_more_is_named_and_what_is_finished_is_shown(
     assert "4 rows" in said.out
     assert len(rows.read_text().splitlines()) == 5
     [line] = said.err.splitlines()
-    assert f"--resume {path}: cannot be written: No space left on device; 1 runs are left; the same command" in line
+    assert f"--resume {path}: cannot be written: No space left on device; 1 runs are left; to continue, " in line
     assert ask(QUESTION, grid) == 0
 
 

@@ -186,7 +186,7 @@ def test_refused_features_are_named(report: bytes, transport: Transport, message
 @pytest.mark.parametrize(
     ("kind", "arguments", "message"),
     [
-        (ControllerState, ((0.0, 0.0), (0.0, 0.0), 0.0, 0.0, frozenset({Button.UP, Button.DOWN})), "has down and up"),
+        (ControllerState, ((0.0, 0.0), (0.0, 0.0), 0.0, 0.0, frozenset({Button.UP, Button.DOWN})), "down and up"),
         (build_address, ("aa:bb:cc:dd:ee",), "address = 'aa:bb:cc:dd:ee'; valid: six pairs"),
         (build_address, ("AA:BB:CC:DD:EE:FF",), "address = "),
         (build_address, ("aa:bb:cc:dd:ee:ff\n",), "address = "),

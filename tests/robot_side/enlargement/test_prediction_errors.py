@@ -79,7 +79,7 @@ def test_a_file_is_in_the_units_of_its_keys(tmp_path: Path) -> None:
         ("loop_age_ms = 100", "loop_age_ms = 300", "[[operator]]"),
         ("[[robot]]", "[[momentary]]", "[[robot]]"),
         ("[[robot]]", "robot = 3\n[other]", "[[robot]]"),
-        ("[[robot]]", "[[robot", "valid: a file that"),
+        ("[[robot]]", "[[robot", "valid: a file written"),
     ],
 )
 def test_a_file_that_is_none_is_named_with_what_is_wrong(tmp_path: Path, old: str, new: str, named: str) -> None:
