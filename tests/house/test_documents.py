@@ -79,9 +79,8 @@ def parse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def indented(name: str) -> list[str]:
     """Return the commands in a document's indented blocks; blocks that show a file's content are left out."""
-    names: dict[str, str] = {}
     blocks = [one for one in Document.read(ROOT / name).blocks() if not one.startswith(("from ", "import ", "<"))]
-    lines = [line for block in blocks if not is_toml(block) for line in typed(block, names)]
+    lines = [line for block in blocks if not is_toml(block) for line in typed(block)]
     return [line for line in lines if not line.startswith(NOT_TYPED)]
 
 
@@ -186,7 +185,6 @@ def test_the_guide_for_two_machines_is_in_order_and_the_readme_says_the_same() -
 
 _BLOCK = re.compile(r"(?:(?<=\n\n)|\A)((?:(?: {4}.*)?\n)+)")
 _SPAN = re.compile(r"`((?:feelahead|feelahead-robot|feelahead-operator|make)(?:\s[^`]*)?)`")
-_DEFINITION = re.compile(r"\b([A-Z])=(\S*\"[^\"]*\"(?: \"[^\"]*\")*|[^\s;]+)(?:; |$)")
 _AN_OPTION = re.compile(r"\[--[^\]]*\]")
 
 
@@ -210,28 +208,16 @@ class Document:
         return [" ".join(found[1].split()) for found in _SPAN.finditer(self.text)]
 
 
-def typed(block: str, names: dict[str, str]) -> list[str]:
+def typed(block: str) -> list[str]:
     """Return the commands of a block: its lines after `$ ` if there are any, otherwise all lines.
 
-    names: values of variables, whose names are one capital letter. They replace the variables, and a block's own
-    assignments are added to them. Options in brackets are left out.
+    Options in brackets are left out.
     """
     lines = [line for line in block.replace("\\\n", " ").splitlines() if line.strip()]
     if any(line.startswith("$ ") for line in lines):
         lines = [line.removeprefix("$ ") for line in lines if line.startswith("$ ")]
-    commands: list[str] = []
-    for line in lines:
-        for name, value in names.items():
-            line = line.replace(f"${name}", value)  # noqa: PLW2901
-        if _DEFINITION.match(line):
-            for name, value in _DEFINITION.findall(line):
-                said = value.strip('"') if value.count('"') == 2 else value
-                for known, meant in names.items():
-                    said = said.replace(f"${known}", meant)
-                names[name] = said
-        else:
-            commands += [part.partition(" | ")[0].strip() for part in _AN_OPTION.sub("", line).split(" && ")]
-    return commands
+    commands = [part for line in lines for part in _AN_OPTION.sub("", line).split(" && ")]
+    return [command.partition(" | ")[0].strip() for command in commands]
 
 
 def words(command: str) -> list[str]:
