@@ -60,11 +60,12 @@ class KeptPage:
         self._address: str | None = None
         self.wants_again = False
 
-    def flags(self) -> list[str]:
-        """Return the operator side's flags for the console's token and port."""
+    def flags(self, *, waits: bool) -> list[str]:
+        """Return the operator side's flags. waits: the scripted person waits for the first picture."""
         port = None if self._address is None else urlsplit(self._address).port
         kept = [] if port is None else [f"--console-port={port}"]
-        return [f"--console-token={self._token}", f"--person-waits={PERSON_WAITS_S:g}", *kept]
+        patience = [f"--person-waits={PERSON_WAITS_S:g}"] if waits else []
+        return [f"--console-token={self._token}", *patience, *kept]
 
     def is_new(self, address: str) -> bool:
         """Store the console's address; return whether it differs from that of the last run."""

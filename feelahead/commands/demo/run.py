@@ -104,7 +104,7 @@ def operator_arguments(
         arguments.append("--status=facts")
     always = (*given, "console", "console_port")
     flags = _flags(settings, always, *_SHARED, "console", "console_port", "compensation", "haptics")
-    return [*arguments, *flags, *(() if page is None else page.flags())]
+    return [*arguments, *flags, *(() if page is None else page.flags(waits=_duration_s(settings) is None))]
 
 
 def _files(settings: DemoSettings, summary: Path) -> list[str]:

@@ -59,13 +59,14 @@ def test_it_does_not_end_before_the_link_was_up() -> None:
 
 def test_a_page_finds_the_next_run_at_the_same_address(tmp_path: Path) -> None:
     page = KeptPage(tmp_path)
-    token, waits = page.flags()
+    token, waits = page.flags(waits=True)
     path = Path(token.removeprefix("--console-token="))
     secret = path.read_text()
     assert (len(secret) >= 24, path.stat().st_mode & 0o077) == (True, 0)
     assert waits.startswith("--person-waits=")
     assert page.is_new("http://127.0.0.1:4321/secret/")
-    assert page.flags() == [token, waits, "--console-port=4321"]
+    assert page.flags(waits=True) == [token, waits, "--console-port=4321"]
+    assert page.flags(waits=False) == [token, "--console-port=4321"], "who asked for a duration gets it whole"
     assert not page.is_new("http://127.0.0.1:4321/secret/")
     assert path.read_text() == secret
     page.wants_again = True
