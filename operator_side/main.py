@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from common.command.command_line import given_fields, parse_settings
 from common.command.status import Status
 from common.emulation.spec import unused_clauses
-from common.errors import ConfigurationError
 from common.loop.loop import Loop
 from common.loop.process import Process
 from common.silence import MOTION_PERIOD_S
@@ -31,8 +30,6 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     If a real controller is absent or unplugged, the process waits for it. backend: used instead of hidapi, if given.
     """
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
-    if settings.device == "browser" and not settings.console:
-        raise ConfigurationError("--device browser is given without --console, so no page could drive; valid: both")
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     status = TerminalStatus("operator") if settings.tui else Status(settings.status, "operator")
     loop = Loop(MOTION_PERIOD_S, REMEDIES, settings.seed)
@@ -49,6 +46,8 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
         )
         process.stack.enter_context(sockets)
         core = build_recorded(settings, secrets.randbits(53), process.recording)
+        if settings.device == "browser" and not settings.console:
+            process.note("no page can drive: --device browser is given without --console")
         for text in unused_clauses(settings.link_spec(), [("to_robot", "haptics")]):
             process.note(text)
         desk = _desk(settings, core, process, backend, console)
