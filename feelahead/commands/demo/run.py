@@ -177,7 +177,7 @@ def _duration_s(settings: DemoSettings) -> float | None:
 
 @dataclass
 class _Said:
-    """What the two sides have reported until now: newest status, and more."""
+    """Reports of both sides until now."""
 
     robot: RobotStatus | None = None
     operator: OperatorStatus | None = None

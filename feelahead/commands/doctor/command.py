@@ -19,7 +19,7 @@ from common.command.command_line import parse_settings
 from common.sockets.authentication import OperatorKeys
 from feelahead.commands.doctor import controllers, link, machine
 from feelahead.commands.doctor.finding import Finding, Verdict, can_be
-from feelahead.commands.doctor.path import measure_path_along, path_line
+from feelahead.commands.doctor.path import measure_path, path_line
 from feelahead.commands.doctor.port import RobotAddress
 
 _COLOURS: Final = {Verdict.OK: "green", Verdict.NOTE: "yellow", Verdict.MISSING: "red"}
@@ -88,11 +88,11 @@ def doctor(arguments: Sequence[str]) -> int:
 
 def _look_along(settings: DoctorSettings, connect: str) -> int:
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
-    way = RobotAddress.to(connect, settings.view_connect, keys)
-    talk, error = link.check_path(way)
-    path = measure_path_along(way) if settings.path and error is None else None
+    address = RobotAddress.to(connect, settings.view_connect, keys)
+    talk, error = link.check_path(address)
+    path = measure_path(address) if settings.path and error is None else None
     if settings.json:
-        said = json.dumps(link.as_json(way, talk, error) | ({} if path is None else {"path": path}), indent=2)
+        said = json.dumps(link.as_json(address, talk, error) | ({} if path is None else {"path": path}), indent=2)
     elif error is not None:
         said = str(error)
     else:

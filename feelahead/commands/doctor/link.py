@@ -54,18 +54,20 @@ class Talk:
     """Number of operators that observe"""
 
 
-def check_path(way: RobotAddress) -> tuple[Talk, PathError | None]:
+def check_path(address: RobotAddress) -> tuple[Talk, PathError | None]:
     """Check the path up to the first fault; return what the robot side answered, and the fault if there is one."""
     clock, talk = MonotonicClock(), Talk()
     try:
-        to_control, to_view = resolved(way.control, "--connect"), resolved(way.view, "--view-connect")
+        to_control, to_view = resolved(address.control, "--connect"), resolved(address.view, "--view-connect")
         opening = knock(to_control, clock)
-        judge_port(way, way.control, opening, loopback=to_control.is_loopback())
+        judge_port(address, address.control, opening, loopback=to_control.is_loopback())
         topics = (b"telemetry",)
-        with OperatorSockets(way.control.address, way.view.address, topics=topics, keys=way.keys) as sockets:
-            questions = _Questions(sockets, way, clock, opening.took_s)
+        with OperatorSockets(
+            address.control.address, address.view.address, topics=topics, keys=address.keys
+        ) as sockets:
+            questions = _Questions(sockets, address, clock, opening.took_s)
             talk = questions.talk()
-            judge_view(way, knock(to_view, clock), loopback=to_view.is_loopback())
+            judge_view(address, knock(to_view, clock), loopback=to_view.is_loopback())
             questions.expect_telemetry()
             questions.expect_large()
     except PathError as error:
@@ -73,12 +75,12 @@ def check_path(way: RobotAddress) -> tuple[Talk, PathError | None]:
     return talk, None
 
 
-def as_json(way: RobotAddress, talk: Talk, error: PathError | None) -> dict[str, object]:
+def as_json(address: RobotAddress, talk: Talk, error: PathError | None) -> dict[str, object]:
     """Return the result of the check as a JSON object, for programs."""
     trips_s = talk.round_trips_s
     return {
-        "connect": host_and_port(way.control),
-        "view_connect": host_and_port(way.view),
+        "connect": host_and_port(address.control),
+        "view_connect": host_and_port(address.view),
         "reached": error is None,
         "wrong": error and error.wrong,
         "said": error and error.said,
@@ -104,9 +106,11 @@ def reached(talk: Talk) -> str:
 class _Questions:
     """Questions that the robot side answers even to programs without a Hello, and checks of what else arrives."""
 
-    def __init__(self, sockets: OperatorSockets, way: RobotAddress, clock: MonotonicClock, round_trip_s: float) -> None:
+    def __init__(
+        self, sockets: OperatorSockets, address: RobotAddress, clock: MonotonicClock, round_trip_s: float
+    ) -> None:
         self._sockets = sockets
-        self._way, self._place = way, host_and_port(way.control)
+        self._address, self._place = address, host_and_port(address.control)
         self._clock = clock
         self._round_trip_s = round_trip_s
         self._epoch = secrets.randbits(53)
@@ -143,7 +147,7 @@ class _Questions:
     def expect_telemetry(self) -> None:
         """Raise PathError unless telemetry arrives at the view connection."""
         if not self._until(_TELEMETRY_LIMIT_S + 2.0 * self._round_trip_s, lambda: self._telemetry):
-            place = host_and_port(self._way.view)
+            place = host_and_port(self._address.view)
             said = f"{place} is no view port of a robot side, or not of this one: it sends no telemetry"
             raise PathError("view port", f"the control port works, but {said}", VIEW_CONNECT)
 
@@ -161,12 +165,12 @@ class _Questions:
 
     def _no_handshake(self) -> PathError:
         place = self._place
-        if self._way.keys is None:
+        if self._address.keys is None:
             return self._no_answer()
         if self._sockets.key_refused:
             said = f"the robot side at {place} does not let this key in: it was never allowed there, or was revoked"
             return PathError(
-                "our key", said, f"run there: feelahead keys allow NAME {public_part(self._way.keys.secret)}"
+                "our key", said, f"run there: feelahead keys allow NAME {public_part(self._address.keys.secret)}"
             )
         said = f"the program at {place} has another key than --robot-key says, or is no such port of a robot side"
         remedy = "--robot-key with the key that this shows on the robot's machine: feelahead keys show robot"

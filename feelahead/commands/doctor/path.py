@@ -34,11 +34,11 @@ _LEAST_PICTURES_HZ: Final = 4.0
 _OLDEST_PICTURE_MS: Final = 500.0
 
 
-def measure_path_along(way: RobotAddress) -> dict[str, Any]:
+def measure_path(address: RobotAddress) -> dict[str, Any]:
     """Measure the path to a robot side that answers; return the figures by name, None for a figure without a value."""
     topics = (b"telemetry", VIDEO_TOPIC)
-    with OperatorSockets(way.control.address, way.view.address, topics=topics, keys=way.keys) as sockets:
-        return _measured(sockets, (way.control.port, way.view.port), MonotonicClock())
+    with OperatorSockets(address.control.address, address.view.address, topics=topics, keys=address.keys) as sockets:
+        return _measured(sockets, (address.control.port, address.view.port), MonotonicClock())
 
 
 def _measured(sockets: OperatorSockets, ports: tuple[int, int], clock: MonotonicClock) -> dict[str, Any]:

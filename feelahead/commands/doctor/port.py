@@ -57,13 +57,13 @@ class Opening:
     """Time until the connection was established."""
 
 
-def judge_port(way: RobotAddress, port: Endpoint, opening: Opening, *, loopback: bool = False) -> None:
+def judge_port(address: RobotAddress, port: Endpoint, opening: Opening, *, loopback: bool = False) -> None:
     """Raise PathError if `opening` shows that `port` is no robot side's. loopback: the port is on this machine."""
     place = host_and_port(port)
     if opening.error is not None:
-        raise _no_connection(way, port, opening.error, loopback=loopback)
+        raise _no_connection(address, port, opening.error, loopback=loopback)
     see_who = f"give the robot side's port; the program at this one is shown there by: ss -ltnp 'sport = :{port.port}'"
-    match mechanism_of(opening.said), way.keys is not None:
+    match mechanism_of(opening.said), address.keys is not None:
         case ("NULL", False) | ("CURVE", True):
             return
         case "CURVE", _:
@@ -86,16 +86,16 @@ def judge_port(way: RobotAddress, port: Endpoint, opening: Opening, *, loopback:
     raise PathError("something else", said, see_who)
 
 
-def judge_view(way: RobotAddress, opening: Opening, *, loopback: bool = False) -> None:
+def judge_view(address: RobotAddress, opening: Opening, *, loopback: bool = False) -> None:
     """Raise PathError if the view port is no robot side's, after the control port was found to work."""
     try:
-        judge_port(way, way.view, opening, loopback=loopback)
+        judge_port(address, address.view, opening, loopback=loopback)
     except PathError as error:
         remedy = f"{error.remedy}; or {VIEW_CONNECT}" if error.wrong == "firewall" else VIEW_CONNECT
         raise PathError("view port", f"the control port works, but not the view port: {error.said}", remedy) from error
 
 
-def _no_connection(way: RobotAddress, port: Endpoint, error: int, *, loopback: bool) -> PathError:
+def _no_connection(address: RobotAddress, port: Endpoint, error: int, *, loopback: bool) -> PathError:
     place = host_and_port(port)
     if error == errno.ECONNREFUSED:
         remedy = f"start feelahead-robot, or say where it is: --connect tcp://ROBOT:{port.port}"
@@ -104,7 +104,7 @@ def _no_connection(way: RobotAddress, port: Endpoint, error: int, *, loopback: b
             remedy += " --bind it listens on its own loopback alone"
         return PathError("closed port", f"{place} refuses connections: nothing listens there", remedy)
     if error == errno.ETIMEDOUT:
-        ports = list(dict.fromkeys(str(each.port) for each in (way.control, way.view)))
+        ports = list(dict.fromkeys(str(each.port) for each in (address.control, address.view)))
         said = f"{place} gave no answer in {_CONNECT_LIMIT_S:g} s: a firewall drops the packets, or no machine has"
         remedy = (
             f"let TCP ports {' and '.join(ports)} in on the robot's machine, such as: sudo ufw allow proto tcp from"
