@@ -76,6 +76,16 @@ def handle(monkeypatch: pytest.MonkeyPatch) -> PlayedHandle:
     return played
 
 
+def test_a_folder_that_cannot_be_made_is_said_before_the_person_begins(
+    handle: PlayedHandle, own_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (own_folder / "feelahead").write_text("in the way")
+    with pytest.raises(ConfigurationError, match="is no folder that this user may write to"):
+        command(["calibrate"])
+    assert (handle.now_s, capsys.readouterr().out) == (0.0, "")
+    assert handle.closed == handle.times_opened
+
+
 def test_a_real_controller_is_measured_and_kept_by_its_address(
     handle: PlayedHandle, capsys: pytest.CaptureFixture[str]
 ) -> None:
