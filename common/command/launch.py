@@ -55,6 +55,11 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
     except KeyboardInterrupt:
         # Just before or after run_command's own handling; otherwise the exit status would be SIGINT's.
         sys.exit(0)
+    except ImportError as error:
+        # A package that the command imports late makes an ImportError of the interrupt, as MuJoCo does.
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        sys.exit(0)
 
 
 def _summary_path(arguments: Sequence[str]) -> str | None:

@@ -194,3 +194,16 @@ def test_closed_streams_become_the_null_device(tmp_path: Path) -> None:
     words = f"exec '{sys.executable}' '{program}' '{said}' <&- >&- 2>&-"
     assert subprocess.call(["/bin/sh", "-c", words], env=os.environ | {"PYTHONPATH": str(ROOT)}) == 0
     assert said.read_text() == "False False True\n"
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize(("cause", "code"), [("KeyboardInterrupt", 0), ("OSError", 1)])
+def test_an_interrupted_late_import_ends_quietly_and_a_broken_one_does_not(cause: str, code: int) -> None:
+    program = (
+        "from common.command.launch import launch\n"
+        "def command(_):\n"
+        f"    raise ImportError('initialization failed') from {cause}()\n"
+        "launch('x', lambda: command)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, "Traceback" in done.stderr) == (code, code == 1)
