@@ -163,13 +163,13 @@ class LinkEnd:
         if sent_s is None or held_s is None:
             self.clock_offset.arrived(header.sent_s, now_s)
             return None
-        last = header.last_sent_s is None
         # A stamp from before our restart, or an invented one, says nothing about the link.
-        if not self.clock_offset.update(sent_s, header.sent_s, held_s, now_s, arrived_last=last):
+        if not self.clock_offset.update(sent_s, header.sent_s, held_s, now_s):
             return None
         self.outgoing.echoed(sent_s, header.sent_s - held_s)
         if header.last_sent_s is not None and header.last_held_s is not None:
-            self.clock_offset.overtaken(header.last_sent_s, header.sent_s, header.last_held_s, now_s)
+            # Without the message that a newer one overtook, round trips would be biased low on a link that reorders.
+            self.clock_offset.update(header.last_sent_s, header.sent_s, header.last_held_s, now_s)
         if self.clock_offset.round_trip_s is not None:
             self.round_trip.add(self.clock_offset.round_trip_s)
         return max(0.0, now_s - sent_s - held_s) + counted_s(held_s)
@@ -193,17 +193,12 @@ class LinkEnd:
         return one_way_s
 
     def offset_summary_ms(self) -> dict[str, Any]:
-        """Return the clock offset's `value` and `bound` in ms, `skew_ppm` and `estimator`; None where unknown.
-
-        Also return the number of `rejected` stamps and of clock `jumps`.
-        """
+        """Return the offset's `value` and `bound` in ms, and how many stamps were `rejected` and `jumps` found."""
         offset = self.clock_offset
-        value_s, bound_s, skew = offset.offset_s, offset.bound_s, offset.skew
+        value_s, bound_s = offset.offset_s, offset.bound_s
         return {
             "value": None if value_s is None else 1e3 * value_s,
             "bound": None if bound_s is None else 1e3 * bound_s,
-            "skew_ppm": None if skew is None else 1e6 * skew,
-            "estimator": offset.estimator,
             "rejected": offset.rejected,
             "jumps": offset.jumps,
         }

@@ -124,7 +124,6 @@ def test_an_invented_echo_is_not_measured() -> None:
 # Both ends' clocks and delays, in virtual time at their real rates
 
 QUEUES = Way("exponential", 0.050, 0.010)
-JITTER = Way("normal", 0.050, 0.010)
 
 
 def last_estimates(traffic: Traffic) -> dict[str, Estimate]:
@@ -140,17 +139,6 @@ def test_both_ends_know_the_offset_after_five_seconds_of_queues(to_robot: Way, t
         assert estimate.one_way_error_s is not None
         assert abs(estimate.offset_error_s) < 0.5e-3
         assert abs(estimate.one_way_error_s) < 0.5e-3
-    assert traffic.robot.offset_summary_ms()["skew_ppm"] == pytest.approx(1e6 * skew, abs=15.0)
-
-
-def test_reordering_does_not_pull_the_mean() -> None:
-    # Echoes of the newest stamps alone would be 10 ms off: at 1 kHz the newest to have arrived is an early one.
-    traffic = Traffic(Scenario(JITTER, JITTER, 20e-6), seed=1, duration_s=10.0)
-    for estimate in last_estimates(traffic).values():
-        assert estimate.offset_error_s is not None
-        assert abs(estimate.offset_error_s) < 0.6e-3
-    assert traffic.robot.offset_summary_ms()["estimator"] == "mean"
-    assert traffic.operator.offset_summary_ms()["estimator"] == "mean"
 
 
 ways = st.builds(
@@ -199,8 +187,8 @@ def test_delays_wait_for_the_offset_to_settle() -> None:
         if sent_s < 0.9:
             assert robot.delay.count == 0
     assert robot.delay.count == 61
-    assert robot.delay.mean == pytest.approx(0.02, abs=1e-6)
-    assert robot.delay.sd == pytest.approx(0.0, abs=1e-6)
+    assert robot.delay.mean == pytest.approx(0.02, abs=20e-6)
+    assert robot.delay.sd == pytest.approx(0.0, abs=20e-6)
 
 
 def test_a_new_epoch_forgets_the_offset_and_all_that_hung_on_it() -> None:
@@ -270,10 +258,10 @@ def test_a_peer_that_invents_stamps_spoils_nothing_for_long(
 
 def test_the_summary_of_a_shared_clock_is_exact_and_that_of_no_peer_is_empty() -> None:
     robot, operator = ends()
-    unknown = {"value": None, "bound": None, "skew_ppm": None, "estimator": None, "rejected": 0, "jumps": 0}
+    unknown = {"value": None, "bound": None, "rejected": 0, "jumps": 0}
     assert robot.offset_summary_ms() == unknown
     robot.arrived(operator.hello(0.0), 0.02)
-    shared = {"value": 0.0, "bound": 0.0, "skew_ppm": 0.0, "estimator": "shared clock", "rejected": 0, "jumps": 0}
+    shared = {"value": 0.0, "bound": 0.0, "rejected": 0, "jumps": 0}
     assert robot.offset_summary_ms() == shared
 
 
