@@ -195,10 +195,8 @@ def test_the_bound_holds_on_every_arrival_whatever_the_link(
             math.inf if generator.random() < loss else max(0.0, float(generator.normal(base_s, spread_s)))
         )
 
-    robot, operator = (
-        LinkEnd(side, number, f"{side}'s clock", asymmetry_s=asymmetry_s)
-        for number, side in enumerate(("robot", "operator"), 1)
-    )
+    robot = LinkEnd("robot", 1, "robot's clock", asymmetry_s=asymmetry_s)
+    operator = LinkEnd("operator", 2, "operator's clock", asymmetry_s=asymmetry_s)
     for end, at_s, _ in talk(robot, operator, (delay(*ways[0]), delay(*ways[1])), skew, 1.0):
         error_s, bound_s = offset_error_s(robot, end, at_s, skew)
         if error_s is not None:
