@@ -82,7 +82,9 @@ class Sight:
 
     def choose_next(self, objects: PerceivedObjects, tool_position_m: FloatArray, approach: FloatArray) -> None:
         """Make the next object along the unit vector `approach` (3,) the target."""
-        chosen = next_target(objects, self.target, object_centers(objects), tool_position_m, approach)
+        chosen = next_target(
+            objects, self.target, object_centers(self._surroundings.see(objects)), tool_position_m, approach
+        )
         if chosen is None:
             return
         if self.target is not None:

@@ -147,7 +147,7 @@ def test_what_is_new_since_an_earlier_frame_is_written_into_its_table_alone(seed
         said_whole = make(dataclasses.replace(objects))
         for name in ("shapes", "bounds", "object_bounds", "object_volumes"):
             np.testing.assert_array_equal(getattr(table, name), getattr(said_whole, name))
-        centers_m = object_centers(objects)
+        centers_m = object_centers(table)
         for thing in range(len(objects.names)):
             np.testing.assert_array_equal(seeing.center_m(objects, thing), centers_m[thing])
     assert table.bounds is kept
