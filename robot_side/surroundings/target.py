@@ -51,9 +51,9 @@ def center_m(table: SceneTable, thing: int) -> FloatArray:
 
     A mesh's centre is that of its bounding box in its own frame.
     """
-    center: FloatArray = np.empty((1, 3))
-    _center(table.bundle, thing, center)
-    return center[0]
+    center: FloatArray = np.empty(3)
+    _center(table.bundle, thing, center.reshape(1, 3))
+    return center
 
 
 def next_target(
