@@ -17,8 +17,6 @@ _REMEMBERED_EPOCHS = 64
 """Number of the peer's ended epochs that are remembered, and so refused; older ones are forgotten to bound memory."""
 _MOST_RECENT = 4096
 """Maximum number of arrivals in `recent`; enough for the last second."""
-_MOST_UNMEASURED = 4096
-"""Maximum number of arrivals kept until the clock offset settles: that takes a second, in which about 1000 arrive."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class LinkEnd:
     ) -> None:
         """`asymmetry_s`: least delay to the robot minus least delay to the operator, if known from elsewhere."""
         self.delay = RunningStatistics(seed)
-        """One-way delays from the peer in seconds, of all arrivals, fresh or not; empty until the offset settles."""
+        """One-way delays from the peer in seconds, of all arrivals since the offset settled, fresh or not."""
         self.round_trip = RunningStatistics(seed)
         """Round trips without the peer's holding time, in seconds, of all arrivals that echo a stamp."""
         self.recent: deque[tuple[float, float | None, float | None]] = deque(maxlen=_MOST_RECENT)
@@ -81,7 +79,6 @@ class LinkEnd:
         """Estimate of the peer's clock offset; begun anew with each epoch of the peer."""
         self._jumps = 0
         self.outgoing.reset()
-        self._unmeasured: deque[tuple[float, float]] = deque(maxlen=_MOST_UNMEASURED)
         self._queueing = QueueingAge()
         self._newest_of_kind: dict[type, int] = {}
         self._newest: Header | None = None
@@ -180,16 +177,9 @@ class LinkEnd:
             self._jumps = self.clock_offset.jumps
             self._queueing.reset()
             self.outgoing.reset()
-            self._unmeasured.clear()
         one_way_s = self.clock_offset.one_way_from_peer_s(sent_s, now_s)
-        if one_way_s is None or not self.clock_offset.settled:
-            self._unmeasured.append((sent_s, now_s))
-            return one_way_s
-        while self._unmeasured:
-            earlier_s = self.clock_offset.one_way_from_peer_s(*self._unmeasured.popleft())
-            if earlier_s is not None:
-                self.delay.add(earlier_s)
-        self.delay.add(one_way_s)
+        if one_way_s is not None and self.clock_offset.settled:
+            self.delay.add(one_way_s)
         return one_way_s
 
     def offset_summary_ms(self) -> dict[str, Any]:
