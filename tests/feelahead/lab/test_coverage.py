@@ -148,17 +148,6 @@ def test_zones_and_errors_are_those_of_the_law() -> None:
     assert statistical_distance_m(draw, time_s, 0.99) == pytest.approx(2.326 * 0.003, rel=0.02)
 
 
-def test_a_drift_counts_as_reported_once_a_report_of_it_is_back() -> None:
-    drifting = staged("wall", LINKS["50 ms"], pull="drift")[0]
-    times = drifting.record.began_s + np.arange(0.0, 0.8, 0.01)
-    known = np.array([drifting.knows_aside(float(time_s)) for time_s in times])
-    # There and back, with jitter, and 30 ms to look from all places; the arm must also start.
-    assert 0.1 < times[int(np.argmax(known))] - drifting.record.began_s < 0.3
-    assert known[int(np.argmax(known)) :].all()
-    steady = staged("wall")[0]
-    assert steady.knows_aside(steady.record.began_s)
-
-
 # The judged pipeline is the shipped one
 
 
@@ -233,7 +222,6 @@ def test_placements_whose_stick_moves_after_judgement_are_counted_apart() -> Non
     assert (row["places"], row["unavoidable"], row["unknowable"], row["coverage"]) == (8, 0, 1, 1.0)
     # The same number of draws in each other placement, 20 or more in all.
     assert row["draws"] == 3 * 7
-    assert row["reported"] < row["draws"]
 
 
 @pytest.mark.parametrize("link", ["0 ms", "200 ms"])
