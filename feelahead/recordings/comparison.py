@@ -3,7 +3,7 @@
 import contextlib
 import math
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -18,6 +18,11 @@ from operator_side.controller.feel import Feel
 
 WITHIN_EIGHTHS = 1.0
 WITHIN_M = 1e-12
+_EIGHTHS: Final = {"stiffness": 8.0, "rumble": 8.0, "l2": 1.0, "r2": 1.0}
+"""Eighths of strength in a unit of each figure that is a strength"""
+_UNJUDGED: Final = ("_m_s", "_m_s2")
+"""Endings of the names of figures that are not compared"""
+_FEEL: Final = msgspec.msgpack.Decoder(Feel)
 _NEEDED: Final = ("settings", "epoch", "clock_domain")
 
 
@@ -152,30 +157,26 @@ def _is_stiffness(payload: bytes | None) -> bool:
 def _difference(first: bytes, second: bytes, *, effects: bool) -> tuple[float, float]:
     """Return the largest difference in eighths of strength and in metres; infinite eighths if anything else differs."""
     with contextlib.suppress(RemoteProtocolError, ValueError):
-        if effects:
-            return _feel_difference(*(msgspec.msgpack.decode(one, type=Feel) for one in (first, second)))
-        one, other = decode(first), decode(second)
-        if isinstance(one, StiffnessUpdate) and isinstance(other, StiffnessUpdate):
-            return _message_difference(one, other)
+        read: Callable[[bytes], Any] = _FEEL.decode if effects else decode
+        one, other = read(first), read(second)
+        if type(one) is type(other) and isinstance(one, StiffnessUpdate | Feel):
+            return _apart(msgspec.to_builtins(one), msgspec.to_builtins(other))
     return math.inf, 0.0
 
 
-def _message_difference(one: StiffnessUpdate, other: StiffnessUpdate) -> tuple[float, float]:
-    if (one.header, one.state) != (other.header, other.state):
+def _apart(one: Any, other: Any, name: str = "") -> tuple[float, float]:
+    """Return the largest differences of values with this name, and within them: in eighths, and in metres."""
+    if one == other or name.endswith(_UNJUDGED):
+        return 0.0, 0.0
+    if isinstance(one, dict) and isinstance(other, dict):
+        found = [_apart(one[key], other.get(key), key) for key in one]
+    elif isinstance(one, list | tuple) and isinstance(other, list | tuple) and len(one) == len(other):
+        found = [_apart(*both, name) for both in zip(one, other, strict=True)]
+    elif not (isinstance(one, float | int) and isinstance(other, float | int)):
         return math.inf, 0.0
-    eighths, metres = [8.0 * abs(one.rumble - other.rumble)], [abs(one.horizon_m - other.horizon_m)]
-    for a, b in ((one.l2, other.l2), (one.r2, other.r2)):
-        eighths.append(8.0 * abs(a.stiffness - b.stiffness))
-        metres += [abs(x - y) for x, y in zip((*a.fast_m, *a.slow_m), (*b.fast_m, *b.slow_m), strict=True)]
-        metres.append(abs(a.displacement_m - b.displacement_m))
+    elif name.endswith("_m"):
+        return 0.0, abs(one - other)
+    else:
+        return _EIGHTHS.get(name, math.inf) * abs(one - other), 0.0
+    eighths, metres = zip(*found, strict=True)
     return max(eighths), max(metres)
-
-
-def _feel_difference(one: Feel, other: Feel) -> tuple[float, float]:
-    apart = [0.0 if (one.rumble, one.light) == (other.rumble, other.light) else math.inf]
-    for a, b in ((one.l2, other.l2), (one.r2, other.r2)):
-        if a is not None and b is not None:
-            apart += [abs(x - y) for x, y in zip(a, b, strict=True)]
-        elif a is not b:
-            apart.append(math.inf)
-    return max(apart), 0.0
