@@ -15,9 +15,7 @@ from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from feelahead.lab.approaches.judging import (
     false_alarms,
-    statistical_distance_m,
     strength_before_release,
-    zone_speed_m_s,
 )
 from feelahead.lab.approaches.laws import Law
 from feelahead.lab.approaches.placements import first_touch_s, last_release_s
@@ -134,18 +132,6 @@ def test_strength_without_cause_is_an_alarm_and_only_that() -> None:
     replay, posed, draw = staged("wall", ahead_m=-0.30)
     near = false_alarms(Judged("full", 0.99), draw, posed, -0.30 * replay.axis, began_s + 0.1)
     assert near.number == 0
-
-
-def test_zones_and_errors_are_those_of_the_law() -> None:
-    speeds = [zone_speed_m_s(zone) for zone in range(10)]
-    assert speeds == sorted(speeds)
-    # The sensor ends at three quarters of the travel.
-    assert speeds[7] == speeds[9] == pytest.approx(0.25)
-    assert speeds[0] == pytest.approx(0.25 * (0.05 / 0.75 - 0.05) / 0.93)
-    replay, _, draw = staged("wall", LINKS["200 ms"])
-    time_s = replay.record.began_s + 1.0
-    assert statistical_distance_m(draw, time_s, 0.5) == pytest.approx(0.0, abs=1e-9)
-    assert statistical_distance_m(draw, time_s, 0.99) == pytest.approx(2.326 * 0.003, rel=0.02)
 
 
 # The judged pipeline is the shipped one
