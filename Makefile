@@ -79,7 +79,7 @@ pictures: $(VENV)/.installed $(VENV)/.kernels ## the documents' pictures of cons
 
 # Also in virtual time and over loopback, the same links: half an hour and more. Needs Docker.
 latency-experiment: $(VENV)/.installed ## links by name, in containers and emulated: what the delay does to the hand
-	$(BIN)/feelahead try latency --compose --csv latency.csv $(ARGS)
+	$(BIN)/feelahead try latency --compose --csv latency.csv --picture latency.png $(ARGS)
 
 EXPORT = uv export --quiet --no-emit-project --no-header
 lock: ## pin every dependency anew (needs uv); the files hold hashes and no addresses

@@ -3,26 +3,20 @@
 import contextlib
 import math
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
-
-import msgspec
 
 from common.errors import ConfigurationError, RemoteProtocolError
 from common.protocol.codec import decode
 from common.protocol.messages import StiffnessUpdate
 from common.recording.entries import Block, Entry, unpack_block
 from common.recording.reading import Recording
+from feelahead.recordings.controller import recorded_feel
 from operator_side.controller.feel import Feel
 
 WITHIN_EIGHTHS = 1.0
 WITHIN_M = 1e-12
-_EIGHTHS: Final = {"stiffness": 8.0, "rumble": 8.0, "l2": 1.0, "r2": 1.0}
-"""Eighths of strength in a unit of each figure that is a strength"""
-_UNJUDGED: Final = ("_m_s", "_m_s2")
-"""Endings of the names of figures that are not compared"""
-_FEEL: Final = msgspec.msgpack.Decoder(Feel)
 _NEEDED: Final = ("settings", "epoch", "clock_domain")
 
 
@@ -50,12 +44,12 @@ class Comparison:
         """Whether the differences are no larger than those between two kinds of processor."""
         return self.worst_eighths <= WITHIN_EIGHTHS and self.worst_m <= WITHIN_M
 
-    def take(self, first: bytes | None, second: bytes | None, *, effects: bool = False) -> None:
+    def take(self, first: bytes | None, second: bytes | None, feel_kind: int | None = None) -> None:
         """Compare the recorded message `first` with the recomputed `second`; None for a missing one.
 
-        effects: the two are effects for the controller instead.
+        feel_kind: kind of entry, one of FEELS, if the two are effects for the controller instead.
         """
-        counts = effects or _is_stiffness(first if second is None else second) or self.side == "operator"
+        counts = feel_kind is not None or _is_stiffness(first if second is None else second) or self.side == "operator"
         same = first == second
         if counts:
             self.made += second is not None
@@ -67,14 +61,18 @@ class Comparison:
             return
         eighths, metres = math.inf, 0.0
         if first is not None and second is not None:
-            eighths, metres = _difference(first, second, effects=effects)
+            eighths, metres = _difference(first, second, feel_kind)
         self.worst_eighths = max(self.worst_eighths, eighths)
         self.worst_m = max(self.worst_m, metres)
 
-    def missed(self, made: deque[bytes], *, effects: bool = False) -> None:
-        """Count each recomputed item left in `made` as missing in the recording, and remove it."""
+    def missed(self, made: deque[Any], feel_kind: int | None = None) -> None:
+        """Count each recomputed item left in `made` as missing in the recording, and remove it.
+
+        The items are messages, or effects for the controller.
+        """
         while made:
-            self.take(None, made.popleft(), effects=effects)
+            one = made.popleft()
+            self.take(None, one if isinstance(one, bytes) else b"", feel_kind)
 
     def lines(self) -> list[str]:
         """Return the lines that report the comparison."""
@@ -154,29 +152,33 @@ def _is_stiffness(payload: bytes | None) -> bool:
         return False
 
 
-def _difference(first: bytes, second: bytes, *, effects: bool) -> tuple[float, float]:
+def _difference(first: bytes, second: bytes, feel_kind: int | None) -> tuple[float, float]:
     """Return the largest difference in eighths of strength and in metres; infinite eighths if anything else differs."""
-    with contextlib.suppress(RemoteProtocolError, ValueError):
-        read: Callable[[bytes], Any] = _FEEL.decode if effects else decode
-        one, other = read(first), read(second)
-        if type(one) is type(other) and isinstance(one, StiffnessUpdate | Feel):
-            return _apart(msgspec.to_builtins(one), msgspec.to_builtins(other))
+    with contextlib.suppress(RemoteProtocolError):
+        if feel_kind is not None:
+            return _feel_difference(recorded_feel(feel_kind, first), recorded_feel(feel_kind, second))
+        one, other = decode(first), decode(second)
+        if isinstance(one, StiffnessUpdate) and isinstance(other, StiffnessUpdate):
+            return _message_difference(one, other)
     return math.inf, 0.0
 
 
-def _apart(one: Any, other: Any, name: str = "") -> tuple[float, float]:
-    """Return the largest differences of values with this name, and within them: in eighths, and in metres."""
-    if one == other or name.endswith(_UNJUDGED):
-        return 0.0, 0.0
-    if isinstance(one, dict) and isinstance(other, dict):
-        found = [_apart(one[key], other.get(key), key) for key in one]
-    elif isinstance(one, list | tuple) and isinstance(other, list | tuple) and len(one) == len(other):
-        found = [_apart(*both, name) for both in zip(one, other, strict=True)]
-    elif not (isinstance(one, float | int) and isinstance(other, float | int)):
+def _message_difference(one: StiffnessUpdate, other: StiffnessUpdate) -> tuple[float, float]:
+    if (one.header, one.state) != (other.header, other.state):
         return math.inf, 0.0
-    elif name.endswith("_m"):
-        return 0.0, abs(one - other)
-    else:
-        return _EIGHTHS.get(name, math.inf) * abs(one - other), 0.0
-    eighths, metres = zip(*found, strict=True)
+    eighths, metres = [8.0 * abs(one.rumble - other.rumble)], [abs(one.horizon_m - other.horizon_m)]
+    for a, b in ((one.l2, other.l2), (one.r2, other.r2)):
+        eighths.append(8.0 * abs(a.stiffness - b.stiffness))
+        metres += [abs(x - y) for x, y in zip((*a.fast_m, *a.slow_m), (*b.fast_m, *b.slow_m), strict=True)]
+        metres.append(abs(a.displacement_m - b.displacement_m))
     return max(eighths), max(metres)
+
+
+def _feel_difference(one: Feel, other: Feel) -> tuple[float, float]:
+    apart = [0.0 if (one.rumble, one.light) == (other.rumble, other.light) else math.inf]
+    for a, b in ((one.l2, other.l2), (one.r2, other.r2)):
+        if a is not None and b is not None:
+            apart += [abs(x - y) for x, y in zip(a, b, strict=True)]
+        elif a is not b:
+            apart.append(math.inf)
+    return max(apart), 0.0
