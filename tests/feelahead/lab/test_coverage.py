@@ -146,7 +146,7 @@ def test_over_a_whole_pull_it_is_what_both_sides_show_live(law: Law) -> None:
     for _ in run.go_on(began_s + 2.0):
         pass
     assert run.onset is not None
-    trace = run.samples.trace()
+    trace = run.trace()
 
     replay, posed, _ = staged("wall", link)
     # The camera's errors are those of the robot side with that seed, see `assemble`.
