@@ -4,6 +4,7 @@ import pytest
 
 from common.clock import VirtualClock
 from common.realtime.stages import EVERY, Stages
+from common.statistics import BLOCK
 
 
 class Both:
@@ -33,6 +34,18 @@ def test_a_stage_adds_up_within_a_turn_and_restarts_in_the_next() -> None:
     assert summary["sockets"]["cpu_us"] == pytest.approx({"p50": 3.5, "p99": 3.99, "max": 4.0})
     assert summary["law"]["cpu_us"] == pytest.approx({"p50": 4.0, "p99": 7.92, "max": 8.0})
     assert stages.spent_s == pytest.approx([10e-6, 7e-6, 10e-6, 8e-6])
+
+
+def test_turns_are_reckoned_with_in_blocks_and_none_is_lost() -> None:
+    clocks = Both()
+    stages = Stages(("law",), clocks.wall, clocks.processor, every=1)
+    think = stages.timed("law", clocks.pass_)
+    for _ in range(2 * BLOCK + 1):
+        think(1e-6, 1e-6)
+        stages.end_turn()
+        assert len(stages._turns_s) < BLOCK
+    stages.take_in()
+    assert stages.spent_s[0] == pytest.approx((2 * BLOCK + 1) * 1e-6)
 
 
 def test_sampled_turns_are_scaled_up_to_all_turns() -> None:

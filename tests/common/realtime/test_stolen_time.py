@@ -28,3 +28,7 @@ def test_a_system_that_does_not_count_is_unknown(tmp_path: Path, monkeypatch: py
         monkeypatch.setattr(module, name, tmp_path / "none")
     assert read_stolen_time() == StolenTime(None, None, None)
     assert StolenTime(1.0, 2.0, 3.0).shares_since(StolenTime(None, None, None), 1.0) == (None, None)
+
+
+def test_shares_are_of_what_passed() -> None:
+    assert StolenTime(3.0, 15.0, 400.0).shares_since(StolenTime(2.0, 5.0, 200.0), 4.0) == (0.25, 0.05)

@@ -8,6 +8,7 @@ import pytest
 from common.protocol.codec import encode
 from common.protocol.link_end import LinkEnd
 from common.protocol.view_messages import VIDEO_TOPIC, VideoFrame
+from common.sockets.tcp_figures import TcpFigures
 from feelahead.commands.doctor import path
 from feelahead.commands.doctor.path import judged, path_line
 from feelahead.main import command
@@ -42,6 +43,12 @@ def test_the_verdict(others: dict[str, Any], linked: bool, works: bool, views: i
     path = judged(FINE | others, linked=linked)
     assert (path["arm_works"], path["views_that_work"]) == (works, views)
     assert said in path_line(path)
+
+
+def test_lost_packets_are_a_share_of_those_sent_meanwhile() -> None:
+    figures = TcpFigures(sent=300, sent_again=5).since(TcpFigures(sent=100, sent_again=3))
+    assert figures.lost_share == 0.01
+    assert figures.since(figures).lost_share is None
 
 
 class _Filming(ServingRobot):

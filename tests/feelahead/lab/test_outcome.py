@@ -20,6 +20,7 @@ pytestmark = pytest.mark.long
 
 approaches = pytest.mark.xdist_group("approaches")
 """Mark that runs these tests in one worker of pytest-xdist, so that each approach is computed once."""
+WAY_MM = 320.0
 FAR = "delay 200ms"
 JITTER = "delay 20ms 10ms distribution normal"
 
@@ -112,6 +113,14 @@ def test_where_the_robot_side_assists_no_finger_is_too_strong_for_a_wall() -> No
     assert assisted.least_gap_mm > 5.0
     assert (alone.end, alone.contact_with) == ("contact", "wall")
     assert alone.contact_speed_mm_s == pytest.approx(free_speed_mm_s(3.0), abs=3.0)
+
+
+@approaches
+def test_what_is_gripped_counts_as_gripper() -> None:
+    outcome = ended("place_held", force_n=3.7, grip=True, law="none")
+    assert (outcome.end, outcome.contact_with) == ("contact", "table")
+    assert outcome.contact_speed_mm_s == pytest.approx(250.0, abs=3.0)
+    assert 1e3 * outcome.trace.gap_m[0] == pytest.approx(WAY_MM, abs=1.0)
 
 
 # Objects beside a straight pull, moving away, or rising

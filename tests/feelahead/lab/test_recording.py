@@ -103,6 +103,22 @@ def test_until_it_brakes_it_goes_as_the_arm_went_with_these_commands(pull: PullK
 
 
 @recordings
+def test_an_arm_that_goes_brakes_from_the_zones_speed_and_one_that_starts_has_to_reach_it_first() -> None:
+    replay, ends_m = replayed("steady"), []
+    speed_m_s = commanded_m_s(replay)
+    for since_s in (0.0, GOES_S):
+        time_s = replay.record.began_s + since_s
+        arrives_s = replay.record.arrives_s(time_s)
+        path = stopping_path(replay, time_s, speed_m_s)[1]
+        reached_m = replay.pose_at(arrives_s).tool_position_m
+        ends_m.append(float((path.positions_m[-1] - reached_m) @ replay.axis) - speed_m_s * HORIZON_S)
+    starts_m, goes_m = ends_m
+    # At 3 m/s²: u²/2a more than u h, or, from rest, just u h.
+    assert goes_m == pytest.approx(speed_m_s**2 / 6.0, rel=0.2)
+    assert starts_m == pytest.approx(0.0, abs=0.001)
+
+
+@recordings
 @pytest.mark.parametrize(("pull", "direction", "fastest"), [("drift", 0, 0.1), ("yaw", 4, 0.5)])
 def test_sticks_end_go_on_by_half_or_go_on_until_it_stands(pull: PullKind, direction: int, fastest: float) -> None:
     replay = replayed(pull)
