@@ -142,8 +142,9 @@ class PullRun(Listener):
 
     def trace(self) -> Trace:
         """Return the course so far."""
-        numbers = np.array([row[:4] for row in self._rows]).reshape(-1, 4).T.copy()
-        return Trace(*numbers, np.array([row[4] for row in self._rows], dtype=np.int64).reshape(-1, ZONE_COUNT))
+        time_s, speed_m_s, gap_m, travel = np.array([row[:4] for row in self._rows]).reshape(-1, 4).T.copy()
+        strengths = np.array([row[4] for row in self._rows], dtype=np.int64).reshape(-1, ZONE_COUNT)
+        return Trace(time_s, speed_m_s, gap_m, travel, strengths)
 
     def on_sent(self, now_s: float) -> None:
         """Sample the true contacts, and every 10 ms speed, gap, travel and R2's zones."""
