@@ -23,7 +23,7 @@ TELLING = {
 }
 EXTRAS = {
     "record": {"foxglove-sdk", "mcap"},
-    "bench": {"mpmath"},
+    "bench": {"mpmath", "overlap"},
     "experiments": {"matplotlib", "pyarrow", "distributed"},
 }
 OF_THE_SIDES = {"mujoco-core", "mujoco", "numba", "simplejpeg", "hidapi", "viser"}

@@ -26,14 +26,14 @@ from feelahead.lab.reference.classes import DEPTHS, MAKERS, family, frozen_class
 from feelahead.lab.reference.meshes import around_torus, torus
 from feelahead.lab.reference.oracle import true_overlaps
 from feelahead.lab.reference.pairs import Pairs
-from feelahead.lab.reference.published import SDIST, CompiledHeader
+from feelahead.lab.reference.published import SDIST, CompiledHeader, PythonPackage
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
 from feelahead.lab.turns import in_turns, least_ns
 from robot_side.overlap import Mesh, sphere_box, sphere_tetrahedron
 
-OURS, KERNEL, HEADER = "ours, checked", "ours, kernel", "overlap, C++"
+OURS, KERNEL, PACKAGE, HEADER = "ours, checked", "ours, kernel", "overlap, Python", "overlap, C++"
 FASTER, BOXES_A_QUERY, FEW_TRIANGLES = 13.0, 20.0, 50
 Groups = Iterable[tuple[tuple[Any, ...], Table]]
 _BATCH = 4096
@@ -49,14 +49,15 @@ _COUNTS = ("pairs", "undefined", "negative", "false_zeros", "false_positives")
 class OverlapSweep(Sweep):
     """Measure run time and error of the overlaps and of their alternatives, on the same pairs in the same run.
 
-    The alternatives are the published package `overlap` 0.2.0 in C++, 29 satellite points and Monte Carlo. The package
-    needs a compiler, Eigen (apt-get install libeigen3-dev) and its header:
+    The alternatives are the published package `overlap` 0.2.0 from Python and in C++, 29 satellite points, Monte Carlo
+    and more. Those that this machine lacks are named. The package comes with: pip install '.[bench]' in the clone. The
+    C++ row needs a compiler, Eigen (apt-get install libeigen3-dev) and the package's header:
 
         pip download --no-deps --no-binary overlap overlap==0.2.0 && tar xzf overlap-0.2.0.tar.gz
     """
 
     peer_header: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """overlap.hpp of the package's source distribution."""
+    """overlap.hpp of the package's source distribution, for the C++ row."""
     adversarial: Annotated[Annotated[int, Meta(ge=1, le=10**8)] | None, tyro.conf.arg(metavar="PAIRS")] = None
     """Number of adversarial pairs; 100000 unless given, 20000 with --quick."""
     truths: Annotated[Annotated[int, Meta(ge=2, le=10**6)] | None, tyro.conf.arg(metavar="PAIRS")] = None
@@ -94,11 +95,11 @@ def cells(settings: OverlapSweep) -> Iterator[Piece]:
     for radius in _RADII:
         yield Piece("mesh", "mesh", f"{radius:g}", False, min(timed, 500), turns)
     for solid, case in product(_FLAT_FACED, _TRADED):
-        yield Piece("tradeoff", solid, case, False, truths, 2 if settings.quick else 4, header)
+        yield Piece("tradeoff", solid, case, False, truths, 2 if settings.quick else 4)
     for one in _CLASSES:
-        yield Piece("accuracy", *one, truths, turns, header)
+        yield Piece("accuracy", *one, truths, turns)
     for one in _CLASSES:
-        yield Piece("adversarial", *one, -(-wanted // len(_CLASSES)), turns, header)
+        yield Piece("adversarial", *one, -(-wanted // len(_CLASSES)), turns)
 
 
 def run(cell: Piece, seed: int) -> Iterator[Row]:
@@ -112,9 +113,10 @@ def _pairs(cell: Piece, seed: int) -> Pairs:
 
 
 def _package_volumes(cell: Piece, pairs: Pairs) -> FloatArray | None:
-    if (header := _header(cell.header)).missing or cell.solid not in _FLAT_FACED:
+    package = PythonPackage()
+    if package.missing or cell.solid not in _FLAT_FACED:
         return None
-    return header.turn(pairs, mend=cell.case != "inverted")[1]
+    return package.volumes(pairs, mend=cell.case != "inverted")
 
 
 @functools.cache
@@ -135,11 +137,12 @@ def _speed(cell: Piece, seed: int) -> Iterator[Row]:
         OURS: lambda: least_ns([functools.partial(_checked, batch) for batch in batches], clock),
         KERNEL: lambda: least_ns([functools.partial(errors.kernel_overlaps, batch) for batch in batches], clock),
     }
-    header = _header(cell.header)
-    if header.missing:
-        yield {"method": HEADER, "missing": header.missing}
-    else:
+    package, header = PythonPackage(), _header(cell.header)
+    if not header.missing:
         contenders[HEADER] = lambda: header.turn(pairs)[0]
+    for method, missing in ((PACKAGE, package.missing), (HEADER, header.missing)):
+        if missing:
+            yield {"method": method, "missing": missing}
     for method, time_ns in in_turns(contenders, cell.turns).items():
         yield {"method": method, "ns": time_ns / len(pairs)}
 
@@ -157,7 +160,7 @@ def _accuracy(cell: Piece, seed: int) -> Iterator[Row]:
         answered = np.isfinite(volumes)
         most = {"volume": float(errors.volume_errors(pairs, truths, volumes)[answered].max(initial=0.0))}
         most[relative] = float(errors.relative_errors(truths, volumes)[known & answered].max(initial=0.0))
-        yield {"method": HEADER, **group, **most, "undefined": int((~answered).sum())}
+        yield {"method": PACKAGE, **group, **most, "undefined": int((~answered).sum())}
 
 
 def _failures(cell: Piece, seed: int) -> Iterator[Row]:
@@ -166,7 +169,7 @@ def _failures(cell: Piece, seed: int) -> Iterator[Row]:
     shares = {"asymmetry": errors.asymmetry(pairs, volumes), "shrinking": errors.shrinking(pairs, volumes)}
     yield {"method": "ours", **asdict(errors.count_failures(pairs, volumes)), **shares}
     if (theirs := _package_volumes(cell, pairs)) is not None:
-        yield {"method": HEADER, **asdict(errors.count_failures(pairs, theirs))}
+        yield {"method": PACKAGE, **asdict(errors.count_failures(pairs, theirs))}
 
 
 def _tradeoff(cell: Piece, seed: int) -> Iterator[Row]:
@@ -176,6 +179,8 @@ def _tradeoff(cell: Piece, seed: int) -> Iterator[Row]:
     methods: dict[str, tuple[Callable[[Pairs], FloatArray], int]]
     methods = {"ours, batch": (errors.kernel_volumes, _BATCH), "29 points": (satellites, _BATCH)}
     methods |= {name: (volumes_of, cell.turns) for name, volumes_of in SLOW.items()}
+    if not (package := PythonPackage()).missing:
+        methods[PACKAGE] = package.volumes, len(pairs)
     cut = np.flatnonzero([truth.faces_cut > 0 and truth.area != 0 for truth in truths])
     for method, (volumes_of, count) in methods.items():
         rows = cut[:count] if count < len(pairs) and len(cut) else np.arange(len(pairs))
@@ -187,10 +192,6 @@ def _tradeoff(cell: Piece, seed: int) -> Iterator[Row]:
             many = pairs[np.resize(np.arange(len(pairs)), _BATCH)]
             time_ns = float(least_ns([functools.partial(volumes_of, many)], clock)[0]) / _BATCH
         yield {"method": method, "ns": time_ns, "volume": float(np.minimum(wrong, 1.0).max())}
-    if not (header := _header(cell.header)).missing:
-        times_ns, volumes = header.turn(pairs)
-        wrong = np.minimum(errors.volume_errors(pairs, truths, volumes), 1.0)
-        yield {"method": HEADER, "ns": times_ns.sum() / len(pairs), "volume": float(wrong.max())}
 
 
 def _mesh(cell: Piece, seed: int) -> Iterator[Row]:
@@ -222,17 +223,17 @@ def show(_: OverlapSweep, table: Table) -> Iterator[Shown | str]:
         yield shown(title, headings, by_method)
     yield from dict.fromkeys(f"not measured: {row['method']}: {row['missing']}" for row in speed if "missing" in row)
     names = ("volume", "gradient", "area", "relative", "direction")
-    every = [*((name, "ours") for name in names), ("volume", HEADER)]
+    every = [*((name, "ours") for name in names), ("volume", PACKAGE)]
     title = "worst errors, of the sphere, great circle and surface; relative for overlaps from 1e-12 of the sphere"
-    yield shown(title, ("class", *names, HEADER), _rows(accuracy.groups("solid", "family"), every))
+    yield shown(title, ("class", *names, PACKAGE), _rows(accuracy.groups("solid", "family"), every))
     shallow = Table(row for row in accuracy if "shallow" in row).groups("solid", "case")
-    both = [("shallow", "ours"), ("shallow", HEADER)]
-    yield shown("shallow overlaps, worst relative error", ("class", "ours", HEADER), _rows(shallow, both))
+    both = [("shallow", "ours"), ("shallow", PACKAGE)]
+    yield shown("shallow overlaps, worst relative error", ("class", "ours", PACKAGE), _rows(shallow, both))
     counts = [
-        (name, *(_total(adversarial.where(method=method), name) for method in ("ours", HEADER)))
+        (name, *(_total(adversarial.where(method=method), name) for method in ("ours", PACKAGE)))
         for name in (*_COUNTS, "largest_missed", "largest_false_positive", "excess", "asymmetry", "shrinking")
     ]
-    yield shown("adversarial pairs: counts, and largest shares of the sphere", ("", "ours", HEADER), counts)
+    yield shown("adversarial pairs: counts, and largest shares of the sphere", ("", "ours", PACKAGE), counts)
     of_mesh = ("triangles", "ns", "gradient_ns")
     queries = _rows(meshes.groups("case"), [(name, "ours") for name in of_mesh])
     yield shown("a torus of 10 000 triangles, ns a query, by triangles evaluated", ("radius, m", *of_mesh), queries)

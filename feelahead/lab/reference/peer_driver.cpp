@@ -13,7 +13,6 @@
 #include <cstdlib>
 #include <fstream>
 #include <limits>
-#include <optional>
 #include <vector>
 
 #include "overlap.hpp"
@@ -44,7 +43,7 @@ int run(const std::vector<double>& numbers, std::size_t count, int repeats, cons
     for (std::size_t part = 0; part < parts; ++part) {
       const std::size_t first = part * at_once, last = std::min(count, first + at_once);
       std::vector<overlap::Sphere> spheres;
-      std::vector<std::optional<Element>> elements;
+      std::vector<Element> elements;
       spheres.reserve(at_once);
       elements.reserve(at_once);
       const auto before = Clock::now();
@@ -56,17 +55,13 @@ int run(const std::vector<double>& numbers, std::size_t count, int repeats, cons
           corners[corner] = overlap::Vector{at[0], at[1], at[2]};
         }
         spheres.emplace_back(overlap::Vector{row[0], row[1], row[2]}, row[3]);
-        try {
-          elements.emplace_back(std::in_place, corners);
-        } catch (...) {
-          elements.emplace_back(std::nullopt);
-        }
+        elements.emplace_back(corners);
       }
       keep_least(building[part], before);
       const auto start = Clock::now();
       for (std::size_t pair = first; pair < last; ++pair) {
         try {
-          volumes[pair] = overlap::overlap_volume(spheres[pair - first], elements[pair - first].value());
+          volumes[pair] = overlap::overlap_volume(spheres[pair - first], elements[pair - first]);
         } catch (...) {
           volumes[pair] = std::numeric_limits<double>::quiet_NaN();
         }

@@ -1,14 +1,16 @@
-"""Run the C++ header of the published package `overlap` 0.2.0 on the same pairs.
+"""Run the published package `overlap` 0.2.0 on the same pairs: from Python, and its C++ header alone.
 
-It is optional: `missing` names the missing part and how to get it. The header takes one pair a call, has another order
-of corners, and returns volumes only.
+Both are optional: `missing` names the missing part and how to get it. The package takes one pair a call, has another
+order of corners, and returns volumes only.
 """
 
+import importlib.util
 import shutil
 import subprocess
 import tempfile
 import weakref
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +41,27 @@ def package_corners(pairs: Pairs, *, mend: bool = True) -> FloatArray:
     return np.ascontiguousarray(corners)
 
 
+class PythonPackage:
+    """The package from Python."""
+
+    def __init__(self) -> None:
+        found = importlib.util.find_spec("overlap") is not None
+        self.missing = "" if found else "not installed; in the clone: pip install '.[bench]'"
+
+    def volumes(self, pairs: Pairs, *, mend: bool = True) -> FloatArray:
+        """Return volumes (p,); NaN for pairs with which the package raises an exception."""
+        package: Any = importlib.import_module("overlap")
+        volumes = np.full(len(pairs), np.nan)
+        element = package.Tetrahedron if pairs.solid == "tetrahedron" else package.Hexahedron
+        for row, corners in enumerate(package_corners(pairs, mend=mend)):
+            try:
+                sphere = package.Sphere(pairs.centers[row], float(pairs.radii[row]))
+                volumes[row] = package.overlap_volume(sphere, element(corners))
+            except (ValueError, RuntimeError):
+                continue
+        return volumes
+
+
 class CompiledHeader:
     """The package's header, overlap.hpp of the source distribution, compiled into the driver beside this file."""
 
@@ -64,12 +87,9 @@ class CompiledHeader:
             errors = [line for line in said.stderr.splitlines() if "error" in line]
             self.missing = f"does not compile: {(errors or ['unknown error'])[0][:200]}" if said.returncode else ""
 
-    def turn(self, pairs: Pairs, *, mend: bool = True) -> tuple[FloatArray, FloatArray]:
-        """Compute all pairs twice in another process; return the least times in ns (parts,), and the volumes (p,).
-
-        A volume is NaN where the header throws. mend: reorder the corners of inverted tetrahedra.
-        """
-        corners = package_corners(pairs, mend=mend)
+    def turn(self, pairs: Pairs) -> tuple[FloatArray, FloatArray]:
+        """Compute all pairs twice in another process; return the least times in ns (parts,), and the volumes (p,)."""
+        corners = package_corners(pairs)
         rows = np.concatenate([pairs.centers, pairs.radii[:, None], corners.reshape(len(pairs), -1)], axis=1)
         given, found = (self._driver.with_name(name) for name in ("pairs", "volumes"))
         given.write_bytes(np.array([len(pairs), corners.shape[1]], np.int64).tobytes() + rows.tobytes())
