@@ -26,6 +26,7 @@ def test_keys_ramp_up_and_let_go_at_once(browser: Browser) -> None:
         half = alone.pulled[1]
         alone.let_pass(0.4)
         full = alone.pulled[1]
+        assert _keyed(alone)
         keyboard.up("KeyW")
         alone.let_pass(0.04)
         after = alone.pulled[1]
@@ -88,6 +89,10 @@ def test_keys_mark_episodes_in_any_state_and_drive_nothing(browser: Browser) -> 
         assert alone.page.ask(marks) == ["success", "failure", "discard", "reset"]
         alone.let_pass(0.1)
         assert alone.runs
+
+
+def _keyed(alone: HandsAlone) -> bool:
+    return bool(alone.messages[-1]["hands"]["keyed"])
 
 
 def _parts(value: object) -> tuple[float, ...]:
@@ -222,6 +227,7 @@ def test_pointer_and_gamepad_drive(browser: Browser) -> None:
         alone.let_pass(0.06)
         assert alone.intent is not None
         assert abs(alone.pulled[1] - 0.6) < 0.01
+        assert not _keyed(alone), "a finger's pull yields by itself"
         assert alone.intent.turning[1] > 0.97
         held[1] = 1.0
         alone.page.pretend_gamepad(_AXES, tuple(held))

@@ -125,8 +125,8 @@ function showFacts(message) {
   showLink(status);
   text("target", status.target ?? "none");
   text("holding", said.holding);
-  triggers.l2.show(facts.l2, message.fingers[0], facts.advancing === "L2");
-  triggers.r2.show(facts.r2, message.fingers[1], facts.advancing === "R2");
+  triggers.l2.show(facts.l2, message.fingers[0], facts.advancing === "L2", facts.page?.yields?.[0]);
+  triggers.r2.show(facts.r2, message.fingers[1], facts.advancing === "R2", facts.page?.yields?.[1]);
   charts.delay.add(clock.nowMs, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
   const asked = [["robot", facts.to_robot.asked], ["operator", facts.to_operator.asked]].filter(([, words]) => words);
   charts.delay.said = asked.map(([side, words]) => `emulated to the ${side}: ${words}`).join("; ");

@@ -35,7 +35,7 @@ const PULLED = 0.05; // dead zone of a gamepad's trigger
 const DEFLECTED = 0.12; // dead zone of a gamepad's sticks
 
 export const REST = Object.freeze({
-  run: false, l2: 0, r2: 0, lateral: [0, 0], turning: [0, 0], gripper: 0, next_target: false, hand_over: false,
+  run: false, l2: 0, r2: 0, keyed: false, lateral: [0, 0], turning: [0, 0], gripper: 0, next_target: false, hand_over: false,
 });
 
 export const atRest = (hands) =>
@@ -77,6 +77,7 @@ export class Keys {
     };
     const axis = (plus, minus) => way(plus, minus) - way(minus, plus);
     const hands = {
+      keyed: true,
       run: held.has("run"),
       r2: way("advance", "retreat"),
       l2: way("retreat", "advance"),
@@ -118,6 +119,7 @@ export function readGamepads(swapped) {
     stop ||= pressed(1);
     reset ||= pressed(9);
     hands = both(hands, {
+      keyed: false,
       run: pressed(swapped ? 5 : 4),
       l2: swapped ? right : left,
       r2: swapped ? left : right,
@@ -138,6 +140,7 @@ export function both(one, other) {
     run: one.run || other.run,
     l2: Math.max(one.l2, other.l2),
     r2: Math.max(one.r2, other.r2),
+    keyed: Math.max(one.l2, one.r2) >= Math.max(other.l2, other.r2) ? one.keyed : other.keyed,
     lateral: farther(one.lateral, other.lateral),
     turning: farther(one.turning, other.turning),
     gripper: Math.sign(one.gripper + other.gripper),

@@ -22,9 +22,10 @@ export class Trigger {
     this.#words = Array.from({ length: 2 }, () => add("p", place));
   }
 
-  show(facts, finger, advances) {
+  // yields: whether the pull of a key yields to the zones.
+  show(facts, finger, advances, yields) {
     this.#title.textContent = advances ? `▲ ${this.#name} advances` : `▼ ${this.#name} retreats`;
-    this.#meets.textContent = `meets ${facts.meets} of ${STRONGEST}`;
+    this.#meets.textContent = `${yields ? "yields: a 2 N finger · " : ""}meets ${facts.meets} of ${STRONGEST}`;
     facts.zones.forEach((strength, zone) => {
       const [bar, number] = this.#bars[zone];
       bar.style.height = `${(100 * strength) / STRONGEST}%`;
