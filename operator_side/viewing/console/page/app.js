@@ -30,7 +30,7 @@ for (const [id, title] of Object.entries(FIGURES)) {
 
 const clock = new Clock();
 const views = VIEWS.map((name) => new View(byId(name), clock));
-const overlay = new Overlay(byId("first_person"));
+const overlay = new Overlay(VIEWS.map(byId));
 const triggers = { l2: new Trigger(byId("l2"), "L2"), r2: new Trigger(byId("r2"), "R2") };
 const charts = {
   delay: new Chart(byId("delay_chart"), "delay", "ms", [["to here", "--l2"], ["to the robot", "--r2", [5, 3]]]),
