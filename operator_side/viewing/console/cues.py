@@ -98,7 +98,7 @@ class Cues:
     def _drop(self, shapes: SceneShapes, state: SceneState, tool: Floats, eyes: "_Eyes") -> dict[str, Any] | None:
         """Return what lies below the gripper's point, how far below it or what is held, and the line in each view."""
         held = None if state.near is None or state.near.held is None else state.near.held
-        point, below = tool[:3], []
+        point, below, tool_m = tool[:3], [], float(tool[2])
         for owner in self._own.keys() - ({shapes.objects.index(held)} if held in shapes.objects else set()):
             if (far_m := self._body(owner).top_below_m(point, self._poses[owner])) is not None:
                 below.append((far_m, shapes.objects[owner]))
@@ -109,7 +109,7 @@ class Cues:
         height_m = far_m
         if held in shapes.objects:
             owner = shapes.objects.index(held)
-            height_m = max(0.0, self._body(owner).lowest_m(self._poses[owner]) - (point[2] - far_m))
+            height_m = max(0.0, self._body(owner).lowest_m(self._poses[owner]) - (tool_m - far_m))
         lines = [None if eye is None else seen(ends, frame, eye) for eye, frame in eyes]
         flat = [None if line is None else [*map(float, np.ravel(line))] for line in lines]
         return {"name": name, "height_m": height_m, "lines": flat}

@@ -88,7 +88,7 @@ export class Overlay {
     const rows = [
       ["nearest", near.nearest === null ? "nothing" : `${near.nearest} ${far(near.nearest_m)}`, touched],
       target && target !== near.held && ["target", `${target} ${far(near.target_m)}${seen.at(-1) ? "" : ", out of view"}`],
-      target && target !== near.held && way && ["its middle", `${way} mm`],
+      target && target !== near.held && way && ["its middle", way],
       drop && ["height", `${mm(drop.height_m)} mm above ${drop.name}`],
       most?.overlap_mm3[column] > 0 && ["ahead", most.name, true],
       near.held !== null && ["holding", near.held + (facts.status.stands ? ", it stands" : "")],

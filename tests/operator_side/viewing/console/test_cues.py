@@ -26,7 +26,8 @@ def scene(tool_m: tuple[float, float, float], held: str | None = None, **changed
     assert isinstance(now, SceneState)
     cues = Cues()
     cues.shapes(msgspec.structs.replace(made, **{"eye": AHEAD, "overview_eye": ABOVE} | changed))
-    return cues.of(msgspec.structs.replace(now, tool_pose=(*tool_m, *ALONG_X), near=Near(held=held)))
+    shown = cues.of(msgspec.structs.replace(now, tool_pose=(*tool_m, *ALONG_X), near=Near(held=held)))
+    return dict(msgspec.json.decode(msgspec.json.encode(shown)))
 
 
 @pytest.mark.parametrize(
@@ -67,7 +68,7 @@ def test_both_views_have_the_line_and_the_target() -> None:
     assert overview == pytest.approx([-0.1 / 1.8, 0.0, -0.1 / 2.0, 0.0], abs=1e-6)
     assert first_person == pytest.approx([0.0, -0.1 / 0.3, 0.0, -0.3 / 0.3])
     target = shown["target"]
-    assert (target["name"], target["way_m"]) == ("mug", pytest.approx((0.1, -0.15, 0.12)))
+    assert (target["name"], target["way_m"]) == ("mug", pytest.approx([0.1, -0.15, 0.12]))
     left, low, right, high = target["boxes"][1]
     assert left < 0.1 / 0.42 < right
     assert low < (-0.15 - 0.1) / 0.42 < high
