@@ -13,7 +13,6 @@ import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -78,7 +77,7 @@ class Hand:
         while len(self._seen) > 1 and self._seen[1][0] <= now_s - _REACTION_S:
             self._seen.popleft()
         known = self._seen[0][1]
-        if "run" in self._held and known["state"] in ("disarmed", "stopped"):
+        if "run" in self._held and ("All keys up" in known["hands"] or known["state"] in ("disarmed", "stopped")):
             self.arm()
             return self.look()
         return known
@@ -215,23 +214,23 @@ def place(hand: Hand) -> None:
         near = height_mm < _GENTLE_MM
         way_mm = max(0.4 * _GENTLE_MM, height_mm) if near else height_mm - 0.7 * _GENTLE_MM
         leg("KeyF", 2 if near else 5, way_mm, lambda seen: "stands" in seen["rows"].get("holding", "stands"))
+    while _holds(hand.settle()):
+        hand.release()
+        hand.hold("KeyO")
+        hand.wait(3.0, lambda seen: not _holds(seen))
     hand.release()
-    hand.hold("KeyO")
-    hand.wait(3.0, lambda seen: not _holds(seen))
-    hand.release()
-    hand.wait(1.0)
 
 
 def drive(page: Page) -> tuple[Hand, str]:
     """Do the whole task at the page; return the hand, and how it ended."""
-    page.wait("document.querySelector('#drive:enabled') !== null", "a button to drive by", 60.0)
-    page.raw.click("#drive")
-    page.wait("document.querySelector('.near dt') !== null", "figures beside the gripper", 60.0)
     hand = Hand(page)
-    hand.arm()
-    hand.began_s = time.monotonic()
-    hand.look()
     try:
+        page.wait("document.querySelector('#drive:enabled') !== null", "a button to drive by", 60.0)
+        page.raw.click("#drive")
+        page.wait("document.querySelector('.near dt') !== null", "figures beside the gripper", 60.0)
+        hand.arm()
+        hand.began_s = time.monotonic()
+        hand.look()
         for _ in range(_TRIES):
             approach(hand)
             if grasp(hand):
@@ -293,7 +292,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 rows.append(row := run_once(one, delay_ms, seed))
                 print(*row.values(), sep="\t", flush=True)
     if asked.csv is not None:
-        with asked.csv.open("w", newline="") as file, suppress(BrokenPipeError):
+        with asked.csv.open("w", newline="") as file:
             table = csv.DictWriter(file, COLUMNS)
             table.writeheader()
             table.writerows(rows)
