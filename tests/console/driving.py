@@ -41,7 +41,7 @@ _SEEN: Final = """() => {
     const rows = [...document.querySelectorAll('.near dt')].map((dt) => [dt.textContent, dt.nextSibling.textContent]);
     return {
         rows: Object.fromEntries(rows), state: document.body.dataset.state, hands: text('#hands_state'),
-        delay: text('#delay'), r2: text('#r2 .meets'), off: !document.querySelector('#hands_off').hidden,
+        delay: text('#delay'), r2: text('#r2 .yields'), off: !document.querySelector('#hands_off').hidden,
         ages: [...document.querySelectorAll('.view')].map((view) => view.dataset.age),
     };
 }"""
@@ -145,7 +145,7 @@ def _held_s(way_mm: float, key: str, level: int) -> float:
 
 def _middle_mm(seen: Mapping[str, Any]) -> tuple[float, float, float] | None:
     """Return the shown way of the target's middle: right, up and ahead; None if it is not shown."""
-    words = re.findall(r"(\d+) (right|left|up|down|ahead|behind)", seen["rows"].get("its middle", ""))
+    words = re.findall(r"(\d+) (right|left|up|down|ahead|behind)", seen["rows"].get("middle", ""))
     if len(words) != len(("right", "up", "ahead")):
         return None
     right, up, ahead = (float(mm) * (1 if side in ("right", "up", "ahead") else -1) for mm, side in words)

@@ -93,11 +93,11 @@ def make_states(folder: Path, paths: Sequence[Path]) -> None:
         fed.state, fed.status = "stopped", {"person": Doing.ALL_KEYS_UP_FIRST}
         page.wait(f"{STATE} == 'stopped'", "shown as stopped")
         keep(page)
-        fed.page, fed.status = shown, {"link": LinkState.LOST, "person": Doing.ALL_KEYS_UP_FIRST}
+        fed.state, fed.page, fed.status = "armed", shown, {"link": LinkState.LOST, "person": Doing.ALL_KEYS_UP_FIRST}
         page.wait(f"{STATE} == 'lost'", "shown as lost")
         keep(page)
         fed.ends.set()
-        page.wait_for_text("#lost", "ended")
+        page.wait_for_text("#lost", "run has ended")
         keep(page)
         page.complaints.clear()  # the console is gone
 

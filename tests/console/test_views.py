@@ -91,10 +91,10 @@ def test_the_height_is_a_line_down_in_both_views_and_the_yielding_pull_is_said(
 ) -> None:
     """The overview looks straight down from 1.2 m; the other eye is level, 0.3 m behind the gripper and 0.1 m above."""
     with fed_page(browser, size) as (_, page):
-        page.wait_for_text(".near", "200 mm above table")
+        page.wait_for_text(".near", "200 mm over table")
         page.wait_for_text(".near", "150 right")  # the tool lies on its side
-        page.wait_for_text("#r2 .meets", "yields: a 2 N finger")
-        assert "yields" not in page.text("#l2 .meets")
+        page.wait_for_text("#r2 .yields", "yields: a 2 N finger")
+        assert not page.ask("document.querySelector('#l2 .yields')")
         half = math.tan(math.radians(35.0))
         for view in VIEWS:
             point, below, height, shown = page.ask(_LINE, view)

@@ -85,11 +85,12 @@ export class Overlay {
     const rumble = Math.ceil(EIGHTHS * facts.rumble);
     const touched = near.nearest_m !== null && near.nearest_m < TOUCHED_M;
     const way = scene.target?.way_m.map((metres, k) => `${mm(Math.abs(metres))} ${SIDES[k][Number(metres > 0)]}`).join(", ");
+    const aims = target && target !== near.held;
     const rows = [
-      ["nearest", near.nearest === null ? "nothing" : `${near.nearest} ${far(near.nearest_m)}`, touched],
-      target && target !== near.held && ["target", `${target} ${far(near.target_m)}${seen.at(-1) ? "" : ", out of view"}`],
-      target && target !== near.held && way && ["its middle", way],
-      drop && ["height", `${mm(drop.height_m)} mm above ${drop.name}`],
+      !(aims && near.nearest === target) && ["nearest", near.nearest === null ? "nothing" : `${near.nearest} ${far(near.nearest_m)}`, touched],
+      aims && ["target", `${target} ${far(near.target_m)}${seen.at(-1) ? "" : ", out of view"}`, touched && near.nearest === target],
+      aims && way && ["middle", way],
+      drop && ["height", `${mm(drop.height_m)} mm over ${drop.name}`],
       most?.overlap_mm3[column] > 0 && ["ahead", most.name, true],
       near.held !== null && ["holding", near.held + (facts.status.stands ? ", it stands" : "")],
       rumble > 0 && ["rumble", `${rumble} of ${EIGHTHS}: near where the stick leads`, true],
