@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from common.arrays import FloatArray
+from common.errors import FeelaheadError
 from common.recording.reading import Recording
 from feelahead.recordings.demonstrations import Demonstrations, Episode, Picture
 
@@ -36,8 +37,12 @@ def export_lerobot(recording: Recording, frames: Demonstrations, folder: Path) -
         why = str(error).splitlines()[0]
     else:
         if library.CODEBASE_VERSION == _VERSION:
-            _write_by(library, recording, frames, folder)
-            return f"written by lerobot {importlib.metadata.version('lerobot')}, pictures as video"
+            writer = f"lerobot {importlib.metadata.version('lerobot')}"
+            try:
+                _write_by(library, recording, frames, folder)
+            except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
+                raise FeelaheadError(f"{writer} cannot write {folder}: {error}") from error
+            return f"written by {writer}, pictures as video"
         why = f"lerobot writes {library.CODEBASE_VERSION}"
     _write(recording, frames, folder)
     return f"written by feelahead, pictures as JPEG ({why})"

@@ -284,6 +284,7 @@ def test_lerobots_own_writer_gets_every_frame_of_each_episode(
     assert "; written by feelahead, pictures as JPEG (lerobot writes v2.1)" in capsys.readouterr().out
 
 
+@pytest.mark.filterwarnings("default")  # what a foreign package warns of
 def test_lerobot_reads_what_its_own_writer_wrote(
     run: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,0 +1,56 @@
+"""The tables of docs/measurements.md come from stored figures, and the README's figures agree with them."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from feelahead.lab.measurements import DOCUMENT, FIGURES, MARKED, TABLES, read, written
+from tests.helpers.repository import ROOT
+
+README = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+TEXT = DOCUMENT.read_text(encoding="utf-8")
+
+
+def test_every_table_stands_between_markers_and_below_the_command_that_make_figures_runs() -> None:
+    assert not re.search(r"^\|", MARKED.sub("", TEXT), re.MULTILINE)
+    assert [found["name"] for found in MARKED.finditer(TEXT)] == [*TABLES]
+    asked = dict(re.findall(r"^figures/(\w+)\.csv: asks = (.+)$", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    above = re.findall(r"^    feelahead (.+)\n\n<!-- (\w+): by make figures -->$", TEXT, re.MULTILINE)
+    assert {name: command for command, name in above} == asked
+
+
+def test_the_tables_are_those_of_the_stored_figures() -> None:
+    assert written(TEXT) == TEXT
+
+
+def test_a_figure_copied_by_hand_does_not_last(tmp_path: Path) -> None:
+    (tmp_path / "commit").write_text("0123abcd\n")
+    (tmp_path / "cover.csv").write_text("part,spheres,sticks_out_mm,stands_out_mm\npalm,7,0.0,2.5\ntip,3,0.1,1.0\n")
+    marked = "Before\n<!-- {}: by make figures -->\n| by hand | 99 |\n<!-- end -->\nAfter\n"
+    once = written(marked.format("cover"), tmp_path)
+    assert "99" not in once
+    assert "Commit 0123abcd:\n\n| part |" in once
+    assert "\n| all | 10 | 0.1 | 2.5 |\n<!-- end -->\nAfter\n" in once
+    assert written(once, tmp_path) == once
+    without_figures = marked.format("demo")
+    assert written(without_figures, tmp_path) == without_figures
+
+
+def test_the_readme_says_how_fast_overlaps_are_as_the_appendix_does() -> None:
+    appendix = (ROOT / "docs/benchmarks.md").read_text(encoding="utf-8")
+    times = re.findall(r"^\| times faster than the C\+\+ package.*? \| ([\d.]+) \|", appendix, re.MULTILINE)
+    assert len(times) == 2
+    assert f"at least {int(min(map(float, times)))} times as fast" in README
+
+
+def test_the_readme_says_how_many_trials_have_a_hit() -> None:
+    if not (FIGURES / "haptics.csv").exists():
+        pytest.skip("figures/haptics.csv is missing; make figures measures it")
+    trials = read("haptics")
+    counts = {}
+    for (arm,), those in trials.groups("arm"):
+        ahead = [row["hits"] > 0 for row in those if row["scene"] in ("wall", "slot")]
+        counts[arm] = f"{sum(ahead)} of {len(ahead)}"
+    assert f"hits a wall or a post in {counts['off']} trials without haptics" in README
+    assert f"and in {counts['reacting']} with them" in README
