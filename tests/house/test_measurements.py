@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from feelahead.lab.measurements import DOCUMENT, FIGURES, MARKED, TABLES, read, written
+from feelahead.lab.table import Table
 from tests.helpers.repository import ROOT
 
 README = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
@@ -35,6 +36,35 @@ def test_a_figure_copied_by_hand_does_not_last(tmp_path: Path) -> None:
     assert written(once, tmp_path) == once
     without_figures = marked.format("demo")
     assert written(without_figures, tmp_path) == without_figures
+
+
+def test_intervals_of_haptics_resample_seeds_and_not_trials(tmp_path: Path) -> None:
+    (tmp_path / "commit").write_text("0123abcd\n")
+    rows = [
+        {
+            "scene": "wall",
+            "delay_ms": delay_ms,
+            "arm": arm,
+            "seed": seed,
+            "hits": int(arm == "off" and seed == 0),
+            "fastest_hit_mm_s": 50.0 + delay_ms if arm == "off" and seed == 0 else None,
+            "full_share": None if arm == "off" else 0.25,
+            "placed": arm != "off" or seed == 1,
+            "finished_s": None if arm == "off" and seed == 0 else 20.0 + seed,  # None counts as 45 s
+        }
+        for delay_ms in (0.0, 100.0)
+        for arm in ("off", "mechanical", "reacting")
+        for seed in (0, 1)
+    ]
+    Table(rows).write_csv(tmp_path / "haptics.csv")
+    lines = written("<!-- haptics: by make figures -->\n<!-- end -->", tmp_path).splitlines()
+    assert lines[5] == (
+        "| wall, 0 ms | 1/2 at 50 (50) | 0/2 | 0/2 | 1 / 2 / 2 | 33.0 / 20.5 / 20.5"
+        " | -12.5 [-25.0, +0.0] | -12.5 [-25.0, +0.0] | 25% / 25% |"
+    )
+    # Four pairs of two seeds: as wide as for one delay.
+    assert lines[7].startswith("| **wall, all** | 2/4 at 100 (150) | 0/4 | 0/4 | 2 / 4 / 4 |")
+    assert "| -12.5 [-25.0, +0.0] |" in lines[7]
 
 
 def test_the_readme_says_how_fast_overlaps_are_as_the_appendix_does() -> None:
