@@ -24,7 +24,7 @@ MARKED: Final = re.compile(
     r"(<!-- (?P<name>(?P<file>\w+)[^\n]*?): by make figures -->\n).*?(?P<end><!-- end -->)", re.DOTALL
 )
 _PLAIN: Final = {"": None, "True": True, "False": False}
-_ARMS: Final = ("off", "mechanical", "reacting")
+ARMS: Final = ("off", "mechanical", "reacting")
 _LIFTED_MM: Final = 50.0
 
 Lines = Iterable[Iterable[str]]
@@ -89,18 +89,18 @@ def compared(trials: Table) -> Iterator[str]:
 
     Trials of a seed share scene and errors, so an interval resamples the seeds, each with its mean over its trials.
     """
-    of = {arm: trials.where(arm=arm) for arm in _ARMS}
+    of = {arm: trials.where(arm=arm) for arm in ARMS}
     for those in of.values():
         speeds = those.values("fastest_hit_mm_s")
         hits = f"{sum(row['hits'] > 0 for row in those)}/{len(those)}"
         yield f"{hits} at {median(speeds):.0f} ({max(speeds):.0f})" if speeds else hits
     yield " / ".join(f"{sum(those.values('placed')):g}" for those in of.values())
     yield " / ".join(f"{fmean(_times_s(those)):.1f}" for those in of.values())
-    means_s = {arm: {seed: fmean(_times_s(rows)) for (seed,), rows in of[arm].groups("seed")} for arm in _ARMS}
-    for arm in _ARMS[1:]:
+    means_s = {arm: {seed: fmean(_times_s(rows)) for (seed,), rows in of[arm].groups("seed")} for arm in ARMS}
+    for arm in ARMS[1:]:
         longer_s = [means_s[arm][seed] - off_s for seed, off_s in means_s["off"].items()]
         yield "{:+.1f} [{:+.1f}, {:+.1f}]".format(fmean(longer_s), *mean_interval(longer_s))
-    yield " / ".join(f"{fmean(of[arm].values('full_share')):.0%}" for arm in _ARMS[1:])
+    yield " / ".join(f"{fmean(of[arm].values('full_share')):.0%}" for arm in ARMS[1:])
 
 
 def _times_s(trials: Table) -> list[float]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from feelahead.lab.measurements import DOCUMENT, FIGURES, MARKED, TABLES, read, written
+from feelahead.lab.measurements import ARMS, DOCUMENT, FIGURES, MARKED, TABLES, compared, read, written
 from feelahead.lab.table import Table
 from tests.helpers.repository import ROOT
 
@@ -74,13 +74,16 @@ def test_the_readme_says_how_fast_overlaps_are_as_the_appendix_does() -> None:
     assert f"at least {int(min(map(float, times)))} times as fast" in README
 
 
-def test_the_readme_says_how_many_trials_have_a_hit() -> None:
+def test_the_readme_says_what_haptics_change() -> None:
     if not (FIGURES / "haptics.csv").exists():
         pytest.skip("figures/haptics.csv is missing; make figures measures it")
     trials = read("haptics")
-    counts = {}
-    for (arm,), those in trials.groups("arm"):
-        ahead = [row["hits"] > 0 for row in those if row["scene"] in ("wall", "slot")]
-        counts[arm] = f"{sum(ahead)} of {len(ahead)}"
-    assert f"hits a wall or a post in {counts['off']} trials without haptics" in README
-    assert f"and in {counts['reacting']} with them" in README
+    ahead, shelf = (Table(row for row in trials if (row["scene"] == "shelf") is beside) for beside in (False, True))
+    of = len(ahead.where(arm="off"))
+    off, on, reacts = (sum(hits > 0 for hits in ahead.where(arm=arm).values("hits")) for arm in ARMS)
+    assert f"hits a wall or a post in {off} of {of} trials without haptics, and in {on} of {of} with them" in README
+    assert on == reacts
+    assert f"At a shelf none of {len(shelf.where(arm='off'))} trials hits anything" in README
+    assert sum(shelf.values("hits")) == 0
+    cost_s = [float(entry.split()[0]) for entry in [*compared(shelf)][5:7]]
+    assert "haptics cost {:.0f} to {:.0f} s".format(*cost_s) in README

@@ -219,16 +219,18 @@ def marked(run: Recording, folder: Path) -> Recording:
 class PublishedWriter:
     """LeRobotDataset as published (0.4.4 to 0.6.1), as far as it is used; keeps what it is given."""
 
-    CODEBASE_VERSION = "v3.0"
     made: "PublishedWriter"
+
+    def __init__(self, asked: tuple[str, int, str], features: dict[str, Any], root: Path) -> None:
+        self.asked, self.features, self.root = asked, features, root
+        self.frames: list[dict[str, Any]] = []
+        self.episodes: list[list[dict[str, Any]]] = []
 
     @classmethod
     def create(cls, repo_id: str, fps: int, features: dict[str, Any], root: Path, robot_type: str) -> "PublishedWriter":
         root.mkdir(parents=True, exist_ok=False)
-        cls.made = one = cls()
-        one.asked, one.features, one.root = (repo_id, fps, robot_type), features, root
-        one.frames, one.episodes, one.whole = [], [], False
-        return one
+        cls.made = cls((repo_id, fps, robot_type), features, root)
+        return cls.made
 
     def add_frame(self, frame: dict[str, Any]) -> None:
         assert set(frame) == {*self.features, "task"}
