@@ -100,7 +100,7 @@ def compared(trials: Table) -> Iterator[str]:
     for arm in ARMS[1:]:
         longer_s = [means_s[arm][seed] - off_s for seed, off_s in means_s["off"].items()]
         yield "{:+.1f} [{:+.1f}, {:+.1f}]".format(fmean(longer_s), *mean_interval(longer_s))
-    yield " / ".join(f"{fmean(of[arm].values('full_share')):.0%}" for arm in ARMS[1:])
+    yield " / ".join(f"{100 * fmean(of[arm].values('full_share')):.0f} %" for arm in ARMS[1:])
 
 
 def _times_s(trials: Table) -> list[float]:

@@ -60,7 +60,7 @@ def test_intervals_of_haptics_resample_seeds_and_not_trials(tmp_path: Path) -> N
     lines = written("<!-- haptics: by make figures -->\n<!-- end -->", tmp_path).splitlines()
     assert lines[5] == (
         "| wall, 0 ms | 1/2 at 50 (50) | 0/2 | 0/2 | 1 / 2 / 2 | 33.0 / 20.5 / 20.5"
-        " | -12.5 [-25.0, +0.0] | -12.5 [-25.0, +0.0] | 25% / 25% |"
+        " | -12.5 [-25.0, +0.0] | -12.5 [-25.0, +0.0] | 25 % / 25 % |"
     )
     # Four pairs of two seeds: as wide as for one delay.
     assert lines[7].startswith("| **wall, all** | 2/4 at 100 (150) | 0/4 | 0/4 | 2 / 4 / 4 |")
