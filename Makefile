@@ -13,7 +13,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 # A file that is only half made is made again.
 .DELETE_ON_ERROR:
-.PHONY: figures demo test quick types test-kernel test-netem test-two-hosts wide-area test-containers test-console pictures latency-experiment lock clean
+.PHONY: figures demo test quick types test-kernel test-netem test-two-hosts wide-area test-containers test-console pictures driving latency-experiment lock clean
 
 # The environment is rebuilt only when the lock or the package's metadata change.
 $(VENV)/.installed: requirements.lock pyproject.toml
@@ -100,6 +100,10 @@ figures/commit: anew
 .PHONY: anew
 figures: $(VENV)/.installed $(VENV)/.kernels $(FIGURES) ## docs/measurements.md: every figure measured by this commit, the tables written
 	$(BIN)/python -m feelahead.lab.measurements
+
+# As for the pictures. A run takes at most two minutes, half a minute as a rule: make driving ARGS="--delays 0 150 --seeds 2 --csv F"
+driving: $(VENV)/.installed $(VENV)/.kernels ## grasp and place by keyboard alone in a real browser, with delays: a table
+	$(BIN)/python -m tests.console.driving $(ARGS)
 
 # Also in virtual time and over loopback, the same links: half an hour and more. Needs Docker.
 latency-experiment: $(VENV)/.installed ## links by name, in containers and emulated: what the delay does to the hand
