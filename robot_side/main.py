@@ -2,6 +2,7 @@
 
 import secrets
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from functools import partial
 from typing import Final
 
@@ -64,10 +65,12 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
     status, loop = Status(settings.status, "robot"), Loop(TICK_PERIOD_S, REMEDIES, settings.seed)
     with Process(settings, "robot", status, RobotEncoder(), loop) as process:
         epoch, recording = secrets.randbits(53), process.recording
-        beside = ConnectedDrivers(settings.arm, settings.objects, process.note, insecure=settings.insecure, keys=keys)
-        process.stack.enter_context(beside)
-        # Fail at once for an occupied port, even if `beside` has just taken it.
-        open_sockets().close()
+        # Fail at once for an occupied port; open meanwhile, so that a driver's flag with the same port is named.
+        with closing(open_sockets()):
+            beside = ConnectedDrivers(
+                settings.arm, settings.objects, process.note, insecure=settings.insecure, keys=keys
+            )
+            process.stack.enter_context(beside)
         parts = build_parts(settings, epoch, clock_domain(), announce=process.note, beside=beside)
         recorder = [] if recording is None else [Recorder(recording.noted.append)]
         core_parts, others = adapt(parts)
