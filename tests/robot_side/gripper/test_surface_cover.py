@@ -140,10 +140,9 @@ def test_searches_in_a_row_are_said_once_in_a_few_seconds() -> None:
     said: list[str] = []
     notes = SearchNotes(said.append)
     for number in range(5):
-        notes.what = f"link {number}"
-        notes.begins()
+        notes.at(f"link {number}", 0.25)
     [line] = said
-    assert "link 0" in line
+    assert "link 0, 25.0 % covered" in line
 
 
 def test_a_cover_is_found_once_and_a_broken_file_is_made_anew(tmp_path: Path) -> None:
