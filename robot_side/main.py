@@ -33,8 +33,8 @@ from robot_side.viewing.viewpoints import first_person_eye
 
 TICK_PERIOD_S: Final = 1e-3
 _COMPILING: Final = (
-    "compiling for this processor, about half a minute; the next start is quick (to do it beforehand: feelahead doctor"
-    " --compile)"
+    "compiling for this processor, about half a minute: {} of {} kernels are ready; the next start is quick (to do it"
+    " beforehand: feelahead doctor --compile)"
 )
 _OPEN_TO_ALL: Final = "WITHOUT KEYS: anyone who reaches the port can move the arm"
 
@@ -79,7 +79,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         unused = unused_clauses(settings.link_spec(), [("to_operator", stream) for stream in sent])
         for text in unused:
             process.note(text)
-        warm_up(lambda: process.note(_COMPILING), parts.kernels)
+        warm_up(lambda ready, of: process.note(_COMPILING.format(ready, of)), parts.kernels)
         beside.wait()
         if recording is not None:
             recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": parts.notes})
