@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from viser.transforms import SO3
 
 from common.protocol.view_messages import Eye, Shape
 
@@ -39,8 +39,7 @@ def outline(shapes: Iterable[Shape], owner_pose: Floats, tool_pose: Floats, eye:
     corners = [_moved(owner_pose, corners_m(shape)) for shape in shapes]
     if not corners:
         return None
-    turn = Rotation.from_quat(tool_pose[3:], scalar_first=True)
-    seen = turn.inv().apply(np.concatenate(corners) - tool_pose[:3]) - np.array(eye.position_m)
+    seen = SO3(tool_pose[3:]).inverse().apply(np.concatenate(corners) - tool_pose[:3]) - np.array(eye.position_m)
     forward, up = np.array(eye.forward), np.array(eye.up)
     depth_m = seen @ forward
     if depth_m.min() < _NEAREST_M:
@@ -51,5 +50,5 @@ def outline(shapes: Iterable[Shape], owner_pose: Floats, tool_pose: Floats, eye:
 
 
 def _moved(pose: Floats, points: Floats) -> Floats:
-    moved: Floats = Rotation.from_quat(pose[3:], scalar_first=True).apply(points) + pose[:3]
+    moved: Floats = SO3(pose[3:]).apply(points) + pose[:3]
     return moved
