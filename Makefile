@@ -19,7 +19,8 @@ PIP_LOG = $(VENV)/pip.log
 # In a pipe pip says nothing for minutes: a line every 3 s counts its packages.
 # A background shell stays deaf to Ctrl-C, so it looks whether this one is still there.
 COUNT_PACKAGES = (while sleep 3 && kill -0 $$$$ 2> /dev/null; do \
-	echo "packages: $$(cat $(PIP_LOG) 2> /dev/null | grep -c ^Collecting) of $$(grep -c == requirements.lock) fetched," \
+	echo "of at most $$(grep -c == requirements.lock) packages" \
+	"$$(cat $(PIP_LOG) 2> /dev/null | grep -c '^Collecting\|^Processing') are fetched," \
 	"$$(ls -d $(VENV)/lib/python*/site-packages/*.dist-info 2> /dev/null | wc -l) installed"; done) & \
 	trap "kill $$!" EXIT INT TERM
 
