@@ -1,4 +1,4 @@
-"""Work of a search for a cover, counted and not timed, so that a limit gives the same cover on every machine."""
+"""Work of a search for a cover, counted and not timed, so that a busy machine searches as far as a fast one."""
 
 from collections.abc import Callable
 
