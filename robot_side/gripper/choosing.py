@@ -39,7 +39,8 @@ def with_contained(
     if known is None:
         return of_new
     beside = contained_points(centers_m[:spheres], radii_m[:spheres], points_m[points:], images)
-    return vstack([hstack([known, beside]), of_new], format="csr")
+    together: csr_array = vstack([hstack([known, beside]), of_new], format="csr")
+    return together
 
 
 def greedy_set_cover(inside: csr_array, costs: FloatArray) -> IntArray:

@@ -180,7 +180,7 @@ class Drawing:
                 batch.place(links, self._objects, tints)
             self._place_label(shapes, roles)
             spheres = np.frombuffer(state.spheres, np.float32).reshape(-1, 4)
-            along = SO3(np.array(state.tool_pose[3:])).apply(np.array([0.0, 0.0, 1.0]))
+            along: Floats = SO3(np.array(state.tool_pose[3:])).apply(np.array([0.0, 0.0, 1.0])).astype(np.float64)
             for ghost, name, ahead_m, terms in zip(
                 self._ghosts, ("L2", "R2"), needed_m, (state.l2, state.r2), strict=True
             ):
