@@ -33,8 +33,8 @@ from robot_side.viewing.viewpoints import first_person_eye
 
 TICK_PERIOD_S: Final = 1e-3
 _COMPILING: Final = (
-    "compiling for this processor, half a minute at the first start (or beforehand: feelahead doctor --compile): {} of {}"
-    " kernels are ready"
+    "compiling for this processor, half a minute at the first start (or beforehand: feelahead doctor --compile):"
+    " {} of {} kernels are ready"
 )
 _OPEN_TO_ALL: Final = "WITHOUT KEYS: anyone who reaches the port can move the arm"
 
