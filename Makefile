@@ -29,7 +29,7 @@ $(VENV)/.installed: requirements.lock pyproject.toml
 	@echo "installing into $(VENV)"; $(COUNT_PACKAGES); \
 	{ test -x $(BIN)/python || $(PYTHON) -m venv $(VENV); } && \
 	{ { $(PIP) --require-hashes -r requirements.lock && $(PIP) --no-deps --no-build-isolation -e .; } > $(PIP_LOG) 2>&1 \
-	|| { cat $(PIP_LOG); exit 1; }; }
+	|| { tail -n 20 $(PIP_LOG); exit 1; }; }
 	@touch $@
 
 demo: $(VENV)/.installed ## both sides on loopback with a simulated controller: make demo ARGS="--duration 10"

@@ -20,7 +20,7 @@ class Cells(NamedTuple):
     bare: BoolArray
     """(t, 3) Whether each corner is on the union's surface"""
 
-    def only(self, rows: BoolArray) -> "Cells":
+    def only(self, rows: BoolArray | np.bool) -> "Cells":
         """Return the cells of these rows (t,)."""
         return Cells(self.corners_m[rows], self.bare[rows])
 

@@ -208,7 +208,7 @@ def _not_contained(
         waiting, still = of_solid, []
         while len(waiting.corners_m):
             work.add(2 * SPHERE_TEST * waiting.bare.size * len(radii_m))
-            waiting = waiting.only(np.logical_not(_within_one(waiting.corners_m, centers_m, radii_m)))
+            waiting = waiting.only(~_within_one(waiting.corners_m, centers_m, radii_m))
             missed = waiting.bare & ~_within_any(waiting.corners_m.reshape(-1, 3), centers_m, radii_m).reshape(-1, 3)
             found = missed.any(axis=1)
             points.append(waiting.corners_m[missed])
