@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-MOST_WORK = 24_000_000_000
-"""Work of all searches for one gripper: two processors take some 16 s for it."""
+MOST_WORK = 20_000_000_000
+"""Work of all searches for one gripper: two processors take 14 to 18 s for it."""
 SPHERE_TEST, FACE_TEST, CHOICE = 5, 2, 300
 """Work of testing a point and a sphere, or a point and a face, and of choosing by one point in one sphere: about the
 nanoseconds of a processor"""
