@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 MOST_WORK = 20_000_000_000
 """Work of all searches for one gripper: two processors take 14 to 18 s for it."""
-SPHERE_TEST, FACE_TEST, CHOICE = 5, 2, 300
-"""Work of testing a point and a sphere, or a point and a face, and of choosing by one point in one sphere: about the
-nanoseconds of a processor"""
+SPHERE_TEST, FACE_TEST, CHOICE = 5, 2, 3
+"""Work of testing a point and a sphere, or a point and a face, and of choosing one sphere, for each point in each
+candidate: about the nanoseconds of a processor"""
 
 
 class SearchWork:

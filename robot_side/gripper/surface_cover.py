@@ -84,8 +84,8 @@ def _cover(
         known = 0 if inside is None else inside.shape[0] * inside.shape[1]
         work.add(SPHERE_TEST * (len(centers) * len(points) - known) * len(images))
         inside = with_contained(inside, centers - origin, depths + lean_m, points - origin, images)
-        work.add(CHOICE * inside.nnz)
         rows = greedy_set_cover(inside, _orbit_sizes(centers - origin, images))
+        work.add(CHOICE * inside.nnz * len(rows))
         added = _all_images(centers[rows], depths[rows] + stand_out_m, origin, images)
         spheres = np.concatenate([before[0], added[0]]), np.concatenate([before[1], added[1]])
         if len(spheres[1]) > most:
