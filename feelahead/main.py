@@ -2,30 +2,36 @@
 
 import sys
 from collections.abc import Callable, Sequence
+from importlib import import_module
 
 from common.errors import ConfigurationError
-from feelahead.commands.bench_and_try import bench, try_out
-from feelahead.commands.calibrate import calibrate
-from feelahead.commands.demo.command import demo
-from feelahead.commands.doctor.command import doctor
-from feelahead.commands.feel.command import feel
-from feelahead.commands.keys import keys
-from feelahead.commands.recordings import export, plot, replay
-from feelahead.commands.virtual_dualsense import virtual_dualsense
 
-_COMMANDS: dict[str, tuple[Callable[[Sequence[str]], int], str]] = {
-    "demo": (demo, "both sides on this machine, with a simulated controller and person"),
-    "doctor": (doctor, "find what is missing on this machine, or wrong on the path to a robot side, with the remedy"),
-    "calibrate": (calibrate, "measure where a controller's triggers and sticks begin and end"),
-    "feel": (feel, "feel the triggers' zones with a controller alone, or measure their forces with a kitchen scale"),
-    "keys": (keys, "who may operate the robot side: make key pairs, allow, list and revoke"),
-    "virtual-dualsense": (virtual_dualsense, "a controller that every program on this machine sees, with no hardware"),
-    "replay": (replay, "show a recording, or compute it again and compare"),
-    "export": (export, "turn a recording into CSV, Parquet or a LeRobot dataset"),
-    "plot": (plot, "draw a recording on one page"),
-    "bench": (bench, "measure speed and accuracy, compared with alternatives"),
-    "try": (try_out, "run an experiment in simulation: approaches, the demo, haptics on and off, latency"),
+_COMMANDS: dict[str, tuple[str, str]] = {
+    "demo": ("demo.command:demo", "both sides on this machine, with a simulated controller and person"),
+    "doctor": (
+        "doctor.command:doctor",
+        "find what is missing on this machine, or wrong on the path to a robot side, with the remedy",
+    ),
+    "calibrate": ("calibrate:calibrate", "measure where a controller's triggers and sticks begin and end"),
+    "feel": (
+        "feel.command:feel",
+        "feel the triggers' zones with a controller alone, or measure their forces with a kitchen scale",
+    ),
+    "keys": ("keys:keys", "who may operate the robot side: make key pairs, allow, list and revoke"),
+    "virtual-dualsense": (
+        "virtual_dualsense:virtual_dualsense",
+        "a controller that every program on this machine sees, with no hardware",
+    ),
+    "replay": ("recordings:replay", "show a recording, or compute it again and compare"),
+    "export": ("recordings:export", "turn a recording into CSV, Parquet or a LeRobot dataset"),
+    "plot": ("recordings:plot", "draw a recording on one page"),
+    "bench": ("bench_and_try:bench", "measure speed and accuracy, compared with alternatives"),
+    "try": (
+        "bench_and_try:try_out",
+        "run an experiment in simulation: approaches, the demo, haptics on and off, latency",
+    ),
 }
+"""By its name: where each command is, as a module of feelahead.commands and a function, and its help"""
 
 
 def command(arguments: Sequence[str]) -> int:
@@ -41,4 +47,7 @@ def command(arguments: Sequence[str]) -> int:
     name, *rest = arguments
     if name not in _COMMANDS:
         raise ConfigurationError(f"unknown command {name!r}; valid: {', '.join(_COMMANDS)}")
-    return _COMMANDS[name][0](rest)
+    module, _, function = _COMMANDS[name][0].partition(":")
+    # Only this command: the others take longer to import than the demo takes to show its address.
+    run: Callable[[Sequence[str]], int] = getattr(import_module(f"feelahead.commands.{module}"), function)
+    return run(rest)

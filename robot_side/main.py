@@ -2,6 +2,7 @@
 
 import secrets
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from functools import partial
 from typing import Final
 
@@ -32,8 +33,8 @@ from robot_side.viewing.viewpoints import first_person_eye, overview_eye
 
 TICK_PERIOD_S: Final = 1e-3
 _COMPILING: Final = (
-    "compiling for this processor, about half a minute; the next start is quick (to do it beforehand: feelahead doctor"
-    " --compile)"
+    "compiling for this processor, half a minute at the first start (or beforehand: feelahead doctor --compile):"
+    " {} of {} kernels are ready"
 )
 _OPEN_TO_ALL: Final = "WITHOUT KEYS: anyone who reaches the port can move the arm"
 
@@ -64,10 +65,12 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
     status, loop = Status(settings.status, "robot"), Loop(TICK_PERIOD_S, REMEDIES, settings.seed)
     with Process(settings, "robot", status, RobotEncoder(), loop) as process:
         epoch, recording = secrets.randbits(53), process.recording
-        beside = ConnectedDrivers(settings.arm, settings.objects, process.note, insecure=settings.insecure, keys=keys)
-        process.stack.enter_context(beside)
-        # Fail at once for an occupied port, even if `beside` has just taken it.
-        open_sockets().close()
+        # Fail at once for an occupied port; open meanwhile, so that a driver's flag with the same port is named.
+        with closing(open_sockets()):
+            beside = ConnectedDrivers(
+                settings.arm, settings.objects, process.note, insecure=settings.insecure, keys=keys
+            )
+            process.stack.enter_context(beside)
         parts = build_parts(settings, epoch, clock_domain(), announce=process.note, beside=beside)
         recorder = [] if recording is None else [Recorder(recording.noted.append)]
         core_parts, others = adapt(parts)
@@ -76,7 +79,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         unused = unused_clauses(settings.link_spec(), [("to_operator", stream) for stream in sent])
         for text in unused:
             process.note(text)
-        warm_up(lambda: process.note(_COMPILING), parts.kernels)
+        warm_up(lambda ready, of: process.note(_COMPILING.format(ready, of)), parts.kernels)
         beside.wait()
         if recording is not None:
             recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": parts.notes})

@@ -262,7 +262,7 @@ def _cover_notes(cover: GripperCover, asked_m: float, held: HeldCovers) -> list[
     if cover.stand_out_m > asked_m * (1.0 + 1e-9):
         notes.append(
             f"the gripper's {len(cover.radii_m)} spheres protrude from it by up to {1e3 * cover.stand_out_m:.1f} mm"
-            f" instead of {1e3 * asked_m:.1f}: its links are large"
+            f" instead of {1e3 * asked_m:.1f}: its links are large or of many faces"
         )
     if held.coarse:
         shown = [f"{name} by {1e3 * stand_out:.0f} mm" for name, stand_out in held.coarse[:_NAMED_OBJECTS]]

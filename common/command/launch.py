@@ -3,7 +3,6 @@
 Only the standard library and small modules are imported here, so that a Ctrl-C right after the start is handled.
 """
 
-import importlib.metadata
 import os
 import signal
 import sys
@@ -33,7 +32,9 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
     _write_in_any_locale()
     if sys.argv[1:] == ["--version"]:
         try:
-            sys.stdout.write(f"{program} {importlib.metadata.version('feelahead')}\n")
+            from importlib.metadata import version  # noqa: PLC0415  # loads the library for electronic mail
+
+            sys.stdout.write(f"{program} {version('feelahead')}\n")
             sys.stdout.flush()
         except OSError as error:
             sys.exit(say_output_failed(program, error))

@@ -1,7 +1,6 @@
 """Provenance of a run, needed for replay: settings, versions of packages, and the kind of machine."""
 
 import dataclasses
-import importlib.metadata
 import platform
 from collections.abc import Mapping
 from pathlib import Path
@@ -49,11 +48,13 @@ def _plain(value: object) -> object:
 
 
 def _versions() -> dict[str, str]:
+    from importlib import metadata  # noqa: PLC0415  # loads the library for electronic mail
+
     found = {}
     for name in _PACKAGES:
         try:
-            found[name] = importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
             continue
     return found
 

@@ -1,7 +1,9 @@
 """Compilation of all kernels before a run, so that no tick waits for a compilation."""
 
 import os
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from pkgutil import walk_packages
@@ -13,15 +15,16 @@ from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.machine_code import can_keep
 from robot_side.compiled.sources import code_sizes, digest
 
-NOTEWORTHY_WARM_UP_S = 1.0
-"""Duration of a warm-up after which it is announced"""
+_NOTEWORTHY_S: Final = 1.0
+"""Duration of a compilation after which it is announced"""
+_BETWEEN_NOTES_S: Final = 4.0
 _WORTH_A_PROCESS: Final = 20_000
 """Bytes of bytecode above which helper processes are started. So many compile in some five seconds; a process starts in
 one."""
 
 
 def warm_up(
-    announce: Callable[[], None] | None = None,
+    announce: Callable[[int, int], None] | None = None,
     kernels: Sequence[Compiled] | None = None,
     done: Callable[[str], None] = lambda _: None,
 ) -> float:
@@ -29,8 +32,8 @@ def warm_up(
 
     Without this the first call of each kernel does so, which takes up to seconds. If much is to be compiled, helper
     processes share the work on the processors that this process may use; the rest is compiled here. `announce` is
-    called once, before helpers start or when compilation has taken more than a second. `done` is called with the name
-    of each kernel that has been compiled.
+    called by a thread after a second of compilation, and then every 4 s, with the number of compiled kernels and of
+    all that were missing. `done` is called with the name of each kernel that has been compiled.
     """
     clock = MonotonicClock()
     start_s = clock.now()
@@ -39,21 +42,39 @@ def warm_up(
     # Other processes find only the kernels of our modules.
     missing = [kernel for kernel in kernels if kernel.is_ours and not (kernel.ready or kernel.is_kept)]
     sizes = {part: size for kernel in missing for part, size in code_sizes(kernel.function).items()}
-    if processors > 1 and sum(sizes.values()) > _WORTH_A_PROCESS and can_keep():
-        if announce is not None:
-            announce()
-            announce = None
-        compile_in_helpers(missing, processors, done)
-    compiled = False
-    for kernel in kernels:
-        kernel.prepare()
-        if kernel.cache_hits == 0:
-            compiled = True
-            done(kernel.name)
-        if announce is not None and compiled and clock.now() - start_s > NOTEWORTHY_WARM_UP_S:
-            announce()
-            announce = None
+    names = {kernel.name for kernel in missing}
+
+    def note_done(name: str) -> None:
+        names.discard(name)
+        done(name)
+
+    with _repeated(announce if missing else None, lambda: (len(missing) - len(names), len(missing))):
+        if processors > 1 and sum(sizes.values()) > _WORTH_A_PROCESS and can_keep():
+            compile_in_helpers(missing, processors, note_done)
+        for kernel in kernels:
+            kernel.prepare()
+            if kernel.cache_hits == 0:
+                note_done(kernel.name)
     return clock.now() - start_s
+
+
+@contextmanager
+def _repeated(announce: Callable[[int, int], None] | None, counts: Callable[[], tuple[int, int]]) -> Iterator[None]:
+    """Call `announce` with the `counts` a second after the context was opened, and then every 4 s."""
+    over = threading.Event()
+
+    def repeat(announce: Callable[[int, int], None]) -> None:
+        pause_s = _NOTEWORTHY_S
+        while not over.wait(pause_s):
+            announce(*counts())
+            pause_s = _BETWEEN_NOTES_S
+
+    if announce is not None:
+        threading.Thread(target=repeat, args=(announce,), daemon=True).start()
+    try:
+        yield
+    finally:
+        over.set()
 
 
 def import_kernels() -> tuple[Compiled, ...]:

@@ -1,7 +1,7 @@
 """Greedy set cover: choice of few spheres that together contain many points."""
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, hstack, vstack
 from scipy.spatial.distance import cdist
 
 from common.arrays import BoolArray, FloatArray, IntArray
@@ -28,6 +28,19 @@ def contained_points(centers_m: FloatArray, radii_m: FloatArray, points_m: Float
         pieces.append((row + first, column))
     row, column = (np.concatenate(several) for several in zip(*pieces, strict=True))
     return csr_array((np.ones(len(row)), (row, column)), shape=(len(centers_m), len(points_m)))
+
+
+def with_contained(
+    known: csr_array | None, centers_m: FloatArray, radii_m: FloatArray, points_m: FloatArray, images: FloatArray
+) -> csr_array:
+    """Return `contained_points`. known: its result for the first spheres and points, which is not computed anew."""
+    spheres, points = (0, 0) if known is None else known.shape
+    of_new = contained_points(centers_m[spheres:], radii_m[spheres:], points_m, images)
+    if known is None:
+        return of_new
+    beside = contained_points(centers_m[:spheres], radii_m[:spheres], points_m[points:], images)
+    together: csr_array = vstack([hstack([known, beside]), of_new], format="csr")
+    return together
 
 
 def greedy_set_cover(inside: csr_array, costs: FloatArray) -> IntArray:

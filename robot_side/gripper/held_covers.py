@@ -1,6 +1,7 @@
 """Spheres of the objects that may be held, found when the objects are first known: a tick is too short for it."""
 
 from collections.abc import Collection
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from common.arrays import BoolArray, FloatArray, IntArray
 from common.roles import Role
 from robot_side.gripper.kept_covers import SearchNotes, kept_cover
+from robot_side.gripper.search_work import SearchWork
 from robot_side.gripper.solids import Solid, convex_solid
 from robot_side.gripper.spheres import cover_boxes
 from robot_side.gripper.surface_cover import cover_surface
@@ -60,15 +62,13 @@ class HeldCovers:
             if objects.roles[index] is Role.SUPPORT or objects.names[index] in never_held:
                 continue
             name, stand_outs = objects.names[index], [0.0]
-            if searching is not None:
-                searching.what = f"object {name!r}, {place} of {len(first)}"
+            told = None if searching is None else partial(searching.at, f"object {name!r}, {place} of {len(first)}")
             for mesh in np.unique(objects.mesh_index[objects.mesh_object == index]).tolist():
                 if objects.mesh_library is not None and mesh not in self._meshes and self._may_search(corners[mesh]):
                     solid = _mesh_solid(objects.mesh_library, mesh, corners[mesh])
                     found = kept_cover(
                         corners[mesh].tobytes() + repr(stand_out_m).encode(),
-                        lambda solid=solid: cover_surface([solid], stand_out_m, [np.eye(3)]),  # type: ignore[misc]
-                        searching=searching,
+                        partial(cover_surface, [solid], stand_out_m, [np.eye(3)], work=SearchWork(told=told)),
                     )
                     self._meshes[mesh] = found[:2]
                     stand_outs.append(found[2])
@@ -80,8 +80,7 @@ class HeldCovers:
                 if solids:
                     centers, radii, stand_out = kept_cover(
                         vertices.tobytes() + repr(stand_out_m).encode(),
-                        lambda solids=solids: cover_surface(solids, stand_out_m),  # type: ignore[misc]
-                        searching=searching,
+                        partial(cover_surface, solids, stand_out_m, work=SearchWork(told=told)),
                     )
                     self._tetrahedra[name] = (*_shares(vertices, centers), radii)
                     stand_outs.append(stand_out)

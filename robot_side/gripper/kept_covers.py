@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import math
 import os
+import threading
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -18,37 +19,32 @@ _BETWEEN_NOTES_S = 3.0
 
 
 class SearchNotes:
-    """Notes on searches for covers: what is searched and how far, at most one in a few seconds."""
+    """Notes on searches for covers: what is searched and how far, at most one in a few seconds, from any thread."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         """say: takes one line."""
-        self.what = ""
-        """Shape that comes next, and its number"""
+        self._lock = threading.Lock()
         self._say, self._clock, self._next_s = say, MonotonicClock(), -math.inf
 
-    def begins(self) -> None:
-        """Say that the search for `what` begins, unless the last note is too young."""
-        if (now_s := self._clock.now()) >= self._next_s:
-            self._next_s = now_s + _BETWEEN_NOTES_S
-            self._say(
-                f"searching for spheres that cover gripper and objects: {self.what}; what is found is kept on disk"
-            )
+    def at(self, what: str, covered: float) -> None:
+        """Say which share of the shape `what` is covered, from 0 to 1, unless the last note is too young."""
+        with self._lock:
+            if (now_s := self._clock.now()) >= self._next_s:
+                self._next_s = now_s + _BETWEEN_NOTES_S
+                self._say(
+                    f"searching for spheres that cover gripper and objects: {what}, {100.0 * covered:.1f} % covered;"
+                    " what is found is kept on disk"
+                )
 
 
 _Cover = tuple[FloatArray, FloatArray, float]
 """Centres (m, 3), radii (m,), and the distance by which the spheres protrude, in m."""
 
 
-def kept_cover(
-    shape: bytes,
-    make: Callable[[], _Cover],
-    folder: Path | None = None,
-    searching: SearchNotes | None = None,
-) -> _Cover:
+def kept_cover(shape: bytes, make: Callable[[], _Cover], folder: Path | None = None) -> _Cover:
     """Return the cover that `make` computes for a `shape`; read it from disk if the same code stored it before.
 
-    An unreadable file is replaced. A folder without write permission stores nothing. `searching` is told what begins
-    before `make` is called, so that a person learns the reason for the wait.
+    An unreadable file is replaced. A folder without write permission stores nothing.
     """
     name = hashlib.sha256(_code() + shape).hexdigest()[:32]
     path = (cache_folder() / "covers" if folder is None else folder) / f"{name}.npy"
@@ -56,8 +52,6 @@ def kept_cover(
         rows = np.load(path, allow_pickle=False)
         if rows.ndim == 2 and rows.shape[1] == 5 and len(rows) and np.isfinite(rows).all():
             return rows[:, :3].copy(), rows[:, 3].copy(), float(rows[0, 4])
-    if searching is not None:
-        searching.begins()
     centers, radii, stand_out_m = make()
     rows = np.column_stack([centers, radii, np.full(len(radii), stand_out_m)])
     with contextlib.suppress(OSError):

@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from common.arrays import FloatArray
 from robot_side.overlap.meshes.mesh_shapes import capsule_mesh, ellipsoid_mesh
 
-_POINTS_AT_A_TIME = 2048
+_POINTS_AT_A_TIME = 128
 # Excess of the prism around a cylinder, as a share of the radius.
 _EXCESS = 0.003
 _SUBDIVISIONS = 16

@@ -11,17 +11,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from common.arrays import BoolArray, FloatArray
-from robot_side.gripper.choosing import contained_points, containing, greedy_set_cover
+from robot_side.gripper.choosing import containing, greedy_set_cover, with_contained
 from robot_side.gripper.mirrors import mirror_images
-from robot_side.gripper.solids import Solid, corner_points, halved, triangles_within
+from robot_side.gripper.search_work import CHOICE, SPHERE_TEST, SearchWork
+from robot_side.gripper.solid_union import Cells, SolidUnion
+from robot_side.gripper.solids import Solid, halved
 
 _MOST_POINTS = 1500
 _MOST_STARTS = 600
 _MOST_CENTERS = 2500
 _MOST_ROUNDS = 40
 _CHOSEN_ANEW = 5
-_MOST_TESTS = 1_000_000_000
-"""Tests of a point in a sphere, some seconds, after which spheres are only added and not chosen anew."""
+_GIVES_WAY_M = 0.003
+"""Distance up to which spheres may protrude farther than asked, in m, if the work would be too much"""
 _CELL = 0.03
 """Longest edge of the smallest cells, as a share of the distance by which spheres may protrude"""
 _CHOSEN_WITH = 0.97
@@ -29,116 +31,82 @@ _CHOSEN_WITH = 0.97
 _DEPTHS = np.array([0.15, 0.35, 0.6, 1.0, 1.5, 2.2, 3.0, 4.0, 5.5, 7.5, 10.0, 14.0, 20.0, 30.0])
 """Depths of candidate centres, as multiples of the distance by which spheres may protrude"""
 _COARSER = 1.2
-_ROUNDING_M = 1e-9
 
 Spheres = tuple[FloatArray, FloatArray]
 """Centres (m, 3) and radii (m,)."""
 
 
-class _Union:
-    """Union of solids; a part of one solid's surface inside another solid is no surface of the union."""
-
-    def __init__(self, solids: Sequence[Solid]) -> None:
-        self._solids = solids
-        self.area_m2 = float(sum(_area_m2(solid.corners_m) for solid in solids))
-
-    def depth_m(self, points_m: FloatArray) -> FloatArray:
-        """Return (n,): the greatest depth of each point (n, 3) in any of the solids."""
-        depths: FloatArray = np.max([solid.depth_m(points_m) for solid in self._solids], axis=0)
-        return depths
-
-    def room_m(self, points_m: FloatArray) -> FloatArray:
-        """Return (n,): a lower bound of each point's depth (n, 3) in a true solid; -infinity outside."""
-        rooms = []
-        for solid in self._solids:
-            excess_m = solid.excess_m if solid.true_depth_m is None else 0.0
-            depths = (solid.true_depth_m or solid.depth_m)(points_m)
-            rooms.append(np.where(depths >= -_ROUNDING_M, depths - excess_m, -np.inf))
-        deepest: FloatArray = np.max(rooms, axis=0)
-        return deepest
-
-    def cells(self, longest_m: float) -> list[FloatArray]:
-        """Return for each solid the triangles (t, 3, 3) of its surface, subdivided to edges of at most `longest_m`."""
-        return [triangles_within(solid.corners_m, longest_m) for solid in self._solids]
-
-    def points(self, longest_m: float, margin_m: float) -> tuple[FloatArray, FloatArray]:
-        """Return points (p, 3) and normals (p, 3) of the union's surface; neighbours are at most `longest_m` apart."""
-        found = []
-        for number, corners in enumerate(self.cells(longest_m)):
-            points, normals = corner_points(corners)
-            outside = self.outside(number, points, margin_m)
-            found.append(np.concatenate([points[outside], normals[outside]], axis=1))
-        both = np.concatenate(found)
-        return both[:, :3], both[:, 3:]
-
-    def outside(self, solid: int, points_m: FloatArray, margin_m: float) -> BoolArray:
-        """Return (n,): whether no other solid contains a point (n, 3) of this solid's surface by `margin_m` or more."""
-        outside = np.ones(len(points_m), dtype=np.bool_)
-        for number, other in enumerate(self._solids):
-            if number != solid:
-                outside[outside] = other.depth_m(points_m[outside]) < margin_m
-        return outside
-
-
 def cover_surface(
-    solids: Sequence[Solid], stand_out_m: float, frames: Sequence[FloatArray] = (), most: int = 2000
+    solids: Sequence[Solid],
+    stand_out_m: float,
+    frames: Sequence[FloatArray] = (),
+    most: int = 2000,
+    work: SearchWork | None = None,
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return spheres' centres (m, 3), radii (m,), and the distance by which they protrude from the union of `solids`.
 
-    The distance is `stand_out_m`, or as much more as is needed for at most `most` spheres. The spheres share the
-    union's mirror planes normal to axes of `frames` (3, 3) or to its principal axes. The result depends on nothing
-    else.
+    The distance is `stand_out_m`, or as much more as is needed for at most `most` spheres. If `work` is spent before,
+    it is at least 3 mm. The spheres share the union's mirror planes normal to axes of `frames` (3, 3) or to its
+    principal axes. The result depends on nothing else.
     """
-    union = _Union(solids)
+    work = work or SearchWork()
+    union = SolidUnion(solids, work)
     # Skip hopeless searches: discs of radius √30 s, those of centres 14.5 s deep, cannot cover the area.
     while union.area_m2 > most * 30.0 * stand_out_m**2 * np.pi:
         stand_out_m *= _COARSER
     while True:
-        spheres = _cover(union, stand_out_m, frames, most)
+        spheres = _cover(union, stand_out_m, frames, most, work)
         if spheres is not None:
             return *spheres, stand_out_m
-        stand_out_m *= _COARSER
+        stand_out_m = max(_COARSER * stand_out_m, _GIVES_WAY_M if work.spent else 0.0)
 
 
-def _cover(union: _Union, stand_out_m: float, frames: Sequence[FloatArray], most: int) -> Spheres | None:
-    """Return spheres that cover the union; None if more than `most` are needed."""
+def _cover(
+    union: SolidUnion, stand_out_m: float, frames: Sequence[FloatArray], most: int, work: SearchWork
+) -> Spheres | None:
+    """Return spheres that cover the union; None if more than `most` are needed, or too much work for so fine ones."""
     cell_m = _CELL * stand_out_m
     # Every point of a cell is nearer than this to one of the corners.
     margin_m = cell_m / np.sqrt(3.0)
     coarse, _ = union.points(float(np.sqrt(union.area_m2 / 200.0)), margin_m)
     origin, images = mirror_images(coarse, union.depth_m, frames)
     step_m = max(0.6 * stand_out_m, float(np.sqrt(1.5 * union.area_m2 / len(images) / _MOST_POINTS)))
-    cells = union.cells(step_m)
+    cells = every_cell = union.cells(step_m, cell_m)
     # One of the mirror images of each point is enough.
     points, normals = _first_images(*union.points(step_m, margin_m), origin, images)
     centers, depths = _alike(union, _below(union, points, normals, stand_out_m, images, origin), origin, images)
     lean_m = _CHOSEN_WITH * stand_out_m - margin_m
     before: Spheres = np.empty((0, 3)), np.empty(0)
-    tests = 0
+    inside = None
     for turn in range(_MOST_ROUNDS):
-        tests += len(centers) * len(points) * len(images)
-        inside = contained_points(centers - origin, depths + lean_m, points - origin, images)
+        if work.spent and stand_out_m < _GIVES_WAY_M:
+            return None
+        known = 0 if inside is None else inside.shape[0] * inside.shape[1]
+        work.add(SPHERE_TEST * (len(centers) * len(points) - known) * len(images))
+        inside = with_contained(inside, centers - origin, depths + lean_m, points - origin, images)
         rows = greedy_set_cover(inside, _orbit_sizes(centers - origin, images))
+        work.add(CHOICE * inside.nnz * len(rows))
         added = _all_images(centers[rows], depths[rows] + stand_out_m, origin, images)
         spheres = np.concatenate([before[0], added[0]]), np.concatenate([before[1], added[1]])
         if len(spheres[1]) > most:
             return None
-        left, missed = _not_contained(union, cells, spheres[0], spheres[1] - margin_m, cell_m)
+        left, missed = _not_contained(union, cells, spheres[0], spheres[1] - margin_m, cell_m, work)
         if not len(missed):
             return spheres
+        work.covered = 1.0 - sum(len(of.bare) for of in left) / sum(len(of.bare) for of in every_cell)
         missed, _ = _first_images(missed, missed, origin, images)
-        if turn < _CHOSEN_ANEW and tests < _MOST_TESTS:
+        if turn < _CHOSEN_ANEW and not work.spent:
             # Chosen together with the others, such a point hardly costs another sphere.
             points = np.concatenate([points, missed])
         else:
-            before, points, cells = spheres, missed, left
+            before, points, cells, inside = spheres, missed, left, None
         more = _alike(union, _between(missed, centers, depths), origin, images)
         centers, depths = np.concatenate([centers, more[0]]), np.concatenate([depths, more[1]])
     return None
 
 
 def _below(
-    union: _Union,
+    union: SolidUnion,
     points_m: FloatArray,
     normals: FloatArray,
     stand_out_m: float,
@@ -183,7 +151,7 @@ def _between(points_m: FloatArray, centers_m: FloatArray, depths_m: FloatArray) 
     return np.concatenate(found)
 
 
-def _alike(union: _Union, centers_m: FloatArray, origin_m: FloatArray, images: FloatArray) -> Spheres:
+def _alike(union: SolidUnion, centers_m: FloatArray, origin_m: FloatArray, images: FloatArray) -> Spheres:
     """Return the centres (c, 3) whose images are all inside, and the depth (c,) of each centre's shallowest image.
 
     With that depth, no image protrudes by more than another.
@@ -227,24 +195,28 @@ def _all_images(centers_m: FloatArray, radii_m: FloatArray, origin_m: FloatArray
 
 
 def _not_contained(
-    union: _Union, cells: Sequence[FloatArray], centers_m: FloatArray, radii_m: FloatArray, smallest_m: float
-) -> tuple[list[FloatArray], FloatArray]:
+    union: SolidUnion,
+    cells: Sequence[Cells],
+    centers_m: FloatArray,
+    radii_m: FloatArray,
+    smallest_m: float,
+    work: SearchWork,
+) -> tuple[list[Cells], FloatArray]:
     """Return the cells that no single sphere contains, even when subdivided, and their corners outside all spheres."""
     left, points = [], [np.empty((0, 3))]
     for number, of_solid in enumerate(cells):
-        waiting, still = of_solid, [np.empty((0, 3, 3))]
-        while len(waiting):
-            waiting = waiting[~_within_one(waiting, centers_m, radii_m)]
-            bare = union.outside(number, waiting.reshape(-1, 3), smallest_m).reshape(-1, 3)
-            waiting, bare = waiting[bare.any(axis=1)], bare[bare.any(axis=1)]
-            missed = bare & ~_within_any(waiting.reshape(-1, 3), centers_m, radii_m).reshape(-1, 3)
+        waiting, still = of_solid, []
+        while len(waiting.corners_m):
+            work.add(2 * SPHERE_TEST * waiting.bare.size * len(radii_m))
+            waiting = waiting.only(~_within_one(waiting.corners_m, centers_m, radii_m))
+            missed = waiting.bare & ~_within_any(waiting.corners_m.reshape(-1, 3), centers_m, radii_m).reshape(-1, 3)
             found = missed.any(axis=1)
-            points.append(waiting[missed])
-            still.append(waiting[found])
-            waiting = waiting[~found]
-            longest = np.linalg.norm(waiting - np.roll(waiting, -1, axis=1), axis=2).max(axis=1, initial=0.0)
-            waiting = halved(waiting[longest > smallest_m])
-        left.append(np.concatenate(still))
+            points.append(waiting.corners_m[missed])
+            still.append(waiting.only(found))
+            whole = waiting.corners_m[~found]
+            longest = np.linalg.norm(whole - np.roll(whole, -1, axis=1), axis=2).max(axis=1, initial=0.0)
+            waiting = union.outer_cells(number, halved(whole[longest > smallest_m]), smallest_m)
+        left.append(Cells(*(np.concatenate(column) for column in zip(*still, strict=True))) if still else of_solid)
     places = np.concatenate(points)
     _, first = np.unique((places / 1e-7).round().astype(np.int64), axis=0, return_index=True)
     return left, places[first]
@@ -266,8 +238,3 @@ def _within_any(points_m: FloatArray, centers_m: FloatArray, radii_m: FloatArray
         for first in range(0, len(points_m), 4096)
     ]
     return np.concatenate([np.empty(0, dtype=np.bool_), *pieces])
-
-
-def _area_m2(corners_m: FloatArray) -> float:
-    across = np.cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
-    return float(0.5 * np.linalg.norm(across, axis=1).sum())

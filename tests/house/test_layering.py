@@ -129,7 +129,7 @@ ARROWS = """
     feelahead/lab: common/* robot_side/* operator_side/* feelahead/both_sides feelahead/containers
     feelahead/commands: common/* robot_side/compiled robot_side/laws/named.py robot_side/viewing operator_side/*
         feelahead/lab feelahead/both_sides feelahead/recordings
-    feelahead: common/* feelahead/commands/*
+    feelahead: common/*
 """
 """One row for each room: the room, and the rooms that it may import.
 

@@ -2,7 +2,8 @@
 
 import secrets
 import socket
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Final
 from urllib.parse import urlsplit
@@ -78,10 +79,16 @@ class KeptPage:
         return wanted
 
 
-def free_ports(count: int) -> list[int]:
-    """Return `count` ports that are free on 127.0.0.1 now. As they are known in advance, both sides start at once."""
+@contextmanager
+def kept_addresses(*names: str) -> Iterator[dict[str, str]]:
+    """Yield for each of `names` an address of 127.0.0.1 that no program gets by asking for any free port.
+
+    As they are known in advance, both sides start at once. Sockets that do not listen keep the ports.
+    """
     with ExitStack() as stack:
-        probes = [stack.enter_context(socket.socket()) for _ in range(count)]
-        for probe in probes:
-            probe.bind(("127.0.0.1", 0))
-        return [int(probe.getsockname()[1]) for probe in probes]
+        keepers = {name: stack.enter_context(socket.socket()) for name in names}
+        for keeper in keepers.values():
+            # ZeroMQ does the same: such sockets may share a port while at most one of them listens.
+            keeper.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            keeper.bind(("127.0.0.1", 0))
+        yield {name: f"tcp://127.0.0.1:{keeper.getsockname()[1]}" for name, keeper in keepers.items()}

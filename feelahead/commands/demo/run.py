@@ -15,7 +15,7 @@ from common.command.stop_signal import StopSignal
 from common.status.codes import LinkState
 from common.status.statuses import OperatorStatus, RobotStatus
 from feelahead.both_sides.processes import SideFailedError, SideProcess
-from feelahead.commands.demo.page import KeptPage, Lifetime, free_ports
+from feelahead.commands.demo.page import KeptPage, Lifetime, kept_addresses
 from feelahead.commands.demo.settings import DemoSettings
 from feelahead.commands.open_browser import show_address
 from operator_side.viewing.facts import OperatorFacts
@@ -42,8 +42,10 @@ def run_both(
     page: notes whether a page asks for another run.
     """
     status.note("starting both sides")
-    listening = dict(zip(("control", "view"), map("tcp://127.0.0.1:{}".format, free_ports(2)), strict=True))
-    with SideProcess("robot_side", "robot", robot_arguments(settings, given, summaries["robot"], listening)) as robot:
+    with (
+        kept_addresses("control", "view") as listening,
+        SideProcess("robot_side", "robot", robot_arguments(settings, given, summaries["robot"], listening)) as robot,
+    ):
         status.event("started", side="robot", process_id=robot.process_id)
         operator_flags = operator_arguments(settings, given, summaries["operator"], listening, page)
         with SideProcess("operator_side", "operator", operator_flags) as operator:

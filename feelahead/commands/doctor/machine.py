@@ -169,9 +169,16 @@ def compile_kernels(*, as_json: bool) -> int:
     except ImportError as error:
         raise ConfigurationError(f"--compile: {error}; install it in the clone: pip install '.[robot]'") from error
     missing = {kernel.name for kernel in kernels if not kernel.is_kept}
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    console = Console(stderr=True)
+
+    def announce(ready: int, of: int) -> None:
+        # A bar shows nothing in a file or a pipe.
+        if not console.is_terminal:
+            console.print(f"compiling: {ready} of {of} kernels are ready")
+
+    with Progress(console=console, transient=True) as progress:
         task = progress.add_task("compiling", total=max(len(missing), 1))
-        took_s = warm_up(kernels=kernels, done=lambda name: progress.advance(task, name in missing))
+        took_s = warm_up(announce, kernels, lambda name: progress.advance(task, name in missing))
     facts = _facts(kernels)
     left, folder = facts.missing, facts.folder
     if as_json:

@@ -78,6 +78,7 @@ class _Process:
             from operator_side.viewing.console.pages import Pages  # noqa: PLC0415
             from operator_side.viewing.console.proof import prove  # noqa: PLC0415
             from operator_side.viewing.console.server import Server  # noqa: PLC0415
+            from operator_side.viewing.console.solids import sphere  # noqa: PLC0415
         except ModuleNotFoundError as error:
             missing = (error.name or "").partition(".")[0]
             self._give_up(f"{missing} is not installed; install it in the clone: pip install '.[operator]'")
@@ -103,7 +104,8 @@ class _Process:
             return
         assert server.loop is not None  # noqa: S101  # Server guarantees it
         server.loop.call_soon_threadsafe(self._begin, server.loop, gate.address)
-        # Late, as it takes up to a second: until then, and without it, pictures are JPEG.
+        # Late, as both take up to a second: the first shape, and H.264, without which pictures are JPEG.
+        sphere(1)
         with contextlib.suppress(ImportError, ValueError):
             from common.video.steps import Steps  # noqa: PLC0415  # an extra
 

@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import viser
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from viser.transforms import SO3
 
 from common.protocol.view_messages import SceneShapes, SceneState, Shape
 from common.roles import ROLES, Role
@@ -36,8 +36,8 @@ _GONE: Final = 1e-6
 
 def compose(outer: Floats, inner: Floats) -> Floats:
     """Compose poses (n, 7): `inner` is given in the frame `outer`; return it in the frame in which `outer` is given."""
-    turn, inner_turn = (Rotation.from_quat(poses[:, 3:], scalar_first=True) for poses in (outer, inner))
-    turns = (turn * inner_turn).as_quat(scalar_first=True)
+    turn, inner_turn = (SO3(poses[:, 3:]) for poses in (outer, inner))
+    turns = (turn @ inner_turn).normalize().wxyz
     return np.concatenate([outer[:, :3] + turn.apply(inner[:, :3]), turns], axis=1)
 
 
@@ -180,7 +180,7 @@ class Drawing:
                 batch.place(links, self._objects, tints)
             self._place_label(shapes, roles)
             spheres = np.frombuffer(state.spheres, np.float32).reshape(-1, 4)
-            along = Rotation.from_quat(state.tool_pose[3:], scalar_first=True).apply([0.0, 0.0, 1.0])
+            along: Floats = SO3(np.array(state.tool_pose[3:])).apply(np.array([0.0, 0.0, 1.0])).astype(np.float64)
             for ghost, name, ahead_m, terms in zip(
                 self._ghosts, ("L2", "R2"), needed_m, (state.l2, state.r2), strict=True
             ):

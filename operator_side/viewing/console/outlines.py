@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from viser.transforms import SO3
 
 from common.protocol.view_messages import Eye, Shape
 
@@ -37,8 +37,7 @@ def seen(points: Floats, eye_frame: Floats, eye: Eye) -> Floats | None:
     The result is (n, 2), right and above the picture's centre, in half heights. eye_frame: pose (7,) of the frame in
     which `eye` is given, position and quaternion, w first.
     """
-    turn = Rotation.from_quat(eye_frame[3:], scalar_first=True)
-    from_eye = turn.inv().apply(points - eye_frame[:3]) - np.array(eye.position_m)
+    from_eye = SO3(eye_frame[3:]).inverse().apply(points - eye_frame[:3]) - np.array(eye.position_m)
     forward, up = np.array(eye.forward), np.array(eye.up)
     depth_m = from_eye @ forward
     if depth_m.min() < _NEAREST_M:
@@ -63,5 +62,5 @@ def outline(shapes: Iterable[Shape], owner_pose: Floats, eye_frame: Floats, eye:
 
 def moved(pose: Floats, points: Floats) -> Floats:
     """Return points (n, 3), given in the frame whose pose (7,) in the world frame is `pose`, in the world frame."""
-    placed: Floats = Rotation.from_quat(pose[3:], scalar_first=True).apply(points) + pose[:3]
+    placed: Floats = SO3(pose[3:]).apply(points) + pose[:3]
     return placed

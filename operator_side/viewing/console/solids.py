@@ -4,13 +4,15 @@ Vertices are (v, 3) float32 in metres; triangles are (t, 3) uint32, counterclock
 """
 
 from functools import cache
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from common.protocol.view_messages import Shape
+
+if TYPE_CHECKING:
+    import trimesh
 
 Floats = NDArray[np.float32]
 _SIDES: Final = 24
@@ -42,10 +44,10 @@ def solid_of(shape: Shape) -> tuple[tuple[object, ...], Solid, tuple[float, floa
     if shape.kind == "ellipsoid":
         return ("sphere",), sphere(), (x, y, z)
     if shape.kind == "cylinder":
-        drum = trimesh.creation.cylinder(radius=1.0, height=2.0, sections=_SIDES)
+        drum = _creation().cylinder(radius=1.0, height=2.0, sections=_SIDES)
         return ("cylinder",), _solid(drum, flat=True), (x, x, y)
     if shape.kind == "capsule":
-        pill = trimesh.creation.capsule(height=2.0 * y, radius=x, count=[_SIDES, _SIDES])
+        pill = _creation().capsule(height=2.0 * y, radius=x, count=[_SIDES, _SIDES])
         return ("capsule", x, y), _solid(pill), (1.0, 1.0, 1.0)
     vertices = np.frombuffer(shape.vertices_m, np.float32).reshape(-1, 3)
     triangles = np.frombuffer(shape.triangles, np.uint32).reshape(-1, 3)
@@ -55,14 +57,21 @@ def solid_of(shape: Shape) -> tuple[tuple[object, ...], Solid, tuple[float, floa
 @cache
 def box() -> Solid:
     """Return a box with half sizes of 1."""
-    return _solid(trimesh.creation.box((2.0, 2.0, 2.0)), flat=True)
+    return _solid(_creation().box((2.0, 2.0, 2.0)), flat=True)
 
 
 @cache
 def sphere(divisions: int = 2) -> Solid:
     """Return a sphere of radius 1: an icosahedron, each triangle divided into four, `divisions` times over."""
-    return _solid(trimesh.creation.icosphere(subdivisions=divisions))
+    return _solid(_creation().icosphere(subdivisions=divisions))
 
 
-def _solid(mesh: trimesh.Trimesh, *, flat: bool = False) -> Solid:
+def _creation() -> Any:
+    """Return the makers of shapes of trimesh, which is slow to load: the console shows its address first."""
+    from trimesh import creation  # noqa: PLC0415
+
+    return creation
+
+
+def _solid(mesh: "trimesh.Trimesh", *, flat: bool = False) -> Solid:
     return Solid(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32), flat)

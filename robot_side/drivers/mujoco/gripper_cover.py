@@ -1,8 +1,9 @@
 """Cover of a simulated gripper: spheres that contain its colliding geoms, in the frames of its links."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from robot_side.drivers.mujoco.mesh_arrays import mesh_vertices
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.gripper.capsule_cover import cover_capsule
 from robot_side.gripper.kept_covers import SearchNotes, kept_cover
+from robot_side.gripper.search_work import MOST_WORK, SearchWork
 from robot_side.gripper.solids import Solid, capsule, convex_solid, cylinder, ellipsoid, simpler_convex_solid
 from robot_side.gripper.spheres import cover_boxes
 from robot_side.gripper.surface_cover import cover_surface
@@ -22,6 +24,9 @@ _WITH_ROWS = (GeomKind.SPHERE, GeomKind.CAPSULE, GeomKind.BOX)
 """Kinds of geoms whose cover is computed directly, with the fewest spheres; other kinds need a search."""
 _SIMPLER = 0.05
 """Share of the largest protrusion by which a mesh's faces may be moved outwards, so that they are fewer"""
+
+_Cover = tuple[FloatArray, FloatArray, float]
+_Told = Callable[[float], None]
 
 
 @dataclass(frozen=True)
@@ -56,21 +61,32 @@ def cover_gripper(
     """Cover the colliding geoms `geoms` (k,) of a compiled MuJoCo model.
 
     A mesh counts as its convex hull, which is the colliding shape. No sphere protrudes from the link's geoms by more
-    than `stand_out_m`, unless a geom would need more than 2000 spheres. Links of the same shape get the same spheres.
-    searching: told of each search, but not of a stored cover. Each link's spheres are stored as soon as they are found.
+    than `stand_out_m`, unless a link would need more than 2000 spheres or too much work. Links of the same shape get
+    the same spheres. searching: told of each search, but not of a stored cover. Two links are searched at a time, and
+    each link's spheres are stored as soon as they are found.
     """
-    centers, radii, bodies, stand_outs = [], [], [], []
     # Sorted, as a set has no defined order.
     links = sorted(set(model.geom_bodyid[geoms].tolist()))
-    for number, body in enumerate(links, 1):
-        if searching is not None:
-            searching.what = f"link {number} of {len(links)} of the gripper, {model.body(body).name!r}"
+    frames, shapes = {}, {}
+    for body in links:
         of_body = geoms[model.geom_bodyid[geoms] == body].tolist()
         # In the first geom's frame, which does not depend on the choice of the link's frame.
         first = Rotation.from_quat(model.geom_quat[of_body[0]], scalar_first=True)
         origin = model.geom_pos[of_body[0]]
-        parts = tuple(_part(model, geom, first, origin) for geom in of_body)
-        found, found_radii, stand_out = _cover_link(parts, stand_out_m, searching)
+        frames[body] = first, origin
+        shapes[body] = tuple(_part(model, geom, first, origin) for geom in of_body)
+    names = {parts: f"link {model.body(body).name!r} of the gripper" for body, parts in shapes.items()}
+    # Of any links two threads then do at most half of all work each.
+    limit = MOST_WORK / (sum(not _in_rows(parts) for parts in names) + 2)
+    # NumPy and SciPy compute without the interpreter's lock, so threads run beside each other.
+    with ThreadPoolExecutor(2) as threads:
+        told = (None if searching is None else partial(searching.at, name) for name in names.values())
+        covers = threads.map(lambda parts, tell: _cover_link(parts, stand_out_m, limit, tell), names, told)
+        of_shape = dict(zip(names, covers, strict=True))
+    centers, radii, bodies, stand_outs = [], [], [], []
+    for body in links:
+        found, found_radii, stand_out = of_shape[shapes[body]]
+        first, origin = frames[body]
         centers.append(first.apply(found) + origin)
         radii.append(found_radii)
         bodies.append(np.full(len(found_radii), body, dtype=np.int64))
@@ -96,30 +112,34 @@ def _box_corners(box: FloatArray) -> FloatArray:
     return corners
 
 
-@lru_cache(maxsize=64)
-def _cover_link(
-    parts: tuple[_Part, ...], stand_out_m: float, searching: SearchNotes | None
-) -> tuple[FloatArray, FloatArray, float]:
-    rotations = [Rotation.from_quat(part.quaternion).as_matrix() for part in parts]
-    positions = [np.array(part.position_m) for part in parts]
-    solids = (
-        []
-        if all(part.kind in _WITH_ROWS for part in parts)
-        else [_solid(part, _SIMPLER * stand_out_m) for part in parts]
-    )
-    if solids and all(solid is not None for solid in solids):
-        placed = [
-            solid.placed(rotation, position)
-            for solid, rotation, position in zip(solids, rotations, positions, strict=True)
-            if solid is not None
-        ]
-        return kept_cover(
-            repr((parts, stand_out_m)).encode(),
-            lambda: cover_surface(placed, stand_out_m, rotations),
-            searching=searching,
-        )
+def _cover_link(parts: tuple[_Part, ...], stand_out_m: float, limit: float, told: _Told | None) -> _Cover:
+    if _in_rows(parts):
+        return _rows(parts, stand_out_m)
+
+    def search() -> _Cover:
+        solids = [_solid(part, _SIMPLER * stand_out_m) for part in parts]
+        placed = [solid.placed(*_pose(part)) for part, solid in zip(parts, solids, strict=True) if solid is not None]
+        if len(placed) < len(parts):
+            return _rows(parts, stand_out_m)
+        frames = [_pose(part)[0] for part in parts]
+        return cover_surface(placed, stand_out_m, frames, work=SearchWork(limit, told))
+
+    return kept_cover(repr((parts, stand_out_m, limit)).encode(), search)
+
+
+def _in_rows(parts: Sequence[_Part]) -> bool:
+    return all(part.kind in _WITH_ROWS for part in parts)
+
+
+def _pose(part: _Part) -> tuple[FloatArray, FloatArray]:
+    return Rotation.from_quat(part.quaternion).as_matrix(), np.array(part.position_m)
+
+
+def _rows(parts: Sequence[_Part], stand_out_m: float) -> _Cover:
+    """Return the spheres of the parts one by one, a mesh's those of its bounding box; no search is needed."""
     centers, radii, stand_outs = [], [], []
-    for part, rotation, position in zip(parts, rotations, positions, strict=True):
+    for part in parts:
+        rotation, position = _pose(part)
         found, found_radii, stand_out = _with_rows(part, stand_out_m)
         centers.append(found @ rotation.T + position)
         radii.append(found_radii)

@@ -2,8 +2,10 @@
 
 import json
 import re
+import socket
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -12,7 +14,8 @@ from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 from websockets.typing import Origin
 
-from feelahead.commands.demo.page import AFTER_PAGES_S, FIRST_PAGE_S, KeptPage, Lifetime, free_ports
+from common.sockets.robot import RobotSockets
+from feelahead.commands.demo.page import AFTER_PAGES_S, FIRST_PAGE_S, KeptPage, Lifetime, kept_addresses
 from tests.operator_side.viewing.terminal.on_terminal import OnTerminal
 
 _LIMIT_S = 60.0
@@ -73,10 +76,12 @@ def test_a_page_finds_the_next_run_at_the_same_address(tmp_path: Path) -> None:
     assert [page.take_again(), page.take_again()] == [True, False]
 
 
-def test_ports_for_both_sides_differ() -> None:
-    ports = free_ports(2)
-    assert len(set(ports)) == 2
-    assert all(1024 <= port <= 65535 for port in ports)
+def test_the_robot_side_gets_the_addresses_that_are_kept_from_others() -> None:
+    with kept_addresses("control", "view") as kept:
+        with socket.socket() as other, pytest.raises(OSError, match="in use"):
+            other.bind(("127.0.0.1", int(kept["control"].rpartition(":")[2])))
+        with closing(RobotSockets(kept["control"], kept["view"])) as robot:
+            assert kept == {"control": robot.control_endpoint, "view": robot.view_endpoint}
 
 
 def opened(address: str) -> Connection:

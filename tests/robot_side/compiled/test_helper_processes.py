@@ -119,3 +119,14 @@ def test_without_a_place_to_keep_it_no_process_is_started(tmp_path: Path, monkey
     warm_up(kernels=fresh, done=told.append)
     assert all(kernel.ready for kernel in fresh)
     assert told == [kernel.name for kernel in fresh]
+
+
+def test_a_compilation_says_how_many_kernels_are_ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(warm_up_module, "_NOTEWORTHY_S", 0.0)
+    monkeypatch.setattr(warm_up_module, "_BETWEEN_NOTES_S", 0.01)
+    said: list[tuple[int, int]] = []
+    for _ in range(2):
+        warm_up(lambda ready, of: said.append((ready, of)), fresh_kernels())
+    assert said == sorted(said), "the second time nothing is missing, and nothing is said"
+    assert {of for _, of in said} == {len(NAMES)}

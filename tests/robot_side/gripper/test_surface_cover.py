@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from common.arrays import FloatArray
 from robot_side.gripper.capsule_cover import cover_capsule
 from robot_side.gripper.kept_covers import SearchNotes, kept_cover
+from robot_side.gripper.search_work import SearchWork
 from robot_side.gripper.solids import Solid, convex_solid, cylinder, ellipsoid, simpler_convex_solid
 from robot_side.gripper.surface_cover import cover_surface
 from tests.helpers.perceived_scenes import random_rotation
@@ -120,6 +121,18 @@ def test_the_same_twice_and_what_would_need_too_many_stands_out_farther() -> Non
     assert few_spheres[2] > STAND_OUT_M
 
 
+def test_a_search_whose_work_is_spent_gives_way_to_3_mm_and_says_how_far_it_is() -> None:
+    solid = cylinder(0.02, 0.02)
+    assert solid is not None
+    told: list[float] = []
+    work = SearchWork(0.0, told.append)
+    centers, radii, stand_out_m = cover_surface([solid], 0.3 * STAND_OUT_M, work=work)
+    assert (work.spent, stand_out_m) == (True, STAND_OUT_M)
+    assert outside_m(points_on(solid, np.random.default_rng(0)), centers, radii).max() <= 1e-12
+    assert told[0] == 0.0
+    assert 0.5 < max(told) < 1.0
+
+
 @settings(derandomize=True, deadline=None, max_examples=50)
 @given(radius=st.floats(0.001, 0.1), half=st.floats(0.0, 0.3), stand_out=st.floats(0.001, 0.01))
 def test_a_row_of_spheres_covers_a_capsule(radius: float, half: float, stand_out: float) -> None:
@@ -140,10 +153,9 @@ def test_searches_in_a_row_are_said_once_in_a_few_seconds() -> None:
     said: list[str] = []
     notes = SearchNotes(said.append)
     for number in range(5):
-        notes.what = f"link {number}"
-        notes.begins()
+        notes.at(f"link {number}", 0.25)
     [line] = said
-    assert "link 0" in line
+    assert "link 0, 25.0 % covered" in line
 
 
 def test_a_cover_is_found_once_and_a_broken_file_is_made_anew(tmp_path: Path) -> None:

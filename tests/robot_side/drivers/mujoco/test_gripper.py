@@ -1,12 +1,15 @@
 """Measurement of a gripper's travel between open and closed, and the gap between the spheres of its fingers."""
 
 from pathlib import Path
+from typing import Any
 
+import mujoco  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
+from robot_side.drivers.mujoco import gripper_cover
 from robot_side.drivers.mujoco.gripper_cover import cover_gripper
 from robot_side.drivers.mujoco.gripper_measurement import (
     GripperSweep,
@@ -17,6 +20,7 @@ from robot_side.drivers.mujoco.gripper_measurement import (
     travel_from_sweep,
 )
 from robot_side.drivers.mujoco.scene import load_scene
+from robot_side.gripper.surface_cover import cover_surface
 from tests.helpers.arm_models import TENDON_GRIPPER, planar_arm
 
 
@@ -84,3 +88,29 @@ def test_the_spheres_leave_the_gap_between_the_fingers_free_but_for_what_they_st
     gap_m, kept_m = gaps
     assert gap_m == pytest.approx(0.085, abs=1e-4)
     assert gap_m - 2.0 * stand_out_m - 1e-6 <= kept_m < gap_m
+
+
+TWO_LINKS = """<mujoco><worldbody>
+  <body><geom type="cylinder" size="0.01 0.01"/></body>
+  <body pos="1 0 0"><geom type="ellipsoid" size="0.01 0.012 0.02"/></body>
+</worldbody></mujoco>"""
+
+
+def test_an_interrupted_search_continues_with_the_link_that_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    searches = []
+
+    def search(*shape: Any, **work: Any) -> tuple[FloatArray, FloatArray, float]:
+        searches.append(shape)
+        if len(searches) == 2:
+            raise InterruptedError
+        return cover_surface(*shape, **work)
+
+    monkeypatch.setattr(gripper_cover, "cover_surface", search)
+    model = mujoco.MjModel.from_xml_string(TWO_LINKS)
+    with pytest.raises(InterruptedError):
+        cover_gripper(model, np.arange(2), 0.01)
+    assert set(cover_gripper(model, np.arange(2), 0.01).bodies.tolist()) == {1, 2}
+    assert len(searches) == 3
