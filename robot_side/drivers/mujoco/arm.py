@@ -91,7 +91,7 @@ class MujocoArm:
         measured = int(robot.gripper_actuators[0]) if gripper is not None else 0
         self._plant = Plant(
             self._reference.joints,
-            robot.drives.table(model.dof_damping[robot.arm_velocities]),
+            robot.drives.table(model.dof_damping[robot.arm_velocities], model.dof_frictionloss[robot.arm_velocities]),
             inertia_table(model, robot.arm_velocities),
             np.zeros(0, GRIPPER) if gripper is None else gripper.drive,
             np.zeros((0, 3)) if gripper is None else gripper.samples,

@@ -18,17 +18,21 @@ DRIVE: Final = np.dtype(
         ("stiffness", np.float64),
         ("damping", np.float64),
         ("friction", np.float64),
+        ("dry_friction", np.float64),
         ("acceleration", np.float64),
         ("load", np.float64),
     ]
 )
 """Record of a joint's drive; for the other fields see `JointDrives`. friction: damping of the joint itself, N m s/rad.
+dry_friction: torque that the joint's dry friction takes while it moves, N m.
 acceleration: commanded acceleration, rad/s². load: torque that this acceleration, friction and gravity need, N m."""
 
 # Bandwidths of the loops that this controller closes; servos of the model have their own stiffness.
 _MOTOR_BANDWIDTH_RAD_S = 50.0
 _VELOCITY_SERVO_BANDWIDTH_RAD_S = 20.0
 _MOST_WINDUP_RAD = 0.02
+_SLIDING_RAD_S = 0.02
+"""Velocity from which dry friction is met in full; 0 at rest, so that a resting joint does not chatter."""
 _IDLE_BANDWIDTH_RAD_S = 30.0
 """Bandwidth of the servos that hold idle joints driven by motors."""
 
@@ -59,13 +63,21 @@ class JointDrives:
         pressing = np.divide(self.strongest, 8.0 * stiffness, out=np.full_like(stiffness, np.inf), where=known)
         return np.clip(pressing, least_rad, max(_MOST_WINDUP_RAD, least_rad))
 
-    def table(self, friction: FloatArray) -> np.ndarray:
-        """Return records (n,) of DRIVE. friction (n,): damping of each joint itself, N m s/rad."""
+    def table(self, friction: FloatArray, dry_friction: FloatArray) -> np.ndarray:
+        """Return records (n,) of DRIVE. friction, dry_friction (n,): of each joint itself, in N m s/rad and N m."""
         drives = np.zeros(self.gear.shape, DRIVE)
         for name in ("gear", "gain", "offset", "stiffness", "damping"):
             drives[name] = getattr(self, name)
-        drives["friction"] = friction
+        drives["friction"], drives["dry_friction"] = friction, dry_friction
         return drives
+
+
+@inlined
+def friction_load(drive: Any, velocity: float) -> float:
+    """Return the torque that friction takes at the reference's `velocity`; the dry part rises from 0 at rest."""
+    dry: float = drive.dry_friction * min(max(velocity / _SLIDING_RAD_S, -1.0), 1.0)
+    load: float = drive.friction * velocity + dry
+    return load
 
 
 @inlined
