@@ -80,7 +80,8 @@ class MujocoArm:
         self._gripper = None if travel is None else GripperDrive(travel, gripper_stroke_time_s)
         start = data.qpos[robot.arm_positions].copy()
         limits = limits or MotionLimits()
-        self._reference = JointReference(start, *self.ends_rad, limits, robot.drives.windup_rad(limits.windup_rad))
+        windup_rad = robot.drives.windup_rad(limits.windup_rad, model.dof_frictionloss[robot.arm_velocities])
+        self._reference = JointReference(start, *self.ends_rad, limits, windup_rad)
         mujoco.mj_forward(model, data)
         of_arm = [actuator for actuator in range(model.nu) if moves_any(model, actuator, robot.arm_joints)]
         hold_idle(model, data, np.union1d(of_arm, robot.gripper_actuators).astype(np.int64))
@@ -91,7 +92,7 @@ class MujocoArm:
         measured = int(robot.gripper_actuators[0]) if gripper is not None else 0
         self._plant = Plant(
             self._reference.joints,
-            robot.drives.table(model.dof_damping[robot.arm_velocities], model.dof_frictionloss[robot.arm_velocities]),
+            robot.drives.table(model.dof_damping[robot.arm_velocities]),
             inertia_table(model, robot.arm_velocities),
             np.zeros(0, GRIPPER) if gripper is None else gripper.drive,
             np.zeros((0, 3)) if gripper is None else gripper.samples,

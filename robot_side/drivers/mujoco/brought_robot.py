@@ -3,7 +3,7 @@
 import contextlib
 import math
 from collections.abc import Iterator
-from itertools import islice, product
+from itertools import chain, islice, product
 from typing import Any, Final, NamedTuple
 
 import mujoco  # type: ignore[import-untyped]
@@ -21,7 +21,7 @@ _ABOVE_M: Final = 0.02
 """Least distance of the hand from the table, and, if it comes from above, from the target"""
 _TURNED_RAD: Final = math.radians(20.0)
 _DROPS_M: Final = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5)
-_NEARER_M: Final = (0.0, 0.06, 0.11, 0.15)
+_NEARER_M: Final = (0.0, 0.06, 0.11, 0.15, 0.18)
 _SPANNED: Final = 0.6
 """Largest share of the open gripper's gap that the target fills"""
 _RAYS: Final = 32
@@ -29,8 +29,11 @@ _THINNEST_M: Final = 0.005
 _SLIMMEST: Final = 4.0
 """Largest ratio of the target's height to its thickness, beyond the built-in one's"""
 _SAMPLES: Final = 2000
-_MOST_STARTS: Final = 16
+_MOST_STARTS: Final = 48
+_FEWEST_JOINTS: Final = 5
+"""Number of joints below which no start helps an arm to hold the tool's direction on the way"""
 _LEAST_AHEAD_M: Final = 0.15
+_MORE_M: Final = 1e-3
 _STRAIGHT: Final = 0.95
 """Cosine of the largest angle between the tool's approach and the way ahead, or down, at a start that is found"""
 TABLE_PREFIX: Final = "table_scene/"
@@ -75,9 +78,8 @@ def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_
     target there, else nearer or lower. may_search: whether another start may be searched for.
     """
     fit_target(table, _clear_m(model, robot, start))
-    for number, tried in enumerate(
-        [start, *(islice(_other_starts(model, robot, start), _MOST_STARTS) if may_search else ())]
-    ):
+    most = _MOST_STARTS if may_search and robot.arm_joints.size >= _FEWEST_JOINTS else 0
+    for number, tried in enumerate(chain([start], islice(_other_starts(model, robot, start), most))):
         if (place := _find_place(table, model, robot, tried)) is not None:
             settled = Settled(tried, place, number > 0)
             break
@@ -122,11 +124,14 @@ def _find_place(table: Any, model: Any, robot: RobotModel, start: FloatArray) ->
 
 
 def _other_starts(model: Any, robot: RobotModel, start: FloatArray) -> Iterator[FloatArray]:
-    """Yield free configurations (nq,) away from the joints' ends, in which the tool points ahead or down.
+    """Yield configurations (nq,) away from the joints' ends, in which the tool points ahead or down.
 
-    They are drawn in the same order each time.
+    The robot touches itself no more than at its start. They are drawn in the same order each time.
     """
-    generator, data = np.random.default_rng(0), mujoco.MjData(model)
+    generator, data = np.random.default_rng(0), _placed(model, start)
+    # The parts of many models penetrate each other everywhere.
+    mujoco.mj_forward(model, data)
+    deepest_m = float(data.contact.dist.min(initial=0.0))
     lower = np.where(np.isfinite(robot.lower_rad), robot.lower_rad, -math.pi)
     upper = np.where(np.isfinite(robot.upper_rad), robot.upper_rad, math.pi)
     for _ in range(_SAMPLES):
@@ -139,7 +144,7 @@ def _other_starts(model: Any, robot: RobotModel, start: FloatArray) -> Iterator[
         if far_m < _LEAST_AHEAD_M or max(float(approach @ level) / far_m, -float(approach[2])) < _STRAIGHT:
             continue
         mujoco.mj_forward(model, data)
-        if not (data.contact.dist < 0.0).any():
+        if float(data.contact.dist.min(initial=0.0)) >= deepest_m - _MORE_M:
             yield data.qpos.copy()
 
 
@@ -160,7 +165,7 @@ def _clear_m(model: Any, robot: RobotModel, start: FloatArray) -> float | None:
     """
     data = _placed(model, start)
     travel = None
-    with contextlib.suppress(ConfigurationError):
+    with contextlib.suppress(ConfigurationError, mujoco.FatalError):
         travel = measure_gripper(Simulated(model, data, robot))
     if travel is None:
         return None

@@ -18,21 +18,18 @@ DRIVE: Final = np.dtype(
         ("stiffness", np.float64),
         ("damping", np.float64),
         ("friction", np.float64),
-        ("dry_friction", np.float64),
         ("acceleration", np.float64),
         ("load", np.float64),
     ]
 )
 """Record of a joint's drive; for the other fields see `JointDrives`. friction: damping of the joint itself, N m s/rad.
-dry_friction: torque that the joint's dry friction takes while it moves, N m.
 acceleration: commanded acceleration, rad/s². load: torque that this acceleration, friction and gravity need, N m."""
 
 # Bandwidths of the loops that this controller closes; servos of the model have their own stiffness.
 _MOTOR_BANDWIDTH_RAD_S = 50.0
 _VELOCITY_SERVO_BANDWIDTH_RAD_S = 20.0
 _MOST_WINDUP_RAD = 0.02
-_SLIDING_RAD_S = 0.02
-"""Velocity from which dry friction is met in full; 0 at rest, so that a resting joint does not chatter."""
+_MOST_STUCK_RAD = 0.3
 _IDLE_BANDWIDTH_RAD_S = 30.0
 """Bandwidth of the servos that hold idle joints driven by motors."""
 
@@ -53,31 +50,26 @@ class JointDrives:
     strongest: FloatArray
     """Greatest torque in N m, or force in N, of each actuator; infinite without a limit in the model"""
 
-    def windup_rad(self, least_rad: float) -> FloatArray:
+    def windup_rad(self, least_rad: float, dry_friction_nm: FloatArray | float = 0.0) -> FloatArray:
         """Return the largest lead (n,) of each reference over its joint: where a servo gives an eighth of `strongest`.
 
         The lead is at least least_rad and at most 20 mrad; drives without stiffness, or without a limit, have 20 mrad.
+        It is more where a servo needs more, up to 300 mrad, to overcome the joints' dry friction (n,).
         """
         stiffness = self.gear**2 * self.stiffness
         known = (stiffness > 0.0) & np.isfinite(self.strongest)
         pressing = np.divide(self.strongest, 8.0 * stiffness, out=np.full_like(stiffness, np.inf), where=known)
-        return np.clip(pressing, least_rad, max(_MOST_WINDUP_RAD, least_rad))
+        sticks = np.divide(1.5 * dry_friction_nm, stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0)
+        usual = np.clip(pressing, least_rad, max(_MOST_WINDUP_RAD, least_rad))
+        return np.maximum(usual, np.minimum(sticks, _MOST_STUCK_RAD))
 
-    def table(self, friction: FloatArray, dry_friction: FloatArray) -> np.ndarray:
-        """Return records (n,) of DRIVE. friction, dry_friction (n,): of each joint itself, in N m s/rad and N m."""
+    def table(self, friction: FloatArray) -> np.ndarray:
+        """Return records (n,) of DRIVE. friction (n,): damping of each joint itself, N m s/rad."""
         drives = np.zeros(self.gear.shape, DRIVE)
         for name in ("gear", "gain", "offset", "stiffness", "damping"):
             drives[name] = getattr(self, name)
-        drives["friction"], drives["dry_friction"] = friction, dry_friction
+        drives["friction"] = friction
         return drives
-
-
-@inlined
-def friction_load(drive: Any, velocity: float) -> float:
-    """Return the torque that friction takes at the reference's `velocity`; the dry part rises from 0 at rest."""
-    dry: float = drive.dry_friction * min(max(velocity / _SLIDING_RAD_S, -1.0), 1.0)
-    load: float = drive.friction * velocity + dry
-    return load
 
 
 @inlined

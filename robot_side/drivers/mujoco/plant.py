@@ -9,7 +9,7 @@ from robot_side.compiled.columns import BUNDLE, INDICES, NUMBERS, Declared, reco
 from robot_side.compiled.kernel import BOOL, FLOAT64, compiled, output_array
 from robot_side.drivers.mujoco.encoders import reading
 from robot_side.drivers.mujoco.gripper_drive import GRIPPER, GRIPPER_INPUT, advance_gripper
-from robot_side.drivers.mujoco.joint_drives import DRIVE, control, friction_load, motor_acceleration
+from robot_side.drivers.mujoco.joint_drives import DRIVE, control, motor_acceleration
 from robot_side.drivers.mujoco.joint_reference import REFERENCE, advance_references
 
 INERTIA: Final = np.dtype([("place", np.int64), ("row", np.int64), ("column", np.int64)])
@@ -101,7 +101,7 @@ def drive(bundle: IntArray, following: bool, ended: bool, closing: float, step_s
         velocity_error = joint.velocity - joint.measured_velocity
         drive.acceleration = joint.acceleration + motor_acceleration(drive, position_error, velocity_error)
         forces = plant.bias[place] - plant.compensated[place] - plant.sprung[place]
-        drive.load = forces + friction_load(drive, joint.velocity)
+        drive.load = forces + drive.friction * joint.velocity
     for k in range(inertia.size):
         row, column = inertia[k].row, inertia[k].column
         element = plant.mass[inertia[k].place]

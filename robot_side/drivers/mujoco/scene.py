@@ -109,6 +109,7 @@ def load_scene(
             spec = _read(model_path)
         model = _compile(spec)
         robot = find_robot(model, site)
+        _require_step(float(model.opt.timestep))
         turn_site(model, robot.site, site_axis)
         start, start_pose = _start_configuration(model, robot)
         if _is_alone(model, robot):
@@ -130,11 +131,6 @@ def load_scene(
             robot = find_robot(model, site)
             turn_site(model, robot.site, site_axis)
             start = model.key(start_key).qpos
-    if not _SHORTEST_STEP_S <= model.opt.timestep <= _LONGEST_STEP_S:
-        raise ConfigurationError(
-            f"model: timestep = {model.opt.timestep}; valid: {_SHORTEST_STEP_S:g} to {_LONGEST_STEP_S:g} s, such as"
-            " 0.002"
-        )
     data = mujoco.MjData(model)
     data.qpos[:] = start
     data.qvel[:] = _start_velocities(model, robot)
@@ -161,6 +157,13 @@ def load_scene(
         shared_names=shared_names,
         warnings=tuple(" ".join(str(warning.message).split()) for warning in said),
     )
+
+
+def _require_step(timestep_s: float) -> None:
+    if not _SHORTEST_STEP_S <= timestep_s <= _LONGEST_STEP_S:
+        raise ConfigurationError(
+            f"model: timestep = {timestep_s}; valid: {_SHORTEST_STEP_S:g} to {_LONGEST_STEP_S:g} s, such as 0.002"
+        )
 
 
 def _is_alone(model: Any, robot: RobotModel) -> bool:
