@@ -61,7 +61,8 @@ class JointDrives:
         pressing = np.divide(self.strongest, 8.0 * stiffness, out=np.full_like(stiffness, np.inf), where=known)
         sticks = np.divide(1.5 * dry_friction_nm, stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0)
         usual = np.clip(pressing, least_rad, max(_MOST_WINDUP_RAD, least_rad))
-        return np.maximum(usual, np.minimum(sticks, _MOST_STUCK_RAD))
+        windup_rad: FloatArray = np.maximum(usual, np.minimum(sticks, _MOST_STUCK_RAD))
+        return windup_rad
 
     def table(self, friction: FloatArray) -> np.ndarray:
         """Return records (n,) of DRIVE. friction (n,): damping of each joint itself, N m s/rad."""

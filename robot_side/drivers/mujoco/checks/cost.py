@@ -15,7 +15,8 @@ _LONGEST_S: Final = 0.5
 def cost_findings(scene: Scene, clock: Clock | None = None) -> list[str]:
     """Return a line if the median step takes longer than the time that it simulates, by `clock`: processor time."""
     model, clock = scene.model, clock or ThreadClock()
-    data, took_s, began_s = mujoco.MjData(model), [], clock.now()
+    data, began_s = mujoco.MjData(model), clock.now()
+    took_s: list[float] = []
     mujoco.mj_copyData(data, model, scene.data)
     while len(took_s) < _STEPS and clock.now() - began_s < _LONGEST_S:
         start_s = clock.now()

@@ -44,10 +44,12 @@ def test_the_built_in_arm_as_a_model_of_ones_own_stands_as_ever_and_nothing_is_s
 
 
 def test_without_a_keyframe_a_start_is_found_from_which_the_target_is_in_reach(tmp_path: Path) -> None:
-    scene = load_scene(brought(tmp_path, no_keyframe()), "tool")
+    # In the middle of this range the tool points up.
+    upwards = ('<joint name="wrist_2"/>', '<joint name="wrist_2" range="0 3.1416"/>')
+    scene = load_scene(brought(tmp_path, no_keyframe(), upwards), "tool")
     assert "searched for" in scene.start_pose
     assert reach_findings(scene) == []
-    again = load_scene(brought(tmp_path, no_keyframe()), "tool")
+    again = load_scene(brought(tmp_path, no_keyframe(), upwards), "tool")
     assert (again.data.qpos == scene.data.qpos).all()
 
 
@@ -69,9 +71,8 @@ def test_the_target_is_so_thin_that_the_fingers_span_it(opening_m: float) -> Non
 
 
 def test_a_start_out_of_reach_is_said(tmp_path: Path) -> None:
-    # Stretched out to the side, at the height of the shoulder.
-    stretched = ("-0.45168 -1.55140 2.37501 -0.82361 1.11912 1.57080 0.0425 0.0425", "0 0 0 0 0 0 0.0425 0.0425")
-    [line] = reach_findings(load_scene(brought(tmp_path, stretched), "tool"))
+    stiff = ('name="elbow" range="-3.1416 3.1416"', 'name="elbow" range="2.37 2.38"')
+    [line] = reach_findings(load_scene(brought(tmp_path, stiff), "tool"))
     assert "'target' is out of reach" in line
 
 
