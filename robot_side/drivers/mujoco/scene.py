@@ -15,7 +15,7 @@ from common.errors import ConfigurationError
 from common.files.input_file import require_input_file
 from common.roles import Role
 from robot_side.arm.port import ArmState
-from robot_side.drivers.mujoco.brought_robot import TABLE_PREFIX, attach, settle, usual_place
+from robot_side.drivers.mujoco.brought.table import TABLE_PREFIX, attach, settle, usual_place
 from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.object_primitives import ObjectPrimitives, SceneObject

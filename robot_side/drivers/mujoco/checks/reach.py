@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from common.roles import Role
-from robot_side.drivers.mujoco.reach import NEAR_M, go, grasp_places
+from robot_side.drivers.mujoco.brought.reach import NEAR_M, go, grasp_places
 from robot_side.drivers.mujoco.scene import Scene
 
 _PLACES: Final = (

@@ -11,10 +11,10 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
+from robot_side.drivers.mujoco.brought.reach import FROM_ABOVE, NEAR_M, go, grasp_places
 from robot_side.drivers.mujoco.built_in_scenes import make_room
 from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
 from robot_side.drivers.mujoco.model_enums import GeomKind
-from robot_side.drivers.mujoco.reach import FROM_ABOVE, NEAR_M, go, grasp_places
 from robot_side.drivers.mujoco.robot_model import RobotModel, Simulated
 
 _ABOVE_M: Final = 0.02

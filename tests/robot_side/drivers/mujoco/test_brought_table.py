@@ -5,7 +5,7 @@ from pathlib import Path
 import mujoco  # type: ignore[import-untyped]
 import pytest
 
-from robot_side.drivers.mujoco.brought_robot import fit_target
+from robot_side.drivers.mujoco.brought.table import fit_target
 from robot_side.drivers.mujoco.checks.cost import cost_findings
 from robot_side.drivers.mujoco.checks.joints import joint_findings
 from robot_side.drivers.mujoco.checks.reach import reach_findings
