@@ -28,6 +28,8 @@ _RAYS: Final = 32
 _THINNEST_M: Final = 0.005
 _SLIMMEST: Final = 4.0
 """Largest ratio of the target's height to its thickness, beyond the built-in one's"""
+_LOWEST_M: Final = 0.045
+"""Least half height of the target: a hand from above grasps it 20 mm above its centre"""
 _SAMPLES: Final = 2000
 _MOST_STARTS: Final = 48
 _FEWEST_JOINTS: Final = 5
@@ -97,7 +99,7 @@ def fit_target(table: Any, clear_m: float | None) -> None:
     most_m = max(0.5 * _SPANNED * clear_m, _THINNEST_M)
     length_m, width_m, height_m = target.size
     length_m, width_m = min(length_m, most_m), min(width_m, most_m)
-    height_m = min(height_m, _SLIMMEST * width_m)
+    height_m = min(height_m, max(_SLIMMEST * width_m, _LOWEST_M))
     target.size, body.pos = [length_m, width_m, height_m], [*body.pos[:2], height_m]
 
 
