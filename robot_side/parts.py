@@ -15,6 +15,9 @@ from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.core import RobotParts
 from robot_side.drivers.mujoco.arm import MujocoArm, stand
 from robot_side.drivers.mujoco.camera import CameraError, MujocoCamera
+from robot_side.drivers.mujoco.checks.cost import cost_findings
+from robot_side.drivers.mujoco.checks.joints import joint_findings
+from robot_side.drivers.mujoco.checks.reach import reach_findings
 from robot_side.drivers.mujoco.checks.site_axis import site_findings
 from robot_side.drivers.mujoco.checks.start_collision import start_collision
 from robot_side.drivers.mujoco.encoders import Encoder
@@ -247,6 +250,8 @@ def _notes(scene: Scene, settings: RobotSettings, travel: GripperTravel | None) 
         if len(largest_first) > len(shown):
             shown.append(f"and {len(largest_first) - len(shown)} more, none by more than these")
         notes.append(f"perceived larger than they are, at most: {', '.join(shown)}")
+    if settings.model is not None and settings.arm is None:
+        notes += joint_findings(scene, travel) + reach_findings(scene) + cost_findings(scene)
     return tuple(notes)
 
 

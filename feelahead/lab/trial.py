@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Final, Literal
 
 from common.emulation.clauses import LinkModel
@@ -19,6 +20,7 @@ from operator_side.settings import OperatorSettings
 from robot_side.arm.port import GripperPose
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.drivers.mujoco.ground_truth import GroundTruth
+from robot_side.drivers.mujoco.robot_model import SiteAxis
 from robot_side.drivers.mujoco.scene import load_scene
 from robot_side.drivers.mujoco.true_contact import TrueContact
 from robot_side.events import Listener
@@ -58,6 +60,10 @@ class Trial:
     """Standard deviation of the camera's error along each axis; the law knows it"""
     probability: float = RobotSettings().probability
     """P of eq. 10"""
+    model: Path | None = None
+    """MJCF file of an arm instead of the built-in one; `site` and `site_axis` belong to it"""
+    site: str | None = None
+    site_axis: SiteAxis = "z"
 
 
 class _Silent:
@@ -92,7 +98,7 @@ class Watch(Listener):
         self.pulled_s = self.full_s = 0.0
         """Time for which R2 was pulled, and for which the finger met full strength at R2, in seconds"""
         self.placing = Placing()
-        self.scene = load_scene(name=trial.scene, seed=seed)
+        self.scene = load_scene(trial.model, trial.site, name=trial.scene, seed=seed, site_axis=trial.site_axis)
         self._contact, self.truth = TrueContact(self.scene), GroundTruth(self.scene)
         self._parts = {self.scene.model.geom(geom).name for geom in self.scene.robot.gripper_geoms}
         self._hit_s: dict[str, float] = {}
@@ -101,7 +107,10 @@ class Watch(Listener):
             link=trial.link,
             link_model=trial.link_model,
             seed=seed,
-            scene=trial.scene,
+            scene=trial.scene if trial.model is None else None,
+            model=trial.model,
+            site=trial.site,
+            site_axis=trial.site_axis,
             camera=CameraSettings(sd_m=trial.camera_sd_m),
             probability=trial.probability,
         )

@@ -50,6 +50,8 @@ _PRESSES_S: Final = 0.2
 _CLEAR_M: Final = 0.01
 _CLEARS_S: Final = 3.0
 """Rise before the person draws back (first, in metres), and maximum time for it (second, in seconds)"""
+_FROM_ABOVE: Final = -0.5
+"""Part of the upward direction along the tool, below which the tool comes from above"""
 _BACK_M: Final = 0.1
 """Distance by which the person draws back from an object that was set down, in metres"""
 
@@ -182,7 +184,9 @@ class SimulatedOperator:
             self._fingers.do(0.0, _REST)
             return
         across = look.view.target_in_tool_m[:2]
-        depth_m = look.view.target_in_tool_m[2] + self._settings.grasp_depth_m + self._depth_error_m
+        # From above they grasp above the centre, so that what they lift does not tip over.
+        past_m = self._settings.grasp_depth_m * (-1.0 if look.view.up_in_tool[2] < _FROM_ABOVE else 1.0)
+        depth_m = look.view.target_in_tool_m[2] + past_m + self._depth_error_m
         off_m = math.hypot(*across)
         aligned = off_m < self._ALIGNED_M
         settled = self._settings.aiming == "servo" or self._moves.free(look.now_s, look.lag_s)

@@ -4,7 +4,8 @@ feelahead try demo --seeds 10 --link "" "delay 200ms 10ms distribution normal"
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Annotated, Final
 
 import tyro
@@ -19,6 +20,7 @@ from feelahead.lab.table import Row, Table
 from feelahead.lab.trial import Trial, run_trial
 from operator_side.people.settings import PersonSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
+from robot_side.drivers.mujoco.robot_model import SiteAxis
 
 _COLUMNS: Final = {
     "seed": ("seed", 0),
@@ -43,6 +45,12 @@ class DemoSettings(Sweep):
     """Number of seeds."""
     scene: SceneName = "table"
     """Scene of the demo: table, wall, slot or shelf."""
+    model: Annotated[Path | None, tyro.conf.arg(metavar="FILE.xml")] = None
+    """MJCF arm with actuators, instead of the built-in one."""
+    site: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Site of the model between the fingertips, with the z axis along the approach."""
+    site_axis: SiteAxis = "z"
+    """Axis of the site along which R2 advances."""
     link: Annotated[tuple[str, ...], tyro.conf.arg(metavar="SPEC...")] = ("", "delay 200ms 10ms distribution normal")
     """Emulated links, in both directions, in netem's syntax."""
     link_model: LinkModel = "datagram"
@@ -66,7 +74,8 @@ class DemoSettings(Sweep):
 def cells(settings: DemoSettings) -> Iterator[Trial]:
     """Yield one cell for each link."""
     for link in settings.link[: 1 if settings.quick else None]:
-        yield Trial(settings.scene, link, "reacting", settings.person, settings.duration, settings.link_model)
+        one = Trial(settings.scene, link, "reacting", settings.person, settings.duration, settings.link_model)
+        yield replace(one, model=settings.model, site=settings.site, site_axis=settings.site_axis)
 
 
 def run(cell: Trial, seed: int) -> Iterator[Row]:

@@ -3,7 +3,6 @@
 from typing import Any, Final
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from common.protocol.view_messages import Eye, SceneShapes, SceneState, Shape
 from common.roles import ROLES, Role
@@ -29,7 +28,7 @@ class _Body:
 
     def top_below_m(self, point: Floats, pose: Floats) -> float | None:
         """Return how far below a point the object's next upper side lies; None if none does."""
-        turn = Rotation.from_quat(pose[3:], scalar_first=True).inv()
+        turn = SO3(pose[3:]).inverse()
         start, down = turn.apply(point - pose[:3]), turn.apply((0.0, 0.0, -1.0))
         if np.linalg.norm(np.cross(self.centre - start, down)) > self.radius_m:
             return None
@@ -91,7 +90,7 @@ class Cues:
         pose = self._poses[target]
         corners = np.concatenate([corners_m(shape) for shape in own])
         centre = moved(pose, 0.5 * (corners.min(axis=0) + corners.max(axis=0)))
-        right, down, ahead = Rotation.from_quat(tool[3:], scalar_first=True).inv().apply(centre - tool[:3]).tolist()
+        right, down, ahead = SO3(tool[3:]).inverse().apply(centre - tool[:3]).tolist()
         boxes = [None if eye is None else outline(own, pose, frame, eye) for eye, frame in eyes]
         return {"name": shapes.objects[target], "boxes": boxes, "way_m": (right, -down, ahead)}
 

@@ -80,7 +80,8 @@ class MujocoArm:
         self._gripper = None if travel is None else GripperDrive(travel, gripper_stroke_time_s)
         start = data.qpos[robot.arm_positions].copy()
         limits = limits or MotionLimits()
-        self._reference = JointReference(start, *self.ends_rad, limits, robot.drives.windup_rad(limits.windup_rad))
+        windup_rad = robot.drives.windup_rad(limits.windup_rad, model.dof_frictionloss[robot.arm_velocities])
+        self._reference = JointReference(start, *self.ends_rad, limits, windup_rad)
         mujoco.mj_forward(model, data)
         of_arm = [actuator for actuator in range(model.nu) if moves_any(model, actuator, robot.arm_joints)]
         hold_idle(model, data, np.union1d(of_arm, robot.gripper_actuators).astype(np.int64))

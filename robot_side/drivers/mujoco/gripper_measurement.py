@@ -11,7 +11,7 @@ import numpy as np
 from common.arrays import BoolArray, FloatArray, IntArray
 from common.errors import ConfigurationError
 from robot_side.drivers.mujoco.gripper_cover import GripperCover, link_solids
-from robot_side.drivers.mujoco.scene import Scene
+from robot_side.drivers.mujoco.robot_model import Simulated
 
 _GRIPPER_SAMPLES = 9
 _SHORTEST_SETTLING_S, _LONGEST_SETTLING_S = 0.05, 2.0
@@ -67,7 +67,7 @@ class GripperTravel:
     """Lag of a moving drive behind its reference, in seconds: shares of the stroke for each share per second"""
 
 
-def measure_gripper(scene: Scene) -> GripperTravel | None:
+def measure_gripper(scene: Simulated) -> GripperTravel | None:
     """Measure the gripper's travel, by driving a copy of the scene's gripper to both ends in empty space.
 
     None without a gripper, or if its fingers' geoms do not approach each other. ConfigurationError for a gripper
@@ -103,7 +103,7 @@ def measure_gripper(scene: Scene) -> GripperTravel | None:
     return travel_from_sweep(sweep, min(_DEFAULT_FORCE_LEAD, float(leads.min())), float(lags.max()))
 
 
-def _sweep_gripper(model: Any, scene: Scene, first: FloatArray, last: FloatArray) -> GripperSweep:
+def _sweep_gripper(model: Any, scene: Simulated, first: FloatArray, last: FloatArray) -> GripperSweep:
     robot, data = scene.robot, mujoco.MjData(model)
     data.qpos[:] = scene.data.qpos
     held = scene.data.qpos[robot.arm_positions].copy()
@@ -181,7 +181,7 @@ def travel_from_sweep(sweep: GripperSweep, force_lead: float, lag_s: float) -> G
     )
 
 
-def open_gap(scene: Scene, cover: GripperCover) -> tuple[float, float] | None:
+def open_gap(scene: Simulated, cover: GripperCover) -> tuple[float, float] | None:
     """Return the gap between the gripping geoms of the open gripper, and the least between their spheres, in m.
 
     None without fingers.
@@ -207,7 +207,7 @@ def open_gap(scene: Scene, cover: GripperCover) -> tuple[float, float] | None:
     return float(opening_m), max(kept_m, 0.0)
 
 
-def _spheres_of(scene: Scene, cover: GripperCover, data: Any, geom: int) -> tuple[FloatArray, FloatArray]:
+def _spheres_of(scene: Simulated, cover: GripperCover, data: Any, geom: int) -> tuple[FloatArray, FloatArray]:
     """Return centres (m, 3) in the world frame and radii (m,) of those spheres whose centres are in a geom."""
     link = int(scene.model.geom_bodyid[geom])
     own = np.flatnonzero(cover.bodies == link)

@@ -29,6 +29,7 @@ acceleration: commanded acceleration, rad/s². load: torque that this accelerati
 _MOTOR_BANDWIDTH_RAD_S = 50.0
 _VELOCITY_SERVO_BANDWIDTH_RAD_S = 20.0
 _MOST_WINDUP_RAD = 0.02
+_MOST_STUCK_RAD = 0.3
 _IDLE_BANDWIDTH_RAD_S = 30.0
 """Bandwidth of the servos that hold idle joints driven by motors."""
 
@@ -49,15 +50,19 @@ class JointDrives:
     strongest: FloatArray
     """Greatest torque in N m, or force in N, of each actuator; infinite without a limit in the model"""
 
-    def windup_rad(self, least_rad: float) -> FloatArray:
+    def windup_rad(self, least_rad: float, dry_friction_nm: FloatArray | float = 0.0) -> FloatArray:
         """Return the largest lead (n,) of each reference over its joint: where a servo gives an eighth of `strongest`.
 
         The lead is at least least_rad and at most 20 mrad; drives without stiffness, or without a limit, have 20 mrad.
+        It is more where a servo needs more, up to 300 mrad, to overcome the joints' dry friction (n,).
         """
         stiffness = self.gear**2 * self.stiffness
         known = (stiffness > 0.0) & np.isfinite(self.strongest)
         pressing = np.divide(self.strongest, 8.0 * stiffness, out=np.full_like(stiffness, np.inf), where=known)
-        return np.clip(pressing, least_rad, max(_MOST_WINDUP_RAD, least_rad))
+        sticks = np.divide(1.5 * dry_friction_nm, stiffness, out=np.zeros_like(stiffness), where=stiffness > 0.0)
+        usual = np.clip(pressing, least_rad, max(_MOST_WINDUP_RAD, least_rad))
+        windup_rad: FloatArray = np.maximum(usual, np.minimum(sticks, _MOST_STUCK_RAD))
+        return windup_rad
 
     def table(self, friction: FloatArray) -> np.ndarray:
         """Return records (n,) of DRIVE. friction (n,): damping of each joint itself, N m s/rad."""

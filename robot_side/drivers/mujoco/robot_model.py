@@ -63,6 +63,17 @@ class RobotModel:
     """(k,) whether a finger joint moves the geom"""
 
 
+@dataclass(frozen=True)
+class Simulated:
+    """Robot in a compiled model, with the model's state."""
+
+    model: Any
+    """Compiled model, a mujoco.MjModel"""
+    data: Any
+    """State, a mujoco.MjData"""
+    robot: RobotModel
+
+
 def find_robot(model: Any, site_name: str | None) -> RobotModel:
     """Find the arm that carries the site `site_name` in a compiled MuJoCo model.
 
@@ -246,6 +257,15 @@ def _actuator_of(model: Any, joint: int) -> int:
         f"model: the arm's {_joint_name(model, joint)} has no actuator of its own: {_why_no_actuator(model, joint)};"
         " valid: a position, velocity or motor actuator on each joint from the base to the site"
     )
+
+
+def machines(model: Any) -> set[int]:
+    """Return the root bodies of all that has a driven joint, such as arms."""
+    return {
+        int(model.body_rootid[model.jnt_bodyid[joint]])
+        for joint in range(model.njnt)
+        if any(moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu))
+    }
 
 
 def moves_any(model: Any, actuator: int, joints: IntArray) -> bool:

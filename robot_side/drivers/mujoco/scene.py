@@ -1,7 +1,6 @@
 """Simulated world of an arm among objects, loaded from MJCF files."""
 
 import logging
-import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,30 +15,36 @@ from common.errors import ConfigurationError
 from common.files.input_file import require_input_file
 from common.roles import Role
 from robot_side.arm.port import ArmState
-from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish, make_room
+from robot_side.drivers.mujoco.brought.table import TABLE_PREFIX, attach, settle, usual_place
+from robot_side.drivers.mujoco.built_in_scenes import SceneName, furnish
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.object_primitives import ObjectPrimitives, SceneObject
-from robot_side.drivers.mujoco.robot_model import RobotModel, SiteAxis, can_touch, find_robot, moves_any, turn_site
+from robot_side.drivers.mujoco.robot_model import (
+    RobotModel,
+    Simulated,
+    SiteAxis,
+    can_touch,
+    find_robot,
+    machines,
+    turn_site,
+)
 from robot_side.surroundings.roles import assign_roles
 
 _LOG = logging.getLogger(__name__)
 _ASSETS = Path(__file__).parent / "assets"
-# MuJoCo requires a prefix for attached elements; objects are named without it.
-_TABLE_PREFIX = "table_scene/"
 _START_KEY = "feelahead_start"
+_FOUND_START = (
+    "a pose that was searched for, in which it reaches the target, as the model has no keyframe (to choose a pose: a"
+    " keyframe named 'home')"
+)
 # Longer steps make the arm's servos oscillate; shorter ones are too slow for real time on any machine.
 _SHORTEST_STEP_S, _LONGEST_STEP_S = 1e-5, 0.02
 
 
 @dataclass(frozen=True)
-class Scene:
+class Scene(Simulated):
     """Compiled model and its only live state, which the arm advances and all others only read."""
 
-    model: Any
-    """Compiled model, a mujoco.MjModel"""
-    data: Any
-    """Live state, a mujoco.MjData"""
-    robot: RobotModel
     objects: tuple[SceneObject, ...]
     roles: dict[str, Role]
     """Present role of each object; `MujocoCamera.set_role` changes it."""
@@ -63,14 +68,10 @@ class Scene:
     def never_held(self) -> frozenset[str]:
         """Names of the objects that cannot be held: fixed ones, and machines with actuators, such as another arm"""
         model = self.model
-        machines = {
-            int(model.body_rootid[model.jnt_bodyid[joint]])
-            for joint in range(model.njnt)
-            if any(moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu))
+        driven, roots = machines(model), model.body_rootid[model.geom_bodyid]
+        return self.fixed | {
+            thing.name for thing in self.objects if any(int(roots[geom]) in driven for geom in thing.geoms)
         }
-        roots = model.body_rootid[model.geom_bodyid]
-        driven = {thing.name for thing in self.objects if any(int(roots[geom]) in machines for geom in thing.geoms)}
-        return self.fixed | driven
 
     def step(self) -> None:
         """Advance the state by one step, with the actuators' present inputs."""
@@ -93,9 +94,10 @@ def load_scene(
 ) -> Scene:
     """Load the built-in arm, or the MJCF file `model_path`, whose tool is the site `site`.
 
-    A file with only a robot and planes gets the built-in scene `name`, drawn from `seed`, in front of the robot; so
-    does the built-in arm. The arm starts at the keyframe `home`, else at the first keyframe, else in the middle of the
-    joints' ranges. roles: override the roles that objects' names tell. The tool's z axis is the site's `site_axis`.
+    A file with only a robot, planes and other machines gets the built-in scene `name`, drawn from `seed`, in front of
+    the robot; so does the built-in arm. The arm starts at the keyframe `home`, else at the first keyframe, else in the
+    middle of the joints' ranges; at the table, if that is out of reach, in a pose that is searched for.
+    roles: override the roles that objects' names tell. The tool's z axis is the site's `site_axis`.
     ConfigurationError, of one line, for a file, model or site that cannot be used.
     """
     mujoco.set_mju_user_warning(_log_warning)
@@ -107,26 +109,28 @@ def load_scene(
             spec = _read(model_path)
         model = _compile(spec)
         robot = find_robot(model, site)
+        _require_step(float(model.opt.timestep))
         turn_site(model, robot.site, site_axis)
         start, start_pose = _start_configuration(model, robot)
-        if all(model.geom_type[geom] == GeomKind.PLANE for thing in _objects(model, robot)[0] for geom in thing.geoms):
+        if _is_alone(model, robot):
+            table = _read(_ASSETS / f"{name}_scene.xml")
+            furnish(table, name, seed)
+            if model_path is not None and name == "table":
+                start, place, found = settle(table, model, robot, start, may_search=model.nkey == 0)
+                if found:
+                    start_pose = _FOUND_START
+            else:
+                place = usual_place(model, robot, start)
             # Attaching extends the keyframes by the attached joints, so that a keyframe preserves the configuration.
             start_key = _START_KEY
             while any(model.key(key).name == start_key for key in range(model.nkey)):
                 start_key += "_"
             spec.add_key(name=start_key, qpos=start)
-            surroundings = _read(_ASSETS / f"{name}_scene.xml")
-            furnish(surroundings, name, seed)
-            _attach(surroundings, spec, model, robot, start, room=model_path is not None and name == "table")
+            attach(table, spec, model, robot, start, place)
             model = _compile(spec)
             robot = find_robot(model, site)
             turn_site(model, robot.site, site_axis)
             start = model.key(start_key).qpos
-    if not _SHORTEST_STEP_S <= model.opt.timestep <= _LONGEST_STEP_S:
-        raise ConfigurationError(
-            f"model: timestep = {model.opt.timestep}; valid: {_SHORTEST_STEP_S:g} to {_LONGEST_STEP_S:g} s, such as"
-            " 0.002"
-        )
     data = mujoco.MjData(model)
     data.qpos[:] = start
     data.qvel[:] = _start_velocities(model, robot)
@@ -153,6 +157,20 @@ def load_scene(
         shared_names=shared_names,
         warnings=tuple(" ".join(str(warning.message).split()) for warning in said),
     )
+
+
+def _require_step(timestep_s: float) -> None:
+    if not _SHORTEST_STEP_S <= timestep_s <= _LONGEST_STEP_S:
+        raise ConfigurationError(
+            f"model: timestep = {timestep_s}; valid: {_SHORTEST_STEP_S:g} to {_LONGEST_STEP_S:g} s, such as 0.002"
+        )
+
+
+def _is_alone(model: Any, robot: RobotModel) -> bool:
+    """Return whether a model has nothing but the robot, planes, and other machines such as a second arm."""
+    driven, roots = machines(model), model.body_rootid[model.geom_bodyid]
+    geoms = [geom for thing in _objects(model, robot)[0] for geom in thing.geoms]
+    return all(model.geom_type[geom] == GeomKind.PLANE or int(roots[geom]) in driven for geom in geoms)
 
 
 def _log_warning(message: str) -> None:
@@ -236,62 +254,8 @@ def _objects(model: Any, robot: RobotModel) -> tuple[tuple[SceneObject, ...], tu
             continue
         # Each geom of the world is an object, unless names are shared; a tree of bodies is one object.
         kind, index, named = ("geom", geom, model.geom(geom)) if root == 0 else ("body", root, model.body(root))
-        name = named.name.removeprefix(_TABLE_PREFIX) or f"{kind}{index}"
+        name = named.name.removeprefix(TABLE_PREFIX) or f"{kind}{index}"
         geoms_of.setdefault(name, []).append(geom)
         parts_of.setdefault(name, set()).add((kind, index))
     shared = tuple(name for name, parts in parts_of.items() if len(parts) > 1)
     return tuple(SceneObject(name, tuple(geoms)) for name, geoms in geoms_of.items()), shared
-
-
-def _attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatArray, *, room: bool) -> None:
-    """Attach the scene below the tool's start, at the base's height, turned towards the tool.
-
-    room: whether to give a hand that is wider than the built-in one as much room as that one has.
-    """
-    data = mujoco.MjData(model)
-    data.qpos[:] = start
-    mujoco.mj_kinematics(model, data)
-    base, tool = data.xpos[robot.root_body], data.site_xpos[robot.site]
-    ahead = tool[:2] - base[:2]
-    # A tool right above the base has no direction.
-    yaw = math.atan2(ahead[1], ahead[0]) if np.hypot(*ahead) > 0.05 else 0.0
-    if room:
-        make_room(table, *_hand_reach_m(model, robot, start, np.array([math.cos(yaw), math.sin(yaw)])))
-    home_x, home_y, _ = table.site("tool_home").pos
-    if model.geom_type[model.geom_type == GeomKind.PLANE].size:
-        table.delete(table.geom("floor"))
-    turned_x = math.cos(yaw) * home_x - math.sin(yaw) * home_y
-    turned_y = math.sin(yaw) * home_x + math.cos(yaw) * home_y
-    spec.attach(
-        table,
-        prefix=_TABLE_PREFIX,
-        frame=spec.worldbody.add_frame(
-            pos=[tool[0] - turned_x, tool[1] - turned_y, base[2]],
-            quat=[math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0)],
-        ),
-    )
-
-
-def _hand_reach_m(model: Any, robot: RobotModel, start: FloatArray, ahead: FloatArray) -> tuple[float, float]:
-    """Return how far the hand reaches from the tool's point, along the horizontal `ahead` (2,) and to its sides.
-
-    The fingers are at the start, and at either end of their ranges.
-    """
-    if robot.gripper_geoms.size == 0:
-        return 0.0, 0.0
-    data, geoms, fingers = mujoco.MjData(model), robot.gripper_geoms, robot.finger_positions
-    of_position = {int(address): joint for joint, address in enumerate(model.jnt_qposadr)}
-    ranges = model.jnt_range[[of_position[int(address)] for address in fingers]].reshape(-1, 2)
-    reaches_m = []
-    for placed in (start[fingers], *ranges.T):
-        data.qpos[:] = start
-        data.qpos[fingers] = placed
-        mujoco.mj_kinematics(model, data)
-        around = np.einsum("gij,gj->gi", data.geom_xmat[geoms].reshape(-1, 3, 3), model.geom_aabb[geoms, :3])
-        half_m = np.einsum("gij,gj->gi", np.abs(data.geom_xmat[geoms].reshape(-1, 3, 3)), model.geom_aabb[geoms, 3:])
-        middle_m = (data.geom_xpos[geoms] + around - data.site_xpos[robot.site])[:, :2]
-        for axis in (ahead, np.array([-ahead[1], ahead[0]])):
-            reaches_m.append((middle_m @ axis, half_m[:, :2] @ np.abs(axis)))
-    forward_m = max(float((middle + half).max()) for middle, half in reaches_m[::2])
-    sideways_m = max(float((np.abs(middle) + half).max()) for middle, half in reaches_m[1::2])
-    return forward_m, sideways_m

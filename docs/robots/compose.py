@@ -1,0 +1,49 @@
+"""Join an arm and a hand, each an MJCF file such as robosuite's, into one model with absolute paths to its meshes.
+
+python docs/robots/compose.py ARM.xml HAND.xml OUT.xml [BODY [ANGLE...]]
+
+BODY: the arm's body that carries the hand; right_hand unless given. ANGLE: the arm's joints in the keyframe `home`.
+"""
+
+import re
+import sys
+from pathlib import Path
+
+import mujoco  # type: ignore[import-untyped]
+
+
+def read(path: Path) -> mujoco.MjSpec:
+    """Read a file whose meshes may be declared twice, or whose default classes have a stray group, as robosuite's."""
+    seen: set[str] = set()
+
+    def once(found: re.Match[str]) -> str:
+        name = re.search(r'name="([^"]+)"', found[0])
+        again = name is not None and name[1] in seen
+        seen.update([name[1]] if name else [])
+        return "" if again else found[0]
+
+    text = re.sub(r"<mesh [^>]*/>", once, path.read_text())
+    text = re.sub(r'(<default class="[^"]*") group="\d"', r"\1", text)
+    return mujoco.MjSpec.from_string(re.sub(r'file="(?=[^/])', f'file="{path.parent.resolve()}/', text))
+
+
+def main(arm_path: str, hand_path: str, out_path: str, carrier: str = "right_hand", *angles: str) -> None:
+    """Write the joined model, with steps of 2 ms."""
+    arm, hand = read(Path(arm_path)), read(Path(hand_path))
+    arm.attach(hand, frame=arm.body(carrier).add_frame(), prefix="g_")
+    arm.option.timestep, arm.option.integrator = 0.002, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    model = arm.compile()
+    chain, body = set(), model.body(carrier).id
+    while body:
+        chain.add(body)
+        body = model.body_parentid[body]
+    if angles:
+        joints = [joint for joint in range(model.njnt) if model.jnt_bodyid[joint] in chain]
+        start = model.qpos0.copy()
+        start[model.jnt_qposadr[joints[: len(angles)]]] = [float(angle) for angle in angles]
+        arm.add_key(name="home", qpos=start)
+        arm.compile()
+    Path(out_path).write_text(arm.to_xml())
+
+
+main(*sys.argv[1:])

@@ -1,0 +1,1 @@
+"""Robots that a person brings: their reach, and the built-in table in front of them."""

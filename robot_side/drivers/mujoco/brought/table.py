@@ -1,0 +1,234 @@
+"""Built-in table in front of a robot that a person brought: where it stands, what room and target the hand needs."""
+
+import contextlib
+import math
+from collections.abc import Iterator
+from itertools import chain, islice, product
+from typing import Any, Final, NamedTuple
+
+import mujoco  # type: ignore[import-untyped]
+import numpy as np
+
+from common.arrays import FloatArray
+from common.errors import ConfigurationError
+from robot_side.drivers.mujoco.brought.reach import FROM_ABOVE, NEAR_M, go, grasp_places
+from robot_side.drivers.mujoco.built_in_scenes import make_room
+from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
+from robot_side.drivers.mujoco.model_enums import GeomKind
+from robot_side.drivers.mujoco.robot_model import RobotModel, Simulated
+
+_ABOVE_M: Final = 0.02
+"""Least distance of the hand from the table, and, if it comes from above, from the target"""
+_TURNED_RAD: Final = math.radians(20.0)
+_DROPS_M: Final = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5)
+_NEARER_M: Final = (0.0, 0.06, 0.11, 0.15, 0.18)
+_SPANNED: Final = 0.6
+"""Largest share of the open gripper's gap that the target fills"""
+_RAYS: Final = 32
+_THINNEST_M: Final = 0.005
+_SLIMMEST: Final = 4.0
+"""Largest ratio of the target's height to its thickness, beyond the built-in one's"""
+_LOWEST_M: Final = 0.045
+"""Least half height of the target: a hand from above grasps it 20 mm above its centre"""
+_SAMPLES: Final = 2000
+_MOST_STARTS: Final = 48
+_FEWEST_JOINTS: Final = 5
+"""Number of joints below which no start helps an arm to hold the tool's direction on the way"""
+_LEAST_AHEAD_M: Final = 0.15
+_MORE_M: Final = 1e-3
+_STRAIGHT: Final = 0.95
+"""Cosine of the largest angle between the tool's approach and the way ahead, or down, at a start that is found"""
+TABLE_PREFIX: Final = "table_scene/"
+"""Prefix that MuJoCo requires for attached elements; objects are named without it"""
+
+
+class Place(NamedTuple):
+    """Place of the table, relative to the robot at its start."""
+
+    yaw_rad: float
+    """Direction from the base to the tool, about the vertical"""
+    nearer_m: float
+    """Distance by which all objects are nearer to the robot than to the built-in arm"""
+    top_m: float
+    """Height of the table's top in the world"""
+
+
+class Settled(NamedTuple):
+    """Start of a robot at the table."""
+
+    start: FloatArray
+    """(nq,) configuration"""
+    place: Place
+    found: bool
+    """Whether the start was searched for, because from the given one the target is out of reach"""
+
+
+def usual_place(model: Any, robot: RobotModel, start: FloatArray) -> Place:
+    """Return the place of the built-in arm's table: its top at the base's height, the tool at home above it."""
+    data = _placed(model, start)
+    base_m, tool_m = data.xpos[robot.root_body], data.site_xpos[robot.site]
+    ahead = tool_m[:2] - base_m[:2]
+    # A tool right above the base has no direction.
+    yaw_rad = math.atan2(ahead[1], ahead[0]) if np.hypot(*ahead) > 0.05 else 0.0
+    return Place(yaw_rad, 0.0, float(base_m[2]))
+
+
+def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_search: bool) -> Settled:
+    """Give the hand room and a target that it can span; return where the robot and the table stand.
+
+    table: the MjSpec of the table's scene, which is changed. The table is at its usual place if the tool reaches the
+    target there, else nearer or lower. may_search: whether another start may be searched for.
+    """
+    fit_target(table, _clear_m(model, robot, start))
+    most = _MOST_STARTS if may_search and robot.arm_joints.size >= _FEWEST_JOINTS else 0
+    for number, tried in enumerate(chain([start], islice(_other_starts(model, robot, start), most))):
+        if (place := _find_place(table, model, robot, tried)) is not None:
+            settled = Settled(tried, place, number > 0)
+            break
+    else:
+        settled = Settled(start, usual_place(model, robot, start), found=False)
+    make_room(table, *hand_reach_m(model, robot, settled.start, settled.place.yaw_rad)[:2])
+    return settled
+
+
+def fit_target(table: Any, clear_m: float | None) -> None:
+    """Make the target so thin that a gripper with `clear_m` of room spans it, and so low that it stands safely."""
+    if not clear_m:
+        return
+    target, body = table.geom("target"), table.body("target")
+    most_m = max(0.5 * _SPANNED * clear_m, _THINNEST_M)
+    length_m, width_m, height_m = target.size
+    length_m, width_m = min(length_m, most_m), min(width_m, most_m)
+    height_m = min(height_m, max(_SLIMMEST * width_m, _LOWEST_M))
+    target.size, body.pos = [length_m, width_m, height_m], [*body.pos[:2], height_m]
+
+
+def _find_place(table: Any, model: Any, robot: RobotModel, start: FloatArray) -> Place | None:
+    """Return the first place of the table at which the tool reaches the target from `start`; None if there is none."""
+    data, usual = _placed(model, start), usual_place(model, robot, start)
+    tool_m, approach = data.site_xpos[robot.site], data.site_xmat[robot.site].reshape(3, 3)[:, 2]
+    lowest_m = tool_m[2] - hand_reach_m(model, robot, start, usual.yaw_rad)[2]
+    from_target_m = np.array(table.body("target").pos) - np.array([*table.site("tool_home").pos[:2], 0.0])
+    height_m = 2.0 * from_target_m[2] if approach[2] < FROM_ABOVE else 0.0
+    if approach[2] > -FROM_ABOVE:
+        return None
+    links_m = _lowest_link_m(model, data, robot)
+    for top_m, nearer_m in product((usual.top_m, *(tool_m[2] - drop_m for drop_m in _DROPS_M)), _NEARER_M):
+        if lowest_m < top_m + height_m + _ABOVE_M or links_m < top_m - _ABOVE_M:
+            continue
+        ahead_m = from_target_m[0] - nearer_m
+        direction = np.array([math.cos(usual.yaw_rad), math.sin(usual.yaw_rad)])
+        target_m = np.array([*(tool_m[:2] + ahead_m * direction), top_m + from_target_m[2]])
+        gone = go(model, robot, start, grasp_places(tool_m, approach, target_m))
+        if gone.left_m <= NEAR_M and gone.turned_rad <= _TURNED_RAD:
+            return usual._replace(top_m=float(top_m), nearer_m=nearer_m)
+    return None
+
+
+def _other_starts(model: Any, robot: RobotModel, start: FloatArray) -> Iterator[FloatArray]:
+    """Yield configurations (nq,) away from the joints' ends, in which the tool points ahead or down.
+
+    The robot touches itself no more than at its start. They are drawn in the same order each time.
+    """
+    generator, data = np.random.default_rng(0), _placed(model, start)
+    # The parts of many models penetrate each other everywhere.
+    mujoco.mj_forward(model, data)
+    deepest_m = float(data.contact.dist.min(initial=0.0))
+    lower = np.where(np.isfinite(robot.lower_rad), robot.lower_rad, -math.pi)
+    upper = np.where(np.isfinite(robot.upper_rad), robot.upper_rad, math.pi)
+    for _ in range(_SAMPLES):
+        data.qpos[:] = start
+        data.qpos[robot.arm_positions] = lower + (upper - lower) * generator.uniform(0.2, 0.8, lower.size)
+        mujoco.mj_kinematics(model, data)
+        out = data.site_xpos[robot.site] - data.xpos[robot.root_body]
+        level, approach = np.array([*out[:2], 0.0]), data.site_xmat[robot.site].reshape(3, 3)[:, 2]
+        far_m = float(np.linalg.norm(level))
+        if far_m < _LEAST_AHEAD_M or max(float(approach @ level) / far_m, -float(approach[2])) < _STRAIGHT:
+            continue
+        mujoco.mj_forward(model, data)
+        if float(data.contact.dist.min(initial=0.0)) >= deepest_m - _MORE_M:
+            yield data.qpos.copy()
+
+
+def _lowest_link_m(model: Any, data: Any, robot: RobotModel) -> float:
+    """Return the height of the lowest part of the arm's links beyond the first one."""
+    links = np.isin(model.geom_bodyid, model.jnt_bodyid[robot.arm_joints[1:]])
+    touches = links & ((model.geom_contype != 0) | (model.geom_conaffinity != 0))
+    turns = data.geom_xmat[touches].reshape(-1, 3, 3)[:, 2]
+    middles_m = data.geom_xpos[touches, 2] + (turns * model.geom_aabb[touches, :3]).sum(axis=1)
+    lowest_m = middles_m - (np.abs(turns) * model.geom_aabb[touches, 3:]).sum(axis=1)
+    return float(lowest_m.min(initial=np.inf))
+
+
+def _clear_m(model: Any, robot: RobotModel, start: FloatArray) -> float | None:
+    """Return how thick an object around the tool's point the open gripper spans; None without a gripper.
+
+    One jaw may be nearer to the point than the other.
+    """
+    data = _placed(model, start)
+    travel = None
+    with contextlib.suppress(ConfigurationError, mujoco.FatalError):
+        travel = measure_gripper(Simulated(model, data, robot))
+    if travel is None:
+        return None
+    data.qpos[robot.finger_positions] = travel.open_fingers
+    mujoco.mj_kinematics(model, data)
+    tool, own = data.site_xmat[robot.site].reshape(3, 3), model.geom_bodyid[robot.gripper_geoms]
+    nearest_m, hit = 0.5 * float(travel.openings_m[0]), np.zeros(1, dtype=np.int32)
+    for angle in np.linspace(0.0, 2.0 * math.pi, _RAYS, endpoint=False):
+        ray = tool @ np.array([math.cos(angle), math.sin(angle), 0.0])
+        away_m = mujoco.mj_ray(model, data, data.site_xpos[robot.site], ray, None, 1, -1, hit)
+        if away_m >= 0.0 and model.geom_bodyid[hit[0]] in own:
+            nearest_m = min(nearest_m, away_m)
+    return 2.0 * nearest_m
+
+
+def hand_reach_m(model: Any, robot: RobotModel, start: FloatArray, yaw_rad: float) -> FloatArray:
+    """Return how far (3,) the hand reaches from the tool's point: ahead along `yaw_rad`, to its sides, and down.
+
+    The fingers are at the start, and at either end of their ranges.
+    """
+    if robot.gripper_geoms.size == 0:
+        return np.zeros(3)
+    data, geoms, fingers = mujoco.MjData(model), robot.gripper_geoms, robot.finger_positions
+    of_position = {int(address): joint for joint, address in enumerate(model.jnt_qposadr)}
+    ranges = model.jnt_range[[of_position[int(address)] for address in fingers]].reshape(-1, 2)
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    axes = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, -1.0]])
+    reach_m: FloatArray = np.zeros(3)
+    for placed in (start[fingers], *ranges.T):
+        data.qpos[:] = start
+        data.qpos[fingers] = placed
+        mujoco.mj_kinematics(model, data)
+        turns = data.geom_xmat[geoms].reshape(-1, 3, 3)
+        middles_m = data.geom_xpos[geoms] + np.einsum("gij,gj->gi", turns, model.geom_aabb[geoms, :3])
+        halves_m = np.einsum("gij,gj->gi", np.abs(turns), model.geom_aabb[geoms, 3:]) @ np.abs(axes.T)
+        out_m = (middles_m - data.site_xpos[robot.site]) @ axes.T
+        out_m[:, 1] = np.abs(out_m[:, 1])
+        reach_m = np.maximum(reach_m, (out_m + halves_m).max(axis=0))
+    return reach_m
+
+
+def attach(table: Any, spec: Any, model: Any, robot: RobotModel, start: FloatArray, place: Place) -> None:
+    """Attach the table's scene `table` to the robot's `spec`, at its place."""
+    tool_m = _placed(model, start).site_xpos[robot.site]
+    home_x, home_y, _ = table.site("tool_home").pos
+    if model.geom_type[model.geom_type == GeomKind.PLANE].size:
+        table.delete(table.geom("floor"))
+    cos, sin = math.cos(place.yaw_rad), math.sin(place.yaw_rad)
+    x, y = home_x + place.nearer_m, home_y
+    spec.attach(
+        table,
+        prefix=TABLE_PREFIX,
+        frame=spec.worldbody.add_frame(
+            pos=[tool_m[0] - (cos * x - sin * y), tool_m[1] - (sin * x + cos * y), place.top_m],
+            quat=[math.cos(place.yaw_rad / 2.0), 0.0, 0.0, math.sin(place.yaw_rad / 2.0)],
+        ),
+    )
+
+
+def _placed(model: Any, start: FloatArray) -> Any:
+    data = mujoco.MjData(model)
+    data.qpos[:] = start
+    mujoco.mj_kinematics(model, data)
+    return data

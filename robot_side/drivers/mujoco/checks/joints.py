@@ -1,0 +1,86 @@
+"""Check of a model's joints: what is held, what can hardly move, and whether the fingers can span the target."""
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from common.roles import Role
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
+from robot_side.drivers.mujoco.robot_model import moves_any
+from robot_side.drivers.mujoco.scene import Scene
+
+_NEAR_END: Final = math.radians(2.0)
+_SAME: Final = 0.02
+_NAMED: Final = 4
+
+
+def joint_findings(scene: Scene, travel: GripperTravel | None) -> list[str]:
+    """Return a line for each kind of joints that do not move as a person may expect."""
+    model, robot = scene.model, scene.robot
+    busy = {*robot.arm_joints.tolist(), *_joints_at(model, robot.finger_positions)}
+    own = [joint for joint in range(model.njnt) if model.body_rootid[model.jnt_bodyid[joint]] == robot.root_body]
+    held = [_name(model, joint) for joint in own if joint not in busy and _driven(model, joint)]
+    loose = [_name(model, joint) for joint in own if joint not in busy and not _driven(model, joint)]
+    at = scene.data.qpos[robot.arm_positions]
+    near = (at - robot.lower_rad < _NEAR_END) | (robot.upper_rad - at < _NEAR_END)
+    stuck = [_name(model, int(joint)) for joint in robot.arm_joints[near]]
+    dead = _dead(scene)
+    lines = (
+        (held, "held where they start, as they do not move the tool"),
+        (loose, "without an actuator, so that they move freely"),
+        (stuck, "start at an end of their ranges, and move only one way"),
+        (dead, "turn farther than their actuators' ctrlrange lets them: the rest of their ranges is dead"),
+    )
+    found = [f"joints {_few(names)}: {what}" for names, what in lines if names]
+    return found + _grip(scene, travel)
+
+
+def _dead(scene: Scene) -> list[str]:
+    """Return the joints of position servos whose inputs do not cover the joints' ranges."""
+    model, robot, drives = scene.model, scene.robot, scene.robot.drives
+    names = []
+    for index, joint in enumerate(robot.arm_joints.tolist()):
+        actuator = next(
+            one for one in range(model.nu) if int(model.actuator_ctrladr[one]) == int(robot.arm_controls[index])
+        )
+        if drives.stiffness[index] <= 0.0 or not model.actuator_ctrllimited[actuator] or not model.jnt_limited[joint]:
+            continue
+        scale = drives.gain[index] / (drives.stiffness[index] * drives.gear[index])
+        low, high = sorted(scale * model.actuator_ctrlrange[actuator])
+        if low > robot.lower_rad[index] + _SAME or high < robot.upper_rad[index] - _SAME:
+            names.append(_name(model, joint))
+    return names
+
+
+def _grip(scene: Scene, travel: GripperTravel | None) -> list[str]:
+    """Return a line if nothing can be gripped, or not the target."""
+    if travel is None:
+        return ["no actuator opens and closes fingers beyond the arm's last joint: nothing can be grasped"]
+    targets = [thing for thing in scene.objects if scene.roles[thing.name] is Role.TARGET]
+    opening_m = float(travel.openings_m[0])
+    for thing in targets[:1]:
+        thick_m = 2.0 * float(np.sort(scene.model.geom_aabb[list(thing.geoms), 3:].max(axis=0))[0])
+        if thick_m > opening_m:
+            return [
+                f"the open gripper's gap of {1e3 * opening_m:.0f} mm does not span {thing.name!r}, which is"
+                f" {1e3 * thick_m:.0f} mm thick"
+            ]
+    return []
+
+
+def _driven(model: Any, joint: int) -> bool:
+    return any(moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu))
+
+
+def _joints_at(model: Any, positions: Any) -> list[int]:
+    return np.flatnonzero(np.isin(model.jnt_qposadr, positions)).tolist()
+
+
+def _name(model: Any, joint: int) -> str:
+    return model.joint(joint).name or f"joint{joint}"
+
+
+def _few(names: list[str]) -> str:
+    more = [f"and {len(names) - _NAMED} more"] if len(names) > _NAMED else []
+    return ", ".join([*names[:_NAMED], *more])

@@ -1,0 +1,104 @@
+"""A robot that a person brings: where the table stands, what the hand can hold, and what the start says."""
+
+from pathlib import Path
+
+import mujoco  # type: ignore[import-untyped]
+import pytest
+
+from robot_side.drivers.mujoco.brought.table import fit_target
+from robot_side.drivers.mujoco.checks.cost import cost_findings
+from robot_side.drivers.mujoco.checks.joints import joint_findings
+from robot_side.drivers.mujoco.checks.reach import reach_findings
+from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
+from robot_side.drivers.mujoco.scene import Scene, load_scene
+from tests.helpers.arm_models import planar_arm
+
+ASSETS = Path(load_scene.__code__.co_filename).parent / "assets"
+SECOND_ARM = """<body name="second" pos="0 1 0"><joint name="other"/><geom size="0.05"/></body></worldbody>"""
+
+
+def brought(folder: Path, *changes: tuple[str, str]) -> Path:
+    """Write the built-in arm as a model of one's own, with the texts replaced; return its path."""
+    text = (ASSETS / "arm.xml").read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "arm.xml"
+    path.write_text(text)
+    return path
+
+
+def no_keyframe() -> tuple[str, str]:
+    text = (ASSETS / "arm.xml").read_text()
+    return text[text.index("<keyframe>") : text.index("</mujoco>")], ""
+
+
+def joint_lines(scene: Scene) -> list[str]:
+    return joint_findings(scene, measure_gripper(scene))
+
+
+def test_the_built_in_arm_as_a_model_of_ones_own_stands_as_ever_and_nothing_is_said(tmp_path: Path) -> None:
+    own, built_in = load_scene(brought(tmp_path), "tool"), load_scene()
+    assert own.data.body("table_scene/table").xpos == pytest.approx(built_in.data.body("table_scene/table").xpos)
+    assert reach_findings(own) + joint_lines(own) == []
+
+
+def test_without_a_keyframe_a_start_is_found_from_which_the_target_is_in_reach(tmp_path: Path) -> None:
+    # In the middle of this range the tool points up.
+    upwards = ('<joint name="wrist_2"/>', '<joint name="wrist_2" range="0 3.1416"/>')
+    scene = load_scene(brought(tmp_path, no_keyframe(), upwards), "tool")
+    assert "searched for" in scene.start_pose
+    assert reach_findings(scene) == []
+    again = load_scene(brought(tmp_path, no_keyframe(), upwards), "tool")
+    assert (again.data.qpos == scene.data.qpos).all()
+
+
+def test_a_second_arm_is_no_surroundings(tmp_path: Path) -> None:
+    motor = '<actuator>\n    <motor name="other" joint="other"/>'
+    changes = (no_keyframe(), ("</worldbody>", SECOND_ARM), ("<actuator>", motor))
+    assert "target" in load_scene(brought(tmp_path, *changes), "tool").roles
+
+
+@pytest.mark.parametrize("opening_m", [0.023, 0.057, 0.2])
+def test_the_target_is_so_thin_that_the_fingers_span_it(opening_m: float) -> None:
+    table = mujoco.MjSpec.from_file(str(ASSETS / "table_scene.xml"))
+    before = list(table.geom("target").size)
+    fit_target(table, opening_m)
+    length_m, width_m, height_m = table.geom("target").size
+    assert max(length_m, width_m) <= 0.3 * opening_m + 1e-12
+    assert table.body("target").pos[2] == pytest.approx(height_m)
+    assert (list(table.geom("target").size) == before) == (opening_m > 0.11)
+
+
+def test_a_start_out_of_reach_is_said(tmp_path: Path) -> None:
+    stiff = ('name="elbow" range="-3.1416 3.1416"', 'name="elbow" range="2.37 2.38"')
+    [line] = reach_findings(load_scene(brought(tmp_path, stiff), "tool"))
+    assert "'target' is out of reach" in line
+
+
+def test_joints_that_do_not_move_as_expected_are_named(tmp_path: Path) -> None:
+    dead = ('ctrlrange="-3.1416 3.1416"', 'ctrlrange="-2.9 2.9"')
+    [line] = joint_lines(load_scene(brought(tmp_path, dead), "tool"))
+    assert line.startswith("joints elbow: turn farther than")
+
+
+def test_a_hand_without_driven_fingers_is_said(tmp_path: Path) -> None:
+    bare = planar_arm(tmp_path, gripper_actuators="")
+    assert any("nothing can be grasped" in line for line in joint_lines(load_scene(bare, "tcp")))
+
+
+@pytest.mark.parametrize(("reading_s", "said"), [(0.004, 1), (0.0, 0)])
+def test_physics_that_is_slower_than_real_time_is_said(reading_s: float, said: int) -> None:
+    class Readings:
+        """Clock that goes on by `reading_s` with each reading."""
+
+        def __init__(self) -> None:
+            self.now_s = 0.0
+
+        def now(self) -> float:
+            self.now_s += reading_s
+            return self.now_s
+
+    lines = cost_findings(load_scene(), Readings())
+    assert len(lines) == said
+    assert not said or "4.0 ms for each step of 1 ms" in lines[0]
