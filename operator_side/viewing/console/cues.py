@@ -3,6 +3,7 @@
 from typing import Any, Final
 
 import numpy as np
+from viser.transforms import SO3
 
 from common.protocol.view_messages import Eye, SceneShapes, SceneState, Shape
 from common.roles import ROLES, Role
@@ -29,7 +30,7 @@ class _Body:
     def top_below_m(self, point: Floats, pose: Floats) -> float | None:
         """Return how far below a point the object's next upper side lies; None if none does."""
         turn = SO3(pose[3:]).inverse()
-        start, down = turn.apply(point - pose[:3]), turn.apply((0.0, 0.0, -1.0))
+        start, down = turn.apply(point - pose[:3]), turn.apply(np.array((0.0, 0.0, -1.0)))
         if np.linalg.norm(np.cross(self.centre - start, down)) > self.radius_m:
             return None
         first, second, third = self.triangles.swapaxes(0, 1)
