@@ -30,6 +30,8 @@ def read(path: Path) -> mujoco.MjSpec:
 def main(arm_path: str, hand_path: str, out_path: str, carrier: str = "right_hand", *angles: str) -> None:
     """Write the joined model, with steps of 2 ms."""
     arm, hand = read(Path(arm_path)), read(Path(hand_path))
+    if 'angle="' not in Path(hand_path).read_text():
+        hand.compiler.degree = arm.compiler.degree
     arm.attach(hand, frame=arm.body(carrier).add_frame(), prefix="g_")
     arm.option.timestep, arm.option.integrator = 0.002, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     model = arm.compile()

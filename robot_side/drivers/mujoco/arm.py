@@ -88,6 +88,8 @@ class MujocoArm:
         # MuJoCo's arrays keep their addresses; fetching one costs more than its use in a step.
         self._unstable = data.warning.number[_UNSTABLE]
         self._borne_nm = data.qfrc_constraint
+        self._rubbing = np.flatnonzero(model.dof_frictionloss > 0.0)
+        self._rubs = np.isin(robot.arm_velocities, self._rubbing)
         gripper = self._gripper
         measured = int(robot.gripper_actuators[0]) if gripper is not None else 0
         self._plant = Plant(
@@ -226,8 +228,17 @@ class MujocoArm:
             finger_positions=fingers,
             gripper_opening_m=0.0 if gripper is None else gripper.opening_m,
             gripper_holding=gripper is not None and gripper.holding,
-            joint_loads_nm=-self._borne_nm[plant.velocities],
+            joint_loads_nm=self._loads_nm(),
         )
+
+    def _loads_nm(self) -> FloatArray:
+        """Return the loads (n,) beyond the joints' own dry friction, as sensors behind the gears measure them."""
+        loads_nm: FloatArray = -self._borne_nm[self._plant.velocities]
+        if self._rubs.any():
+            # MuJoCo's constraints: equalities first, then the dry friction of each velocity that has any.
+            rubbing = self._data.efc_force[self._data.ne :][: self._rubbing.size]
+            loads_nm[self._rubs] += rubbing[np.searchsorted(self._rubbing, self._plant.velocities[self._rubs])]
+        return loads_nm
 
     def _require_stable(self) -> None:
         # MuJoCo resets an unstable simulation to its start, which must not count as a motion of the arm.

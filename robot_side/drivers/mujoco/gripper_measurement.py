@@ -162,6 +162,9 @@ def travel_from_sweep(sweep: GripperSweep, force_lead: float, lag_s: float) -> G
     controls, fingers = sweep.controls, sweep.fingers
     if jaws[0].min() < jaws[-1].min():
         controls, fingers, lengths, jaws = controls[::-1], fingers[::-1], lengths[::-1], jaws[::-1]
+    # Geoms that pass through each other grip nothing between them.
+    apart = jaws[-1] > -_GRASP_BAND_M
+    jaws = jaws[:, apart] if apart.any() else jaws
     jaws = jaws[:, jaws[-1] <= jaws[-1].min() + _GRASP_BAND_M]
     openings = np.maximum(jaws.min(axis=1), 0.0)
     closures = (lengths - lengths[0]) / (lengths[-1] - lengths[0])

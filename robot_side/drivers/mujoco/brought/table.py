@@ -13,7 +13,7 @@ from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from robot_side.drivers.mujoco.brought.reach import FROM_ABOVE, NEAR_M, go, grasp_places
 from robot_side.drivers.mujoco.built_in_scenes import make_room
-from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.robot_model import RobotModel, Simulated
 
@@ -25,6 +25,8 @@ _NEARER_M: Final = (0.0, 0.06, 0.11, 0.15, 0.18)
 _SPANNED: Final = 0.6
 """Largest share of the open gripper's gap that the target fills"""
 _RAYS: Final = 32
+_LEVEL: Final = 0.5
+"""Least horizontal part of the fingers' direction of closing at which the target turns"""
 _THINNEST_M: Final = 0.005
 _SLIMMEST: Final = 4.0
 """Largest ratio of the target's height to its thickness, beyond the built-in one's"""
@@ -79,7 +81,8 @@ def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_
     table: the MjSpec of the table's scene, which is changed. The table is at its usual place if the tool reaches the
     target there, else nearer or lower. may_search: whether another start may be searched for.
     """
-    fit_target(table, _clear_m(model, robot, start))
+    travel = _travel(model, robot, start)
+    fit_target(table, None if travel is None else _clear_m(model, robot, start, travel))
     most = _MOST_STARTS if may_search and robot.arm_joints.size >= _FEWEST_JOINTS else 0
     for number, tried in enumerate(chain([start], islice(_other_starts(model, robot, start), most))):
         if (place := _find_place(table, model, robot, tried)) is not None:
@@ -87,6 +90,8 @@ def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_
             break
     else:
         settled = Settled(start, usual_place(model, robot, start), found=False)
+    if travel is not None:
+        _turn_target(table, _closing(model, robot, settled.start, travel), settled.place.yaw_rad)
     make_room(table, *hand_reach_m(model, robot, settled.start, settled.place.yaw_rad)[:2])
     return settled
 
@@ -160,17 +165,41 @@ def _lowest_link_m(model: Any, data: Any, robot: RobotModel) -> float:
     return float(lowest_m.min(initial=np.inf))
 
 
-def _clear_m(model: Any, robot: RobotModel, start: FloatArray) -> float | None:
-    """Return how thick an object around the tool's point the open gripper spans; None without a gripper.
+def _travel(model: Any, robot: RobotModel, start: FloatArray) -> GripperTravel | None:
+    """Return the gripper's travel; None without a gripper that can be measured."""
+    with contextlib.suppress(ConfigurationError, mujoco.FatalError):
+        return measure_gripper(Simulated(model, _placed(model, start), robot))
+    return None
+
+
+def _closing(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> FloatArray:
+    """Return the direction (3,) across the tool, in the world, along which the fingers close."""
+    data, middles_m = _placed(model, start), []
+    for fingers in (travel.open_fingers, travel.closed_fingers):
+        data.qpos[robot.finger_positions] = fingers
+        mujoco.mj_kinematics(model, data)
+        middles_m.append(data.geom_xpos[robot.gripper_geoms])
+    across = data.site_xmat[robot.site].reshape(3, 3)[:, :2]
+    moved_m = np.subtract(*middles_m) @ across
+    closing: FloatArray = across @ np.linalg.eigh(moved_m.T @ moved_m)[1][:, -1]
+    return closing
+
+
+def _turn_target(table: Any, closing: FloatArray, yaw_rad: float) -> None:
+    """Turn a face of the target towards fingers that close along `closing`; `yaw_rad` is the table's direction."""
+    if np.hypot(*closing[:2]) < _LEVEL:
+        return
+    quarters = (math.atan2(closing[1], closing[0]) - yaw_rad) / (0.5 * math.pi)
+    turn_rad = 0.5 * math.pi * (quarters - round(quarters))
+    table.body("target").quat = [math.cos(0.5 * turn_rad), 0.0, 0.0, math.sin(0.5 * turn_rad)]
+
+
+def _clear_m(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> float:
+    """Return how thick an object around the tool's point the open gripper spans.
 
     One jaw may be nearer to the point than the other.
     """
     data = _placed(model, start)
-    travel = None
-    with contextlib.suppress(ConfigurationError, mujoco.FatalError):
-        travel = measure_gripper(Simulated(model, data, robot))
-    if travel is None:
-        return None
     data.qpos[robot.finger_positions] = travel.open_fingers
     mujoco.mj_kinematics(model, data)
     tool, own = data.site_xmat[robot.site].reshape(3, 3), model.geom_bodyid[robot.gripper_geoms]
