@@ -2,7 +2,8 @@
 
 python docs/robots/compose.py ARM.xml HAND.xml OUT.xml [BODY [ANGLE...]]
 
-BODY: the arm's body that carries the hand; right_hand unless given. ANGLE: the arm's joints in the keyframe `home`.
+BODY: the arm's body that carries the hand; right_hand unless given. ANGLE: the arm's joints in the keyframe `home`,
+then the hand's, if its parts collide at 0.
 """
 
 import re
@@ -41,6 +42,7 @@ def main(arm_path: str, hand_path: str, out_path: str, carrier: str = "right_han
         body = model.body_parentid[body]
     if angles:
         joints = [joint for joint in range(model.njnt) if model.jnt_bodyid[joint] in chain]
+        joints += [joint for joint in range(model.njnt) if model.joint(joint).name.startswith("g_")]
         start = model.qpos0.copy()
         start[model.jnt_qposadr[joints[: len(angles)]]] = [float(angle) for angle in angles]
         arm.add_key(name="home", qpos=start)

@@ -58,13 +58,18 @@ def _grip(scene: Scene, travel: GripperTravel | None) -> list[str]:
     if travel is None:
         return ["no actuator opens and closes fingers beyond the arm's last joint: nothing can be grasped"]
     targets = [thing for thing in scene.objects if scene.roles[thing.name] is Role.TARGET]
-    opening_m = float(travel.openings_m[0])
+    opening_m, closed_m = float(travel.openings_m[0]), float(travel.openings_m[-1])
     for thing in targets[:1]:
         thick_m = 2.0 * float(np.sort(scene.model.geom_aabb[list(thing.geoms), 3:].max(axis=0))[0])
         if thick_m > opening_m:
             return [
                 f"the open gripper's gap of {1e3 * opening_m:.0f} mm does not span {thing.name!r}, which is"
                 f" {1e3 * thick_m:.0f} mm thick"
+            ]
+        if thick_m < closed_m:
+            return [
+                f"the fingers close from {1e3 * opening_m:.0f} to {1e3 * closed_m:.0f} mm only: they do not hold"
+                f" {thing.name!r}, which is {1e3 * thick_m:.0f} mm thick"
             ]
     return []
 
