@@ -18,6 +18,7 @@ from common.timing.ages import LoopAge
 from robot_side.arm.ability import JointLimits
 from robot_side.arm.joint_estimate import JointEstimate, lateness_s
 from robot_side.arm.port import Arm, ArmState, GripperKinematics
+from robot_side.arm.stick_frames import StickFrames
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.events import Found, Listener, Listeners, Tick
 from robot_side.gripper.grip import Grip
@@ -51,6 +52,8 @@ class RobotParts:
     loop_age: LoopAge
     limits: JointLimits
     motion: ToolMotionSettings
+    frames: StickFrames | None = None
+    """Frames in which an operator may steer besides the tool's; None: as the tool's"""
     truth: Observer | None = None
     """Observer of true contacts and distances, for the figures; None if these are unknown"""
     held_covers: HeldCovers | None = None
@@ -72,7 +75,7 @@ class RobotSide:
         self.sight = Sight(parts.camera, parts.surroundings)
         self.grip = Grip(parts.surroundings, parts.held_covers)
         self.motion = Motion(parts.arm, parts.limits, parts.motion, assists=parts.assists)
-        self.reports = Reports(parts.session, parts.law, full_rate=parts.full_rate)
+        self.reports = Reports(parts.session, parts.law, parts.frames, full_rate=parts.full_rate)
         self.figures = RunFigures(parts.seed, parts.truth)
         self.newest: tuple[Sensed, Situation] | None = None
         """Result of the law in the last tick, and the situation for which it was computed"""
@@ -194,6 +197,7 @@ class RobotSide:
             delay_ms=None if delay_s is None else 1e3 * delay_s,
             l2_pulled=None if command is None else command.l2,
             r2_pulled=None if command is None else command.r2,
+            hindrance=self.motion.hindrance.text,
             offset_s=self.session.link.clock_offset.offset_at(now_s),
         )
         if self.newest is None or (objects := self.sight.frame) is None:

@@ -35,6 +35,8 @@ def test_the_help_says_what_the_code_does(capsys: pytest.CaptureFixture[str]) ->
         "triangle changes the target",
         "create hands the robot over",
         "up starts one, right is success, left failure, down discards it",
+        "l3 changes the speed scale",
+        "the touchpad the frame of the sticks",
         "r3 puts a simulated scene back, disarmed",
         "r2 advances",
         "l2 retreats",

@@ -17,6 +17,8 @@ export const KEYS = [
   ["close", ["KeyC"], "close the gripper"],
   ["open", ["KeyO"], "open it"],
   ["next_target", ["KeyT"], "next target"],
+  ["next_speed", ["KeyV"], "speed scale: 100, 50, 25 %"],
+  ["next_frame", ["KeyG"], "frame of the sticks: tool, base, camera"],
   ["hand_over", ["KeyH"], "hand the robot over"],
 ];
 export const MARKS = [
@@ -35,11 +37,13 @@ const PULLED = 0.05; // dead zone of a gamepad's trigger
 const DEFLECTED = 0.12; // dead zone of a gamepad's sticks
 
 export const REST = Object.freeze({
-  run: false, l2: 0, r2: 0, lateral: [0, 0], turning: [0, 0], gripper: 0, next_target: false, hand_over: false,
+  run: false, l2: 0, r2: 0, lateral: [0, 0], turning: [0, 0], gripper: 0, next_target: false, next_speed: false,
+  next_frame: false, hand_over: false,
 });
 
 export const atRest = (hands) =>
-  !hands.run && hands.l2 === 0 && hands.r2 === 0 && hands.gripper === 0 && !hands.next_target && !hands.hand_over &&
+  !hands.run && hands.l2 === 0 && hands.r2 === 0 && hands.gripper === 0 && !hands.next_target && !hands.next_speed &&
+  !hands.next_frame && !hands.hand_over &&
   [...hands.lateral, ...hands.turning].every((part) => part === 0);
 
 // Keys that are down, and the travel of each action, which rises over RAMP_S and falls to zero at once.
@@ -84,6 +88,8 @@ export class Keys {
       turning: [axis("turn_right", "turn_left"), axis("turn_up", "turn_down")],
       gripper: Number(held.has("close")) - Number(held.has("open")),
       next_target: held.has("next_target"),
+      next_speed: held.has("next_speed"),
+      next_frame: held.has("next_frame"),
       hand_over: held.has("hand_over"),
     };
     return { hands, pressed: held.size > 0 };
@@ -125,6 +131,8 @@ export function readGamepads(swapped) {
       turning: sticks[1],
       gripper: Number(pressed(0)) - Number(pressed(2)),
       next_target: pressed(3),
+      next_speed: pressed(10),
+      next_frame: pressed(17),
       hand_over: pressed(8),
     });
   }
@@ -142,6 +150,8 @@ export function both(one, other) {
     turning: farther(one.turning, other.turning),
     gripper: Math.sign(one.gripper + other.gripper),
     next_target: one.next_target || other.next_target,
+    next_speed: one.next_speed || other.next_speed,
+    next_frame: one.next_frame || other.next_frame,
     hand_over: one.hand_over || other.hand_over,
   };
 }
