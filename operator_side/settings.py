@@ -30,7 +30,8 @@ class OperatorSettings(SideOptions):
     moves across, the right stick turns. Cross closes the gripper, square opens it, triangle changes the target, circle
     stops everything, and create hands the robot over to the observer that has waited longest.
     In a recording the directional pad marks episodes: up starts one, right is success, left failure, down discards it.
-    L3 changes the speed scale, the touchpad the frame of the sticks. R3 puts a simulated scene back, disarmed.
+    L3 changes the speed scale, the touchpad the frame of the sticks. Mute, held, moves the
+    arm back to its start. R3 puts a simulated scene back, disarmed.
     """
 
     connect: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT")] = "tcp://127.0.0.1:5555"

@@ -161,6 +161,7 @@ def build_parts(
         ),
         loop_age=LoopAge(settings.assumed_delay_s),
         limits=joint_limits,
+        home_rad=scene.data.qpos[scene.robot.arm_positions].copy(),
         frames=stick_frames(scene),
         motion=settings.motion,
         scene=scene,

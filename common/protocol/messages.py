@@ -103,6 +103,8 @@ class MotionCommand(Message, frozen=True, tag="motion"):
     """Whether the arming button is down."""
     emergency_stop: bool = False
     next_target: bool = False
+    home: float = 0.0
+    """Share of full speed at which to move to the start pose, 0 for not at all; only while triggers and sticks rest."""
     hand_over: bool = False
     """Whether the hand-over button is down: the lease then passes to the observer who has waited longest."""
     token: int = 0
@@ -116,6 +118,7 @@ class MotionCommand(Message, frozen=True, tag="motion"):
         all_in_range("lateral", -1.0, 1.0, self.lateral)
         all_in_range("turning", -1.0, 1.0, self.turning)
         in_range("gripper", -1.0, 1.0, self.gripper)
+        in_range("home", 0.0, 1.0, self.home)
         in_range("token", 0, _LARGEST, self.token)
 
 

@@ -70,6 +70,8 @@ class Haptics:
         A command without hold-to-run counts as travel 0. Whether the arm is armed does not matter here: rendering
         begins with a report that the arm is armed, and the arm follows all commands that are then under way.
         """
+        if command.home > 0.0:  # the arm moves as we cannot know: the robot side's δ is used until a later echo
+            self._commands = CommandsUnderWay()
         travel, sticks = command.r2 - command.l2, (*command.lateral, *command.turning)
         self._commands.sent(command.header.sent_s, *((travel, sticks) if command.run else (0.0,)))
         self._commanding = True

@@ -35,6 +35,8 @@ class OperatorIntent:
     """True while the button is held; each change from false to true selects the next speed scale."""
     next_frame: bool = False
     """Likewise, for the next frame of the sticks."""
+    home: float = 0.0
+    """Share of full speed at which to go home: 1 while the button is held, else 0."""
     gripper: Literal[-1, 0, 1] = 0
     """-1 opens the gripper, 1 closes it, 0 leaves it, also while both buttons are held."""
     raw: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
@@ -54,12 +56,14 @@ class OperatorIntent:
         """Return the same intent with triggers and sticks multiplied by `share`."""
         (right, up), (turn_right, turn_up) = self.lateral, self.turning
         sticks = (share * right, share * up), (share * turn_right, share * turn_up)
-        return replace(self, l2=share * self.l2, r2=share * self.r2, lateral=sticks[0], turning=sticks[1])
+        return replace(
+            self, l2=share * self.l2, r2=share * self.r2, lateral=sticks[0], turning=sticks[1], home=share * self.home
+        )
 
     def resting(self) -> "OperatorIntent":
         """Return the same intent without triggers, sticks, gripper and arming; the other buttons stay."""
         rest = (0.0, 0.0)
-        return replace(self, l2=0.0, r2=0.0, lateral=rest, turning=rest, gripper=0, arm=False)
+        return replace(self, l2=0.0, r2=0.0, lateral=rest, turning=rest, gripper=0, home=0.0, arm=False)
 
 
 def operator_intent(
@@ -92,6 +96,7 @@ def operator_intent(
         hand_over=Action.HAND_OVER in held,
         next_speed=Action.NEXT_SPEED in held,
         next_frame=Action.NEXT_FRAME in held,
+        home=float(Action.HOME in held),
         mark=next((mark for action, mark in MARKS.items() if action in held), None),
         gripper=gripper,
         raw=(state.l2, state.r2),

@@ -56,7 +56,7 @@ def test_every_key_does_what_it_says(browser: Browser) -> None:
             "ArrowLeft": ("turning", (-1.0, 0.0)), "ArrowRight": ("turning", (1.0, 0.0)),
             "KeyI": ("turning", (0.0, 1.0)), "KeyK": ("turning", (0.0, -1.0)),
             "KeyC": ("gripper", 1), "KeyO": ("gripper", -1), "KeyT": ("next_target", True), "KeyH": ("hand_over", True),
-            "KeyV": ("next_speed", True), "KeyG": ("next_frame", True),
+            "KeyV": ("next_speed", True), "KeyG": ("next_frame", True), "KeyP": ("home", 1.0),
         }  # fmt: skip
         keyboard.press("Digit9")
         for code, (name, value) in expected.items():

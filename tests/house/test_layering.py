@@ -61,6 +61,7 @@ ARROWS = """
         robot_side/gripper robot_side/outcome/truth.py robot_side/overlap/meshes robot_side/surroundings
         robot_side/surroundings/kinds
     robot_side/drivers/mujoco/checks: common robot_side/drivers/mujoco
+    robot_side/homing.py: common common/protocol robot_side/arm robot_side/gripper robot_side/surroundings
     robot_side/motion.py: common robot_side/arm robot_side/gripper robot_side/laws robot_side/operators
     robot_side/reporting: common common/emulation common/protocol common/rate common/sockets robot_side/arm
         robot_side/compiled robot_side/gripper robot_side/laws robot_side/motion.py robot_side/operators
@@ -69,8 +70,8 @@ ARROWS = """
         robot_side/surroundings
     robot_side/outcome: common robot_side/events.py robot_side/laws robot_side/outcome/truth.py
     robot_side/core.py: common/status common/timing robot_side/arm robot_side/events.py robot_side/gripper
-        robot_side/laws robot_side/motion.py robot_side/operators robot_side/outcome robot_side/reporting
-        robot_side/surroundings
+        robot_side/homing.py robot_side/laws robot_side/motion.py robot_side/operators robot_side/outcome
+        robot_side/reporting robot_side/surroundings
     robot_side/drivers/remote: common common/sockets common/timing robot_side/arm robot_side/surroundings
     robot_side/viewing: common common/companion common/protocol robot_side/arm robot_side/core.py
         robot_side/drivers/mujoco robot_side/gripper robot_side/laws robot_side/reporting robot_side/surroundings

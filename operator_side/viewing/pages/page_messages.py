@@ -37,6 +37,7 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     next_target: bool = False
     next_speed: bool = False
     next_frame: bool = False
+    home: bool = False
     hand_over: bool = False
     stop: bool = False
     """Whether the emergency stop is pressed"""
@@ -56,7 +57,7 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def all_up(self) -> bool:
         """Whether no trigger, stick, key or button is used."""
         pressed = self.run or self.gripper != 0 or self.stop or self.reset
-        chosen = self.next_target or self.next_speed or self.next_frame or self.hand_over
+        chosen = self.next_target or self.next_speed or self.next_frame or self.home or self.hand_over
         return self.moves_nothing and not (pressed or chosen)
 
 

@@ -37,6 +37,7 @@ def test_the_help_says_what_the_code_does(capsys: pytest.CaptureFixture[str]) ->
         "up starts one, right is success, left failure, down discards it",
         "l3 changes the speed scale",
         "the touchpad the frame of the sticks",
+        "mute, held, moves the arm back to its start",
         "r3 puts a simulated scene back, disarmed",
         "r2 advances",
         "l2 retreats",

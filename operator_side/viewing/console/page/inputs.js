@@ -19,6 +19,7 @@ export const KEYS = [
   ["next_target", ["KeyT"], "next target"],
   ["next_speed", ["KeyV"], "speed scale: 100, 50, 25 %"],
   ["next_frame", ["KeyG"], "frame of the sticks: tool, base, camera"],
+  ["home", ["KeyP"], "go home while held (all else at rest)"],
   ["hand_over", ["KeyH"], "hand the robot over"],
 ];
 export const MARKS = [
@@ -38,12 +39,12 @@ const DEFLECTED = 0.12; // dead zone of a gamepad's sticks
 
 export const REST = Object.freeze({
   run: false, l2: 0, r2: 0, lateral: [0, 0], turning: [0, 0], gripper: 0, next_target: false, next_speed: false,
-  next_frame: false, hand_over: false,
+  next_frame: false, home: false, hand_over: false,
 });
 
 export const atRest = (hands) =>
   !hands.run && hands.l2 === 0 && hands.r2 === 0 && hands.gripper === 0 && !hands.next_target && !hands.next_speed &&
-  !hands.next_frame && !hands.hand_over &&
+  !hands.next_frame && !hands.home && !hands.hand_over &&
   [...hands.lateral, ...hands.turning].every((part) => part === 0);
 
 // Keys that are down, and the travel of each action, which rises over RAMP_S and falls to zero at once.
@@ -90,6 +91,7 @@ export class Keys {
       next_target: held.has("next_target"),
       next_speed: held.has("next_speed"),
       next_frame: held.has("next_frame"),
+      home: held.has("home"),
       hand_over: held.has("hand_over"),
     };
     return { hands, pressed: held.size > 0 };
@@ -133,6 +135,7 @@ export function readGamepads(swapped) {
       next_target: pressed(3),
       next_speed: pressed(10),
       next_frame: pressed(17),
+      home: false,
       hand_over: pressed(8),
     });
   }
@@ -152,6 +155,7 @@ export function both(one, other) {
     next_target: one.next_target || other.next_target,
     next_speed: one.next_speed || other.next_speed,
     next_frame: one.next_frame || other.next_frame,
+    home: one.home || other.home,
     hand_over: one.hand_over || other.hand_over,
   };
 }
