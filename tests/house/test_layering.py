@@ -69,7 +69,7 @@ ARROWS = """
     robot_side/events.py: common robot_side/arm robot_side/laws robot_side/operators robot_side/reporting
         robot_side/surroundings
     robot_side/outcome: common robot_side/events.py robot_side/laws robot_side/outcome/truth.py
-    robot_side/core.py: common/status common/timing robot_side/arm robot_side/events.py robot_side/gripper
+    robot_side/core.py: common common/status common/timing robot_side/arm robot_side/events.py robot_side/gripper
         robot_side/homing.py robot_side/laws robot_side/motion.py robot_side/operators robot_side/outcome
         robot_side/reporting robot_side/surroundings
     robot_side/drivers/remote: common common/sockets common/timing robot_side/arm robot_side/surroundings
