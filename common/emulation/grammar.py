@@ -7,7 +7,7 @@ from typing import Any, TypeVar, cast, get_args
 
 from common.emulation.clauses import Chance, LinkModel, Outage, Rate
 from common.emulation.distribution import Distribution
-from common.emulation.loss import GilbertElliott, LossModel, RandomLoss
+from common.emulation.loss import GilbertElliott, RandomLoss
 from common.emulation.trace import Trace
 from common.errors import ConfigurationError
 from common.units import parse_duration, parse_rate, parse_share
@@ -34,45 +34,45 @@ class _Words:
 
     def __init__(self, profile: str, spec: str) -> None:
         self.spec = spec
+        self.clause = ""
+        """Clause that is being read"""
         try:
-            self._words = shlex.split(profile)
+            self._words = shlex.split(profile)[::-1]
         except ValueError as error:
             raise ConfigurationError(f"link {spec!r}: {str(error).lower()}; valid: quotes in pairs") from error
-        self._position = 0
 
-    def peek(self) -> str | None:
-        return self._words[self._position] if self._position < len(self._words) else None
-
-    def take(self) -> str | None:
-        word = self.peek()
-        self._position += word is not None
-        return word
+    def begin(self) -> bool:
+        """Take the next word as a clause; return False at the end. Raises ConfigurationError for an unknown clause."""
+        if not self._words:
+            return False
+        self.clause = self._words.pop()
+        if self.clause not in GRAMMAR:
+            valid = f"clauses such as {GRAMMAR['delay']}, and {', '.join([*GRAMMAR][1:])}"
+            raise ConfigurationError(f"link {self.spec!r}: the clause {self.clause!r} is unknown; valid: {valid}")
+        return True
 
     def take_if(self, word: str) -> bool:
-        return self.peek() == word and self.take() is not None
+        return self._words[-1:] == [word] and bool(self._words.pop())
 
     def number_follows(self, *, percent: bool) -> bool:
-        word = self.peek()
-        return bool(word) and (word or "")[0] in "0123456789+-." and (word or "").endswith("%") is percent
+        word = self._words[-1] if self._words else ""
+        return word[:1] in tuple("0123456789+-.") and word.endswith("%") is percent
 
-    def value(self, read: Callable[[str, str], _Value], clause: str, name: str) -> _Value:
+    def value(self, read: Callable[[str, str], _Value], name: str) -> _Value:
         """Return the next word, parsed by `read`; raises ConfigurationError if there is none."""
-        if (word := self.take()) is None:
-            raise self.error(f"{clause!r} is given without {name}", clause)
-        return read(word, f"link {self.spec!r}: {name}")
+        if not self._words:
+            raise self.error(f"{self.clause!r} is given without {name}")
+        return read(self._words.pop(), f"link {self.spec!r}: {name}")
 
-    def shares(self, clause: str, names: list[str]) -> list[float]:
+    def shares(self, *names: str) -> list[float]:
         """Return the percentages that follow as shares: at least one, at most one for each of `names`."""
-        shares = [self.value(parse_share, clause, names[0])]
-        for name in names[1:]:
-            if not self.number_follows(percent=True):
-                break
-            shares.append(self.value(parse_share, clause, name))
+        shares = [self.value(parse_share, names[0])]
+        while len(shares) < len(names) and self.number_follows(percent=True):
+            shares.append(self.value(parse_share, names[len(shares)]))
         return shares
 
     def error(self, what: str, clause: str | None = None) -> ConfigurationError:
-        valid = GRAMMAR[clause] if clause else f"clauses such as {GRAMMAR['delay']}, and {', '.join([*GRAMMAR][1:])}"
-        return ConfigurationError(f"link {self.spec!r}: {what}; valid: {valid}")
+        return ConfigurationError(f"link {self.spec!r}: {what}; valid: {GRAMMAR[clause or self.clause]}")
 
 
 def read_fields(profile: str, spec: str, model: LinkModel) -> dict[str, Any]:
@@ -83,18 +83,18 @@ def read_fields(profile: str, spec: str, model: LinkModel) -> dict[str, Any]:
     words = _Words(profile, spec)
     settings: dict[str, Any] = {}
     seen: set[str] = set()
-    while (clause := words.take()) is not None:
-        if clause not in _READERS:
-            raise words.error(f"the clause {clause!r} is unknown")
-        if clause in seen and clause != "outage":
-            raise words.error(f"the clause {clause!r} is given twice", clause)
-        seen.add(clause)
+    while words.begin():
+        if words.clause in seen and words.clause != "outage":
+            raise words.error(f"the clause {words.clause!r} is given twice")
+        seen.add(words.clause)
         try:
-            _READERS[clause](words, settings)
+            found = _READERS[words.clause](words)
         except ConfigurationError:
             raise
         except ValueError as error:
-            raise ConfigurationError(f"link {spec!r}: {clause}: {error}") from error
+            raise ConfigurationError(f"link {spec!r}: {words.clause}: {error}") from error
+        outages = settings.get("outages", ()) + found.get("outages", ())
+        settings |= {**found, "outages": outages}
     if "trace" in seen and (other := seen & {"delay", "loss", "reorder"}):
         raise words.error(f"'trace' has its own delays and losses, and excludes {min(other)!r}", "trace")
     if "reorder" in seen and settings.get("delay_s", 0.0) == 0.0:
@@ -104,94 +104,75 @@ def read_fields(profile: str, spec: str, model: LinkModel) -> dict[str, Any]:
     return settings
 
 
-def _read_delay(words: _Words, settings: dict[str, Any]) -> None:
-    settings["delay_s"] = words.value(parse_duration, "delay", "delay")
+def _delay(words: _Words) -> dict[str, Any]:
+    found: dict[str, Any] = {"delay_s": words.value(parse_duration, "delay")}
     if words.number_follows(percent=False):
-        settings["jitter_s"] = words.value(parse_duration, "delay", "jitter")
+        found["jitter_s"] = words.value(parse_duration, "jitter")
         if words.number_follows(percent=True):
             # Without effect, as in netem: its delays stay independent (measured lag-1 correlation 0).
-            words.value(parse_share, "delay", "correlation")
+            words.value(parse_share, "correlation")
     if words.take_if("distribution"):
-        if "jitter_s" not in settings:
-            raise words.error("'distribution' is given without a jitter, whose distribution it is", "delay")
-        settings["distribution"] = _read_shape(words)
+        if "jitter_s" not in found:
+            raise words.error("'distribution' is given without a jitter, whose distribution it is")
+        found["distribution"] = words.value(_shape, "distribution")
+    return found
 
 
-def _read_shape(words: _Words) -> Distribution:
-    name = words.take() or ""
-    if name not in get_args(Distribution):
-        raise ConfigurationError(
-            f"link {words.spec!r}: distribution {name!r} is unknown; valid: {', '.join(get_args(Distribution))}"
-        )
-    return cast(Distribution, name)
-
-
-def _read_loss(words: _Words, settings: dict[str, Any]) -> None:
-    loss: LossModel
+def _loss(words: _Words) -> dict[str, Any]:
     if words.take_if("gemodel"):
-        p, *rest = words.shares("loss", ["p", "r", "1-h", "1-k"])
+        p, *rest = words.shares("p", "r", "1-h", "1-k")
         # One probability alone is independent loss: with r = 1 − p the next state does not depend on the last.
-        loss = GilbertElliott(p, *(rest or [1.0 - p]))
-    elif words.take_if("state"):
-        raise ConfigurationError(f"link {words.spec!r}: 'loss state' is not emulated; valid: {GRAMMAR['loss']}")
-    else:
-        words.take_if("random")
-        loss = RandomLoss(*words.shares("loss", ["probability", "correlation"]))
-    settings["loss"] = loss
+        return {"loss": GilbertElliott(p, *(rest or [1.0 - p]))}
+    if words.take_if("state"):
+        raise words.error("'loss state' is not emulated")
+    words.take_if("random")
+    return {"loss": RandomLoss(*words.shares("probability", "correlation"))}
 
 
-def _read_chance(name: str) -> Callable[[_Words, dict[str, Any]], None]:
-    def read(words: _Words, settings: dict[str, Any]) -> None:
-        settings[name] = Chance(*words.shares(name, ["probability", "correlation"]))
-
-    return read
-
-
-def _read_reorder(words: _Words, settings: dict[str, Any]) -> None:
-    _read_chance("reorder")(words, settings)
-    if words.take_if("gap"):
-        settings["gap"] = words.value(_positive, "reorder", "gap")
+def _chance(words: _Words) -> dict[str, Any]:
+    found: dict[str, Any] = {words.clause: Chance(*words.shares("probability", "correlation"))}
+    if words.clause == "reorder" and words.take_if("gap"):
+        found["gap"] = words.value(_positive, "gap")
+    return found
 
 
-def _read_rate(words: _Words, settings: dict[str, Any]) -> None:
-    bits_per_second = words.value(parse_rate, "rate", "rate")
-    overhead = words.value(_small_integer, "rate", "packet overhead") if words.number_follows(percent=False) else 0
-    settings["rate"] = Rate(bits_per_second, overhead)
+def _rate(words: _Words) -> dict[str, Any]:
+    bits_per_second = words.value(parse_rate, "rate")
+    overhead = words.value(_small_integer, "packet overhead") if words.number_follows(percent=False) else 0
+    return {"rate": Rate(bits_per_second, overhead)}
 
 
-def _read_outage(words: _Words, settings: dict[str, Any]) -> None:
-    duration_s = words.value(parse_duration, "outage", "duration")
+def _outage(words: _Words) -> dict[str, Any]:
+    duration_s = words.value(parse_duration, "duration")
     if not words.take_if("at"):
-        raise words.error("'outage' is given without 'at' and a time", "outage")
-    at_s = words.value(parse_duration, "outage", "begin")
-    every_s = words.value(parse_duration, "outage", "period") if words.take_if("every") else None
-    settings["outages"] = (*settings.get("outages", ()), Outage(duration_s, at_s, every_s))
+        raise words.error("'outage' is given without 'at' and a time")
+    at_s = words.value(parse_duration, "begin")
+    every_s = words.value(parse_duration, "period") if words.take_if("every") else None
+    return {"outages": (Outage(duration_s, at_s, every_s),)}
 
 
-def _read_value(
-    clause: str, setting: str, name: str, read: Callable[[str, str], Any]
-) -> Callable[[_Words, dict[str, Any]], None]:
-    return lambda words, settings: settings.update({setting: words.value(read, clause, name)})
+_READERS: dict[str, Callable[[_Words], dict[str, Any]]] = {
+    "delay": _delay,
+    "loss": _loss,
+    **dict.fromkeys(("duplicate", "corrupt", "reorder"), _chance),
+    "rate": _rate,
+    "limit": lambda words: {"limit": words.value(_positive, "limit")},
+    "trace": lambda words: {"trace": words.value(lambda path, field: Trace.read(Path(path), field), "trace")},
+    "outage": _outage,
+    "retransmit": lambda words: {"retransmit_s": words.value(parse_duration, "time")},
+}
+
+
+def _shape(text: str, field: str) -> Distribution:
+    if text not in get_args(Distribution):
+        raise ConfigurationError(f"{field} {text!r} is unknown; valid: {', '.join(get_args(Distribution))}")
+    return cast(Distribution, text)
 
 
 def _positive(text: str, field: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) < 10 and int(text) > 0):
         raise ConfigurationError(f"{field}: {text!r}; valid: a whole number from 1 to 999999999")
     return int(text)
-
-
-_READERS: dict[str, Callable[[_Words, dict[str, Any]], None]] = {
-    "delay": _read_delay,
-    "loss": _read_loss,
-    "duplicate": _read_chance("duplicate"),
-    "corrupt": _read_chance("corrupt"),
-    "reorder": _read_reorder,
-    "rate": _read_rate,
-    "limit": _read_value("limit", "limit", "limit", _positive),
-    "trace": _read_value("trace", "trace", "trace", lambda path, field: Trace.read(Path(path), field)),
-    "outage": _read_outage,
-    "retransmit": _read_value("retransmit", "retransmit_s", "time", parse_duration),
-}
 
 
 def _small_integer(text: str, field: str) -> int:

@@ -1,14 +1,18 @@
 """Recorded delays of a real link, applied again message by message."""
 
+import contextlib
 import csv
 import gzip
 import itertools
 import math
 import zlib
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
+import numpy as np
+
+from common.arrays import FloatArray
 from common.errors import ConfigurationError
 from common.files.regular_file import read_regular_file
 
@@ -39,116 +43,73 @@ class Trace:
         file whose name ends in .gz is unpacked. Raises ConfigurationError, in one line that begins with `field`, for
         any other content.
         """
-        rows = read_samples(path, field)
+        _, delays_s = read_samples(path, field)
         try:
-            return cls(tuple(row.delay_s for row in rows))
+            return cls(tuple(None if math.isnan(delay_s) else delay_s for delay_s in delays_s.tolist()))
         except ValueError as error:
             raise ConfigurationError(
                 f"{field}: {path}: no message in it arrives; valid: one message that arrives, or more"
             ) from error
 
 
-@dataclass(frozen=True)
-class Sample:
-    """One recorded message of a trace."""
+def read_samples(path: Path, field: str) -> tuple[FloatArray, FloatArray]:
+    """Read the messages of a trace in order of sending; file and errors are those of `Trace.read`.
 
-    sent_s: float | None
-    """Time of sending on the recording's clock; None if unknown."""
-    delay_s: float | None
-    """Delay from sending to reception; None for a lost message."""
+    Return times of sending (n,) on the recording's clock, NaN if unknown, and delays (n,), NaN for lost messages; both
+    in seconds.
+    """
 
+    def refuse(what: str, valid: str, row: int | None = None) -> NoReturn:
+        where = "" if row is None else f" row {row + 1}:"
+        raise ConfigurationError(f"{field}: {str(path)!r}{where} {what}; valid: {valid}")
 
-def read_samples(path: Path, field: str) -> list[Sample]:
-    """Read the messages of a trace in order of sending, with send times. File and errors are those of `Trace.read`."""
     try:
         text = read_regular_file(path, _LARGEST_BYTES)
         if path.suffix == ".gz":
             text = gzip.decompress(text)
         lines = text.decode("utf-8-sig").splitlines()
-    except (OSError, EOFError, ValueError, zlib.error) as error:
-        reason = getattr(error, "strerror", None) or "it is no CSV file"
-        raise ConfigurationError(
-            f"{field}: {str(path)!r} cannot be read: {reason}; valid: a CSV file with {_COLUMNS}"
-        ) from error
-    if max(map(len, lines), default=0) > csv.field_size_limit():
-        raise ConfigurationError(
-            f"{field}: {str(path)!r} has a line of {max(map(len, lines))} characters; valid: a CSV file with {_COLUMNS}"
+        table = csv.DictReader(lines)
+        names = set(table.fieldnames or ())
+        rows = list(itertools.islice(table, _MOST_ROWS + 1))
+    except (OSError, EOFError, ValueError, zlib.error, csv.Error) as error:
+        refuse(
+            f"cannot be read: {getattr(error, 'strerror', None) or 'it is no CSV file'}", f"a CSV file with {_COLUMNS}"
         )
-    table = csv.DictReader(lines)
-    names = set(table.fieldnames or ())
     if not ("delay_ns" in names or {"sent_ns", "received_ns"} <= names):
-        raise ConfigurationError(
-            f"{field}: {path} has the columns {', '.join(sorted(map(str, names)))[:80] or 'none'}; valid: {_COLUMNS}"
-        )
-    rows: list[tuple[float, Sample]] = []
-    for number, row in enumerate(itertools.islice(table, _MOST_ROWS + 1)):
-        where = f"{field}: {path} row {number + 1}"
-        if number == _MOST_ROWS:
-            raise ConfigurationError(f"{where}: the file has too many rows; valid: up to {_MOST_ROWS} rows")
-        values = {
-            name: _nanoseconds(row.get(name), name, where) for name in ("seq", "sent_ns", "received_ns", "delay_ns")
-        }
-        rows.append((_order(values, names, number, where), _sample(values, names, where)))
-    rows.sort(key=lambda numbered: numbered[0])
-    return _with_gaps(rows, path, field) if "seq" in names else [sample for _, sample in rows]
+        refuse(f"has the columns {', '.join(sorted(map(str, names)))[:80] or 'none'}", _COLUMNS)
+    if len(rows) > _MOST_ROWS:
+        refuse("has too many rows", f"up to {_MOST_ROWS} rows")
 
+    def column(name: str) -> FloatArray:
+        """Return a column (n,); NaN for empty entries."""
+        values = np.full(len(rows), np.nan)
+        for number, row in enumerate(rows):
+            if entry := (row.get(name) or "").strip():
+                with contextlib.suppress(ValueError):
+                    values[number] = float(entry)
+                if not abs(values[number]) < 1e19:
+                    refuse(f"{name} = {entry[:40]!r}", "a number, or nothing for a lost message", number)
+        return values
 
-def _nanoseconds(text: str | None, name: str, where: str) -> float | None:
-    if text is None or not text.strip():
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and abs(value) < 1e19):
-        raise ConfigurationError(
-            f"{where}: {name} = {text.strip()[:40]!r}; valid: a number, or nothing for a lost message"
-        )
-    return value
-
-
-def _order(values: dict[str, float | None], names: set[str], number: int, where: str) -> float:
-    for name in ("seq", "sent_ns"):
-        if name in names:
-            value = values[name]
-            if value is None:
-                raise ConfigurationError(f"{where}: {name} is empty; valid: a number")
-            return value
-    return float(number)
-
-
-def _sample(values: dict[str, float | None], names: set[str], where: str) -> Sample:
-    sent_ns, delay_ns = values["sent_ns"], values["delay_ns"]
-    if "delay_ns" not in names and sent_ns is not None and values["received_ns"] is not None:
-        delay_ns = values["received_ns"] - sent_ns
-    if delay_ns is not None and delay_ns < 0.0:
-        raise ConfigurationError(f"{where}: the delay is {delay_ns:.0f} ns; valid: 0 ns or more")
-    return Sample(
-        None if sent_ns is None else 1e-9 * sent_ns,
-        None if delay_ns is None else 1e-9 * delay_ns,
-    )
-
-
-def _with_gaps(rows: Iterable[tuple[float, Sample]], path: Path, field: str) -> list[Sample]:
-    """Return the samples of `rows` (sequence number, sample), with a lost message for each missing sequence number.
-
-    Send times of lost messages are evenly between those of their neighbours.
-    """
-    samples: list[Sample] = []
-    last: tuple[float, Sample] | None = None
-    for sequence, sample in rows:
-        if last is not None and sequence > last[0] + 1.0:
-            missing = round(sequence - last[0]) - 1
-            if len(samples) + missing > _MOST_ROWS:
-                raise ConfigurationError(
-                    f"{field}: {path}: seq jumps from {last[0]:.0f} to {sequence:.0f}; "
-                    f"valid: up to {_MOST_ROWS} messages"
-                )
-            for position in range(1, missing + 1):
-                sent_s = None
-                if last[1].sent_s is not None and sample.sent_s is not None:
-                    sent_s = last[1].sent_s + (sample.sent_s - last[1].sent_s) * position / (missing + 1)
-                samples.append(Sample(sent_s, None))
-        samples.append(sample)
-        last = (sequence, sample)
-    return samples
+    sent_ns = column("sent_ns")
+    delays_ns = column("delay_ns") if "delay_ns" in names else column("received_ns") - sent_ns
+    for number in np.flatnonzero(delays_ns < 0.0)[:1].tolist():
+        refuse(f"the delay is {delays_ns[number]:.0f} ns", "0 ns or more", number)
+    key = next((name for name in ("seq", "sent_ns") if name in names), None)
+    if key is None:
+        return 1e-9 * sent_ns, 1e-9 * delays_ns
+    keys = column(key)
+    for number in np.flatnonzero(np.isnan(keys))[:1].tolist():
+        refuse(f"{key} is empty", "a number", number)
+    order = np.argsort(keys, kind="stable")
+    keys, sent_ns, delays_ns = keys[order], sent_ns[order], delays_ns[order]
+    if key == "seq" and len(keys):
+        if keys[-1] - keys[0] >= _MOST_ROWS:
+            refuse(f"seq reaches from {keys[0]:.0f} to {keys[-1]:.0f}", f"up to {_MOST_ROWS} messages")
+        # A lost message has no row; it was sent evenly between its neighbours.
+        places = np.rint(keys - keys[0]).astype(np.intp)
+        every = np.arange(places[-1] + 1)
+        found_ns, delays_ns = delays_ns, np.full(len(every), np.nan)
+        delays_ns[places] = found_ns
+        sent_ns = np.interp(every, places, sent_ns)
+    return 1e-9 * sent_ns, 1e-9 * delays_ns

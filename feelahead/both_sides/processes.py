@@ -7,14 +7,12 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Self
 
-from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError, FeelaheadError
 
 _BAD_INPUT = 2
-_STOP_PERIOD_S = 0.05
 
 
 class SideFailedError(FeelaheadError):
@@ -72,45 +70,23 @@ class StartedSide:
         return said
 
     def wait_for(self, kind: str, timeout_s: float) -> dict[str, Any]:
-        """Return the next event of this kind.
+        """Return the next event of this kind; the next `events` returns those of other kinds before it.
 
         Raises SideFailedError if the side ends, or if no event of any kind comes for `timeout_s`.
         """
-        event = self.wait_unless(kind, timeout_s, None)
-        assert event is not None  # noqa: S101  # no stop signal
-        return event
-
-    def wait_unless(
-        self,
-        kind: str,
-        timeout_s: float,
-        stop: StopSignal | None,
-        meanwhile: Callable[[dict[str, Any]], None] | None = None,
-    ) -> dict[str, Any] | None:
-        """Wait like `wait_for`, but return None once `stop` is set.
-
-        Events of other kinds are passed to `meanwhile`; without it, the next `events` returns them.
-        """
-        remaining_s = timeout_s
         while True:
             try:
-                event = self._events.get(timeout=min(remaining_s, _STOP_PERIOD_S))
+                event = self._events.get(timeout=timeout_s)
             except queue.Empty:
-                if stop is not None and stop.is_set:
-                    return None
-                remaining_s -= _STOP_PERIOD_S
-                if remaining_s > 0.0:
-                    continue
                 self.check()
                 raise SideFailedError(f"the {self.name} side did not report for {timeout_s:g} s") from None
-            remaining_s = timeout_s
             if event["event"] == kind:
                 return event
             if event["event"] == "end":
                 self._process.wait(timeout=10.0)
                 self.check()
                 raise SideFailedError(f"the {self.name} side ended early")
-            (meanwhile or self._kept_events.append)(event)
+            self._kept_events.append(event)
 
     def check(self) -> None:
         """Raise SideFailedError, with the side's last line, if the side ended with an error.

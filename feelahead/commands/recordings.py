@@ -13,6 +13,7 @@ from msgspec import Meta
 
 from common.command.command_line import parse_settings
 from common.errors import ConfigurationError, FeelaheadError
+from common.files.output_file import require_output_file
 from common.limits import Limited
 from common.recording.packages import require_packages
 from common.recording.reading import Recording, open_recording
@@ -70,21 +71,19 @@ class PlotSettings:
     out: Path | None = None
     """File to write, which ends in .png, .svg or .pdf; unless given, a .png beside the recording."""
 
+    def __post_init__(self) -> None:
+        require_output_file("--out", self.out, (".png", ".svg", ".pdf"))
 
-def _open(path: Path | None) -> Recording:
+
+@contextmanager
+def _recording(path: Path | None) -> Iterator[Recording]:
+    """Open a recording; errors that its content causes become a ConfigurationError of one line."""
     if path is None:
         raise ConfigurationError("no recording given; valid: the path of a file that --record made")
     recording = open_recording(path)
     if recording.damaged or not recording.whole:
         why = "is damaged" if recording.damaged else "was cut off"
         sys.stderr.write(f"feelahead: {path}: {why}; {recording.length_s():.1f} s of it can be read\n")
-    return recording
-
-
-@contextmanager
-def _recording(path: Path | None) -> Iterator[Recording]:
-    """Open a recording; errors that its content causes become a ConfigurationError of one line."""
-    recording = _open(path)
     try:
         yield recording
     except (FeelaheadError, OSError):
@@ -174,12 +173,6 @@ def plot(arguments: Sequence[str]) -> int:
     settings = parse_settings(PlotSettings, "feelahead plot", arguments)
     with _recording(settings.file) as recording:
         out = recording.path.with_suffix(".png") if settings.out is None else settings.out
-        if out.suffix not in (".png", ".svg", ".pdf"):
-            raise ConfigurationError(
-                f"--out {out}: its ending is unknown; valid: a file that ends in .png, .svg or .pdf"
-            )
-        if not out.absolute().parent.is_dir():
-            raise ConfigurationError(f"--out {out}: its folder does not exist; valid: a file in an existing folder")
         require_packages("plot", "matplotlib", extra="experiments")
         from feelahead.recordings.plot import plot_run  # noqa: PLC0415
         from feelahead.recordings.tables import read_tables  # noqa: PLC0415

@@ -114,21 +114,15 @@ def recorded_entries(recording: Recording, side: str, notes: list[str]) -> Itera
 
 def differing_origin(recorded: Mapping[str, object], present: Mapping[str, object]) -> list[str]:
     """Return a line for each difference of processor or kernels between `recorded` and `present`: bits may differ."""
-    notes = []
+    said = []
     for name, here in present.items():
         there = recorded.get(name)
         if isinstance(there, Mapping) and isinstance(here, Mapping):
-            others = [key for key in there if there[key] != here.get(key)]
-            notes += (
-                [f"recorded with other {name} ({', '.join(others)[:100]}): the last bits of results may differ"]
-                if others
-                else []
-            )
+            if others := [key for key in there if there[key] != here.get(key)]:
+                said.append(f"other {name} ({', '.join(others)[:100]})")
         elif there != here:
-            notes.append(
-                f"recorded with {name} {str(there)[:60]}, here {str(here)[:60]}: the last bits of results may differ"
-            )
-    return notes
+            said.append(f"{name} {str(there)[:60]}, here {str(here)[:60]}")
+    return [f"recorded with {what}: the last bits of results may differ" for what in said]
 
 
 def require_side(recording: Recording, side: str) -> Mapping[str, Any]:

@@ -176,7 +176,9 @@ def export_csv(tables: Tables, folder: Path) -> list[str]:
             writer = csv.writer(file)
             writer.writerow(["recording_s", *columns])
             for time_s, row in zip(table.times_s, table.rows, strict=True):
-                writer.writerow([f"{time_s:.9f}", *(_text(row.get(column)) for column in columns)])
+                values = (row.get(column) for column in columns)
+                numbers = (int(value) if isinstance(value, bool) else value for value in values)
+                writer.writerow([f"{time_s:.9f}", *numbers])
         written.append(f"{name}.csv")
     return written
 
@@ -197,12 +199,6 @@ def export_parquet(tables: Tables, folder: Path) -> list[str]:
 
 def _all(tables: Tables) -> list[tuple[str, Table]]:
     return [*tables.by_name.items(), (JOINED, tables.joined())]
-
-
-def _text(value: Any) -> Any:
-    if value is None:
-        return ""
-    return int(value) if isinstance(value, bool) else value
 
 
 def _one_kind(values: list[Any]) -> list[Any]:

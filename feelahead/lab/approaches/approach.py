@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from common.arrays import FloatArray
 from common.emulation.clauses import LinkModel
 from common.errors import FeelaheadError
@@ -13,7 +15,7 @@ from common.protocol.messages import Vector2
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
 from feelahead.lab.approaches.arming import wait_for_pull
 from feelahead.lab.approaches.laws import Law, compensation_of, law_of_robot
-from feelahead.lab.approaches.outcome import SAMPLE_S, End, Outcome, Samples, reversals, stands
+from feelahead.lab.approaches.outcome import SAMPLE_S, End, Outcome, Trace, reversals, stands
 from operator_side.controller.feel import MAX_STRENGTH, ZONE_COUNT, Feel
 from operator_side.controller.state import ControllerState
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
@@ -81,7 +83,8 @@ class PullRun(Listener):
         self.approach = approach
         self.onset: ContactOnset | None = None
         """First contact since the pull began; None before it."""
-        self.samples = Samples()
+        self._rows: list[tuple[float, float, float, float, tuple[int, ...]]] = []
+        """Rows of the trace: time, speed, gap, travel and strengths"""
         robot = robot_settings(approach)
         operator = OperatorSettings(
             link=approach.link,
@@ -137,6 +140,12 @@ class PullRun(Listener):
             self.loopback.run_until(min(clock.now() + SAMPLE_S, until_s))
             yield clock.now()
 
+    def trace(self) -> Trace:
+        """Return the course so far."""
+        time_s, speed_m_s, gap_m, travel = np.array([row[:4] for row in self._rows]).reshape(-1, 4).T.copy()
+        strengths = np.array([row[4] for row in self._rows], dtype=np.int64).reshape(-1, ZONE_COUNT)
+        return Trace(time_s, speed_m_s, gap_m, travel, strengths)
+
     def on_sent(self, now_s: float) -> None:
         """Sample the true contacts, and every 10 ms speed, gap, travel and R2's zones."""
         if self.onset is not None:
@@ -150,7 +159,7 @@ class PullRun(Listener):
         if now_s >= self._next_s or onset is not None:
             self._next_s = now_s + SAMPLE_S - 1e-9
             speed_m_s, gap_m = self.truth.approach()[1], self.truth.gap_m(run.robot.held)
-            self.samples.rows.append((now_s - hands.pull_began_s, speed_m_s, gap_m, travel, strengths))
+            self._rows.append((now_s - hands.pull_began_s, speed_m_s, gap_m, travel, strengths))
 
 
 def compile_kernels() -> None:
@@ -185,14 +194,14 @@ def run_approach(approach: Approach) -> Outcome:
     try:
         began_s = run.arm()
     except FeelaheadError as error:
-        return Outcome("failed", None, None, math.nan, None, None, 0, 0.0, run.samples.trace(), str(error))
+        return Outcome("failed", None, None, math.nan, None, None, 0, 0.0, run.trace(), str(error))
     for _ in run.go_on(began_s + approach.duration_s):
         pass
     return _outcome(run)
 
 
 def _outcome(run: PullRun) -> Outcome:
-    trace, onset = run.samples.trace(), run.onset
+    trace, onset = run.trace(), run.onset
     end: End = "stopped" if stands(trace) else "undecided"
     if onset is not None or run.disarmed_because is not None:
         end = "contact" if onset is not None else "disarmed"

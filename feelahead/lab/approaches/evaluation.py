@@ -93,8 +93,6 @@ class _Counts:
 
     hits: list[int] = field(default_factory=list)
     draws: list[int] = field(default_factory=list)
-    reported: int = 0
-    reported_hits: int = 0
     alarms: int = 0
     alarm_s: float = 0.0
     judged_s: float = 0.0
@@ -185,11 +183,7 @@ def _count_covered(counts: _Counts, law: Judged, cell: Placement, staged: Sequen
         for number in range(each):
             collision, last_release_s = one.knowable[number % len(one.knowable)]
             draw = one.draw(collision.shift_m, cell, number)
-            covered = strength_before_release(law, draw, last_release_s) == MAX_STRENGTH
-            hits += covered
-            if one.replay.knows_aside(last_release_s - REACTION_S):
-                counts.reported += 1
-                counts.reported_hits += covered
+            hits += strength_before_release(law, draw, last_release_s) == MAX_STRENGTH
         counts.hits.append(hits)
         counts.draws.append(each)
 
@@ -246,8 +240,6 @@ def _figures(counts: _Counts, staged: Sequence[_Staged], probability: float) -> 
     """Compute the figures from the counts; coverage is None if nothing collides or no release avoids it.
 
     holds: true if the interval's lower end is at least P - 0.1 (1 - P), over 10 approaches or more.
-    reported: number of draws whose drift or turn, if any, was known to the operator side when it was judged, 0.25 s
-    before the last release that avoids the contact. reported_coverage: coverage of these draws.
     unavoidable: number of placements in which no release avoids the contact.
     unknowable: number of placements in which the sticks change between judgement and last release.
     judged_s: judged time with R2 pulled. alarm_share: share of it with a false alarm.
@@ -262,8 +254,6 @@ def _figures(counts: _Counts, staged: Sequence[_Staged], probability: float) -> 
         "draws": draws,
         "approaches": len(counts.hits),
         "holds": None if low is None else enough and low >= probability - 0.1 * (1.0 - probability),
-        "reported": counts.reported,
-        "reported_coverage": counts.reported_hits / counts.reported if counts.reported else None,
         "places": sum(len(one.collisions) for one in staged),
         "not_found": sum(one.sought - len(one.collisions) for one in staged),
         "unavoidable": sum(len(one.collisions) - len(one.avoidable) for one in staged),

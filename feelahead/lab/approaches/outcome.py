@@ -61,19 +61,6 @@ class Outcome:
     """Reason for an end that says nothing about the law; None for other ends."""
 
 
-class Samples:
-    """Collects the rows of a trace: time, speed, gap, travel and strengths."""
-
-    def __init__(self) -> None:
-        self.rows: list[tuple[float, float, float, float, tuple[int, ...]]] = []
-
-    def trace(self) -> Trace:
-        """Return the rows as arrays."""
-        times, speeds, gaps, travels = np.array([row[:4] for row in self.rows]).reshape(-1, 4).T.copy()
-        strengths = np.array([row[4] for row in self.rows], dtype=np.int64).reshape(-1, 10)
-        return Trace(times, speeds, gaps, travels, strengths)
-
-
 def stands(trace: Trace) -> bool:
     """Return whether the gripper was slower than 1 mm/s throughout the last second."""
     last = trace.time_s > trace.time_s[-1] - _LAST_S

@@ -4,12 +4,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final, Literal, NamedTuple, get_args
+from typing import Final, NamedTuple, get_args
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 from common.arrays import BoolArray, FloatArray
+from common.protocol.messages import Compensation
 from feelahead.lab.approaches.recording import RecordedApproach
 from feelahead.lab.table import Row, Table
 from operator_side.feel.commands_under_way import CommandsUnderWay, Report
@@ -17,10 +18,9 @@ from robot_side.arm.ability import along_approach
 from robot_side.arm.port import GripperPose
 from robot_side.drivers.mujoco.joint_reference import MotionLimits
 
-Compensation = Literal["operator", "robot", "momentary"]
 COMPENSATIONS: Final[tuple[Compensation, ...]] = get_args(Compensation)
 """operator: the commands under way, known by their sender. robot: v t_d with the robot's high quantile of the loop age
-(eq. 8). momentary: v times the present loop age."""
+(eq. 8)."""
 _STEP_S: Final = 0.01
 _LEAST_SPEED: Final = 1e-9
 AGE_BINS_S: Final = tuple(pairwise((0.0, 0.02, 0.06, 0.13, 0.28, 0.58, 1.2)))
@@ -160,7 +160,6 @@ def judge(record: RecordedApproach, pose_at: PoseAt, limits: MotionLimits, full_
     errors = {
         "operator": displacement_m - own_m,
         "robot": displacement_m - speed_m_s * at.loop_age_quantile_s,
-        "momentary": displacement_m - speed_m_s * at.loop_age_s,
         "speed at the end": path.ability(at.arrives_s)[:, 0] - own_m_s,
     }
     within = path.within_reach(at.reported_s, at.arrives_s)
@@ -210,8 +209,8 @@ def error_table(judged: Table, arm: str, frozen: str, full_speed_m_s: float) -> 
         "# How wrong the predicted displacement is: truth less prediction along the direction in which R2 advances, so",
         "# that mu_mm above 0 is a gripper farther ahead than predicted. p99_mm is of the magnitude.",
         "# [[operator]]: by the commands under way, as their sender knows them. [[robot]]: v t_d, t_d the robot's high",
-        "# quantile of the loop age (eq. 8). [[momentary]]: v times the present loop age. Moments at the edge of the",
-        "# arm's reach, where it cannot do what it is told, are not in it.",
+        "# quantile of the loop age (eq. 8). Moments at the edge of the arm's reach, where it cannot do as told,",
+        "# are not in it.",
         f'arm = "{arm}"',
         f'frozen = "{frozen}"',
         f"full_speed_m_s = {full_speed_m_s:g}",

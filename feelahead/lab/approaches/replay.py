@@ -30,8 +30,6 @@ _TRAVEL = TriggerTravel()
 _LONGEST_RETURN = 4.0
 """Upper bound on the time of the finger's return, in its time constants; from full travel to the dead zone takes 3."""
 _COASTING_STEPS = 100
-_LOOKED_S = 0.04
-"""Time in seconds after which a look was made from every place aside: each place has one at least every 30 ms."""
 
 
 class Replay:
@@ -139,28 +137,6 @@ class Replay:
         travel = float(self.record.travel[self.record.tick_row(released_s), 1])
         rests_s = arrives_s + FINGER_TIME_CONSTANT_S + braking_s
         return arrives_s, rests_s, joints_rad + velocities_rad_s * coasting_s(braking_s, travel)
-
-    def aside(self, time_s: float) -> tuple[FloatArray, FloatArray]:
-        """Return the true tool's velocity (3,) across its approach axis, and its angular velocity (3,); world frame."""
-        row = self.record.pose_row(time_s)
-        twist = self.true[row].tool_jacobian @ self.record.joint_velocities_rad_s[row]
-        axis = self.true[row].tool_rotation[:, 2]
-        return twist[:3] - (twist[:3] @ axis) * axis, twist[3:]
-
-    def knows_aside(self, time_s: float) -> bool:
-        """Return whether a motion aside, if there is one, is in the operator side's newest report at `time_s`."""
-        seen_s = float(self.record.seen_sent_s[self.record.tick_row(time_s)])
-        return seen_s >= self._aside_seen_s
-
-    @cached_property
-    def _aside_seen_s(self) -> float:
-        """Time from which a motion aside is known: the tool moved at half of full speed, and all places had a look."""
-        motion = self.motion
-        for time_s in self.record.pose_time_s[self.record.pose_row(self.record.began_s) :].tolist():
-            across, turning = (float(np.linalg.norm(part)) for part in self.aside(time_s))
-            if across > 0.5 * motion.stick_speed_m_s or turning > 0.5 * motion.turn_speed_rad_s:
-                return float(time_s) + _LOOKED_S
-        return -math.inf
 
     def pose_at(self, time_s: float) -> GripperPose:
         """Return the true gripper at `time_s`."""

@@ -87,13 +87,10 @@ def greatest_delay_s(profile: LinkProfile) -> float:
 
 def read_link_sample(path: Path, flag: str) -> LinkSample:
     """Read a recording with send times; otherwise ConfigurationError, in one line that names `flag`."""
-    samples = read_samples(path, flag)
-    if len(samples) < 2 or any(sample.sent_s is None for sample in samples):
+    sent_s, delay_s = read_samples(path, flag)
+    if len(sent_s) < 2 or np.isnan(sent_s).any():
         raise ConfigurationError(f"{flag}: {path} lacks send times; valid: two messages or more, each with its sent_ns")
-    return LinkSample(
-        np.array([sample.sent_s for sample in samples], dtype=np.float64),
-        np.array([math.nan if sample.delay_s is None else sample.delay_s for sample in samples]),
-    )
+    return LinkSample(sent_s, delay_s)
 
 
 def play(profile: LinkProfile, sent_s: Sequence[float], size_bytes: int) -> tuple[LinkSample, DelayLine[int]]:

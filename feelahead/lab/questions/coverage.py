@@ -159,7 +159,6 @@ def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
     yield "n: draws (approaches). apart: places in which no release avoids the contact / that are judged before the"
     yield "sticks move once more, so that nobody can know / that were not found"
     yield from (by_pull(found, law) for law in settings.laws)
-    yield "once reported: draws in which the operator side had a report of the drift or turn in time"
     yield by_law(table, settings.laws)
 
 
@@ -202,10 +201,10 @@ def by_pull(found: Table, law: str) -> Shown:
         known, pulled = rows.values("coverage"), rows.values("alarms_per_min")
         least = _where(rows, "coverage", min(known), ".3f") if known else ""
         most = _where(rows, "alarms_per_min", max(pulled), ".1f") if pulled else ""
-        means = mean(rows, "coverage"), least, mean(rows, "reported_coverage"), *pooled_alarms(rows), most
+        means = mean(rows, "coverage"), least, *pooled_alarms(rows), most
         minutes = f"{sum(rows.values('judged_s')) / 60.0:.1f}"
         entries.append((*map(str, key), f"{sum(rows.values('holds'))} of {len(known)}", *means, minutes))
-    headings = ("pull", "link", "P", "cells that hold", "covered", "least", "covered, once reported")
+    headings = ("pull", "link", "P", "cells that hold", "covered", "least")
     alarms = ("false alarms a minute", "share", "most a minute", "minutes judged")
     return shown(f"{law}, by pull and link", (*headings, *alarms), entries)
 

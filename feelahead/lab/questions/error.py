@@ -16,11 +16,11 @@ from rich.console import RenderableType
 from rich.table import Table as Shown
 
 from common.files.output_file import output_file, require_output_file
+from common.protocol.messages import Compensation
 from feelahead.lab.approaches.frozen import SITE, frozen_hash, frozen_scene
 from feelahead.lab.approaches.prediction import (
     AGE_BINS_S,
     COMPENSATIONS,
-    Compensation,
     Spread,
     error_table,
     judge,
@@ -47,7 +47,6 @@ _SCENE: Final = "empty"
 _KINDS: Final[dict[Compensation, tuple[str, str]]] = {
     "operator": ("own commands under way", "#0072b2"),
     "robot": ("v t_d (eq. 8)", "#d55e00"),
-    "momentary": ("v times loop age", "#cc79a7"),
 }
 _COLOURS: Final = {"linear": "#0072b2", "unscented": "#d55e00"}
 _LEAST_MM: Final = 0.01

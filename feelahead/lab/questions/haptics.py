@@ -27,6 +27,11 @@ from robot_side.drivers.mujoco.built_in_scenes import SceneName
 
 _ARMS: dict[Arm, str] = {"off": "off", "mechanical": "on, no notice taken", "reacting": "on, reacts"}
 
+_JITTER_MS = 10.0
+"""Standard deviation of all delays but 0"""
+_TICK_S = 0.004
+"""Period of the robot side's ticks; 1 ms, that of the real robot side, would take more than twice the time"""
+
 # Beyond a loop age of two seconds the robot side is never armed.
 _Delay = Annotated[float, Meta(ge=0.0, lt=1000.0)]
 
@@ -46,8 +51,6 @@ class HapticsSettings(Sweep):
     clutter beside the way."""
     delays: Annotated[tuple[_Delay, ...], tyro.conf.arg(metavar="MS...")] = (0.0, 100.0, 200.0, 400.0)
     """Delays in each direction, in milliseconds."""
-    jitter: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MS")] = 10.0
-    """Standard deviation (jitter) of all delays but 0, in milliseconds."""
     camera_mm: Annotated[float, Meta(ge=0.0, le=1000.0), tyro.conf.arg(metavar="MM")] = 3.0
     """Standard deviation of the camera's error along each axis; the law uses the same value."""
     probability: Annotated[float, Meta(gt=0.0, lt=1.0), tyro.conf.arg(metavar="P")] = 0.99
@@ -56,9 +59,6 @@ class HapticsSettings(Sweep):
     """datagram: messages may be lost and reordered. stream: messages stay in order and losses delay them."""
     duration: Annotated[float, Meta(gt=0.0, lt=1e4), tyro.conf.arg(metavar="SECONDS")] = 45.0
     """Maximum duration of each trial, in virtual time."""
-    tick: Annotated[float, Meta(ge=1.0, le=10.0), tyro.conf.arg(metavar="MS")] = 4.0
-    """Period of the robot side's ticks, in milliseconds. 1 is that of the real robot side, and makes trials take more
-    than twice the time."""
     person: PersonSettings = field(default_factory=lambda: MISJUDGES_DEPTH)
 
     def __post_init__(self) -> None:
@@ -96,12 +96,12 @@ def cells(settings: HapticsSettings) -> Iterator[Cell]:
             arm,
             Trial(
                 scene,
-                f"delay {delay_ms:g}ms {settings.jitter:g}ms distribution normal" if delay_ms else "",
+                f"delay {delay_ms:g}ms {_JITTER_MS:g}ms distribution normal" if delay_ms else "",
                 arm,
                 settings.person,
                 settings.duration,
                 settings.link_model,
-                1e-3 * settings.tick,
+                _TICK_S,
                 1e-3 * settings.camera_mm,
                 settings.probability,
             ),

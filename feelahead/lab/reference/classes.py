@@ -4,8 +4,10 @@ Each class comes in two kinds: with general doubles, and on a grid where every c
 that contacts are exact. The same seed and count give the same pairs.
 """
 
+import functools
 import zlib
 from collections.abc import Callable, Iterable
+from typing import Concatenate, ParamSpec
 
 import numpy as np
 
@@ -24,6 +26,19 @@ from feelahead.lab.reference.pairs import Pairs
 
 Maker = Callable[[Rng, int, bool], Pairs]
 """Function that makes pairs of one class, from (random generator, count, whether on the grid)."""
+
+_Parameters = ParamSpec("_Parameters")
+
+
+def _maker(draw: Callable[Concatenate[Rng, int, bool, _Parameters], Pairs]) -> Callable[_Parameters, Maker]:
+    """Turn a function of (random generator, count, grid, parameters) into one from the parameters to a maker."""
+
+    @functools.wraps(draw)
+    def of(*given: _Parameters.args, **named: _Parameters.kwargs) -> Maker:
+        return lambda rng, count, grid: draw(rng, count, grid, *given, **named)
+
+    return of
+
 
 DEPTHS = {"1e-3": 2.0**-10, "1e-6": 2.0**-20, "1e-9": 2.0**-30}
 """Depths of tiny overlaps, in radii; they are powers of two, which are exact on the grid."""
@@ -80,33 +95,27 @@ def _tetrahedron(centers: FloatArray, sizes: FloatArray, vertices: FloatArray) -
     return Pairs("tetrahedron", centers, sizes, (vertices,))
 
 
-def touching(solid: str, feature: str, depth: float, *, swell: float = 1.0) -> Maker:
-    """Return a maker of spheres that reach `depth` radii into a solid at a face, edge or vertex. swell: scales radii.
+@_maker
+def touching(rng: Rng, count: int, grid: bool, solid: str, feature: str, depth: float, *, swell: float = 1.0) -> Pairs:
+    """Draw spheres that reach `depth` radii into a solid at a face, edge or vertex. swell: scales radii.
 
     A depth of 1 puts the sphere's centre on the feature, a depth of 2 puts the whole sphere on its inner side.
     """
-
-    def make(rng: Rng, count: int, grid: bool) -> Pairs:
-        if solid == "tetrahedron":
-            vertices, contact = tetrahedra(rng, count, feature, grid=grid)
-            parameters: tuple[FloatArray, ...] = (vertices,)
-        else:
-            parameters, contact = boxes(rng, count, feature, grid=grid)
-        centers, sizes = contact.spheres(swell * radii(rng, count, grid=grid), depth)
-        return Pairs("tetrahedron" if solid == "tetrahedron" else "box", centers, sizes, parameters)
-
-    return make
+    if solid == "tetrahedron":
+        vertices, contact = tetrahedra(rng, count, feature, grid=grid)
+        parameters: tuple[FloatArray, ...] = (vertices,)
+    else:
+        parameters, contact = boxes(rng, count, feature, grid=grid)
+    centers, sizes = contact.spheres(swell * radii(rng, count, grid=grid), depth)
+    return Pairs("tetrahedron" if solid == "tetrahedron" else "box", centers, sizes, parameters)
 
 
-def _large_or_small(solid: str, ratio: float) -> Maker:
-    """Return a maker of spheres with `ratio` times the solid's size, whose surfaces pass close to a feature."""
-
-    def make(rng: Rng, count: int, grid: bool) -> Pairs:
-        feature = str(rng.choice(list(FEATURES)))
-        depth = min(1.0, 1.0 / ratio) * (0.5 if grid else float(rng.uniform(0.1, 1.0)))
-        return touching(solid, feature, depth, swell=ratio)(rng, count, grid)
-
-    return make
+@_maker
+def _large_or_small(rng: Rng, count: int, grid: bool, solid: str, ratio: float) -> Pairs:
+    """Draw spheres with `ratio` times the solid's size, whose surfaces pass close to a feature."""
+    feature = str(rng.choice(list(FEATURES)))
+    depth = min(1.0, 1.0 / ratio) * (0.5 if grid else float(rng.uniform(0.1, 1.0)))
+    return touching(solid, feature, depth, swell=ratio)(rng, count, grid)
 
 
 def _random_tetrahedra(rng: Rng, count: int, grid: bool) -> Pairs:
@@ -132,49 +141,41 @@ def _corners_on_sphere(rng: Rng, count: int, grid: bool) -> Pairs:
     return _tetrahedron(centers, 9.0 * sizes, centers[:, None] + sizes[:, None, None] * chosen)
 
 
-def _flat(thickness: float) -> Maker:
-    def make(rng: Rng, count: int, grid: bool) -> Pairs:
-        vertices = points(rng, count, 4, grid=grid)
-        if grid:
-            vertices[:, :, 2] = vertices[:, :1, 2]
-            vertices[:, 3, 2] += thickness
-        else:
-            weights = rng.dirichlet(np.ones(3), count)
-            on_plane = np.einsum("nv,nvi->ni", weights, vertices[:, :3])
-            vertices[:, 3] = on_plane + thickness * rng.normal(size=(count, 3))
-        middle = vertices.mean(axis=1) if not grid else vertices[:, 0]
-        return _tetrahedron(middle + 0.5 * points(rng, count, grid=grid), radii(rng, count, grid=grid), vertices)
-
-    return make
+@_maker
+def _flat(rng: Rng, count: int, grid: bool, thickness: float) -> Pairs:
+    vertices = points(rng, count, 4, grid=grid)
+    if grid:
+        vertices[:, :, 2] = vertices[:, :1, 2]
+        vertices[:, 3, 2] += thickness
+    else:
+        weights = rng.dirichlet(np.ones(3), count)
+        on_plane = np.einsum("nv,nvi->ni", weights, vertices[:, :3])
+        vertices[:, 3] = on_plane + thickness * rng.normal(size=(count, 3))
+    middle = vertices.mean(axis=1) if not grid else vertices[:, 0]
+    return _tetrahedron(middle + 0.5 * points(rng, count, grid=grid), radii(rng, count, grid=grid), vertices)
 
 
-def _sliver(ratio: float) -> Maker:
-    """Return a maker of small spheres at slivers: tetrahedra whose faces and edges lie close to each other."""
-
-    def make(rng: Rng, count: int, grid: bool) -> Pairs:
-        thin = 2.0 ** -rng.integers(0, 14, count)
-        vertices = points(rng, count, 4, grid=grid)
-        vertices[:, :, 2] *= thin[:, None]
-        shares = np.array([0.5, 0.25, 0.25, 0.0]) if grid else rng.dirichlet(np.full(4, 0.4), count)[:, :, None]
-        middle = np.tensordot(shares, vertices, (0, 1)) if grid else (shares * vertices).sum(axis=1)
-        sizes = ratio * radii(rng, count, grid=grid)
-        return _tetrahedron(middle + 0.5 * sizes[:, None] * points(rng, count, grid=grid), sizes, vertices)
-
-    return make
+@_maker
+def _sliver(rng: Rng, count: int, grid: bool, ratio: float) -> Pairs:
+    """Draw small spheres at slivers: tetrahedra whose faces and edges lie close to each other."""
+    thin = 2.0 ** -rng.integers(0, 14, count)
+    vertices = points(rng, count, 4, grid=grid)
+    vertices[:, :, 2] *= thin[:, None]
+    shares = np.array([0.5, 0.25, 0.25, 0.0]) if grid else rng.dirichlet(np.full(4, 0.4), count)[:, :, None]
+    middle = np.tensordot(shares, vertices, (0, 1)) if grid else (shares * vertices).sum(axis=1)
+    sizes = ratio * radii(rng, count, grid=grid)
+    return _tetrahedron(middle + 0.5 * sizes[:, None] * points(rng, count, grid=grid), sizes, vertices)
 
 
-def _needle(thickness: float, *, spike: bool = False) -> Maker:
-    """Return a maker of needles: all vertices within `thickness` of a line; a `spike` has three near one end."""
-
-    def make(rng: Rng, count: int, grid: bool) -> Pairs:
-        start, along = points(rng, count, grid=grid), points(rng, count, grid=grid)
-        fractions = rng.integers(0, 5, (count, 4, 1)) / 4.0
-        if spike:
-            fractions[:, :3], fractions[:, 3] = 0.0, 1.0
-        vertices = start[:, None] + fractions * along[:, None] + thickness * points(rng, count, 4, grid=grid)
-        return _tetrahedron(start + 0.5 * along, radii(rng, count, grid=grid), vertices)
-
-    return make
+@_maker
+def _needle(rng: Rng, count: int, grid: bool, thickness: float, *, spike: bool = False) -> Pairs:
+    """Draw needles: all vertices within `thickness` of a line; a `spike` has three near one end."""
+    start, along = points(rng, count, grid=grid), points(rng, count, grid=grid)
+    fractions = rng.integers(0, 5, (count, 4, 1)) / 4.0
+    if spike:
+        fractions[:, :3], fractions[:, 3] = 0.0, 1.0
+    vertices = start[:, None] + fractions * along[:, None] + thickness * points(rng, count, 4, grid=grid)
+    return _tetrahedron(start + 0.5 * along, radii(rng, count, grid=grid), vertices)
 
 
 def _without_volume(rng: Rng, count: int, grid: bool) -> Pairs:
@@ -188,17 +189,14 @@ def _without_volume(rng: Rng, count: int, grid: bool) -> Pairs:
     return pairs
 
 
-def shifted(make: Maker) -> Maker:
-    """Return a maker that shifts pairs far from the origin, where neighbouring doubles are 1e-10 m apart."""
-
-    def made(rng: Rng, count: int, grid: bool) -> Pairs:
-        pairs = make(rng, count, grid)
-        shift = FAR * (rng.choice((-1.0, 1.0), (count, 3)) if grid else rng.normal(size=(count, 3)))
-        place, *rest = pairs.parameters
-        moved = place + (shift[:, None] if pairs.solid == "tetrahedron" else shift)
-        return Pairs(pairs.solid, pairs.centers + shift, pairs.radii, (moved, *rest))
-
-    return made
+@_maker
+def shifted(rng: Rng, count: int, grid: bool, make: Maker) -> Pairs:
+    """Draw pairs by `make`, shifted far from the origin, where neighbouring doubles are 1e-10 m apart."""
+    pairs = make(rng, count, grid)
+    shift = FAR * (rng.choice((-1.0, 1.0), (count, 3)) if grid else rng.normal(size=(count, 3)))
+    place, *rest = pairs.parameters
+    moved = place + (shift[:, None] if pairs.solid == "tetrahedron" else shift)
+    return Pairs(pairs.solid, pairs.centers + shift, pairs.radii, (moved, *rest))
 
 
 def _random_boxes(rng: Rng, count: int, grid: bool) -> Pairs:
@@ -212,40 +210,32 @@ def _single_precision(rng: Rng, count: int, grid: bool) -> Pairs:
     return Pairs("box", pairs.centers, pairs.radii, (place, turn.astype(np.float32).astype(float), half_sizes))
 
 
-def _thin_boxes(thickness: float, axes: int) -> Maker:
-    def make(rng: Rng, count: int, grid: bool) -> Pairs:
-        pairs = _random_boxes(rng, count, grid)
-        pairs.parameters[2][:, :axes] *= thickness
-        return Pairs("box", pairs.parameters[0] + 0.25 * pairs.centers, pairs.radii, pairs.parameters)
-
-    return make
+@_maker
+def _thin_boxes(rng: Rng, count: int, grid: bool, thickness: float, axes: int) -> Pairs:
+    pairs = _random_boxes(rng, count, grid)
+    pairs.parameters[2][:, :axes] *= thickness
+    return Pairs("box", pairs.parameters[0] + 0.25 * pairs.centers, pairs.radii, pairs.parameters)
 
 
-def half_spaces(depth: float | None) -> Maker:
-    """Return a maker of spheres that reach `depth` radii into a half-space; None: random depths."""
-
-    def make(rng: Rng, count: int, grid: bool) -> Pairs:
-        sizes, offsets = radii(rng, count, grid=grid), points(rng, count, grid=grid)[:, 0]
-        normals = rotations(rng, count, grid=True)[:, 0] if grid else unit_vectors(rng, count)
-        reached = depth if depth is not None else rng.integers(-4, 20, count) / 8.0
-        heights = offsets + (1.0 - reached) * sizes
-        return Pairs("half-space", heights[:, None] * normals, sizes, (normals, offsets))
-
-    return make
+@_maker
+def half_spaces(rng: Rng, count: int, grid: bool, depth: float | None) -> Pairs:
+    """Draw spheres that reach `depth` radii into a half-space; None: random depths."""
+    sizes, offsets = radii(rng, count, grid=grid), points(rng, count, grid=grid)[:, 0]
+    normals = rotations(rng, count, grid=True)[:, 0] if grid else unit_vectors(rng, count)
+    reached = depth if depth is not None else rng.integers(-4, 20, count) / 8.0
+    heights = offsets + (1.0 - reached) * sizes
+    return Pairs("half-space", heights[:, None] * normals, sizes, (normals, offsets))
 
 
-def spheres(depth: float | None, ratio: float = 1.0) -> Maker:
-    """Return a maker of spheres that reach `depth` radii (None: random) into spheres of 1 / `ratio` of their size."""
-
-    def make(rng: Rng, count: int, grid: bool) -> Pairs:
-        sizes = ratio * radii(rng, count, grid=grid)
-        others, other_sizes = points(rng, count, grid=grid), radii(rng, count, grid=grid)
-        steps = rotations(rng, count, grid=True)[:, 0] if grid else unit_vectors(rng, count)
-        reached = depth if depth is not None else rng.integers(-4, 20, count) / 8.0
-        distances = other_sizes + sizes - reached * np.minimum(sizes, other_sizes)
-        return Pairs("sphere", others + distances[:, None] * steps, sizes, (others, other_sizes))
-
-    return make
+@_maker
+def spheres(rng: Rng, count: int, grid: bool, depth: float | None, ratio: float = 1.0) -> Pairs:
+    """Draw spheres that reach `depth` radii (None: random) into spheres of 1 / `ratio` of their size."""
+    sizes = ratio * radii(rng, count, grid=grid)
+    others, other_sizes = points(rng, count, grid=grid), radii(rng, count, grid=grid)
+    steps = rotations(rng, count, grid=True)[:, 0] if grid else unit_vectors(rng, count)
+    reached = depth if depth is not None else rng.integers(-4, 20, count) / 8.0
+    distances = other_sizes + sizes - reached * np.minimum(sizes, other_sizes)
+    return Pairs("sphere", others + distances[:, None] * steps, sizes, (others, other_sizes))
 
 
 def _features(solid: str) -> dict[str, Maker]:

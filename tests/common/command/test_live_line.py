@@ -112,12 +112,6 @@ def test_what_is_not_known_is_no_zero() -> None:
     )
 
 
-def test_without_haptics_nothing_resists() -> None:
-    line = live_line(approach(haptics=False), 79)
-    assert "resist" not in line
-    assert "danger" in line
-
-
 @pytest.mark.parametrize(
     ("changed", "expected"),
     [
@@ -213,11 +207,6 @@ def test_a_stiffness_that_hovers_is_one_word(stiffnesses: list[float], expected:
         word = next_resistance(word, stiffness)
         words.append(str(int(word)))
     assert " ".join(words) == expected
-
-
-def test_a_touch_that_rattles_is_told_once() -> None:
-    rattling = [advancing(nearest_mm=0.0 if step % 2 else 5.0) for step in range(40)]
-    assert len(told(*rattling)) == 2
 
 
 def test_what_goes_to_and_fro_is_bounded() -> None:

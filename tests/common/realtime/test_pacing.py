@@ -37,21 +37,6 @@ def test_refuses_to_begin_before_its_time_and_odd_periods() -> None:
             Pacer(period_s, 0.0)
 
 
-def test_the_latest_is_told_once() -> None:
-    pacer = Pacer(PERIOD_S, 0.0)
-    pacer.begin(50e-6)
-    pacer.begin(pacer.deadline_s + 20e-6)
-    assert pacer.take_latest_s() == pytest.approx(50e-6)
-    assert pacer.take_latest_s() == 0.0
-
-
-def test_a_restart_begins_a_new_grid_and_keeps_the_counts() -> None:
-    pacer = Pacer(PERIOD_S, 0.0)
-    pacer.begin(5.5e-3)
-    pacer.restart(100.0)
-    assert (pacer.deadline_s, pacer.overruns) == (100.0, 5)
-
-
 class Waiting:
     """Stand-in for the sockets' `wait`, in virtual time: each wait ends `late_s` late, or when a message comes."""
 

@@ -199,7 +199,7 @@ def test_a_hand_that_pulls_on_through_it_moves_nothing_before_it_has_let_go() ->
     assert began_s == pytest.approx(1.23, abs=0.05)
     for _ in run.go_on(began_s + 2.1):
         pass
-    trace, both = run.samples.trace(), run.loopback
+    trace, both = run.trace(), run.loopback
     assert run.disarmed_because is None
 
     def speeds_mm_s(from_s: float, to_s: float) -> list[float]:

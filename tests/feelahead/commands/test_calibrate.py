@@ -3,7 +3,6 @@
 import math
 import os
 import signal
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -22,20 +21,15 @@ from operator_side.controller.feel import RELEASED
 from operator_side.controller.state import ControllerState
 from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.second_writer import SecondWriters
-from operator_side.dualsense.reports.input_report import build_input_report
 from operator_side.dualsense.reports.output_report import build_output_report
 from operator_side.hands.travel_calibration import TravelCalibration, TriggerTravel
+from tests.feelahead.commands.conftest import Played
 from tests.helpers.fake_hid import ADDRESS, FakeBackend, FakeHandle
 from tests.helpers.machines.fake_proc import add_process
 
-REPORT_S = 0.004
+pytestmark = pytest.mark.usefixtures("own_folder")
+
 MEASURED = TravelCalibration(l2=TriggerTravel(0.1, 0.7))
-
-
-@pytest.fixture(autouse=True)
-def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    return tmp_path
 
 
 def willing_hands(now_s: float) -> ControllerState:
@@ -51,33 +45,15 @@ def willing_hands(now_s: float) -> ControllerState:
     return ControllerState()
 
 
-class PlayedHandle(FakeHandle):
-    """Controller that hidapi takes for a real one, and whose state is a function of a separate clock."""
-
-    def play(self, hands: Callable[[float], ControllerState | None]) -> None:
-        self.hands, self.now_s = hands, 0.0
-
-
 @pytest.fixture
-def handle(monkeypatch: pytest.MonkeyPatch) -> PlayedHandle:
-    played = PlayedHandle()
-    played.play(willing_hands)
-
-    class Clock:
-        def now(self) -> float:
-            played.now_s += REPORT_S
-            played.waiting = [build_input_report(state)] if (state := played.hands(played.now_s)) else []
-            return played.now_s
-
-    monkeypatch.setattr(feelahead.commands.calibrate, "MonotonicClock", Clock)
-    monkeypatch.setattr("feelahead.commands.calibrate.time.sleep", lambda _: None)
-    backend = FakeBackend({0x0CE6: {b"/dev/hidraw3": played}})
-    monkeypatch.setattr(feelahead.commands.calibrate, "load_backend", lambda: backend)
+def willing(played: Played, monkeypatch: pytest.MonkeyPatch) -> Played:
+    played.hands = willing_hands
+    monkeypatch.setattr(feelahead.commands.calibrate, "load_backend", lambda: played.backend)
     return played
 
 
 def test_a_real_controller_is_measured_and_kept_by_its_address(
-    handle: PlayedHandle, capsys: pytest.CaptureFixture[str]
+    willing: Played, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert command(["calibrate"]) == 0
     stored = load_calibration(ADDRESS)
@@ -89,8 +65,8 @@ def test_a_real_controller_is_measured_and_kept_by_its_address(
     assert str(calibration_path(ADDRESS)) in said
     assert "a full pull reaches 7 of 10 zones" in said
     # Nothing pushed against the fingers, and nothing is left on.
-    assert set(handle.written) == {build_output_report(RELEASED)}
-    assert handle.closed == handle.times_opened > 0
+    assert set(willing.handle.written) == {build_output_report(RELEASED)}
+    assert willing.handle.closed == willing.handle.times_opened > 0
 
 
 def test_a_simulated_controller_is_kept_only_where_asked_for(
@@ -98,7 +74,7 @@ def test_a_simulated_controller_is_kept_only_where_asked_for(
 ) -> None:
     assert command(["calibrate", "--device", "simulated"]) == 0
     assert "nothing was stored" in capsys.readouterr().out
-    assert list(own_folder.iterdir()) == []
+    assert not own_folder.exists()
     out = tmp_path / "mine.toml"
     assert command(["calibrate", "--device", "simulated", "--out", str(out)]) == 0
     _, calibration = read_calibration(out)
@@ -110,27 +86,27 @@ def test_a_simulated_controller_is_kept_only_where_asked_for(
     ("still_s", "error", "said"), [(math.inf, CalibrationError, "Pull L2"), (1.0, DeviceError, "sent nothing for 5 s")]
 )
 def test_hands_that_do_not_pull_or_a_silent_controller_end_it_and_nothing_is_stored(
-    handle: PlayedHandle, own_folder: Path, still_s: float, error: type[Exception], said: str
+    willing: Played, own_folder: Path, still_s: float, error: type[Exception], said: str
 ) -> None:
-    handle.play(lambda now_s: ControllerState() if now_s < still_s else None)
+    willing.hands = lambda now_s: ControllerState() if now_s < still_s else None
     with pytest.raises(error, match=said):
         command(["calibrate"])
-    assert list(own_folder.iterdir()) == []
-    assert handle.closed == handle.times_opened > 0
+    assert not own_folder.exists()
+    assert willing.handle.closed == willing.handle.times_opened > 0
 
 
 @pytest.mark.parametrize("out", ["new/mine.toml", "."])
 def test_a_place_where_nothing_can_be_written_is_refused_before_anything_is_measured(
-    out: str, handle: PlayedHandle, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    out: str, willing: Played, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigurationError, match=f"--out {out}: is a folder, or lies in a folder that does not exist"):
         command(["calibrate", "--out", out])
-    assert handle.now_s == 0.0
+    assert willing.now_s == 0.0
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_controller_that_was_asked_for_is_measured_or_the_others_are_named(handle: PlayedHandle) -> None:
+def test_the_controller_that_was_asked_for_is_measured_or_the_others_are_named(willing: Played) -> None:
     with pytest.raises(NoDeviceError, match=f"aa:bb:cc:dd:ee:ff is not connected, only: {ADDRESS}"):
         command(["calibrate", "--controller", "aa:bb:cc:dd:ee:ff"])
     with pytest.raises(ConfigurationError, match="--controller with --device simulated; valid"):
@@ -138,7 +114,7 @@ def test_the_controller_that_was_asked_for_is_measured_or_the_others_are_named(h
     assert load_calibration(ADDRESS) is None
     assert command(["calibrate", "--controller", ADDRESS]) == 0
     assert load_calibration(ADDRESS) is not None
-    assert handle.closed == handle.times_opened
+    assert willing.handle.closed == willing.handle.times_opened
 
 
 # The operator side

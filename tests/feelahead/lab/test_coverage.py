@@ -15,9 +15,7 @@ from feelahead.lab.approaches.felt_by import Draw, Judged
 from feelahead.lab.approaches.frozen import SITE, frozen_scene
 from feelahead.lab.approaches.judging import (
     false_alarms,
-    statistical_distance_m,
     strength_before_release,
-    zone_speed_m_s,
 )
 from feelahead.lab.approaches.laws import Law
 from feelahead.lab.approaches.placements import first_touch_s, last_release_s
@@ -136,29 +134,6 @@ def test_strength_without_cause_is_an_alarm_and_only_that() -> None:
     assert near.number == 0
 
 
-def test_zones_and_errors_are_those_of_the_law() -> None:
-    speeds = [zone_speed_m_s(zone) for zone in range(10)]
-    assert speeds == sorted(speeds)
-    # The sensor ends at three quarters of the travel.
-    assert speeds[7] == speeds[9] == pytest.approx(0.25)
-    assert speeds[0] == pytest.approx(0.25 * (0.05 / 0.75 - 0.05) / 0.93)
-    replay, _, draw = staged("wall", LINKS["200 ms"])
-    time_s = replay.record.began_s + 1.0
-    assert statistical_distance_m(draw, time_s, 0.5) == pytest.approx(0.0, abs=1e-9)
-    assert statistical_distance_m(draw, time_s, 0.99) == pytest.approx(2.326 * 0.003, rel=0.02)
-
-
-def test_a_drift_counts_as_reported_once_a_report_of_it_is_back() -> None:
-    drifting = staged("wall", LINKS["50 ms"], pull="drift")[0]
-    times = drifting.record.began_s + np.arange(0.0, 0.8, 0.01)
-    known = np.array([drifting.knows_aside(float(time_s)) for time_s in times])
-    # There and back, with jitter, and 30 ms to look from all places; the arm must also start.
-    assert 0.1 < times[int(np.argmax(known))] - drifting.record.began_s < 0.3
-    assert known[int(np.argmax(known)) :].all()
-    steady = staged("wall")[0]
-    assert steady.knows_aside(steady.record.began_s)
-
-
 # The judged pipeline is the shipped one
 
 
@@ -171,7 +146,7 @@ def test_over_a_whole_pull_it_is_what_both_sides_show_live(law: Law) -> None:
     for _ in run.go_on(began_s + 2.0):
         pass
     assert run.onset is not None
-    trace = run.samples.trace()
+    trace = run.trace()
 
     replay, posed, _ = staged("wall", link)
     # The camera's errors are those of the robot side with that seed, see `assemble`.
@@ -233,7 +208,6 @@ def test_placements_whose_stick_moves_after_judgement_are_counted_apart() -> Non
     assert (row["places"], row["unavoidable"], row["unknowable"], row["coverage"]) == (8, 0, 1, 1.0)
     # The same number of draws in each other placement, 20 or more in all.
     assert row["draws"] == 3 * 7
-    assert row["reported"] < row["draws"]
 
 
 @pytest.mark.parametrize("link", ["0 ms", "200 ms"])

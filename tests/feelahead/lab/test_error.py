@@ -2,7 +2,6 @@
 
 import math
 import tomllib
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.arrays import FloatArray
-from feelahead.lab.approaches.prediction import AGE_BINS_S, COMPENSATIONS, ToolPath, error_table, judge, moments, over
+from feelahead.lab.approaches.prediction import AGE_BINS_S, COMPENSATIONS, error_table, judge, moments, over
 from feelahead.lab.approaches.recording import RecordedApproach
 from feelahead.lab.propagation import (
     BATCHES,
@@ -172,7 +171,6 @@ def test_the_commands_under_way_predict_an_obedient_arm(there_ms: int, back_ms: 
     loop_s = 1e-3 * (there_ms + back_ms)
     assert loop_s - 1e-9 <= min(judged["loop_age_s"]) <= max(judged["loop_age_s"]) <= loop_s + 0.005
     if loop_s >= 0.4:
-        assert greatest_m(judged, "momentary") > 0.02
         assert greatest_m(judged, "robot") > 0.02
 
 
@@ -182,35 +180,13 @@ def test_a_constant_speed_is_speed_times_the_delay_and_a_quantile_of_it_too_far(
     np.testing.assert_allclose(at.arrives_s - at.reported_s, 0.2, atol=1e-9)
     np.testing.assert_allclose(judged["displacement_m"], speed_m_s * 0.2, atol=1e-9)
     np.testing.assert_allclose(judged["robot"], speed_m_s * (0.2 - 0.25), atol=1e-9)
-    # The age of the newest command known to the report includes up to a period for which it was held.
-    np.testing.assert_allclose(judged["momentary"], -speed_m_s * at.echo_held_s, atol=1e-9)
-
-
-def test_ways_are_along_the_axis_at_their_beginning_and_reach_has_an_edge() -> None:
-    record = recorded(np.full(1500, 1.0), 0, 0)
-
-    def oblique(joints: FloatArray) -> GripperPose:
-        pose = pose_at(joints)
-        return replace(pose, tool_rotation=np.array([[1.0, 0.0, 0.6], [0.0, 1.0, 0.8], [0.0, 0.0, 0.0]]))
-
-    way_m = ToolPath(record, oblique, LIMITS, FULL_M_S).onsets_m(np.array([3.0]), np.array([3.4]))
-    assert way_m[0] == pytest.approx(0.6 * 0.4 * FULL_M_S)
-
-    def far(joints: FloatArray) -> GripperPose:
-        pose = pose_at(joints)
-        return replace(pose, tool_jacobian=pose.tool_jacobian * (1.0 if joints[0] < 0.2 else 0.05))
-
-    crossed_s = float(np.interp(0.2, record.joint_positions_rad[:, 0], record.pose_time_s))
-    from_s = crossed_s + np.array([-0.7, -0.2, 0.2])
-    within = ToolPath(record, far, LIMITS, FULL_M_S).within_reach(from_s, from_s + 0.3)
-    assert within.tolist() == [True, False, False]
 
 
 def made_up(errors_mm: list[float], age_s: float = 0.4, link: str = "") -> dict[str, Any]:
     errors_m, count = 1e-3 * np.array(errors_mm), len(errors_mm)
     row = {"kind": "prediction", "pull": "bell", "link": link, "seed": 3, "loop_age_s": [age_s] * count}
     row |= {"within_reach": [False] + [True] * (count - 1), "way_m": [0.0] * count}
-    return row | {"operator": errors_m.tolist(), "robot": (10.0 * errors_m).tolist(), "momentary": errors_m.tolist()}
+    return row | {"operator": errors_m.tolist(), "robot": (10.0 * errors_m).tolist()}
 
 
 def test_spreads_pool_the_moments_within_reach_by_the_loop_age_of_their_link() -> None:

@@ -116,33 +116,6 @@ def test_where_the_robot_side_assists_no_finger_is_too_strong_for_a_wall() -> No
 
 
 @approaches
-def test_full_is_full_from_the_first_moment_on() -> None:
-    outcome = ended(law="full", duration_s=0.5)
-    assert outcome.end == "undecided"
-    assert (outcome.trace.strengths == 8).all()
-    assert 1e3 * outcome.trace.speed_m_s[-1] == pytest.approx(free_speed_mm_s(1.0), abs=3.0)
-
-
-@approaches
-def test_the_trace_tells_the_way_to_the_wall() -> None:
-    outcome = ended(link=FAR, law="none")
-    trace = outcome.trace
-    rows = len(trace.time_s)
-    assert [getattr(trace, one.name).shape for one in fields(Trace)] == [(rows,)] * 4 + [(rows, 10)]
-    assert trace.time_s[0] == 0.0
-    assert trace.time_s[-1] == outcome.ended_s
-    np.testing.assert_allclose(np.diff(trace.time_s)[:-1], SAMPLE_S, atol=1e-9)
-    # It begins 320 mm before the wall; the integrated speed leads there.
-    assert 1e3 * trace.gap_m[0] == pytest.approx(WAY_MM, abs=0.1)
-    assert 1e3 * np.trapezoid(trace.speed_m_s, trace.time_s) == pytest.approx(WAY_MM, abs=1.0)
-    assert outcome.least_gap_mm == 1e3 * trace.gap_m.min()
-    assert -0.3 < outcome.least_gap_mm <= 0.0
-    # A finger of 3 N against the spring alone.
-    assert trace.travel[-1] == pytest.approx((3.0 - 0.5) / 4.0, abs=1e-3)
-    assert trace.strengths.max() == 0
-
-
-@approaches
 def test_what_is_gripped_counts_as_gripper() -> None:
     outcome = ended("place_held", force_n=3.7, grip=True, law="none")
     assert (outcome.end, outcome.contact_with) == ("contact", "table")

@@ -22,7 +22,6 @@ from common.errors import ConfigurationError
 from feelahead.commands.bench_and_try import try_out
 from feelahead.lab.intervals import mcnemar_p, mean_interval, share_interval, student_interval, welch_interval
 from feelahead.lab.journal import Journal
-from feelahead.lab.progress import progress
 from feelahead.lab.sweep import ask, generator, sweep
 from tests.feelahead.lab import counting
 from tests.feelahead.lab.counting import QUESTION, TIMED, Cell, Counting
@@ -196,17 +195,6 @@ def test_the_example_of_the_readme_runs_and_is_short(tmp_path: Path, capsys: pyt
     assert "overtaken, of 1000" in capsys.readouterr().out
     rows = list(csv.DictReader((tmp_path / "rows.csv").read_text().splitlines()))
     assert [row["overtaken"] == "0" for row in rows] == [True, True] + [False] * 6
-
-
-def test_in_a_log_a_line_says_how_far_it_is_and_what_is_at_work(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("feelahead.lab.progress._EVERY_S", 0.0)
-    with progress("baking", 4.0) as shown:
-        for piece, share in (("rye", 1.0), ("oats", 3.0)):
-            shown.begin(piece)
-            shown.advance(share)
-    assert capsys.readouterr().err == "baking: 0 %, rye\nbaking: 25 %, oats\n"
 
 
 # Killed processes

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from common.roles import Role
-from feelahead.lab.questions.tick import Case, Concave, rows, run
+from feelahead.lab.questions.tick import Case, rows, run
 from feelahead.lab.tick.crowd import MIDDLE_M, NEAREST_M, CrowdedCamera, crowd
 from feelahead.lab.tick.timed_robot import COLUMNS
 from robot_side.drivers.mujoco.camera import MujocoCamera
@@ -41,14 +41,6 @@ def test_of_a_crowd_around_a_cameras_objects_a_frame_says_what_moves() -> None:
     assert camera.perceive(1.5).roles[second.names.index(own[0])] is Role.TARGET
 
 
-def test_alone_a_crowd_is_all_there_is() -> None:
-    camera = CrowdedCamera(MujocoCamera(load_scene()), 30, only=True)
-    for now_s in (0.0, 0.5):
-        frame = camera.perceive(now_s)
-        require_valid(frame)
-        assert frame.names == tuple(f"crowd {k}" for k in range(30))
-
-
 def test_look_to_message_leaves_out_physics_and_frames_and_stands_beside_mixed() -> None:
     tick = dict.fromkeys(COLUMNS, 0.0) | {"spent_s": 80e-6, "physics": 30e-6, "frame": 20e-6, "law": 40e-6}
     turns = np.array([[tick[column] for column in COLUMNS]] * 4)
@@ -72,9 +64,3 @@ def test_a_real_robot_side_is_timed() -> None:
     assert found["tick"]["p50_us"] > found["look to message"]["p50_us"] > 0.0
     assert found["law"]["p50_us"] > 0.0
     assert found["mixed"]["p50_us"] > 0.0
-
-
-def test_looks_at_what_is_concave_take_turns_with_mixed() -> None:
-    found = {row["stage"]: row for row in run(Concave("u_mesh", 0.01), 0)}
-    assert found["field of u_mesh"].keys() == found["mixed"].keys()
-    assert all(row["p50_us"] > 0.0 for row in found.values())
