@@ -11,7 +11,9 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup
 # Bytecode is kept whatever the machine is set to: else each of the many processes compiles every source anew.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test quick types test-kernel test-netem test-two-hosts wide-area test-containers test-console pictures latency-experiment lock clean
+# A file that is only half made is made again.
+.DELETE_ON_ERROR:
+.PHONY: figures demo test quick types test-kernel test-netem test-two-hosts wide-area test-containers test-console pictures driving latency-experiment lock clean
 
 # The environment is rebuilt only when the lock or the package's metadata change.
 $(VENV)/.installed: requirements.lock pyproject.toml
@@ -76,6 +78,32 @@ test-console: $(VENV)/.installed $(VENV)/.kernels ## the console in a real brows
 # Needs Chromium, and a machine with nothing else to do: its runs are real ones.
 pictures: $(VENV)/.installed $(VENV)/.kernels ## the documents' pictures of console, terminal view and plot, made anew
 	$(BIN)/python -m tests.console.pictures $(ARGS)
+
+# An hour and more, on a machine with nothing else to do. A stopped run goes on; a new commit starts anew.
+figures/haptics.csv: asks = try haptics --seeds 10
+figures/camera.csv: asks = try haptics --scenes shelf --delays 0 200 --seeds 4 --camera-mm 1
+figures/demo.csv: asks = try demo --seeds 10
+figures/definition.csv: asks = bench felt --definition
+figures/tick.csv: asks = bench tick --quick
+figures/cover.csv: asks = bench felt --cover
+FIGURES = $(patsubst %,figures/%.csv,haptics camera demo definition tick cover)
+HEAD = git rev-parse --short=8 HEAD
+
+$(FIGURES): figures/commit
+	$(BIN)/feelahead $(asks) --resume $(@:.csv=.jsonl) --csv $@
+
+figures/commit: anew
+	git diff --stat --exit-code HEAD -- '*.py'
+	mkdir -p figures
+	$(HEAD) | cmp -s - $@ || (rm -f figures/*; $(HEAD) > $@)
+
+.PHONY: anew
+figures: $(VENV)/.installed $(VENV)/.kernels $(FIGURES) ## docs/measurements.md: every figure measured by this commit, the tables written
+	$(BIN)/python -m feelahead.lab.measurements
+
+# As for the pictures. A run takes at most two minutes, half a minute as a rule: make driving ARGS="--delays 0 150 --seeds 2 --csv F"
+driving: $(VENV)/.installed $(VENV)/.kernels ## grasp and place by keyboard alone in a real browser, with delays: a table
+	$(BIN)/python -m tests.console.driving $(ARGS)
 
 # Also in virtual time and over loopback, the same links: half an hour and more. Needs Docker.
 latency-experiment: $(VENV)/.installed ## links by name, in containers and emulated: what the delay does to the hand

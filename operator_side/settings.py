@@ -1,5 +1,6 @@
 """Settings of the operator side, from the command line or a TOML file."""
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
@@ -90,6 +91,8 @@ class OperatorSettings(SideOptions):
         if self.tui and self.status != "line":
             raise ValueError(f"--tui and --status {self.status} exclude each other; valid: only one of them")
         check_choice(self.device, self.controller)
+        if self.console_token is not None:
+            _check_token(self.console_token)
         if self.robot_key is not None and self.keys is None:
             raise ValueError(
                 "--robot-key is given without --keys; valid: both (`feelahead keys make operator` makes our key)"
@@ -103,3 +106,13 @@ class OperatorSettings(SideOptions):
     def tells_facts(self) -> bool:
         """Whether the console's facts are shown in the terminal (--tui) or printed for a program (--status facts)."""
         return self.tui or self.status == "facts"
+
+
+def _check_token(path: Path) -> None:
+    """Raise ValueError unless the file holds a token that belongs into an address and cannot be guessed."""
+    try:
+        token = path.read_text(encoding="ascii").strip()
+    except (OSError, UnicodeDecodeError):
+        token = ""
+    if re.fullmatch(r"[\w-]{22,}", token) is None:
+        raise ValueError(f"--console-token {path}; valid: a file with 22 or more of the characters A-Z a-z 0-9 - _")

@@ -28,7 +28,7 @@ from robot_side.viewing.perceived_shapes import PerceivedModel
 from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.shapes import SceneModel
-from robot_side.viewing.viewpoints import first_person_eye
+from robot_side.viewing.viewpoints import first_person_eye, overview_eye
 
 TICK_PERIOD_S: Final = 1e-3
 _COMPILING: Final = (
@@ -81,8 +81,8 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         if recording is not None:
             recording.begin(robot_header(settings, epoch, clock_domain()) | {"notes": parts.notes})
         model = PerceivedModel(parts.scene) if parts.any_objects else SceneModel(parts.scene)
-        eye = first_person_eye(parts.scene) if settings.cameras.on else None
-        view = SceneView(model, parts.kinematics, parts.explains, parts.surroundings, eye)
+        eyes = (first_person_eye(parts.scene), overview_eye(parts.scene)) if settings.cameras.on else (None, None)
+        view = SceneView(model, parts.kinematics, parts.explains, parts.surroundings, *eyes)
         cameras = Cameras(parts.scene, settings.cameras, process.note) if settings.cameras.on else None
 
         def open_side() -> RobotTurns:

@@ -166,9 +166,10 @@ def _one_line(box: str, program: str, settings_type: type) -> str:
             said = f"--{place.replace('_', '-')} = {said[named.end() :]}"
     if "; valid: " in said:
         return _shortened(said)
-    said, fits = re.subn(r"no type matching \S*(FLOAT|INT)\S* could be instantiated from \[(.*)\]\.", r"\2", said)
-    if fits:
-        return f"{_shortened(said)}; valid: a number"
+    unfit = re.search(r"no type matching \S*(FLOAT|INT)\S* could be instantiated from \[(.*)\]\.", said)
+    if unfit:
+        kind = "a number" if "FLOAT" in unfit[0] else "a whole number"
+        return f"{_shortened(said[: unfit.start()] + unfit[2])}; valid: {kind}"
     # For an option with several values tyro does not name their kind.
     several = re.match(r"(--\S+): Could not find valid parse for arguments: \[(.*)\]$", said)
     if several:

@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from types import FrameType
 
 from common.command.flag_value import value_of
@@ -28,6 +29,7 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
     import.
     """
     LeavingAtOnce(_summary_path(sys.argv[1:]) if has_summary else None)
+    _open_closed_streams()
     _write_in_any_locale()
     if sys.argv[1:] == ["--version"]:
         try:
@@ -53,6 +55,11 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
     except KeyboardInterrupt:
         # Just before or after run_command's own handling; otherwise the exit status would be SIGINT's.
         sys.exit(0)
+    except ImportError as error:
+        # A package that the command imports late makes an ImportError of the interrupt, as MuJoCo does.
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        sys.exit(0)
 
 
 def _summary_path(arguments: Sequence[str]) -> str | None:
@@ -68,6 +75,13 @@ def single_threaded_algebra() -> None:
     """
     for library in ("OPENBLAS", "MKL", "OMP"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+
+def _open_closed_streams() -> None:
+    """Replace closed standard streams by the null device, as after `>&-`: else another file would take their number."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115  # open until the end
 
 
 def _write_in_any_locale() -> None:

@@ -34,6 +34,13 @@ def require_output_file(flag: str, path: Path | None, endings: Sequence[str] = (
         )
 
 
+def require_folder(flag: str, path: Path) -> None:
+    """Raise ConfigurationError if this user cannot make the missing folders of `path`, or write into its folder."""
+    first = next(folder for folder in path.absolute().parents if os.path.lexists(folder))
+    if not (first.is_dir() and os.access(first, os.W_OK | os.X_OK)):
+        raise ConfigurationError(f"{flag} {path}: {first} is no folder that this user may write to; valid: one that is")
+
+
 @contextmanager
 def output_file(flag: str, path: Path) -> Iterator[TextIO]:
     """Open `path` to write text, with line ends unchanged. The old content stays until the new text is complete.

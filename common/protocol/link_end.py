@@ -17,8 +17,6 @@ _REMEMBERED_EPOCHS = 64
 """Number of the peer's ended epochs that are remembered, and so refused; older ones are forgotten to bound memory."""
 _MOST_RECENT = 4096
 """Maximum number of arrivals in `recent`; enough for the last second."""
-_MOST_UNMEASURED = 4096
-"""Maximum number of arrivals kept until the clock offset settles: that takes a second, in which about 1000 arrive."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class LinkEnd:
     ) -> None:
         """`asymmetry_s`: least delay to the robot minus least delay to the operator, if known from elsewhere."""
         self.delay = RunningStatistics(seed)
-        """One-way delays from the peer in seconds, of all arrivals, fresh or not; empty until the offset settles."""
+        """One-way delays from the peer in seconds, of all arrivals since the offset settled, fresh or not."""
         self.round_trip = RunningStatistics(seed)
         """Round trips without the peer's holding time, in seconds, of all arrivals that echo a stamp."""
         self.recent: deque[tuple[float, float | None, float | None]] = deque(maxlen=_MOST_RECENT)
@@ -81,7 +79,6 @@ class LinkEnd:
         """Estimate of the peer's clock offset; begun anew with each epoch of the peer."""
         self._jumps = 0
         self.outgoing.reset()
-        self._unmeasured: deque[tuple[float, float]] = deque(maxlen=_MOST_UNMEASURED)
         self._queueing = QueueingAge()
         self._newest_of_kind: dict[type, int] = {}
         self._newest: Header | None = None
@@ -163,13 +160,13 @@ class LinkEnd:
         if sent_s is None or held_s is None:
             self.clock_offset.arrived(header.sent_s, now_s)
             return None
-        last = header.last_sent_s is None
         # A stamp from before our restart, or an invented one, says nothing about the link.
-        if not self.clock_offset.update(sent_s, header.sent_s, held_s, now_s, arrived_last=last):
+        if not self.clock_offset.update(sent_s, header.sent_s, held_s, now_s):
             return None
         self.outgoing.echoed(sent_s, header.sent_s - held_s)
         if header.last_sent_s is not None and header.last_held_s is not None:
-            self.clock_offset.overtaken(header.last_sent_s, header.sent_s, header.last_held_s, now_s)
+            # Without the message that a newer one overtook, round trips would be biased low on a link that reorders.
+            self.clock_offset.update(header.last_sent_s, header.sent_s, header.last_held_s, now_s)
         if self.clock_offset.round_trip_s is not None:
             self.round_trip.add(self.clock_offset.round_trip_s)
         return max(0.0, now_s - sent_s - held_s) + counted_s(held_s)
@@ -180,30 +177,18 @@ class LinkEnd:
             self._jumps = self.clock_offset.jumps
             self._queueing.reset()
             self.outgoing.reset()
-            self._unmeasured.clear()
         one_way_s = self.clock_offset.one_way_from_peer_s(sent_s, now_s)
-        if one_way_s is None or not self.clock_offset.settled:
-            self._unmeasured.append((sent_s, now_s))
-            return one_way_s
-        while self._unmeasured:
-            earlier_s = self.clock_offset.one_way_from_peer_s(*self._unmeasured.popleft())
-            if earlier_s is not None:
-                self.delay.add(earlier_s)
-        self.delay.add(one_way_s)
+        if one_way_s is not None and self.clock_offset.settled:
+            self.delay.add(one_way_s)
         return one_way_s
 
     def offset_summary_ms(self) -> dict[str, Any]:
-        """Return the clock offset's `value` and `bound` in ms, `skew_ppm` and `estimator`; None where unknown.
-
-        Also return the number of `rejected` stamps and of clock `jumps`.
-        """
+        """Return the offset's `value` and `bound` in ms, and how many stamps were `rejected` and `jumps` found."""
         offset = self.clock_offset
-        value_s, bound_s, skew = offset.offset_s, offset.bound_s, offset.skew
+        value_s, bound_s = offset.offset_s, offset.bound_s
         return {
             "value": None if value_s is None else 1e3 * value_s,
             "bound": None if bound_s is None else 1e3 * bound_s,
-            "skew_ppm": None if skew is None else 1e6 * skew,
-            "estimator": offset.estimator,
             "rejected": offset.rejected,
             "jumps": offset.jumps,
         }

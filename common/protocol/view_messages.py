@@ -73,7 +73,7 @@ class Shape(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=
 
 
 class Eye(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """Viewpoint of the first-person view at the start, in the tool frame."""
+    """Viewpoint of a view at the start: of the first-person view in the tool frame, of the overview in the world's."""
 
     position_m: Vector3
     forward: Vector3
@@ -109,7 +109,9 @@ class SceneShapes(Message, frozen=True, tag="shapes"):
     """(objects, 7) float32, rows as in SceneState: poses of all objects, for those that SceneState leaves out. Empty if
     SceneState has all of them"""
     eye: Eye | None = None
-    """None without pictures"""
+    """Of the first-person view; None without pictures"""
+    overview_eye: Eye | None = None
+    """None without pictures, and for a camera that moves"""
 
     def __post_init__(self) -> None:
         if len(self.object_poses) not in (0, _POSE_BYTES * len(self.objects)):

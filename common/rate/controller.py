@@ -75,11 +75,8 @@ class RateController:
     from the measured one, until it shrinks.
     """
 
-    def __init__(self, start_bit_s: float = START_BIT_S) -> None:
-        """Raises ValueError if `start_bit_s` is outside of LEAST_BIT_S to MOST_BIT_S."""
-        if not LEAST_BIT_S <= start_bit_s <= MOST_BIT_S:
-            raise ValueError(f"start_bit_s = {start_bit_s}; valid: {LEAST_BIT_S:g} to {MOST_BIT_S:g}")
-        self.rate_bit_s = start_bit_s
+    def __init__(self) -> None:
+        self.rate_bit_s = START_BIT_S
         """Allowed rate of all streams together, headers included."""
         self._limited_s = -math.inf
         self._updated_s = -math.inf

@@ -184,6 +184,8 @@ class HandshakeWatch:
         self._events.close(linger=0)
 
     def _reason(self, event: int) -> str:
+        if event == zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL and self._keys is None:
+            return "its port is open, but does not answer: it is still starting, or another program listens there"
         if self._keys is None:
             return "the robot side asks for keys; valid: with --keys FOLDER --robot-key KEY (feelahead keys --help)"
         if event == zmq.EVENT_HANDSHAKE_FAILED_AUTH:

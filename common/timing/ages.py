@@ -75,17 +75,15 @@ class LoopAge:
 class QueueingAge:
     """Queueing delay of a message: its one-way delay above the sliding minimum.
 
-    A constant clock offset cancels, and so does a constant delay. The minimum's window counts only time in which
-    messages arrive, at a resolution of a hundredth of the window. Otherwise the minimum would expire in a long pause,
+    A constant clock offset cancels, and so does a constant delay. The minimum's window of 10 s counts only time in
+    which messages arrive, at a resolution of 0.1 s. Otherwise the minimum would expire in a long pause,
     and the delayed messages after the pause would count as fresh.
     """
 
     _RESOLUTION = 100
+    _STEP_S = 0.1
 
-    def __init__(self, window_s: float = 10.0) -> None:
-        if not (math.isfinite(window_s) and window_s > 0.0):
-            raise ValueError(f"window_s = {window_s}; valid: a finite time above 0 s")
-        self._step_s = window_s / self._RESOLUTION
+    def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
@@ -104,6 +102,6 @@ class QueueingAge:
             raise ValueError(f"sent_s = {sent_s}, received_s = {received_s}; valid: finite seconds")
         if self._last_received_s is not None:
             gap_s = received_s - self._last_received_s
-            self._flowing_s += min(max(gap_s, 0.0), self._step_s)
+            self._flowing_s += min(max(gap_s, 0.0), self._STEP_S)
         self._last_received_s = received_s
-        return one_way_s - self._least_delay_s.update(int(self._flowing_s / self._step_s), one_way_s)
+        return one_way_s - self._least_delay_s.update(int(self._flowing_s / self._STEP_S), one_way_s)

@@ -30,6 +30,11 @@ class OffsetInterval:
         loosened_s = self._max_skew * abs(now_s - self._at_s)
         return self._least_s - loosened_s, self._greatest_s + loosened_s
 
+    @property
+    def bounded(self) -> bool:
+        """Whether both bounds are known."""
+        return self._greatest_s - self._least_s < math.inf
+
     def take_least(self, offset_s: float, margin_s: float) -> bool:
         """Bound the present offset below by `offset_s` − `margin_s`.
 

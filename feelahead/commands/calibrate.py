@@ -18,7 +18,7 @@ from common.clock import Clock, MonotonicClock, VirtualClock
 from common.command.command_line import parse_settings
 from common.command.stop_signal import StopSignal
 from common.errors import ConfigurationError, DeviceError
-from common.files.output_file import require_output_file
+from common.files.output_file import require_folder, require_output_file
 from operator_side.calibration.procedure import CalibrationProcedure, Step
 from operator_side.calibration.store import calibration_path, write_calibration
 from operator_side.controller.feel import RELEASED
@@ -80,6 +80,8 @@ def calibrate(arguments: Sequence[str]) -> int:
                     f"{controller.name} does not report its address, under which a calibration is stored; valid: a"
                     " controller that reports its address"
                 )
+            if kept_at is not None:
+                require_folder("calibration", kept_at)
             console.print(f"Calibrating {controller.name}", markup=False, highlight=False, soft_wrap=True)
             with _Screen(console) as show:
                 done = _measure(controller.device, procedure, clock, hands, stop, show)

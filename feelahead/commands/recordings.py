@@ -49,7 +49,8 @@ class ExportSettings(Limited):
 
     csv, parquet: a folder with a file for each topic at its original rate, and a file `joined` with all topics at
     100 Hz.
-    lerobot: a LeRobot dataset, v3.0, at the pictures' own rate, or --fps, cut into the marked episodes.
+    lerobot: a LeRobot dataset, v3.0, at the pictures' own rate, or --fps, cut into the marked episodes. Where the
+    package lerobot is installed, it writes the dataset, with pictures as video.
     """
 
     file: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.mcap")] = None
@@ -152,8 +153,7 @@ def _export(settings: ExportSettings, recording: Recording, folder: Path) -> str
     tables = read_tables(recording)
     if settings.format == "lerobot":
         frames = read_demonstrations(recording, tables, settings.fps)
-        export_lerobot(recording, frames, folder)
-        return frames.words()
+        return f"{frames.words()}; {export_lerobot(recording, frames, folder)}"
     return ", ".join((export_csv if settings.format == "csv" else export_parquet)(tables, folder))
 
 

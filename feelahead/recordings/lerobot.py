@@ -1,10 +1,13 @@
 """Export of a recording's episodes as a LeRobot dataset, v3.0, for learning from demonstrations.
 
+Where the package lerobot is installed, its own writer writes the dataset, with pictures as video. Elsewhere:
+
 data/chunk-000/file-000.parquet            one row for each frame, pictures as encoded bytes
 meta/info.json, stats.json, tasks.parquet
 meta/episodes/chunk-000/file-000.parquet   one row for each episode
 """
 
+import importlib.metadata
 import io
 import json
 from collections.abc import Mapping
@@ -14,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from common.arrays import FloatArray
+from common.errors import FeelaheadError
 from common.recording.reading import Recording
 from feelahead.recordings.demonstrations import Demonstrations, Episode, Picture
 
@@ -25,29 +29,66 @@ _SAMPLED_PICTURES: Final = 20
 _ENLARGED_QUALITY: Final = 90
 
 
-def export_lerobot(recording: Recording, frames: Demonstrations, folder: Path) -> None:
-    """Write the dataset into `folder`."""
+def export_lerobot(recording: Recording, frames: Demonstrations, folder: Path) -> str:
+    """Write the dataset into `folder`, which exists and is empty; return who wrote it, in words."""
+    try:
+        library = importlib.import_module("lerobot.datasets.lerobot_dataset")
+    except (ImportError, OSError, RuntimeError) as error:  # the latter two: a torch that does not fit
+        why = str(error).splitlines()[0]
+    else:
+        if library.CODEBASE_VERSION == _VERSION:
+            writer = f"lerobot {importlib.metadata.version('lerobot')}"
+            try:
+                _write_by(library, recording, frames, folder)
+            except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
+                raise FeelaheadError(f"{writer} cannot write {folder}: {error}") from error
+            return f"written by {writer}, pictures as video"
+        why = f"lerobot writes {library.CODEBASE_VERSION}"
+    _write(recording, frames, folder)
+    return f"written by feelahead, pictures as JPEG ({why})"
+
+
+def _write_by(library: Any, recording: Recording, frames: Demonstrations, folder: Path) -> None:
+    """Write the dataset by LeRobot's own writer, and add the episodes' success to its metadata."""
+    from PIL import Image  # noqa: PLC0415
+    from pyarrow import array, bool_, parquet  # noqa: PLC0415
+
+    values = {name: vector.values for name, vector in frames.vectors.items()} | _results(frames)
+    features, seen = _features(frames, values, "video")
+    folder.rmdir()  # the writer makes it
+    made = library.LeRobotDataset.create(
+        repo_id=f"feelahead/{recording.path.stem}",
+        fps=frames.rate_hz,
+        features={name: feature | {"shape": tuple(feature["shape"])} for name, feature in features.items()},
+        root=folder,
+        robot_type=_robot_type(recording),
+    )
+    for one in frames.episodes:
+        for row in range(one.first, one.end):
+            shown = {key: np.asarray(Image.open(io.BytesIO(of[row].jpeg)).convert("RGB")) for key, of in seen.items()}
+            made.add_frame({name: column[row] for name, column in values.items()} | shown | {"task": _TASK})
+        made.save_episode()
+    made.finalize()
+    for path in (folder / "meta" / "episodes").rglob("*.parquet"):
+        table = parquet.read_table(path)
+        success = [frames.episodes[number].success for number in table.column("episode_index").to_pylist()]
+        parquet.write_table(table.append_column("success", array(success, bool_())), path)
+
+
+def _write(recording: Recording, frames: Demonstrations, folder: Path) -> None:
     import pyarrow  # noqa: PLC0415
     from pyarrow import parquet  # noqa: PLC0415
 
-    values: dict[str, Any] = {name: vector.values for name, vector in frames.vectors.items()}
-    values |= _counters(frames)
-    features: dict[str, Any] = {}
+    values: dict[str, Any] = {name: vector.values for name, vector in frames.vectors.items()} | _counters(frames)
+    features, seen = _features(frames, values, "image")
     columns: dict[str, Any] = {}
     for name, column in values.items():
-        parts = frames.vectors[name].names if name in frames.vectors else None
-        features[name] = {"dtype": str(column.dtype), "shape": [1], "names": None}
         columns[name] = pyarrow.array(column.ravel())
-        if parts is not None:
-            features[name] |= {"shape": [len(parts)], "names": list(parts)}
-            columns[name] = pyarrow.FixedSizeListArray.from_arrays(columns[name], len(parts))
-    seen: dict[str, list[Picture]] = {}
-    for view, pictures in frames.shown.items():
-        key = f"observation.images.{view}"
-        seen[key], (width, height) = _of_one_size(pictures)
-        features[key] = {"dtype": "image", "shape": [height, width, 3], "names": ["height", "width", "channels"]}
+        if name in frames.vectors:
+            columns[name] = pyarrow.FixedSizeListArray.from_arrays(columns[name], column.shape[1])
+    for key, shown in seen.items():
         columns[key] = pyarrow.array(
-            [{"bytes": picture.jpeg, "path": f"frame-{row:06d}.jpg"} for row, picture in enumerate(seen[key])],
+            [{"bytes": picture.jpeg, "path": f"frame-{row:06d}.jpg"} for row, picture in enumerate(shown)],
             type=pyarrow.struct([("bytes", pyarrow.binary()), ("path", pyarrow.string())]),
         )
 
@@ -67,8 +108,27 @@ def export_lerobot(recording: Recording, frames: Demonstrations, folder: Path) -
     (folder / "meta" / "stats.json").write_text(json.dumps(stats(0, len(frames.times_s)), indent=4) + "\n")
 
 
+def _features(
+    frames: Demonstrations, values: Mapping[str, Any], pictures: str
+) -> tuple[dict[str, dict[str, Any]], dict[str, list[Picture]]]:
+    """Return the description of each feature, and each camera's pictures, all of one size.
+
+    pictures: `image` or `video`.
+    """
+    features: dict[str, dict[str, Any]] = {}
+    for name, column in values.items():
+        parts = list(frames.vectors[name].names) if name in frames.vectors else None
+        features[name] = {"dtype": str(column.dtype), "shape": [column.shape[1]], "names": parts}
+    seen = {}
+    for view, shown in frames.shown.items():
+        key = f"observation.images.{view}"
+        seen[key], (width, height) = _of_one_size(shown)
+        features[key] = {"dtype": pictures, "shape": [height, width, 3], "names": ["height", "width", "channels"]}
+    return features, seen
+
+
 def _counters(frames: Demonstrations) -> dict[str, Any]:
-    """Return the columns (n, 1) that number the frames, and say where episodes end and succeed if anybody said."""
+    """Return the columns (n, 1) that number the frames, and `_results`."""
     count = len(frames.times_s)
     lengths = [one.end - one.first for one in frames.episodes]
     within = np.concatenate([np.arange(length) for length in lengths])
@@ -79,12 +139,17 @@ def _counters(frames: Demonstrations) -> dict[str, Any]:
         "index": np.arange(count),
         "task_index": np.zeros(count, dtype=np.int64),
     }
-    if any(one.success is not None for one in frames.episodes):
-        done, success = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
-        done[[one.end - 1 for one in frames.episodes]] = True
-        success[[one.end - 1 for one in frames.episodes if one.success]] = True
-        counters |= {"next.done": done, "next.success": success}
-    return {name: values[:, None] for name, values in counters.items()}
+    return {name: values[:, None] for name, values in counters.items()} | _results(frames)
+
+
+def _results(frames: Demonstrations) -> dict[str, Any]:
+    """Return the columns (n, 1) that say where episodes end and succeed; none if nobody said."""
+    if all(one.success is None for one in frames.episodes):
+        return {}
+    done, success = (np.zeros((len(frames.times_s), 1), dtype=np.bool_) for _ in range(2))
+    done[[one.end - 1 for one in frames.episodes]] = True
+    success[[one.end - 1 for one in frames.episodes if one.success]] = True
+    return {"next.done": done, "next.success": success}
 
 
 def _of_one_size(shown: list[Picture]) -> tuple[list[Picture], tuple[int, int]]:
@@ -159,10 +224,9 @@ def _episode(number: int, episode: Episode, stats: Mapping[str, Any]) -> dict[st
 
 
 def _info(recording: Recording, features: Mapping[str, Any], frames: Demonstrations) -> dict[str, Any]:
-    settings = recording.headers.get("robot", {}).get("settings", {})
     return {
         "codebase_version": _VERSION,
-        "robot_type": Path(settings["model"]).stem if settings.get("model") else "feelahead",
+        "robot_type": _robot_type(recording),
         "total_episodes": len(frames.episodes),
         "total_frames": len(frames.times_s),
         "total_tasks": 1,
@@ -175,6 +239,11 @@ def _info(recording: Recording, features: Mapping[str, Any], frames: Demonstrati
         "video_path": None,
         "features": features,
     }
+
+
+def _robot_type(recording: Recording) -> str:
+    settings = recording.headers.get("robot", {}).get("settings", {})
+    return Path(settings["model"]).stem if settings.get("model") else "feelahead"
 
 
 def _first_file() -> str:

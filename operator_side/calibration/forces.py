@@ -74,8 +74,12 @@ def load_forces(address: str) -> ControllerForces:
 
     ConfigurationError, in one line with the remedy, if the file is invalid or of another controller.
     """
-    path = forces_path(address)
-    return read_forces(path, address) if path.exists() else ControllerForces()
+    return stored_forces(forces_path(address), address)
+
+
+def stored_forces(path: Path, address: str) -> ControllerForces:
+    """Return the content of the file `path`, or nothing measured without a file; errors as in `load_forces`."""
+    return read_forces(path, address) if path.is_file() else ControllerForces()
 
 
 def read_forces(path: Path, address: str) -> ControllerForces:

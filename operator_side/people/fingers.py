@@ -36,6 +36,8 @@ class Fingers:
         self._free = (SimulatedTrigger(), SimulatedTrigger())
         self._forces_n = (0.0, 0.0)
         self._now_s: float | None = None
+        self.also: AbstractSet[Button] = frozenset()
+        """Buttons that are pressed besides those of `do`"""
 
     def let_pass(self, now_s: float) -> None:
         """Move the expected, free triggers until `now_s` under the present forces."""
@@ -73,7 +75,7 @@ class Fingers:
         side = "right" if self._swap_sides else "left"
         self._device.set_sticks(**{side: getattr(self._calibration, f"{side}_stick").raw(stick)})
         run = button_of(swap_sides=self._swap_sides)[Action.RUN]
-        self._device.set_buttons(frozenset({run, *buttons}))
+        self._device.set_buttons(frozenset({run, *buttons, *self.also}))
 
 
 def within_unit_circle(x: float, y: float) -> Vector2:

@@ -23,6 +23,7 @@ from common.status.codes import Doing
 from operator_side.controller.feel import HINDERED_DRIVE, STANDS_DRIVE, WARNING_LIGHT
 from operator_side.controller.state import Button
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
+from operator_side.hands.button_map import BUTTON_OF, Action
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.fingers import Cue, Fingers, within_unit_circle
 from operator_side.people.looking import Glance, StalledApproach, StalledDescent
@@ -44,6 +45,8 @@ _DROPPED_S = 0.5
 """Seconds without a held object on the screen after which the person believes that it was dropped"""
 _CALM_S = 0.5
 """Seconds for which the person keeps triggers and sticks at rest after the controller's warning light"""
+_PRESSES_S: Final = 0.2
+"""Time in seconds for which the person presses the button that arms, or that marks an episode"""
 _CLEAR_M: Final = 0.01
 _CLEARS_S: Final = 3.0
 """Rise before the person draws back (first, in metres), and maximum time for it (second, in seconds)"""
@@ -53,6 +56,13 @@ _BACK_M: Final = 0.1
 """Distance by which the person draws back from an object that was set down, in metres"""
 
 _REST: Final[Vector2] = (0.0, 0.0)
+
+
+def _marked(before: Doing, after: Doing) -> Action | None:
+    """Return the mark of an episode that belongs to a change of phase, if any."""
+    if after is Doing.DONE:
+        return Action.SUCCESS if before is Doing.DRAWING_BACK else Action.FAILURE
+    return Action.START if (before, after) == (Doing.ARMING, Doing.ADVANCING) else None
 
 
 class SimulatedOperator:
@@ -88,7 +98,7 @@ class SimulatedOperator:
         self._holding_s = 0.0
         self._moves = MoveAndWait()
         self._nearing, self._sinking = StalledApproach(0.0), StalledDescent()
-        self._warned_s = -math.inf
+        self._warned_s = self._marked_s = -math.inf
 
     @property
     def doing(self) -> Doing:
@@ -105,6 +115,8 @@ class SimulatedOperator:
         while self._seen and self._seen[0][0] <= now_s - self._settings.visual_reaction_s:
             self._view = self._seen.popleft()[1]
         self._feel(now_s)
+        if now_s - self._marked_s > _PRESSES_S:
+            self._fingers.also = frozenset()
         if self._device.commanded.light == WARNING_LIGHT:
             self._warned_s = now_s
         if self._view is None or now_s - self._warned_s < _CALM_S:
@@ -133,6 +145,8 @@ class SimulatedOperator:
         self._stands |= self._pulse.acted_on(now_s, seeing and self._device.rumble.right > _HARD)
 
     def _enter(self, phase: Doing, now_s: float) -> None:
+        if self._settings.marks and (action := _marked(self.phase, phase)):
+            self._fingers.also, self._marked_s = {BUTTON_OF[action]}, now_s
         self.phase = phase
         self._since_s = now_s
         self._gently_along = self._gently_across = self._stands = False
@@ -149,7 +163,7 @@ class SimulatedOperator:
             self._enter(Doing.ARMING, look.now_s)
 
     def _arming(self, look: Glance) -> None:
-        pressing = self._elapsed_s(look) < 0.2
+        pressing = self._elapsed_s(look) < _PRESSES_S
         self._fingers.do(0.0, _REST, {Button.OPTIONS} if pressing else set())
         if look.view.state == "armed":
             self._aim(look.now_s)

@@ -48,6 +48,9 @@ class PersonSettings(Limited):
     """Distance by which the person lifts the object, in metres."""
     carry_m: _Usual = 0.06
     """Distance by which the person carries the object back towards the robot before setting it down, in metres."""
+    marks: bool = False
+    """Whether the person marks the run as an episode: start once armed, then success, or failure if the object was
+    dropped or never grasped."""
     pull_n: Annotated[float, Meta(ge=0.0, le=20.0)] | None = None
     """Force on R2, in N. If given, the person only arms the robot and then pulls R2 with this force until the end. 2 N
     is a light pull, 3.7 N a normal one."""

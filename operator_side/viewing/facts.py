@@ -65,6 +65,8 @@ class HandsFacts(msgspec.Struct, frozen=True):
     """Share of a page's motion that counts, 0 to 1: less while the pictures are old"""
     reset_first: bool = False
     """Whether a stop must be reset before a page's hands count"""
+    yields: tuple[bool, bool] = (False, False)
+    """For L2 and R2, whether the pull of the page's keys yields to stiff zones, as a finger of 2 N would"""
 
 
 class PictureFacts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

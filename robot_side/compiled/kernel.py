@@ -66,9 +66,12 @@ def record_array(dtype: np.dtype) -> Any:
     return numba.types.Array(numba.from_dtype(dtype), 1, "C")
 
 
-def tuple_type(*parts: Any) -> Any:
-    """Return the Numba type of a tuple of `parts`. A dozen arrays in a tuple are passed as fast as one array."""
-    return cast(Any, numba.types).Tuple(parts)
+def tuple_type(*parts: Any, named: type | None = None) -> Any:
+    """Return the Numba type of a tuple of `parts`, or of the named tuple `named` with these fields.
+
+    A dozen arrays in a tuple are passed as fast as one array.
+    """
+    return cast(Any, numba.types.BaseTuple).from_types(parts, named)
 
 
 FLOAT64: Any = numba.types.float64

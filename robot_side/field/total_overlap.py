@@ -22,23 +22,15 @@ _NOWHERE = np.empty(0)
 
 
 def total_overlap_m3(
-    spheres: FloatArray,
-    scene: SceneTable,
-    classes: IntArray,
-    inflated_m: FloatArray | None = None,
-    moved_m: FloatArray | None = None,
-    of_objects_m3: FloatArray = _NOWHERE,
+    spheres: FloatArray, scene: SceneTable, classes: IntArray, of_objects_m3: FloatArray = _NOWHERE
 ) -> float:
     """Return Σ V_ij in m³ of spheres i (m, 4), centres and radii, with all objects j except those of the class SKIPPED.
 
-    classes (k,): the objects'. inflated_m (m, 1 or more): its first column is added to the radii. moved_m (3,): added
-    to all centres. of_objects_m3 (k,), if given, is filled with the sum for each object that is near; other entries
-    stay. ValueError for a sphere that is not finite, because it would compare as far away.
+    classes (k,): the objects'. of_objects_m3 (k,), if given, is filled with the sum for each object that is near; other
+    entries stay. ValueError for a sphere that is not finite, because it would compare as far away.
     """
-    by_m = np.zeros_like(spheres) if inflated_m is None else inflated_m
-    total = sum_overlaps(
-        spheres, by_m, np.zeros(3) if moved_m is None else moved_m, classes, scene.bundle, np.empty(3), of_objects_m3
-    )
+    still = np.zeros_like(spheres), np.zeros(3)
+    total = sum_overlaps(spheres, *still, classes, scene.bundle, np.empty(3), of_objects_m3)
     if math.isnan(total):
         raise ValueError("spheres holds NaN or infinity; valid: finite numbers")
     return float(total)
@@ -60,7 +52,11 @@ def sum_overlaps(
     overlap_gradient: FloatArray,
     of_objects: FloatArray,
 ) -> float:
-    """Return Σ V_ij in m³ as `total_overlap_m3` does; NaN if a number is not finite. overlap_gradient (3,): scratch."""
+    """Return Σ V_ij in m³ as `total_overlap_m3` does; NaN if a number is not finite.
+
+    inflated (m, 1 or more): its first column is added to the radii. moved (3,): added to all centres. overlap_gradient
+    (3,): scratch.
+    """
     scene, shift, count = _scene_at(scene_bundle), load(moved.reshape(1, 3), 0), spheres.shape[0]
     check = shift[0] + shift[1] + shift[2]
     for i in range(count):

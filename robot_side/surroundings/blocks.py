@@ -72,9 +72,9 @@ def _bound(bounds: FloatArray, which: IntArray, blocks: FloatArray, groups: Floa
 class Blocks:
     """Order of a scene's objects, and bounds of their blocks."""
 
-    def __init__(self, object_bounds: FloatArray, order: IntArray | None = None) -> None:
-        """object_bounds (k, 4): centres and radii. order: as found for earlier positions; None makes a new one."""
-        self.order = in_blocks(object_bounds) if order is None else order
+    def __init__(self, object_bounds: FloatArray) -> None:
+        """object_bounds (k, 4): centres and radii."""
+        self.order = in_blocks(object_bounds)
         """(o,) indices of the objects that have bounds, in the order of the blocks"""
         self._object_bounds = object_bounds
         self.bounds: FloatArray = object_bounds[self.order]

@@ -11,24 +11,11 @@ from robot_side.surroundings.kinds.layout import MESH
 from robot_side.surroundings.scene_table import SceneTable
 
 
-def nearest_points(points_m: FloatArray, scene: SceneTable, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return distances (p,) in m and directions (p, 3) from points (p, 3) to the primitives `rows` (p,), pair by pair.
-
-    Distances are positive outside. A direction is the unit vector along which the distance falls fastest.
-    """
-    distances, directions = np.empty(len(rows)), np.empty((len(rows), 3))
-    points_m = np.ascontiguousarray(points_m)
-    _nearest_loop(points_m, scene.shapes, scene.kinds, rows, distances, directions)
-    meshes = np.flatnonzero(scene.kinds.take(rows) == MESH)
-    if len(meshes):
-        distances[meshes], directions[meshes] = nearest_mesh_points(points_m[meshes], scene, rows[meshes])
-    return distances, directions
-
-
 def nearest_mesh_points(points_m: FloatArray, scene: SceneTable, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return what `nearest_points` returns, for rows that are all meshes.
+    """Return distances (p,) in m and directions (p, 3) from points (p, 3) to the meshes in `rows` (p,), pair by pair.
 
-    ValueError for a scene without a mesh library.
+    Distances are positive outside. A direction is the unit vector along which the distance falls fastest. ValueError
+    for a scene without a mesh library.
     """
     # A scene without meshes does not load the kernels for them.
     from robot_side.overlap.meshes.mesh_library import nearest_mesh_pairs  # noqa: PLC0415
@@ -58,23 +45,6 @@ def object_distances(centers_m: FloatArray, radii_m: FloatArray, scene: SceneTab
             thing = scene.object_index[row]
             gaps[thing] = min(gaps[thing], float((apart - radii_m[near]).min()))
     return np.where(gaps <= reach_m, gaps, np.inf)
-
-
-@compiled(input_array(2), input_array(2), input_indices(), input_indices(), output_array(1), output_array(2))
-def _nearest_loop(
-    points: FloatArray,
-    shapes: FloatArray,
-    kinds: IntArray,
-    rows: IntArray,
-    distances: FloatArray,
-    directions: FloatArray,
-) -> None:
-    for k in range(rows.size):
-        if kinds[rows[k]] == MESH:
-            continue
-        distances[k], direction = nearest(kinds[rows[k]], shapes, rows[k], load(points, k))
-        for axis in range(3):
-            directions[k, axis] = direction[axis]
 
 
 @compiled(input_array(2), input_array(2), input_array(2), input_indices(), input_indices(), FLOAT64, output_array(1))

@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
-from robot_side.compiled.kernel import BOOL, building_block, compiled, input_indices, output_array
+from robot_side.compiled.kernel import building_block, compiled, input_indices, output_array
 from robot_side.surroundings.bounds import write_around
 from robot_side.surroundings.kinds.kind import by_kind
 from robot_side.surroundings.kinds.layout import SHAPE_NUMBERS
@@ -24,7 +24,6 @@ def place_one(kind: int, numbers: FloatArray, k: int, bounds: FloatArray, row: i
 @compiled(
     *(output_array(2), input_indices(), input_indices()),
     *(output_array(2), output_array(1), output_array(2), output_array(1)),
-    returns=BOOL,
 )
 def _place(
     numbers: FloatArray,
@@ -34,18 +33,15 @@ def _place(
     volumes: FloatArray,
     object_bounds: FloatArray,
     object_volumes: FloatArray,
-) -> bool:
-    solid = True
+) -> None:
     for row in range(kinds.size):
         volumes[row] = place_one(kinds[row], numbers, row, bounds, row)
     for thing in range(first_rows.size - 1):
         first, end, volume = first_rows[thing], first_rows[thing + 1], 0.0
         for row in range(first, end):
-            solid = solid and volumes[row] > 0.0
             volume += volumes[row]
         object_volumes[thing] = volume
         write_around(bounds, first, end, object_bounds[thing])
-    return solid
 
 
 class Rows(NamedTuple):
@@ -57,8 +53,6 @@ class Rows(NamedTuple):
     """(n,) volume of each primitive, in m³"""
     object_bounds: FloatArray
     object_volumes: FloatArray
-    solid: bool
-    """Whether all primitives have a volume"""
 
 
 def placed_rows(numbers: FloatArray, kinds: IntArray, first_rows: IntArray) -> Rows:
@@ -69,9 +63,9 @@ def placed_rows(numbers: FloatArray, kinds: IntArray, first_rows: IntArray) -> R
     rows, objects, numbers = len(kinds), len(first_rows) - 1, numbers.copy()
     bounds, volumes = np.empty((rows, 4)), np.empty(rows)
     object_bounds, object_volumes = np.empty((objects, 4)), np.empty(objects)
-    solid = _place(numbers, kinds, first_rows, bounds, volumes, object_bounds, object_volumes)
+    _place(numbers, kinds, first_rows, bounds, volumes, object_bounds, object_volumes)
     shapes = np.ascontiguousarray(numbers[:, :SHAPE_NUMBERS])
-    return Rows(shapes, bounds, volumes, object_bounds, object_volumes, bool(solid))
+    return Rows(shapes, bounds, volumes, object_bounds, object_volumes)
 
 
 class Primitives(NamedTuple):

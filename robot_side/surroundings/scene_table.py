@@ -1,6 +1,6 @@
 """Table of one frame's objects for the compiled law: a row for each primitive, grouped by object."""
 
-from dataclasses import InitVar, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ from robot_side.surroundings.blocks import TOGETHER, Blocks
 from robot_side.surroundings.kinds.layout import MESH, NUMBERS
 from robot_side.surroundings.moving_rows import FLAT, WRITTEN, write_movers
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects, SomeObjects
-from robot_side.surroundings.placing import Rows, numbers_of, placed_rows, primitives_of
+from robot_side.surroundings.placing import numbers_of, placed_rows, primitives_of
 from robot_side.surroundings.scene_columns import SCENE
 from robot_side.surroundings.validity import require_valid
 
@@ -53,12 +53,11 @@ class SceneTable:
     """(k,) volume of each object, in m³"""
     flat: int
     """Number of primitives left out because they have no volume, so that nothing can overlap them"""
-    order: InitVar[IntArray | None] = None
     moving: MoverRows | None = None
     """Movers whose newest numbers are in the table; None without such"""
 
-    def __post_init__(self, order: IntArray | None) -> None:
-        self.blocks = Blocks(self.object_bounds, order)
+    def __post_init__(self) -> None:
+        self.blocks = Blocks(self.object_bounds)
         self.object_order, self.ordered_bounds = self.blocks.order, self.blocks.bounds
         self.block_bounds, self.group_bounds = self.blocks.blocks, self.blocks.groups
 
@@ -138,48 +137,6 @@ def _write_movers(table: SceneTable, moving: MoverRows, numbers: FloatArray) -> 
     return found
 
 
-def _owners(objects: PerceivedObjects) -> tuple[IntArray, ...]:
-    return tuple(getattr(objects, kind.owner) for kind in KINDS)
-
-
-def moved_table(last: SceneTable, objects: PerceivedObjects) -> SceneTable | None:
-    """Return the table of the same objects at new poses; None if the objects differ or a primitive has no volume."""
-    same = last.flat == 0 and len(last.objects.names) == len(objects.names)
-    owners = zip(_owners(last.objects), _owners(objects), strict=True)
-    if not (same and all(old is new or old.tobytes() == new.tobytes() for old, new in owners)):
-        return None
-    starts = np.cumsum([0, *map(len, _owners(objects))])
-    rows = placed_rows(numbers_of(objects)[starts.take(last.kinds) + last.rows_of_kind], last.kinds, last.first_rows)
-    return (
-        _table(objects, last.kinds, last.rows_of_kind, last.first_rows, rows, 0, last.blocks.order)
-        if rows.solid
-        else None
-    )
-
-
-def _table(
-    objects: PerceivedObjects,
-    kinds: IntArray,
-    rows_of_kind: IntArray,
-    first_rows: IntArray,
-    rows: Rows,
-    flat: int,
-    order: IntArray | None = None,
-) -> SceneTable:
-    return SceneTable(
-        objects=objects,
-        bounds=rows.bounds,
-        shapes=rows.shapes,
-        kinds=kinds,
-        rows_of_kind=rows_of_kind,
-        first_rows=first_rows,
-        object_bounds=rows.object_bounds,
-        object_volumes=rows.object_volumes,
-        flat=flat,
-        order=order,
-    )
-
-
 def make(objects: PerceivedObjects) -> SceneTable:
     """Return the table of a valid frame: primitives grouped by object, without primitives that have no volume."""
     owners, kinds, rows_of_kind = primitives_of(objects)
@@ -189,4 +146,14 @@ def make(objects: PerceivedObjects) -> SceneTable:
     order = order[volumes[order] > 0.0]
     first_rows = np.searchsorted(owners[order], np.arange(len(objects.names) + 1))
     rows = placed_rows(numbers[order], kinds[order], first_rows)
-    return _table(objects, kinds[order], rows_of_kind[order], first_rows, rows, len(owners) - len(order))
+    return SceneTable(
+        objects=objects,
+        bounds=rows.bounds,
+        shapes=rows.shapes,
+        kinds=kinds[order],
+        rows_of_kind=rows_of_kind[order],
+        first_rows=first_rows,
+        object_bounds=rows.object_bounds,
+        object_volumes=rows.object_volumes,
+        flat=len(owners) - len(order),
+    )

@@ -5,7 +5,7 @@ from typing import Final
 from common.arrays import FloatArray
 from common.roles import Role
 from robot_side.surroundings.perceived import ObjectSource, PerceivedObjects
-from robot_side.surroundings.scene_table import SceneTable, go_to, make, moved_table
+from robot_side.surroundings.scene_table import SceneTable, go_to, make
 from robot_side.surroundings.target import center_m, next_target, object_centers
 from robot_side.surroundings.validity import require_valid
 
@@ -36,9 +36,7 @@ class Surroundings:
         table = self._tables.get(id(first))
         if table is None:
             require_valid(first)
-            last = next(reversed(self._tables.values()), None)
-            moved = None if last is None else moved_table(last, first)
-            table = self._keep(first, make(first) if moved is None else moved)
+            table = self._keep(first, make(first))
         if table.objects is not frame and not go_to(table, frame):
             return self._keep(frame, make(frame))
         return table
@@ -84,7 +82,9 @@ class Sight:
 
     def choose_next(self, objects: PerceivedObjects, tool_position_m: FloatArray, approach: FloatArray) -> None:
         """Make the next object along the unit vector `approach` (3,) the target."""
-        chosen = next_target(objects, self.target, object_centers(objects), tool_position_m, approach)
+        chosen = next_target(
+            objects, self.target, object_centers(self._surroundings.see(objects)), tool_position_m, approach
+        )
         if chosen is None:
             return
         if self.target is not None:

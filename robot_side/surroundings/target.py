@@ -9,7 +9,7 @@ from common.roles import Role
 from robot_side.compiled.columns import BUNDLE
 from robot_side.compiled.kernel import INT64, compiled, output_array
 from robot_side.surroundings.kinds.layout import HALF_SPACE, TETRAHEDRON
-from robot_side.surroundings.perceived import KINDS, PerceivedObjects
+from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_columns import SCENE
 from robot_side.surroundings.scene_table import SceneTable
 
@@ -18,43 +18,41 @@ _OFF_AXIS_WEIGHT = 3.0
 _scene = SCENE.at
 
 
-def object_centers(objects: PerceivedObjects) -> FloatArray:
-    """Return each object's centre (k, 3), the mean of its primitives' centres, in m; NaN if infinite or ignored.
-
-    A mesh's centre is that of its bounding box in its own frame.
-    """
-    count = len(objects.names)
-    parts = [(kind.centers(*kind.read(objects)), getattr(objects, kind.owner)) for kind in KINDS if kind.centers]
-    centers, owners = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-    counts = np.bincount(owners, minlength=count)
-    sums = np.column_stack([np.bincount(owners, weights=centers[:, axis], minlength=count) for axis in range(3)])
-    with np.errstate(invalid="ignore"):
-        centers_m: FloatArray = sums / np.where(counts > 0.0, counts, np.nan)[:, None]
-    return centers_m
-
-
-@compiled(BUNDLE, INT64, output_array(1))
-def _center(bundle: IntArray, thing: int, center: FloatArray) -> None:
-    scene, count = _scene(bundle), 0
-    center[:] = 0.0
-    for row in range(scene.first_rows[thing], scene.first_rows[thing + 1]):
-        if scene.kinds[row] == HALF_SPACE:
-            continue
-        count += 1
-        points = 4 if scene.kinds[row] == TETRAHEDRON else 1
+@compiled(BUNDLE, INT64, output_array(2))
+def _center(bundle: IntArray, first: int, centers: FloatArray) -> None:
+    """Fill the centres (m, 3) of the m objects from number `first` on."""
+    scene = _scene(bundle)
+    centers[:] = 0.0
+    for k in range(centers.shape[0]):
+        count = 0
+        for row in range(scene.first_rows[first + k], scene.first_rows[first + k + 1]):
+            if scene.kinds[row] == HALF_SPACE:
+                continue
+            count += 1
+            points = 4 if scene.kinds[row] == TETRAHEDRON else 1
+            for axis in range(3):
+                total = 0.0
+                for point in range(points):
+                    total += scene.shapes[row, 3 * point + axis]
+                centers[k, axis] += total / points
         for axis in range(3):
-            total = 0.0
-            for point in range(points):
-                total += scene.shapes[row, 3 * point + axis]
-            center[axis] += total / points
-    for axis in range(3):
-        center[axis] = center[axis] / count if count > 0 else math.nan
+            centers[k, axis] = centers[k, axis] / count if count > 0 else math.nan
+
+
+def object_centers(table: SceneTable) -> FloatArray:
+    """Return each object's centre (k, 3), as `center_m` does; NaN for an object that is infinite or ignored."""
+    centers: FloatArray = np.empty((len(table.first_rows) - 1, 3))
+    _center(table.bundle, 0, centers)
+    return centers
 
 
 def center_m(table: SceneTable, thing: int) -> FloatArray:
-    """Return the centre (3,) of one object of a table, the mean over the primitives that have a volume."""
+    """Return the centre (3,) of one object of a table, the mean over its primitives that have a volume, in m.
+
+    A mesh's centre is that of its bounding box in its own frame.
+    """
     center: FloatArray = np.empty(3)
-    _center(table.bundle, thing, center)
+    _center(table.bundle, thing, center.reshape(1, 3))
     return center
 
 

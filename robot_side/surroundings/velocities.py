@@ -16,13 +16,9 @@ _FRAMES: Final = 8
 
 
 class ObjectVelocities:
-    """Slope of each object's positions over a time window, by least squares."""
+    """Slope of each object's positions over WINDOW_S, by least squares."""
 
-    def __init__(self, window_s: float = WINDOW_S) -> None:
-        """ValueError unless the window is above 0."""
-        if not window_s > 0.0:
-            raise ValueError(f"window_s = {window_s}; valid: above 0")
-        self._window_s = window_s
+    def __init__(self) -> None:
         self._times_s: FloatArray = np.empty(0)
         self._positions_m: FloatArray = np.empty((0, 0))
         self._kept = 0
@@ -42,7 +38,7 @@ class ObjectVelocities:
             self._times_s, self._positions_m = np.resize(self._times_s, rows), np.empty((rows, positions_m.size))
             self._positions_m[: self._kept] = seen_m
         velocities: FloatArray = np.empty(positions_m.shape)
-        oldest_s, flat = time_s - self._window_s - 1e-9, positions_m.reshape(-1)
+        oldest_s, flat = time_s - WINDOW_S - 1e-9, positions_m.reshape(-1)
         seen = self._times_s, self._positions_m, self._kept
         self._kept = _see(*seen, time_s, oldest_s, flat, velocities.reshape(-1))
         return velocities

@@ -12,17 +12,14 @@ from av.video.frame import PictureType
 from av.video.reformatter import VideoReformatter
 
 _ENDLESS: Final = 1 << 30
+"""Number of pictures between whole ones that nobody ordered"""
 
 
 class H264:
     """Encoder of one view. It uses only the previous picture, never a later one, so it delays no picture."""
 
-    def __init__(self, preset: str = "superfast", refresh: int = _ENDLESS) -> None:
-        """preset: of x264. refresh: number of pictures in which a column of intra refresh sweeps over the view.
-
-        av.FFmpegError or ValueError if this FFmpeg has no x264.
-        """
-        self._preset, self._refresh = preset, refresh
+    def __init__(self) -> None:
+        """Raise av.FFmpegError or ValueError if this FFmpeg has no x264."""
         self._reformatter = VideoReformatter()
         self._kind: tuple[int, int, int] | None = None
         self._encoder: VideoCodecContext = CodecContext.create("libx264", "w")
@@ -44,18 +41,18 @@ class H264:
         self.number += 1
         return b"".join(bytes(packet) for packet in self._encoder.encode(frame)), whole
 
-    def _opened(self, width: int, height: int, factor: int) -> VideoCodecContext:
+    @staticmethod
+    def _opened(width: int, height: int, factor: int) -> VideoCodecContext:
         encoder: VideoCodecContext = CodecContext.create("libx264", "w")
         encoder.width, encoder.height, encoder.pix_fmt = width, height, "yuvj420p"
         encoder.framerate = Fraction(30)
         encoder.time_base = Fraction(1, 30)
-        encoder.gop_size, encoder.max_b_frames, encoder.thread_count = self._refresh, 0, 1
+        encoder.gop_size, encoder.max_b_frames, encoder.thread_count = _ENDLESS, 0, 1
         encoder.options = {
-            "preset": self._preset,
+            "preset": "superfast",
             "tune": "zerolatency",
             "crf": str(factor),
             "forced-idr": "1",
-            "intra-refresh": str(int(self._refresh < _ENDLESS)),
             # Without detection of cuts, which would make whole pictures that nobody ordered.
             "sc_threshold": "0",
         }

@@ -65,8 +65,9 @@ class SceneView:
         law: Explains,
         surroundings: Surroundings,
         eye: Eye | None = None,
+        overview_eye: Eye | None = None,
     ) -> None:
-        """eye: viewpoint of the first-person view; None without pictures."""
+        """eye, overview_eye: viewpoints as in SceneShapes."""
         self.version = 0
         self.shapes: Prepared | None = None
         """Newest finished SceneShapes message; None before `work_on_shapes` has finished the first"""
@@ -75,7 +76,7 @@ class SceneView:
         self._model = model
         self._kinematics = kinematics
         self._law = law
-        self._surroundings, self._eye = surroundings, eye
+        self._surroundings, self._eyes = surroundings, (eye, overview_eye)
         self._links: tuple[tuple[Shape, ...], int] | None = None
         self._base: PerceivedObjects | None = None
         """Objects as they were when the shapes were made"""
@@ -197,7 +198,7 @@ class SceneView:
         self.version += 1
         self._base, self.left_out = objects, left_out
         said = SceneShapes(
-            header, self.version, model.links, model.objects, tuple(shapes), left_out, _row_bytes(poses), self._eye
+            header, self.version, model.links, model.objects, tuple(shapes), left_out, _row_bytes(poses), *self._eyes
         )
         self.shapes = Prepared(said)
         self.shapes_bytes = len(self.shapes.under(header))

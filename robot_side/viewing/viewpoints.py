@@ -26,8 +26,21 @@ def viewpoints(scene: Scene) -> dict[ViewName, Viewpoint]:
 
 def first_person_eye(scene: Scene) -> Eye:
     """Return the first-person viewpoint in the tool frame, for a scene at its start."""
-    model, data, view = scene.model, scene.data, _first_person(scene)
-    tool_m, tool = data.site_xpos[scene.robot.site], data.site_xmat[scene.robot.site].reshape(3, 3)
+    tool_m, tool = scene.data.site_xpos[scene.robot.site], scene.data.site_xmat[scene.robot.site].reshape(3, 3)
+    return _eye(scene, _first_person(scene), tool_m, tool)
+
+
+def overview_eye(scene: Scene) -> Eye | None:
+    """Return the overview's viewpoint in the world frame, for a scene at its start; None for a camera that moves."""
+    view, model = _overview(scene), scene.model
+    if view.camera is not None and model.body_weldid[model.cam_bodyid[view.camera]] != 0:
+        return None
+    return _eye(scene, view, np.zeros(3), np.eye(3))
+
+
+def _eye(scene: Scene, view: Viewpoint, frame_m: FloatArray, frame: FloatArray) -> Eye:
+    """Return a viewpoint in a frame: its origin (3,) and its axes as columns (3, 3), in the world frame."""
+    model, data = scene.model, scene.data
     if view.camera is not None:
         # A camera looks along its own -z, with y upwards.
         axes, place_m = data.cam_xmat[view.camera].reshape(3, 3), data.cam_xpos[view.camera]
@@ -36,7 +49,7 @@ def first_person_eye(scene: Scene) -> Eye:
         axes, fovy_deg = data.xmat[view.body].reshape(3, 3), view.fovy_deg
         place_m = data.xpos[view.body] + axes @ view.position_m
         forward, up = axes @ view.forward, axes @ view.up
-    return Eye(_triple(tool.T @ (place_m - tool_m)), _triple(tool.T @ forward), _triple(tool.T @ up), fovy_deg)
+    return Eye(_triple(frame.T @ (place_m - frame_m)), _triple(frame.T @ forward), _triple(frame.T @ up), fovy_deg)
 
 
 def stick_frames(scene: Scene) -> StickFrames:

@@ -6,9 +6,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-import msgspec
+from msgspec.structs import replace
 
 from common.clock import MonotonicClock
+from common.protocol.messages import MotionState
 from common.protocol.view_messages import VIEW_NAMES
 from common.status.codes import Hands
 from operator_side.viewing.console.console import Console
@@ -29,7 +30,13 @@ class Fed:
     age_s: float = 0.0
     sends: bool = True
     """Whether pictures come"""
-    page: HandsFacts = field(default_factory=lambda: HandsFacts(True, "page", False, "", None))
+    tells: bool = True
+    """Whether facts come"""
+    state: MotionState = "armed"
+    status: dict[str, Any] = field(default_factory=dict)
+    """Changes to the status"""
+    page: HandsFacts = field(default_factory=lambda: HandsFacts(True, "page", False, "", None, yields=(False, True)))
+    """Facts for the page; a page that asks to drive is the driver"""
     pictures: PictureFacts = field(default_factory=lambda: PictureFacts((OLD_S,) * 2, (OLD_S,) * 2))
     notes: list[str] = field(default_factory=list)
     address: str | None = None
@@ -37,18 +44,26 @@ class Fed:
 
     def feed(self) -> None:
         """Feed 20 times a second until the end."""
-        clock, pictures, step = MonotonicClock(), Pictures(), 0
+        clock, pictures, step, driver = MonotonicClock(), Pictures(), 0, ""
         with Console("test") as console:
             while not self.ends.wait(0.05):
                 console.receive()
                 self.address, now_s, step = console.address, clock.now(), step + 1
-                told: dict[str, Any] = {"hands": Hands.BROWSER, "page": self.page, "pictures": self.pictures}
+                for _, said in console.words:
+                    if said is not None and "hands" in said:
+                        driver = said["hands"]["page"] if said["hands"]["driving"] else ""
+                console.words.clear()
+                made = facts(now_s, self.state)
+                page = replace(self.page, driver=driver or self.page.driver)
+                status = replace(made.status, **self.status)
                 while self.notes:
                     console.note(self.notes.pop())
                 if step % 20 == 0:
                     console.view(shapes(), video=False)
                 console.view(state(now_s), video=False)
-                console.facts(msgspec.structs.replace(facts(now_s), **told))
+                if self.tells:
+                    told = {"hands": Hands.BROWSER, "page": page, "status": status, "pictures": self.pictures}
+                    console.facts(replace(made, **told))
                 for view in VIEW_NAMES if self.sends else ():
                     console.view(pictures.frame(view, now_s, step, now_s - self.age_s), video=True)
 

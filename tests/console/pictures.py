@@ -11,7 +11,7 @@ import pytest
 from common.errors import FeelaheadError
 from tests.console.film_of_compare import make_compare_film
 from tests.console.film_of_replay import make_film
-from tests.console.pictures_of_page import make_first_minute
+from tests.console.pictures_of_page import SIZES, STATES, make_first_minute, make_states
 from tests.console.pictures_of_recording import make_pictures_of_recording
 from tests.helpers.repository import ROOT
 
@@ -21,14 +21,18 @@ PARTS: Final[Mapping[str, tuple[Sequence[str], Callable[[Path, Sequence[Path]], 
     "recording": (["console/terminal.svg", "recording/run.png"], make_pictures_of_recording),
     "film": (["console/demo.webp"], make_film),
     "compare": (["console/compare.webp"], make_compare_film),
+    "states": (
+        [f"../console-pictures/{state}-{width}x{height}.png" for state in STATES for width, height in SIZES],
+        make_states,
+    ),
 }
-"""Files within docs/ of each part, and the function that makes them"""
+"""Files of each part, from docs/ on, and the function that makes them; `states` is for a look, and made if named"""
 _TRIES: Final = 3
 
 
 def main(names: Sequence[str]) -> int:
     """Make the parts `names`, or all parts. Return 0 if all were made, or if no browser is available; otherwise 1."""
-    for name in names or PARTS:
+    for name in names or [part for part in PARTS if part != "states"]:
         files, make = PARTS[name]
         paths = [DOCS / file for file in files]
         for left in reversed(range(_TRIES)):

@@ -26,6 +26,7 @@ def test_keys_ramp_up_and_let_go_at_once(browser: Browser) -> None:
         half = alone.pulled[1]
         alone.let_pass(0.4)
         full = alone.pulled[1]
+        assert _keyed(alone)
         keyboard.up("KeyW")
         alone.let_pass(0.04)
         after = alone.pulled[1]
@@ -75,6 +76,25 @@ def test_every_key_does_what_it_says(browser: Browser) -> None:
             assert moved <= {name}
 
 
+def _marks(alone: HandsAlone) -> list[str]:
+    return [message["mark"] for message in alone.messages if "mark" in message]
+
+
+@pytest.mark.parametrize("may_drive", [True, False])
+def test_a_gamepads_directional_pad_marks_as_a_dualsense_does(browser: Browser, may_drive: bool) -> None:
+    """Each press is one mark. A controller that the operator side reads itself marks there, and not here."""
+    with hands_alone(browser, may_drive=may_drive) as alone:
+        for button in (12, 15, 14, 13, 11):
+            held = [0.0] * _BUTTONS
+            held[button] = 1.0
+            alone.page.pretend_gamepad(_AXES, tuple(held))
+            alone.let_pass(0.1)
+            alone.page.pretend_gamepad(_AXES, (0.0,) * _BUTTONS)
+            alone.let_pass(0.04)
+        expected = ["start", "success", "failure", "discard", "reset"]
+        assert _marks(alone) == (expected if may_drive else [])
+
+
 def test_keys_mark_episodes_in_any_state_and_drive_nothing(browser: Browser) -> None:
     """Each press is one mark, also of a page that only watches; hold-to-run goes on beside it."""
     marks = "window.sent.map(([, text]) => JSON.parse(text).mark).filter((mark) => mark)"
@@ -89,6 +109,10 @@ def test_keys_mark_episodes_in_any_state_and_drive_nothing(browser: Browser) -> 
         assert alone.page.ask(marks) == ["success", "failure", "discard", "reset"]
         alone.let_pass(0.1)
         assert alone.runs
+
+
+def _keyed(alone: HandsAlone) -> bool:
+    return bool(alone.messages[-1]["hands"]["keyed"])
 
 
 def _parts(value: object) -> tuple[float, ...]:
@@ -223,6 +247,7 @@ def test_pointer_and_gamepad_drive(browser: Browser) -> None:
         alone.let_pass(0.06)
         assert alone.intent is not None
         assert abs(alone.pulled[1] - 0.6) < 0.01
+        assert not _keyed(alone), "a finger's pull yields by itself"
         assert alone.intent.turning[1] > 0.97
         held[1] = 1.0
         alone.page.pretend_gamepad(_AXES, tuple(held))
@@ -253,6 +278,24 @@ def test_what_cannot_be_done_is_said(browser: Browser) -> None:
         given = [message["hands"]["give_back"] for message in alone.messages]
         assert given.count(True) == 1
         assert given[-1] is False
+
+
+def test_a_lost_link_is_why_nothing_can_be_tuned(browser: Browser) -> None:
+    """While nothing is heard, the page does not say that the run permits no tuning, which is then unknown."""
+    with hands_alone(browser) as alone:
+        alone.facts = {"may_tune": False, "status": {"state": "disarmed", "link": "lost", "owner": "ready"}}
+        alone.let_pass(0.06)
+        assert alone.page.text("#tuning_reason") == "The robot is not heard: nothing can be tuned."
+
+
+def test_a_page_that_was_ready_says_that_the_link_is_lost(browser: Browser) -> None:
+    """A ready page asks nobody to hold Space once the robot side is gone."""
+    with hands_alone(browser) as alone:
+        alone.drive()
+        lost = {"state": "disarmed", "link": "lost", "owner": "ready", "person": alone.shared.doing}
+        alone.facts = {"status": lost}
+        alone.let_pass(0.06)
+        assert alone.page.text("#hands_state") == "The robot is not heard: nothing can be driven."
 
 
 def test_sliders_tune(browser: Browser) -> None:

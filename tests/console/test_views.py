@@ -1,5 +1,6 @@
 """The page draws both views, the scene and the triggers as the run has them."""
 
+import math
 import re
 import time
 from typing import Any, Final
@@ -7,6 +8,7 @@ from typing import Any, Final
 import pytest
 
 from tests.console.browser import Browser, Page
+from tests.console.fed_page import fed_page
 from tests.console.run import DRAWN, Run
 
 pytestmark = [pytest.mark.console, pytest.mark.processes]
@@ -17,6 +19,15 @@ _OLDEST_MS: Final = 500.0
 _PATIENCE_S: Final = 60.0
 _LEAST_DETAIL: Final = 8.0
 """Minimum standard deviation of a picture's colours: it is 0 in an empty picture"""
+_LINE = """(view) => {
+    const box = document.querySelector(`#${view} canvas`).getBoundingClientRect();
+    const [line, label] = ["line:not(.under)", ".height"].map((part) => document.querySelector(`#${view} ${part}`));
+    const place = (x, y) => [(line[x].baseVal.value - box.width / 2) / (box.height / 2),
+                             (box.height / 2 - line[y].baseVal.value) / (box.height / 2)];
+    const { left, right, top, bottom } = label.getBoundingClientRect();
+    const inside = left >= box.left && right <= box.right && top >= box.top && bottom <= box.bottom;
+    return [place("x1", "y1"), place("x2", "y2"), label.textContent, inside && label.checkVisibility()];
+}"""
 
 
 def test_both_views_move(browser: Browser, fresh_demo: Run) -> None:
@@ -72,6 +83,27 @@ def test_triggers_agree(browser: Browser, fresh_demo: Run) -> None:
                 raise AssertionError(f"zones {shown} are shown, and {newest[-1]} were written")
         assert stiff > 0, "no trigger stiffened while it was looked at"
         page.picture("triggers")
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (640, 800)])
+def test_the_height_is_a_line_down_in_both_views_and_the_yielding_pull_is_said(
+    browser: Browser, size: tuple[int, int]
+) -> None:
+    """The overview looks straight down from 1.2 m; the other eye is level, 0.3 m behind the gripper and 0.1 m above."""
+    with fed_page(browser, size) as (_, page):
+        page.wait_for_text(".near", "200 mm over table")
+        page.wait_for_text(".near", "150 right")  # the tool lies on its side
+        page.wait_for_text("#r2 .yields", "yields: a 2 N finger")
+        assert not page.ask("document.querySelector('#l2 .yields')")
+        half = math.tan(math.radians(35.0))
+        for view in VIEWS:
+            point, below, height, shown = page.ask(_LINE, view)
+            assert (height, shown) == ("200 mm", True)
+            assert page.text(f"#{view} .outline b") == "mug"
+            if view == "overview":
+                assert [point[0], point[1]] == pytest.approx([0.0, below[1] * 1.2], abs=0.02)
+            else:
+                assert [*point, *below] == pytest.approx([0.0, -0.1 / 0.3 / half, 0.0, -0.3 / 0.3 / half], abs=0.01)
 
 
 def _wait_for_change(page: Page, view: str, before: Any) -> None:

@@ -40,6 +40,10 @@ def complaint(command: str) -> str:
         ("feelahead demo --tui", "--tui", "a terminal"),
         ("feelahead demo --tui --status json", "--status json", "one of them"),
         ("feelahead demo --console-port 99999", "99999", "65535"),
+        ("feelahead demo --probability nan", "nan", "above 0 and below 1"),
+        ("feelahead demo --site tip", "--model and --site", "both"),
+        ("feelahead demo --model missing.xml --site tip", "missing.xml", "an existing file"),
+        ("feelahead demo --robot-config missing.toml", "missing.toml", "an existing file"),
         ("feelahead doctor --keys /tmp", "--keys", "both"),
         ("feelahead doctor --connect 127.0.0.1:5555", "'127.0.0.1:5555' is no address", "tcp://HOST:PORT"),
         ("feelahead doctor --connect tcp://*:5555", "names no host", "tcp://HOST:PORT"),
@@ -67,6 +71,7 @@ def complaint(command: str) -> str:
         ("feelahead replay", "no recording", "--record"),
         ("feelahead replay x.mcap --speed 0", "speed", "0.01"),
         ("feelahead export missing.mcap", "missing.mcap", "--record made"),
+        ("feelahead export x.mcap --format lerobot --fps 1e2", "1e2", "a whole number"),
         ("feelahead plot missing.mcap", "missing.mcap", "--record made"),
         ("feelahead bench overlapp", "overlapp", "overlap"),
         ("feelahead bench overlap --truths 1", "truths = 1", "2 to"),
@@ -153,7 +158,7 @@ def test_one_line_names_the_value_and_what_is_valid(
     [
         ("robot_side", ["--probability", "1"], "probability"),
         ("operator_side", ["--connect", "nowhere"], "nowhere"),
-        ("feelahead", ["demo", "--no-console", "--model", "missing.xml", "--site", "tip"], "missing.xml"),
+        ("feelahead", ["demo", "--no-console", "--model", __file__, "--site", "tip"], "an MJCF file"),
     ],
 )
 def test_the_process_ends_with_code_2_and_one_line(module: str, arguments: list[str], named: str) -> None:

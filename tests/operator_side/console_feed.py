@@ -13,6 +13,8 @@ from common.protocol.session import SessionState
 from common.protocol.view_messages import (
     VIEW_NAMES,
     EnlargementTerms,
+    Eye,
+    Near,
     SceneShapes,
     SceneState,
     Shape,
@@ -118,6 +120,8 @@ def shapes(version: int = 1) -> bytes:
                 shape(4, "ellipsoid", (0.05, 0.05, 0.1), (0.75, 0.12, 0.1), robot=False),
             ),
             left_out=3,
+            eye=Eye((-0.1, 0.0, -0.3), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), 70.0),
+            overview_eye=Eye((0.5, 0.0, 1.2), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), 60.0),
         )
     )
 
@@ -152,6 +156,7 @@ def state(now_s: float, version: int = 1) -> bytes:
             tick_p50_us=70.0 + 5.0 * math.sin(now_s),
             tick_p99_us=130.0,
             overruns=0,
+            near=Near("mug", 0.08, 0.08),
         )
     )
 

@@ -1,6 +1,7 @@
 """Settings of the operator side: from a file and from flags; each refusal is one line."""
 
 import math
+import secrets
 from pathlib import Path
 
 import pytest
@@ -41,3 +42,16 @@ def test_a_file_sets_everything_and_flags_win(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("text", "seconds"), [("0ms", 0.0), ("12ms", 0.012), ("-12ms", -0.012), ("-2s", -2.0)])
 def test_an_asymmetry_has_a_sign(text: str, seconds: float) -> None:
     assert OperatorSettings(asymmetry=text).asymmetry_s() == pytest.approx(seconds)
+
+
+@pytest.mark.parametrize("content", [None, b"", b"a" * 21, "é".encode() * 22, b"../" + b"a" * 22, b"a" * 22 + b"\nb"])
+def test_a_token_that_could_be_guessed_or_is_no_part_of_an_address_is_refused(
+    tmp_path: Path, content: bytes | None
+) -> None:
+    path = tmp_path / "token"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(ValueError, match=r"--console-token .*token; valid: a file with 22"):
+        OperatorSettings(console_token=path)
+    path.write_text(secrets.token_urlsafe(16) + "\n")
+    assert OperatorSettings(console_token=path).console_token == path

@@ -34,7 +34,7 @@ class DemoSettings(RunOptions):
     """Duration of the run, counted from when the link is up. Unless given, the run ends 5 s after the last page of the
     console was closed, or after 60 s without a page. Where no page can open (--no-console, --tui, or output that is no
     terminal) it ends after 30 s."""
-    probability: Annotated[float, tyro.conf.arg(metavar="P")] = 0.99
+    probability: Annotated[float, Meta(gt=0.0, lt=1.0), tyro.conf.arg(metavar="P")] = 0.99
     """Share of approaches in which the warning must come before the contact, between 0 and 1 (eq. 10)."""
     assist: Literal["none", "speed"] = "none"
     """speed: the robot side caps the speed along the triggers, so that the arm stops where full strength begins."""
@@ -75,6 +75,13 @@ class DemoSettings(RunOptions):
             raise ValueError(
                 f"--scene {self.scene} and --model exclude each other, as a model has its own scene; valid: one of them"
             )
+
+        if (self.model is None) != (self.site is None):
+            raise ValueError("--model and --site; valid: both, or neither for the built-in arm")
+        files = {"--model": self.model, "--robot-config": self.robot_config, "--operator-config": self.operator_config}
+        for flag, path in files.items():
+            if path is not None and not path.is_file():
+                raise ValueError(f"{flag} {path}: there is no such file; valid: an existing file")
 
     @property
     def has_pages(self) -> bool:

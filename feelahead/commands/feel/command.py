@@ -15,7 +15,7 @@ from rich.console import Console
 from common.clock import Clock, MonotonicClock, VirtualClock
 from common.command.command_line import parse_settings
 from common.command.stop_signal import StopSignal
-from common.files.output_file import require_output_file
+from common.files.output_file import require_folder, require_output_file
 from common.limits import check_limits
 from feelahead.commands.feel.loop import Activity, Desk, Effects, Typed, live, typing
 from feelahead.commands.feel.measuring import Measuring, result_lines
@@ -23,7 +23,7 @@ from feelahead.commands.feel.patterns import PatternName, Walk
 from feelahead.commands.feel.trying import Trying
 from feelahead.commands.virtual_dualsense import pulling
 from operator_side.calibration.force_measurement import ForceMeasurement, TriggerName
-from operator_side.calibration.forces import ControllerForces, TriggerForces, forces_path, load_forces, write_forces
+from operator_side.calibration.forces import ControllerForces, TriggerForces, forces_path, stored_forces, write_forces
 from operator_side.controller.connection import Connection
 from operator_side.controller.port import OpenController, check_choice
 from operator_side.controller.search import BackgroundSearch, Ready
@@ -60,7 +60,8 @@ class FeelSettings:
     trigger: TriggerName = "r2"
     """With --measure: the trigger to measure. The other one's forces stay as they are stored."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """With --measure: store in this file instead: a new one in an existing folder, or one to replace."""
+    """With --measure: store in this file instead: a new one in an existing folder, or one of this controller's forces,
+    in which the other trigger's stay."""
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -94,7 +95,7 @@ def feel(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
         return ""
 
     source = typing(keys=True) if simulated is None else contextlib.nullcontext(hands)
-    with source as typed, Trying(walk, console, until=until) as trying:
+    with source as typed, Trying(walk, console, until=until, keys=simulated is None) as trying:
         _use(settings, trying, clock, typed, simulated, backend)
     return 0
 
@@ -108,7 +109,8 @@ def _measure(settings: FeelSettings, console: Console, backend: HidBackend | Non
     def say(text: str) -> None:
         console.print(text, markup=False, highlight=False, soft_wrap=not console.is_terminal)
 
-    measuring = Measuring(measurement, say)
+    store = _Store(settings)
+    measuring = Measuring(measurement, say, store.prepare)
     scripted = None if hands is None else contextlib.nullcontext(lambda: hands.act(measurement, clock.now()))
     with scripted or typing(keys=False) as typed:
         _use(settings, measuring, clock, typed, simulated, backend)
@@ -116,18 +118,32 @@ def _measure(settings: FeelSettings, console: Console, backend: HidBackend | Non
         sys.stdout.write("given up: nothing was stored\n")
         return 1
     sys.stdout.write("\n".join(result_lines(settings.trigger.upper(), result)) + "\n")
-    _store(settings, measuring.address, result)
+    sys.stdout.write(f"{store.keep(measuring.address, result)}\n")
     return 0
 
 
-def _store(settings: FeelSettings, address: str, result: TriggerForces) -> None:
-    if settings.device == "simulated" and settings.out is None:
-        sys.stdout.write("simulated: nothing was stored (--out FILE.toml stores it)\n")
-        return
-    known = load_forces(address) if settings.out is None else ControllerForces()
-    path = forces_path(address) if settings.out is None else settings.out
-    write_forces(path, address, dataclasses.replace(known, **{settings.trigger: result}))
-    sys.stdout.write(f"stored: {path}\n")
+class _Store:
+    """Place where measured forces are stored. Its faults show before the first press, not after the last."""
+
+    def __init__(self, settings: FeelSettings) -> None:
+        self._settings = settings
+        self._path = settings.out
+        self._known = ControllerForces()
+
+    def prepare(self, address: str) -> None:
+        """Load what is stored for the controller; ConfigurationError if forces cannot be stored there."""
+        if self._path is None and self._settings.device != "simulated":
+            self._path = forces_path(address)
+            require_folder("forces", self._path)
+        if self._path is not None:
+            self._known = stored_forces(self._path, address)
+
+    def keep(self, address: str, result: TriggerForces) -> str:
+        """Store the result beside the other trigger's forces; return in words where."""
+        if self._path is None:
+            return "simulated: nothing was stored (--out FILE.toml stores it)"
+        write_forces(self._path, address, dataclasses.replace(self._known, **{self._settings.trigger: result}))
+        return f"stored: {self._path}"
 
 
 def _use(

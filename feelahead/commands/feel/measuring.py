@@ -22,10 +22,16 @@ _GUIDE: Final = (
 class Measuring:
     """Activity of the loop: tells what to do, and takes typed grams, until all strengths are measured."""
 
-    def __init__(self, measurement: ForceMeasurement, say: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        measurement: ForceMeasurement,
+        say: Callable[[str], None],
+        prepare: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        """prepare: called once, before the first press, with the controller's address."""
         self.address: str | None = None
         """Address of the measured controller; None before it is found."""
-        self._measurement, self._say = measurement, say
+        self._measurement, self._say, self._prepare = measurement, say, prepare
         self._line = self._told = ""
         self.note = say
 
@@ -41,6 +47,7 @@ class Measuring:
         if self.address not in (None, controller.address):
             raise ConfigurationError(f"another controller, {controller.address}; valid: the same, {self.address}")
         if self.address is None:
+            self._prepare(controller.address)
             self._say(_GUIDE.format(trigger=self._measurement.trigger.upper()))
         self.address = controller.address
 

@@ -23,9 +23,10 @@ _BAR: Final = 20
 class Trying:
     """Activity of the loop: walks through patterns, and shows what both triggers do."""
 
-    def __init__(self, walk: Walk, console: Console, *, until: Callable[[float, Walk], bool]) -> None:
-        """until: function of the time and the walk that returns whether it ends."""
+    def __init__(self, walk: Walk, console: Console, *, until: Callable[[float, Walk], bool], keys: bool) -> None:
+        """until: function of the time and the walk that returns whether it ends. keys: whether keys are read."""
         self._walk, self._console, self._until = walk, console, until
+        self._help = HELP if keys else "simulated, faster than real time; no key is read"
         self._forces = ControllerForces()
         self._live = Live(console=console, auto_refresh=False) if console.is_terminal else None
         self._shown_s, self._start_s = -1.0, 0.0
@@ -115,7 +116,7 @@ class Trying:
                 f"   pulled {'█' * filled}{'·' * (_BAR - filled)} {travel:.2f}, meets {met(strengths, travel)}"
             )
             lines.append(zones)
-        return Group(*lines, Text(HELP, style="dim"))
+        return Group(*lines, Text(self._help, style="dim"))
 
 
 def _newtons(forces: TriggerForces, strength: int) -> str:

@@ -22,7 +22,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import msgspec
-import numpy as np
 
 from common.command.live_view import LiveView
 from common.command.words import lease_words, link_words, words
@@ -41,7 +40,6 @@ from common.protocol.view_messages import (
 from common.roles import ROLES, Role
 from common.status.codes import Hands, Look
 from operator_side.controller.feel import SENSED_TRAVEL
-from operator_side.viewing.console.outlines import outline
 from operator_side.viewing.facts import OperatorFacts, ShownKind
 
 _NICENESS: Final = 5
@@ -63,10 +61,9 @@ class _Process:
         self._channel = channel
         self._facts: OperatorFacts | None = None
         self._shapes: SceneShapes | None = None
-        self._objects: Any = None
-        """Poses (n, 7) of the objects of `_shapes`"""
         self._ended = threading.Event()
         self._drawing: Any = None
+        self._cues: Any = None
         self._pages: Any = None
         self._drawn_s = -math.inf
         self._steps: Any = None
@@ -75,7 +72,8 @@ class _Process:
     def run(self, port: int, token: str) -> None:
         """Serve until the channel ends. If serving is impossible, report the reason through the channel."""
         try:
-            from operator_side.viewing.console.drawing import Drawing  # noqa: PLC0415  # an extra, and slow to import
+            from operator_side.viewing.console.cues import Cues  # noqa: PLC0415  # an extra, and slow to import
+            from operator_side.viewing.console.drawing import Drawing  # noqa: PLC0415
             from operator_side.viewing.console.gate import Gate  # noqa: PLC0415
             from operator_side.viewing.console.pages import Pages  # noqa: PLC0415
             from operator_side.viewing.console.proof import prove  # noqa: PLC0415
@@ -99,7 +97,7 @@ class _Process:
         except RuntimeError as error:
             self._give_up(str(error))
             return
-        self._drawing = Drawing(server.viser)
+        self._drawing, self._cues = Drawing(server.viser), Cues()
         if (hole := prove(port, token)) is not None:
             self._give_up(f"its protection against other programs and pages failed a check: {hole}")
             return
@@ -173,12 +171,8 @@ class _Process:
             before = _FRAME.pack(VIEW_NAMES.index(seen.view), seen.captured_s)
             self._pages.show(seen.view, before + seen.jpeg)
         elif isinstance(seen, SceneShapes):
-            if self._shapes is None or self._shapes.version != seen.version:
-                self._objects = np.zeros((len(seen.objects), 7))
-                self._objects[:, 3] = 1.0
-                if seen.object_poses:
-                    self._objects[:] = np.frombuffer(seen.object_poses, np.float32).reshape(-1, 7)
             self._shapes = seen
+            self._cues.shapes(seen)
             self._drawing.shapes(seen)
         elif isinstance(seen, SceneState):
             return seen
@@ -215,23 +209,9 @@ class _Process:
             "sigma_mm": (1e3 * state.l2.sigma_m, 1e3 * state.r2.sigma_m),
             "tick_us": (state.tick_p50_us, state.tick_p99_us),
             "near": None if state.near is None else msgspec.structs.asdict(state.near),
-            "target": self._target(state),
+            **self._cues.of(state),
         }
         self._pages.show(ShownKind.SCENE, msgspec.json.encode(scene).decode())
-
-    def _target(self, state: SceneState) -> dict[str, Any] | None:
-        """Return the target's name and its outline in the first-person view; None without either."""
-        shapes, role = self._shapes, ROLES.index(Role.TARGET)
-        if shapes is None or shapes.eye is None or shapes.version != state.version or role not in state.roles:
-            return None
-        index, target = np.frombuffer(state.object_index, np.uint32), state.roles.index(role)
-        known = index < len(self._objects)
-        self._objects[index[known]] = np.frombuffer(state.object_poses, np.float32).reshape(-1, 7)[known]
-        if target >= len(self._objects):
-            return None
-        own = [shape for shape in shapes.shapes if shape.owner == target and not shape.of_robot]
-        box = outline(own, self._objects[target], np.array(state.tool_pose), shapes.eye)
-        return None if box is None else {"name": shapes.objects[target], "box": box}
 
 
 def said(facts: OperatorFacts) -> dict[str, Any]:

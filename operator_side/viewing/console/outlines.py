@@ -1,4 +1,4 @@
-"""Outline of an object in the first-person view, from the scene and the robot side's viewpoint."""
+"""Places of points and objects in a camera view, from the scene and the robot side's viewpoint."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -28,28 +28,40 @@ def corners_m(shape: Shape) -> Floats:
         half = {"sphere": (x, x, x), "cylinder": (x, x, y), "capsule": (x, x, x + y)}.get(shape.kind, (x, y, z))
         low, high = -np.array(half), np.array(half)
     box = 0.5 * (low + high) + 0.5 * _SIGNS * (high - low)
-    return _moved(np.array(shape.pose), box)
+    return moved(np.array(shape.pose), box)
 
 
-def outline(shapes: Iterable[Shape], owner_pose: Floats, tool_pose: Floats, eye: Eye) -> Box | None:
-    """Return the box around the shapes of one owner as the eye sees them; None if part of it is behind the eye.
+def seen(points: Floats, eye_frame: Floats, eye: Eye) -> Floats | None:
+    """Return where the eye sees points (n, 3) of the world frame; None if one of them is behind the eye.
 
-    owner_pose, tool_pose: (7,) in the world frame, positions and quaternions, w first.
+    The result is (n, 2), right and above the picture's centre, in half heights. eye_frame: pose (7,) of the frame in
+    which `eye` is given, position and quaternion, w first.
     """
-    corners = [_moved(owner_pose, corners_m(shape)) for shape in shapes]
-    if not corners:
-        return None
-    turn = Rotation.from_quat(tool_pose[3:], scalar_first=True)
-    seen = turn.inv().apply(np.concatenate(corners) - tool_pose[:3]) - np.array(eye.position_m)
+    turn = Rotation.from_quat(eye_frame[3:], scalar_first=True)
+    from_eye = turn.inv().apply(points - eye_frame[:3]) - np.array(eye.position_m)
     forward, up = np.array(eye.forward), np.array(eye.up)
-    depth_m = seen @ forward
+    depth_m = from_eye @ forward
     if depth_m.min() < _NEAREST_M:
         return None
-    half_height = depth_m * np.tan(np.radians(0.5 * eye.fovy_deg))
-    right, above = (seen @ np.cross(forward, up)) / half_height, (seen @ up) / half_height
-    return float(right.min()), float(above.min()), float(right.max()), float(above.max())
+    axes = np.column_stack((np.cross(forward, up), up))
+    place: Floats = (from_eye @ axes) / (depth_m * np.tan(np.radians(0.5 * eye.fovy_deg)))[:, None]
+    return place
 
 
-def _moved(pose: Floats, points: Floats) -> Floats:
-    moved: Floats = Rotation.from_quat(pose[3:], scalar_first=True).apply(points) + pose[:3]
-    return moved
+def outline(shapes: Iterable[Shape], owner_pose: Floats, eye_frame: Floats, eye: Eye) -> Box | None:
+    """Return the box around the shapes of one owner as the eye sees them; None if part of it is behind the eye.
+
+    owner_pose: (7,) in the world frame, as `eye_frame` of `seen`.
+    """
+    corners = [moved(owner_pose, corners_m(shape)) for shape in shapes]
+    places = seen(np.concatenate(corners), eye_frame, eye) if corners else None
+    if places is None:
+        return None
+    (left, low), (right, high) = places.min(axis=0), places.max(axis=0)
+    return float(left), float(low), float(right), float(high)
+
+
+def moved(pose: Floats, points: Floats) -> Floats:
+    """Return points (n, 3), given in the frame whose pose (7,) in the world frame is `pose`, in the world frame."""
+    placed: Floats = Rotation.from_quat(pose[3:], scalar_first=True).apply(points) + pose[:3]
+    return placed

@@ -136,7 +136,10 @@ class Pages:
             count += 1
             try:
                 said = msgspec.json.decode(message if isinstance(message, str) else b"", type=Said)
-            except (msgspec.DecodeError, RecursionError):
+                words = {"hands": said.hands, "tune": said.tune, "play": said.play, "again": said.again}
+                words = {name: value for name, value in words.items() if value is not None}
+                encoded = msgspec.msgpack.encode((number, words))
+            except (msgspec.DecodeError, RecursionError, OverflowError):  # an integer of more than 64 bits
                 said = None
             if said is None or count > _A_SECOND:
                 await connection.close(_NOT_OURS)
@@ -148,6 +151,5 @@ class Pages:
             if said.looks is not None and said.looks != page.looks:
                 page.looks = said.looks
                 self._count()
-            words = {"hands": said.hands, "tune": said.tune, "play": said.play, "again": said.again}
-            if words := {name: value for name, value in words.items() if value is not None}:
-                self._heard("s", msgspec.msgpack.encode((number, words)))
+            if words:
+                self._heard("s", encoded)

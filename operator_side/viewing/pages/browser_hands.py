@@ -1,16 +1,21 @@
-"""Console page as a controller: the inputs at the page become a controller's state."""
+"""Console page as a controller: the inputs at the page become a controller's state.
 
+The zones' strengths act on what keys pull, as on a finger of 2 N; a gamepad at the page is pulled by a real finger.
+"""
+
+import math
 from collections.abc import Callable
 from typing import Final
 
 from common.protocol.messages import Telemetry
 from common.status.codes import Doing, Hands
-from operator_side.controller.feel import RELEASED, Feel
+from operator_side.controller.feel import FREE_TRIGGER, RELEASED, Feel
 from operator_side.controller.state import ControllerState
 from operator_side.hands.button_map import Action, button_of
 from operator_side.hands.travel_calibration import IDENTITY, TravelCalibration
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.pages.page_messages import PageHands
+from operator_side.viewing.pages.yielding_pull import YieldingPull
 
 _PRESS_S: Final = 0.2
 """Seconds for which the arming button is pressed, then released, and so on until the arm is armed"""
@@ -47,6 +52,8 @@ class BrowserHands:
         self._moves = False
         self._state = ControllerState()
         self._commanded = RELEASED
+        self._pulls = YieldingPull(), YieldingPull()
+        self._ticked_s = -math.inf
 
     @property
     def hands(self) -> Hands:
@@ -63,7 +70,9 @@ class BrowserHands:
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """Make the controller's state from the page's inputs. screen: telemetry, which has the arm's state."""
         del delay_s
+        passed_s, self._ticked_s = now_s - self._ticked_s, now_s
         self._calibrate(IDENTITY)
+        self._pages.yields = (False, False)
         stopped = self._was_stopped if screen is None else screen.state == "stopped"
         if stopped and not self._was_stopped:
             self._pages.require_reset()
@@ -85,7 +94,7 @@ class BrowserHands:
         pressed = {Action.RUN}
         if not armed and (now_s - self._began_s) % (2.0 * _PRESS_S) < _PRESS_S:
             pressed.add(Action.ARM)
-        self._state = self._held(hands, pressed)
+        self._state = self._held(hands, pressed, passed_s)
 
     # Interface of `Controller` (operator_side/controller/port.py)
 
@@ -108,7 +117,7 @@ class BrowserHands:
         """Store the release: there is no device to close."""
         self._commanded = self._commanded.farewell
 
-    def _held(self, hands: PageHands, pressed: set[Action]) -> ControllerState:
+    def _held(self, hands: PageHands, pressed: set[Action], passed_s: float) -> ControllerState:
         pressed |= {action for name, action in _BUTTONS.items() if getattr(hands, name)}
         counts = self._pages.pictures.hands
         if not self._moves or counts <= _MOVES_GRIPPER:
@@ -121,5 +130,17 @@ class BrowserHands:
             return ControllerState(pressed=held)
         order = -1 if self._swap_sides else 1
         l2, r2 = (counts * hands.l2, counts * hands.r2)[::order]
+        if hands.keyed:
+            l2, r2 = self._pulled((l2, r2), passed_s)
         left, right = ((counts * x, counts * y) for x, y in (hands.lateral, hands.turning)[::order])
         return ControllerState(left, right, l2, r2, held)
+
+    def _pulled(self, asked: tuple[float, float], passed_s: float) -> tuple[float, float]:
+        """Return the raw travels of L2 and R2 to which keys that ask for `asked` pull them."""
+        l2, r2 = self._pulls
+        travels = (
+            l2.follow(asked[0], self._commanded.l2 or FREE_TRIGGER, passed_s),
+            r2.follow(asked[1], self._commanded.r2 or FREE_TRIGGER, passed_s),
+        )
+        self._pages.yields = (l2.yields, r2.yields)
+        return travels

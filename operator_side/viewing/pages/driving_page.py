@@ -56,6 +56,8 @@ class DrivingPage:
         self._stop_s: float | None = None
         self.reset_first = False
         """Whether a stop waits for its reset, so that no page's hands count"""
+        self.yields = (False, False)
+        """For L2 and R2, whether the pull of the driving page's keys yields to stiff zones, by `BrowserHands`"""
         self._giving_back: set[int] = set()
         self._give_back = False
         self.wishes: deque[TuneWish] = deque(maxlen=_MOST_WISHES)
@@ -134,7 +136,7 @@ class DrivingPage:
         """Return the facts for the pages. person: whether they may hand the controls back to a scripted person."""
         self._expire(now_s)
         known = (self.may_drive, self.driver, person, core.tuner.why, core.tuner.link)
-        return HandsFacts(*known, counts=self.pictures.hands, reset_first=self.reset_first)
+        return HandsFacts(*known, self.pictures.hands, self.reset_first, self.yields)
 
     def _take(self, page: int, hands: PageHands, now_s: float) -> None:
         if hands.stop:  # even an overtaken one

@@ -28,6 +28,8 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Calibrated travel of the trigger that moves the gripper back, 0 to 1"""
     r2: Share = 0.0
     """Calibrated travel of the trigger that moves the gripper forward, 0 to 1"""
+    keyed: bool = False
+    """Whether keys pull the triggers, so that zones must stop the pull; a gamepad's trigger is pulled by a finger"""
     lateral: Deflection = (0.0, 0.0)
     """Deflection of the stick that moves across: right and up positive, -1 to 1 each, dead zone removed"""
     turning: Deflection = (0.0, 0.0)

@@ -8,6 +8,7 @@ import msgspec
 
 from common.arrays import FloatArray
 from common.errors import OtherVersionError, RemoteProtocolError
+from common.timing.clock_offset import MAX_SKEW, ROUNDING
 from common.timing.offset_interval import OffsetInterval
 from robot_side.arm.port import ArmState
 from robot_side.drivers.remote.messages import (
@@ -20,9 +21,6 @@ from robot_side.drivers.remote.messages import (
     floats,
 )
 
-_MAX_SKEW: Final = 600e-6
-_ROUNDING: Final = 1e-15
-
 
 class DriverClock:
     """Bounds of the driver's clock minus ours, computed from stamps.
@@ -32,7 +30,7 @@ class DriverClock:
     """
 
     def __init__(self) -> None:
-        self._interval = OffsetInterval(_MAX_SKEW)
+        self._interval = OffsetInterval(MAX_SKEW)
         self._at_s = 0.0
 
     def take(self, sent_s: float, received_s: float, echoed: tuple[float, float] | None) -> bool:
@@ -40,7 +38,7 @@ class DriverClock:
 
         echoed: our stamp that the message echoes, and the time for which the driver held it.
         """
-        self._at_s, margin_s = max(self._at_s, received_s), _ROUNDING * (abs(sent_s) + abs(received_s))
+        self._at_s, margin_s = max(self._at_s, received_s), ROUNDING * (abs(sent_s) + abs(received_s))
         self._interval.advance(received_s)
         possible = self._interval.take_least(sent_s - received_s, margin_s)
         if echoed is not None and possible:
@@ -51,8 +49,7 @@ class DriverClock:
     @property
     def known(self) -> bool:
         """Whether both bounds of the clock's offset are known"""
-        least_s, greatest_s = self._interval.at(self._at_s)
-        return greatest_s - least_s < float("inf")
+        return self._interval.bounded
 
     def ours_s(self, driver_s: float) -> float:
         """Return the earliest possible time of `driver_s` on our clock; minus infinity before the first echo."""

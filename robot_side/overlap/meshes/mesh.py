@@ -83,9 +83,7 @@ class Mesh:
         volumes, gradients, areas = np.empty(count), np.empty((count, 3)), np.empty(count)
         touched = np.empty(count, dtype=np.int64)
         everywhere = np.zeros(count, dtype=np.int64)
-        overlap_loop(
-            *rows, everywhere, *_IN_PLACE, *self.tables, volumes, gradients, areas, touched, self.tables.room()
-        )
+        overlap_loop(*rows, everywhere, *_IN_PLACE, self.tables, volumes, gradients, areas, touched, self.tables.room())
         results = volumes.reshape(shape), gradients.reshape(*shape, 3), areas.reshape(shape)
         return results, touched.reshape(shape)
 

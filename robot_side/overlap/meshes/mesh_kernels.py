@@ -13,6 +13,7 @@ from robot_side.compiled.kernel import (
     input_indices,
     output_array,
     output_indices,
+    tuple_type,
 )
 from robot_side.compiled.stack import on_stack
 from robot_side.compiled.vectors import Vector, dot, load, negative, norm, scale, subtract
@@ -23,10 +24,10 @@ from robot_side.overlap.meshes.mesh_tables import MeshTables
 from robot_side.overlap.meshes.tree_queries import is_clear_of, nearest_triangle, winding_number
 from robot_side.overlap.meshes.triangle_lanes import SCRATCH
 
-MESH_ARGUMENTS = (
+_TABLES = tuple_type(
     *(input_array(2), input_array(2), input_array(2), input_indices(), input_array(2), input_indices(), input_array(1)),
+    named=MeshTables,
 )
-"""Numba types of the fields of `MeshTables`"""
 PLACED_ARGUMENTS = (input_indices(), input_array(2), input_array(3))
 """Numba types of placed meshes: indices of the meshes (q,), positions (q, 3) and rotations (q, 3, 3)"""
 
@@ -69,7 +70,7 @@ def to_world(rotations: FloatArray, pair: int, vector: Vector) -> Vector:
 
 @compiled(
     *(input_array(2), input_array(1), input_indices(), *PLACED_ARGUMENTS),
-    *MESH_ARGUMENTS,
+    _TABLES,
     *(output_array(1), output_array(2), output_array(1), output_indices(), output_indices()),
 )
 def overlap_loop(
@@ -79,13 +80,7 @@ def overlap_loop(
     mesh_index: IntArray,
     positions: FloatArray,
     rotations: FloatArray,
-    triangles: FloatArray,
-    spheres: FloatArray,
-    boxes: FloatArray,
-    links: IntArray,
-    moments: FloatArray,
-    roots: IntArray,
-    mesh_volumes: FloatArray,
+    tables: MeshTables,
     volumes: FloatArray,
     gradients: FloatArray,
     areas: FloatArray,
@@ -97,7 +92,6 @@ def overlap_loop(
     placed (p,): each sphere's placed mesh, as a row of mesh_index, positions and rotations. near: scratch with room for
     all triangles and one more.
     """
-    tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
     scratch = _scratch()
     for pair in range(radii.size):
         place, radius = placed[pair], radii[pair]
@@ -139,7 +133,7 @@ def _signed_distance(tables: MeshTables, mesh: int, point: Vector) -> tuple[floa
 
 @compiled(
     *(input_array(2), *PLACED_ARGUMENTS),
-    *MESH_ARGUMENTS,
+    _TABLES,
     *(output_array(1), output_array(2)),
 )
 def nearest_loop(
@@ -147,13 +141,7 @@ def nearest_loop(
     mesh_index: IntArray,
     positions: FloatArray,
     rotations: FloatArray,
-    triangles: FloatArray,
-    spheres: FloatArray,
-    boxes: FloatArray,
-    links: IntArray,
-    moments: FloatArray,
-    roots: IntArray,
-    mesh_volumes: FloatArray,
+    tables: MeshTables,
     distances: FloatArray,
     directions: FloatArray,
 ) -> None:
@@ -162,7 +150,6 @@ def nearest_loop(
     The signed distance falls fastest along the direction. Row by row, `mesh_index`, `positions` and `rotations` are the
     placed mesh of the centre in the same row.
     """
-    tables = MeshTables(triangles, spheres, boxes, links, moments, roots, mesh_volumes)
     for pair in range(mesh_index.size):
         point = to_mesh(load(centers, pair), positions, rotations, pair)
         distance, direction = _signed_distance(tables, mesh_index[pair], highs(point))

@@ -111,7 +111,7 @@ def mesh_pairs(
     touched = np.empty(count, dtype=np.int64)
     arrays, tables = (mesh_index, positions, rotations), library.tables
     results = volumes, gradients, areas, touched
-    overlap_loop(centers, radii, np.arange(count), *arrays, *tables, *results, tables.room())
+    overlap_loop(centers, radii, np.arange(count), *arrays, tables, *results, tables.room())
     return volumes, gradients, areas
 
 
@@ -124,5 +124,5 @@ def nearest_mesh_pairs(
     surface, from inside away from that point. The arguments are those of `mesh_pairs`; `centers` (p, 3) are the points.
     """
     distances, directions = np.empty(len(centers)), np.empty((len(centers), 3))
-    nearest_loop(centers, mesh_index, positions, rotations, *library.tables, distances, directions)
+    nearest_loop(centers, mesh_index, positions, rotations, library.tables, distances, directions)
     return distances, directions

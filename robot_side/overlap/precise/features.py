@@ -91,10 +91,6 @@ CORNER_EDGES = _table(
     *([[n for n, edge in enumerate(_EDGES[kind]) if c in edge] for c in _CORNERS[kind]] for kind in range(2))
 )
 """(2, 8, 3) edges that meet in each corner"""
-CORNER_FACES = _table(
-    *([[n for n, face in enumerate(_FACES[kind]) if c in face] for c in _CORNERS[kind]] for kind in range(2))
-)
-"""(2, 8, 3) faces that meet in each corner"""
 
 # The measures of one solid are rows of an array (ROWS, 3, 2). These are the first rows of each measure:
 POINTS = 0

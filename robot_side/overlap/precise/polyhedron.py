@@ -1,9 +1,9 @@
 """Overlap of a sphere with a tetrahedron or a box, as accurate as the input allows, however small the overlap is.
 
-If the ball reaches only one face, or only just reaches one edge or corner, the overlap has a form in which nothing
-cancels (`cap`, `local_forms`). All other cases take the sum over faces in double-double (`face_sum`). The sum's error
-is about 1e-31 of the sphere's volume, or more if the solid is much larger than the sphere. A sum below this error is
-replaced by the form of the feature (corner, edge or face) that reaches deepest into the ball.
+The overlap is the sum over faces in double-double (`face_sum`). Its error is about 1e-31 of the sphere's volume, or
+more if the solid is much larger than the sphere. If the ball reaches only one face, or only just reaches one edge or
+corner, the overlap has a form in which nothing cancels (`cap`, `local_forms`). The form of the feature that reaches
+deepest into the ball replaces the sum where both agree within the sum's error, and where the sum is below this error.
 """
 
 import math
@@ -46,13 +46,14 @@ from robot_side.overlap.precise.features import (
     depth_and_rest,
     distance_in_face,
     measure_all,
-    measure_corner,
-    measure_direction,
-    measure_edge,
-    measure_face,
 )
 from robot_side.overlap.precise.local_forms import SHARP_CORNER, SHARP_EDGE, corner_overlap, edge_overlap
-from robot_side.overlap.precise.screening import ANYTHING, CORNER, EDGE, FACE, NOTHING, WHOLE_SPHERE, screened
+
+NOTHING, WHOLE_SPHERE, FACE, EDGE, CORNER = 0, 1, 2, 3, 4
+"""Kinds of what the ball reaches"""
+
+_LOCAL = 1e-12
+"""Bound of the relative error of a local form that applies"""
 
 NOISE = 1e-29
 """Bound of the rounding error of a sum over faces, as a share of R³, or of R² times the distance of the farthest corner
@@ -70,12 +71,6 @@ def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, sol
     if _is_inside(features, solid, radius):
         # The solid may be so small that its directions and angles are not finite.
         return whole_solid(solid_volume)
-    reached, number = screened(features, solid, radius)
-    if reached != ANYTHING:
-        _measure_lone(features, solid, radius, reached, number)
-        alone, sharpness = _local_form(features, solid, radius, reached, number)
-        if sharpness < (SHARP_CORNER if reached == CORNER else SHARP_EDGE):
-            return bounded(alone, radius, solid_volume)
     measure_all(features, solid, radius)
     farthest, inside = 0.0, 0
     for corner in range(CORNERS[solid]):
@@ -85,11 +80,15 @@ def polyhedron_overlap(features: FloatArray, solid: np.int64, radius: float, sol
         return whole_solid(solid_volume)
     summed = bounded(sum_over_faces(features, solid, radius), radius, solid_volume)
     noise = NOISE * radius * radius * max(radius, farthest)
+    reached, number = _deepest(features, solid, radius)
+    local, sharpness = _local_form(features, solid, radius, reached, number)
+    sharp = sharpness < (SHARP_CORNER if reached == CORNER else SHARP_EDGE)
+    if sharp and abs(local[0] - summed[0]) <= noise + _LOCAL * local[0]:
+        # The ball reaches nothing else of the solid.
+        return bounded(local, radius, solid_volume)
     if summed[0] > noise:
         return summed
     most = min(noise, solid_volume)
-    reached, number = _deepest(features, solid)
-    local, _ = _local_form(features, solid, radius, reached, number)
     # A corner or edge within the ball has some volume there, even if its faces coincide by rounding.
     thin = most if reached in (CORNER, EDGE) else 0.0
     return _below_noise(local, summed, most, thin, radius)
@@ -147,26 +146,11 @@ def _local_form(
 
 
 @building_block
-def _measure_lone(features: FloatArray, solid: np.int64, radius: float, reached: int, number: int) -> None:
-    """Fill the measures in `features` that the local form of a single feature needs."""
-    if reached == FACE:
-        measure_face(features, solid, number)
-    elif reached == EDGE:
-        measure_direction(features, solid, number)
-        measure_edge(features, solid, number, radius)
-        for side in range(2):
-            measure_face(features, solid, EDGE_FACES[solid, number, side])
-    elif reached == CORNER:
-        measure_corner(features, number, radius)
-        for own in range(3):
-            measure_direction(features, solid, CORNER_EDGES[solid, number, own])
-
-
-@building_block
-def _deepest(features: FloatArray, solid: np.int64) -> tuple[int, int]:
-    """Return (kind, number) of the feature that reaches deepest into the ball, for a tiny overlap.
+def _deepest(features: FloatArray, solid: np.int64, radius: float) -> tuple[int, int]:
+    """Return (kind, number) of the feature that reaches deepest into the ball.
 
     It is the deepest corner in the ball; without any, the deepest edge; without any, a face that the ball reaches.
+    Without any, the ball lies within the solid (`WHOLE_SPHERE`) or outside (`NOTHING`).
     """
     deepest, reached, number = 0.0, NOTHING, 0
     for corner in range(CORNERS[solid]):
@@ -179,11 +163,15 @@ def _deepest(features: FloatArray, solid: np.int64) -> tuple[int, int]:
             if passes and features[HALF_CHORDS + edge, 0, 0] > deepest:
                 deepest, reached, number = features[HALF_CHORDS + edge, 0, 0], EDGE, edge
     if reached == NOTHING:
+        reached = WHOLE_SPHERE
         for face in range(FACES[solid]):
-            inside = features[HEIGHTS + face, 0, 0] < 0.0
+            height = features[HEIGHTS + face, 0, 0]
+            if height < radius and reached == WHOLE_SPHERE:
+                reached = NOTHING
+            pierced = abs(height) <= radius
             for side in range(SIDES[solid]):
-                inside = inside and distance_in_face(features, solid, face, side)[0] > 0.0
-            if inside:
+                pierced = pierced and distance_in_face(features, solid, face, side)[0] > 0.0
+            if pierced:
                 reached, number = FACE, face
     return reached, number
 

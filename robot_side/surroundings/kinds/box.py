@@ -220,6 +220,5 @@ KIND: Final = Kind(
     nearest=nearest,
     contact=contact,
     kernel=overlap_one_box,
-    centers=lambda centers, _rotations, _half_sizes: centers,
     in_box=True,
 )

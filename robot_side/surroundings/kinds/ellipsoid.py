@@ -170,6 +170,5 @@ KIND: Final = Kind(
     nearest=nearest,
     contact=contact,
     kernel=overlap_one_ellipsoid,
-    centers=lambda centers, _rotations, _half_axes: centers,
     in_box=True,
 )

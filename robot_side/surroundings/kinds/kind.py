@@ -71,8 +71,6 @@ class Kind:
     kernel: Compiled | None = None
     """Overlap kernel with the argument types OVERLAP; None if `overlap` is given. A scene loads only the kernels of its
     own kinds."""
-    centers: Callable[..., Any] | None = None
-    """Function of the columns that returns centres (k, 3) in metres; None for an infinite kind"""
     in_box: bool = False
     """Whether the columns give each primitive's bounding box: centres (k, 3), rotations (k, 3, 3), half sizes (k, 3)"""
     derive: Callable[[Any], tuple[Any, ...]] | None = None

@@ -88,7 +88,6 @@ KIND: Final = Kind(
     place=place,
     nearest=box.nearest,
     contact=contact,
-    centers=lambda middles, *_: middles,
     in_box=True,
     derive=_derive,
     more=lambda objects: of_library(objects.mesh_library, objects.mesh_index),

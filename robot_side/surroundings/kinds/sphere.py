@@ -67,5 +67,4 @@ KIND: Final = Kind(
     nearest=nearest,
     contact=contact,
     overlap=overlap,
-    centers=lambda centers, _radii: centers,
 )

@@ -154,5 +154,4 @@ KIND: Final = Kind(
     nearest=nearest,
     contact=contact,
     kernel=overlap_one_tetrahedron,
-    centers=lambda vertices: vertices.mean(axis=1),
 )

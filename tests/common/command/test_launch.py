@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -175,3 +176,34 @@ def test_an_output_that_cannot_be_written_is_one_line(code: str) -> None:
     assert done.stderr == (
         "x: the output cannot be written: No space left on device; valid: an output with enough room\n"
     )
+
+
+@pytest.mark.processes
+def test_closed_streams_become_the_null_device(tmp_path: Path) -> None:
+    program, said = tmp_path / "program.py", tmp_path / "said"
+    program.write_text(
+        "import sys\n"
+        "from common.command.launch import launch\n"
+        "def command(_):\n"
+        "    file = open(sys.argv[1], 'w')\n"
+        "    print(sys.stdin.isatty(), sys.stdout.isatty(), file.fileno() > 2, file=file)\n"
+        "    print('lost')\n"
+        "    return 0\n"
+        "launch('x', lambda: command)\n"
+    )
+    words = f"exec '{sys.executable}' '{program}' '{said}' <&- >&- 2>&-"
+    assert subprocess.call(["/bin/sh", "-c", words], env=os.environ | {"PYTHONPATH": str(ROOT)}) == 0
+    assert said.read_text() == "False False True\n"
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize(("cause", "code"), [("KeyboardInterrupt", 0), ("OSError", 1)])
+def test_an_interrupted_late_import_ends_quietly_and_a_broken_one_does_not(cause: str, code: int) -> None:
+    program = (
+        "from common.command.launch import launch\n"
+        "def command(_):\n"
+        f"    raise ImportError('initialization failed') from {cause}()\n"
+        "launch('x', lambda: command)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, "Traceback" in done.stderr) == (code, code == 1)

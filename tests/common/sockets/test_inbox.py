@@ -44,12 +44,6 @@ def signal_of(inbox: Inbox) -> bool:
     return bool(select.select([inbox.descriptor], [], [], PATIENT_S)[0])
 
 
-def settle(inbox: Inbox) -> None:
-    """Read until neither EVENTS nor the descriptor tells of anything new."""
-    while select.select([inbox.descriptor], [], [], 0.0)[0] or inbox.has_some():
-        list(inbox.read())
-
-
 def test_an_empty_socket_is_asked_once(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"], asked: list[Any]) -> None:
     inbox = Inbox(pair[0], frames=1)
     pair[1].send(b"hello")
@@ -60,16 +54,6 @@ def test_an_empty_socket_is_asked_once(pair: tuple["zmq.Socket[bytes]", "zmq.Soc
     asked.clear()
     assert not any(inbox.has_some() for _ in range(100))
     assert asked == []
-
-
-def test_the_descriptor_tells_of_what_comes_later(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"]) -> None:
-    inbox = Inbox(pair[0], frames=1)
-    settle(inbox)
-    for number in range(50):
-        pair[1].send(b"%d" % number)
-        while not inbox.has_some():
-            assert signal_of(inbox)
-        assert [frame.bytes for message in inbox.read() for frame in message] == [b"%d" % number]
 
 
 def test_a_signal_that_another_use_took_is_no_message_lost(
@@ -89,14 +73,6 @@ def test_a_signal_that_another_use_took_is_no_message_lost(
     inbox.used()
     assert inbox.has_some()
     assert [frame.bytes for message in inbox.read() for frame in message] == [b"second"]
-
-
-def test_earlier_messages_are_found(pair: tuple["zmq.Socket[bytes]", "zmq.Socket[bytes]"]) -> None:
-    ours, theirs = pair
-    theirs.send(b"early")
-    while not int(ours.getsockopt(zmq.EVENTS)) & zmq.POLLIN:  # Takes the signal.
-        assert ours.poll(round(1e3 * PATIENT_S))
-    assert Inbox(ours, frames=1).has_some()
 
 
 def test_a_turn_drains_once_and_asks_each_socket_three_times_at_most(

@@ -13,7 +13,6 @@ from common.files.regular_file import read_regular_file
 from common.sockets import keys
 from common.sockets.allow_list import AllowList
 from common.sockets.authentication import OperatorKeys, RobotKeys
-from common.sockets.endpoints import parse_bind, refuse_open
 from common.sockets.keys import KeyFolder, checked_key, checked_name, read_public_key
 
 KEY, OTHER = "ab" * 32, "cd" * 32
@@ -279,13 +278,3 @@ def test_a_key_that_is_let_in_twice_is_named_when_one_name_is_revoked(folder: Ke
     assert "still let in as zed" in complaint(lambda: folder.revoke("alice"))
     folder.revoke("zed")
     assert folder.allowed() == {}
-
-
-def test_keys_are_where_each_system_keeps_a_persons_settings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    # Earlier versions kept keys in ~/.config even if XDG_CONFIG_HOME was set, and on macOS.
-    monkeypatch.setattr("sys.platform", "linux")
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
-    assert keys.default_folder() == KeyFolder().path == tmp_path / "feelahead" / "keys"
-    assert str(tmp_path / "feelahead" / "keys") in complaint(
-        lambda: refuse_open(parse_bind("tcp://0.0.0.0:5555", "--bind"), "tcp://0.0.0.0:5555", "--bind")
-    )

@@ -1,6 +1,7 @@
 """Keys (CURVE) over real sockets on loopback: which peers get in, which stay out, which are disconnected later."""
 
 import errno
+import socket
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -131,6 +132,20 @@ def test_a_key_that_is_allowed_later_gets_in_without_a_restart(robot: Robot) -> 
 def test_no_key_gets_nothing(robot: Robot) -> None:
     with robot.connect(None) as bare:
         assert stays_out_and_says(robot, bare, "--keys")
+
+
+def test_a_port_that_hangs_up_is_not_taken_for_one_that_asks_for_keys() -> None:
+    clock = MonotonicClock()
+    end_s = clock.now() + LIMIT_S
+    with socket.create_server(("127.0.0.1", 0)) as starting:
+        starting.settimeout(LIMIT_S)
+        place = f"tcp://127.0.0.1:{starting.getsockname()[1]}"
+        with OperatorSockets(place, place, keys=None, heartbeat_timeout_s=PATIENT_S) as operator:
+            while operator.trouble is None and clock.now() < end_s:
+                starting.accept()[0].close()
+                operator.wait(0.1)
+                operator.receive()
+            assert "still starting" in str(operator.trouble)
 
 
 def test_a_wrong_robot_key_gets_nothing(robot: Robot) -> None:

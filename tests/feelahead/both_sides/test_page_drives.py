@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from common.roles import Role
 from common.status.codes import Doing
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings
 from operator_side.controller.connection import Connection
@@ -21,11 +22,11 @@ WATCH: dict[str, Any] = {"driving": False}
 GAP_S = 0.1
 
 
-def run_of(does: Does, device: Any = "browser", link: str = "", *, permit_tuning: bool = False) -> Loopback:
+def run_of(does: Does, device: Any = "browser", link: str = "", *, robot: RobotSettings | None = None) -> Loopback:
     operator = OperatorSettings(link=link, device=device)
     pages = DrivingPage(may_drive=device != "hid")
     page = TalkingPage(pages)
-    run = Loopback(LoopbackSettings(RobotSettings(link=link, permit_tuning=permit_tuning), operator), pages=pages)
+    run = Loopback(LoopbackSettings(robot or RobotSettings(link=link), operator), pages=pages)
     opening = DEVICES[operator.device](OpeningParts(operator, run.operator, pages))
     assert opening.hands is not None
     run.connection = Connection(opening.search, run.operator)
@@ -81,6 +82,29 @@ def test_however_a_page_releases_the_arm_stops_at_once(after: tuple[float, dict[
     assert run.operator.screen.tool_position_m == pytest.approx(tool.tool_position_m, abs=2e-3)
 
 
+def pulled_at_a_wall(link: str = "", **hold: Any) -> Loopback:
+    robot = RobotSettings(scene="wall", link=link, roles={"target": Role.IGNORED})
+    run = run_of(timetable((2.5, {}), (4.0, {"run": True}), (99.0, {"run": True} | hold)), robot=robot, link=link)
+    run.run_until(12.0)
+    return run
+
+
+@pytest.mark.parametrize("link", ["", "delay 200ms"])
+@pytest.mark.parametrize("level", [4 / 9, 1.0])
+def test_the_pull_of_a_held_key_ends_before_a_wall(link: str, level: float) -> None:
+    run = pulled_at_a_wall(link, r2=level, keyed=True)
+    assert run.pages.yields == (False, True)
+    assert speed_m_s(run) < 0.002
+    assert run.summary()["contacts"] == 0
+    assert run.summary()["min_distance_mm"] < 60.0
+
+
+def test_a_finger_at_a_gamepad_is_not_held_back() -> None:
+    run = pulled_at_a_wall(r2=1.0)
+    assert run.pages.yields == (False, False)
+    assert run.summary()["contacts"] > 0
+
+
 STOP: dict[str, Any] = {"stop": True}
 
 
@@ -134,7 +158,7 @@ def tuned(run: Loopback, at_s: float, probability: float | None, link: str | Non
 
 
 def test_p_and_both_directions_of_the_link_change_while_the_run_goes_on() -> None:
-    run = run_of(advance_until(3.5, (99.0, {})), permit_tuning=True)
+    run = run_of(advance_until(3.5, (99.0, {})), robot=RobotSettings(permit_tuning=True))
     tuned(run, 5.0, 0.6, "delay 60ms")
     before = run.robot.status(5.0).enlargement_mm
     run.run_until(8.0)
@@ -154,7 +178,7 @@ def test_p_and_both_directions_of_the_link_change_while_the_run_goes_on() -> Non
 
 def test_a_jump_of_the_delay_stops_the_arm_and_the_page_drives_on_once_it_has_rested() -> None:
     does = advance_until(8.0, (10.0, {}), (11.0, {"run": True}), (12.0, PULL))
-    run = run_of(does, permit_tuning=True)
+    run = run_of(does, robot=RobotSettings(permit_tuning=True))
     tuned(run, 3.5, None, "delay 400ms")
     run.run_until(7.9)
     assert state(run) == "disarmed"

@@ -52,6 +52,16 @@ def willing(played: Played, monkeypatch: pytest.MonkeyPatch) -> Played:
     return played
 
 
+def test_a_folder_that_cannot_be_made_is_said_before_the_person_begins(
+    willing: Played, own_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own_folder.write_text("in the way")
+    with pytest.raises(ConfigurationError, match="is no folder that this user may write to"):
+        command(["calibrate"])
+    assert (willing.now_s, capsys.readouterr().out) == (0.0, "")
+    assert willing.handle.closed == willing.handle.times_opened
+
+
 def test_a_real_controller_is_measured_and_kept_by_its_address(
     willing: Played, capsys: pytest.CaptureFixture[str]
 ) -> None:

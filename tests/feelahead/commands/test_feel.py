@@ -86,6 +86,18 @@ def test_a_simulated_measurement_is_stored_only_where_asked_for(
     assert "[r2]" in (tmp_path / "mine.toml").read_text()
 
 
+def test_a_named_file_keeps_the_other_trigger_and_whatever_is_no_forces(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    measure = ["feel", "--measure", "--device", "simulated", "--out", str(path)]
+    for trigger in ("r2", "l2"):
+        assert command([*measure, "--trigger", trigger]) == 0
+    assert {"[l2]", "[r2]"} <= set(path.read_text().splitlines())
+    path.write_text("a letter")
+    with pytest.raises(ConfigurationError, match=r"mine\.toml"):
+        command(measure)
+    assert path.read_text() == "a letter"
+
+
 @pytest.mark.parametrize(
     ("flags", "said"),
     [
@@ -179,6 +191,23 @@ def test_a_measurement_that_is_given_up_stores_nothing(
     assert feel(["--measure"], played.backend) == 1
     assert "given up: nothing was stored" in capsys.readouterr().out
     assert not own_folder.exists()
+
+
+@pytest.mark.parametrize("fault", ["folder", "file"])
+def test_what_cannot_be_stored_is_said_before_the_first_press(
+    played: Played, own_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], fault: str
+) -> None:
+    typed = contextlib.nullcontext(lambda: "" if played.now_s < 10.0 else None)
+    monkeypatch.setattr(feelahead.commands.feel.command, "typing", lambda **_: typed)
+    if fault == "folder":
+        own_folder.write_text("in the way")
+    else:
+        forces_path(ADDRESS).parent.mkdir(parents=True)
+        forces_path(ADDRESS).write_text("version = 7")
+    with pytest.raises(ConfigurationError, match=str(own_folder)):
+        feel(["--measure"], played.backend)
+    assert "press" not in capsys.readouterr().out
+    assert played.handle.closed == played.handle.times_opened
 
 
 @pytest.mark.processes

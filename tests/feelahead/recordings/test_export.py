@@ -5,7 +5,10 @@ import io
 import itertools
 import json
 import shutil
+import sys
+from importlib import metadata
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -32,6 +35,15 @@ pyarrow = pytest.importorskip("pyarrow")
 parquet = pytest.importorskip("pyarrow.parquet")
 
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("recorded run")]
+
+
+LEROBOT = "lerobot.datasets.lerobot_dataset"
+
+
+@pytest.fixture(autouse=True)
+def without_lerobot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let LeRobot's own writer be missing, whatever is installed."""
+    monkeypatch.setitem(sys.modules, LEROBOT, None)
 
 
 def exported(run: Recording, kind: str, out: Path) -> Path:
@@ -202,6 +214,100 @@ def test_lerobot_has_an_episode_for_each_that_was_marked_and_kept(
         assert part.column("next.done").to_pylist() == [False] * (one["length"] - 1) + [True]
         assert part.column("next.success")[-1].as_py() is (one["success"] is True)
         np.testing.assert_allclose(one["stats/observation.state/mean"], states[rows].mean(axis=0), rtol=1e-5, atol=1e-7)
+
+
+MARKS: tuple[tuple[float, EpisodeMark], ...] = ((3.0, "start"), (3.5, "success"), (4.0, "start"), (4.4, "failure"))
+
+
+def marked(run: Recording, folder: Path) -> Recording:
+    path = folder / "marked.mcap"
+    record_pictures(run, path, (*MARKS, (5.0, "start")))
+    return open_recording(path)
+
+
+class PublishedWriter:
+    """LeRobotDataset as published (0.4.4 to 0.6.1), as far as it is used; keeps what it is given."""
+
+    made: "PublishedWriter"
+
+    def __init__(self, asked: tuple[str, int, str], features: dict[str, Any], root: Path) -> None:
+        self.asked, self.features, self.root = asked, features, root
+        self.frames: list[dict[str, Any]] = []
+        self.episodes: list[list[dict[str, Any]]] = []
+
+    @classmethod
+    def create(cls, repo_id: str, fps: int, features: dict[str, Any], root: Path, robot_type: str) -> "PublishedWriter":
+        root.mkdir(parents=True, exist_ok=False)
+        cls.made = cls((repo_id, fps, robot_type), features, root)
+        return cls.made
+
+    def add_frame(self, frame: dict[str, Any]) -> None:
+        assert set(frame) == {*self.features, "task"}
+        for name, feature in self.features.items():
+            assert frame[name].shape == feature["shape"]  # tuples, or the published one refuses the frame
+            assert str(frame[name].dtype) == ("uint8" if feature["dtype"] == "video" else feature["dtype"])
+        self.frames.append(frame)
+
+    def save_episode(self) -> None:
+        self.episodes.append(self.frames)
+        self.frames = []
+
+    def finalize(self) -> None:
+        folder = self.root / "meta/episodes/chunk-000"
+        folder.mkdir(parents=True)
+        numbers = pyarrow.table({"episode_index": list(range(len(self.episodes)))})
+        parquet.write_table(numbers, folder / "file-000.parquet")
+
+
+def test_lerobots_own_writer_gets_every_frame_of_each_episode(
+    run: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = marked(run, tmp_path)
+    plain = exported(recording, "lerobot", tmp_path / "plain")
+    assert f"; written by feelahead, pictures as JPEG (import of {LEROBOT} halted" in capsys.readouterr().out
+    module = SimpleNamespace(LeRobotDataset=PublishedWriter, CODEBASE_VERSION="v3.0")
+    monkeypatch.setitem(sys.modules, LEROBOT, module)
+    monkeypatch.setattr(metadata, "version", lambda _: "0.6.1")
+
+    folder = exported(recording, "lerobot", tmp_path / "own")
+
+    assert "; written by lerobot 0.6.1, pictures as video\n" in capsys.readouterr().out
+    made = PublishedWriter.made
+    data = parquet.read_table(plain / "data/chunk-000/file-000.parquet")
+    info = json.loads((plain / "meta/info.json").read_text())
+    assert made.asked == ("feelahead/marked", info["fps"], info["robot_type"])
+    assert made.frames == []
+    frames = [frame for episode in made.episodes for frame in episode]
+    numbered = {"timestamp", "frame_index", "episode_index", "index", "task_index"}  # the writer's own
+    assert set(info["features"]) == {*made.features} | numbered
+    for name in made.features.keys() - {"observation.images.overview"}:
+        expected = np.array(data.column(name).to_pylist())
+        np.testing.assert_array_equal(np.squeeze([frame[name] for frame in frames]), np.squeeze(expected))
+    assert [len(one) for one in made.episodes] == np.bincount(data.column("episode_index").to_numpy()).tolist()
+    first = Image.open(io.BytesIO(data.column("observation.images.overview")[0].as_py()["bytes"]))
+    np.testing.assert_array_equal(frames[0]["observation.images.overview"], np.asarray(first))
+    episodes = parquet.read_table(folder / "meta/episodes/chunk-000/file-000.parquet")
+    assert episodes.column("success").to_pylist() == [True, False, None]
+    module.CODEBASE_VERSION = "v2.1"
+    exported(recording, "lerobot", tmp_path / "old")
+    assert "; written by feelahead, pictures as JPEG (lerobot writes v2.1)" in capsys.readouterr().out
+
+
+@pytest.mark.filterwarnings("default")  # what a foreign package warns of
+def test_lerobot_reads_what_its_own_writer_wrote(
+    run: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delitem(sys.modules, LEROBOT)
+    library = pytest.importorskip(LEROBOT, exc_type=ImportError)
+    folder = exported(marked(run, tmp_path), "lerobot", tmp_path / "own")
+    assert "; written by lerobot " in capsys.readouterr().out
+    read = library.LeRobotDataset("feelahead/marked", root=folder, video_backend="pyav")
+    assert (read.meta.total_episodes, read.fps, len(read)) == (3, 10, read.meta.total_frames)
+    assert [one["success"] for one in read.meta.episodes] == [True, False, None]
+    ages_s = np.array(read.hf_dataset["observation.picture_age_s"])
+    assert ((ages_s >= 0.0) & (ages_s < 0.2)).all()
+    assert [*read.meta.video_keys] == ["observation.images.overview"]
+    assert len(list((folder / "videos").rglob("*.mp4"))) == 1
 
 
 def test_fps_is_for_lerobot_alone(run: Recording) -> None:

@@ -1,21 +1,51 @@
-"""Distances from points to the surfaces of primitives: thin wrappers of the compiled `nearest_points`.
+"""Distances from points to the surfaces of primitives, by the compiled functions for nearest points.
 
-Each function compares point i with primitive i only. `robot_side.surroundings.distances` explains the result.
+Each function compares point i with primitive i only. `kinds.layout.Nearest` explains the result.
 """
 
 import math
 
 import numpy as np
 
-from common.arrays import FloatArray
-from robot_side.surroundings.distances import nearest_points
-from robot_side.surroundings.kinds.layout import BOX, HALF_SPACE, SPHERE, TETRAHEDRON, rows
+from common.arrays import FloatArray, IntArray
+from robot_side.compiled.kernel import compiled, input_array, input_indices, output_array
+from robot_side.compiled.vectors import load
+from robot_side.surroundings.any_kind import nearest
+from robot_side.surroundings.distances import nearest_mesh_points
+from robot_side.surroundings.kinds.layout import BOX, HALF_SPACE, MESH, SPHERE, TETRAHEDRON, rows
 from robot_side.surroundings.perceived import PerceivedObjects
 from robot_side.surroundings.scene_table import SceneTable, scene_table
 from tests.helpers.perceived_scenes import Scene
 
 Nearest = tuple[FloatArray, FloatArray]
 """Signed distances (p,) in metres, and directions (p, 3)."""
+
+
+@compiled(input_array(2), input_array(2), input_indices(), input_indices(), output_array(1), output_array(2))
+def _nearest_loop(
+    points: FloatArray,
+    shapes: FloatArray,
+    kinds: IntArray,
+    rows: IntArray,
+    distances: FloatArray,
+    directions: FloatArray,
+) -> None:
+    for k in range(rows.size):
+        if kinds[rows[k]] != MESH:
+            distances[k], towards = nearest(kinds[rows[k]], shapes, rows[k], load(points, k))
+            for axis in range(3):
+                directions[k, axis] = towards[axis]
+
+
+def nearest_points(points_m: FloatArray, scene: SceneTable, rows: IntArray) -> Nearest:
+    """Return distances and directions from points (p, 3) to the primitives `rows` (p,) of a table."""
+    distances, directions = np.empty(len(rows)), np.empty((len(rows), 3))
+    points_m = np.ascontiguousarray(points_m)
+    _nearest_loop(points_m, scene.shapes, scene.kinds, rows, distances, directions)
+    meshes = np.flatnonzero(scene.kinds.take(rows) == MESH)
+    if len(meshes):
+        distances[meshes], directions[meshes] = nearest_mesh_points(points_m[meshes], scene, rows[meshes])
+    return distances, directions
 
 
 def distance_to_object(objects: PerceivedObjects, index: int, point_m: FloatArray) -> float:

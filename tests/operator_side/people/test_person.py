@@ -1,6 +1,7 @@
 """Scripted person without a robot: the test shows made-up telemetry, and checks how the person reacts."""
 
 import dataclasses
+import itertools
 import math
 
 import pytest
@@ -118,6 +119,23 @@ def test_the_task_from_waiting_to_withdrawing() -> None:
     for hands in desk.watch(at_height(0.335, 0.33, holding=False), 1.0):
         assert (hands.l2_n, hands.r2_n, hands.left, hands.buttons) == (0.0, 0.0, (0.0, 0.0), frozenset({Button.L1}))
     assert all(Button.L1 in hands.buttons and hands.right == (0.0, 0.0) for hands in desk.hands)
+
+
+@pytest.mark.parametrize("marks", [False, True])
+@pytest.mark.parametrize(("dropped", "result"), [(False, Button.RIGHT), (True, Button.LEFT)])
+def test_a_person_who_marks_episodes_marks_start_and_result(marks: bool, dropped: bool, result: Button) -> None:
+    desk = carried(dataclasses.replace(CLEAR_SIGHTED, marks=marks))
+    if not dropped:
+        sinks(desk, UP_AT_M, 0.32, 0.05)
+        desk.until(Doing.LETTING_GO, at_height(0.32), 1.0)
+        desk.until(Doing.DRAWING_BACK, at_height(0.335, holding=False), 1.0)
+    desk.until(Doing.DONE, at_height(0.335, 0.33, holding=False), 2.0)
+    desk.watch(at_height(0.335, 0.33, holding=False), 1.0)
+    pad = {Button.UP, Button.DOWN, Button.LEFT, Button.RIGHT}
+    pressed = [(pad & hands.buttons, hands.phase) for hands in desk.hands]
+    changes = [one for one, _ in itertools.groupby(pressed, key=lambda found: frozenset(found[0]))]
+    assert [*map(set, changes)] == ([set(), {Button.UP}, set(), {result}, set()] if marks else [set()])
+    assert {phase for button, phase in pressed if button == {result}} == ({Doing.DONE} if marks else set())
 
 
 @pytest.mark.parametrize("trust", [0.0, 1.0])

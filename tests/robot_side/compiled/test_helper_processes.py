@@ -48,16 +48,6 @@ def test_each_kernel_goes_to_one_process_and_all_end_alike(count: int) -> None:
     assert sum(sizes) < 1.25 * size(ours())
 
 
-def test_what_another_process_has_compiled_most_of_is_taken_last() -> None:
-    boxes, tetrahedra, small = (
-        next(kernel for kernel in ours() if kernel.function.__name__ == name)
-        for name in ("precise_boxes", "precise_tetrahedra", "find_prospect")
-    )
-    queue = KernelQueue([boxes, tetrahedra, small], 2)
-    assert queue.take(0) is boxes
-    assert [queue.take(1), queue.take(1), queue.take(1)] == [small, tetrahedra, None]
-
-
 @pytest.mark.processes
 def test_other_processes_leave_machine_code_that_is_loaded_here(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -70,14 +60,6 @@ def test_other_processes_leave_machine_code_that_is_loaded_here(
     for kernel in fresh:
         kernel.prepare()
     assert [kernel.cache_hits for kernel in fresh] == [1, 1, 1]
-
-
-@pytest.mark.processes
-def test_a_process_that_can_keep_nothing_ends_and_claims_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", "/proc/nowhere")
-    told: list[str] = []
-    compile_in_helpers(fresh_kernels(), 2, told.append)
-    assert told == []
 
 
 @pytest.mark.processes

@@ -13,13 +13,11 @@ from robot_side.compiled import kernel as compile_module
 from robot_side.compiled.kernel import (
     Compiled,
     compiled,
-    imported_kernels,
     input_array,
     output_array,
 )
 from robot_side.compiled.machine_code import can_keep, keep, kept
 from robot_side.compiled.numba_inside import machine
-from robot_side.overlap import warm_up
 
 
 def _double(values: FloatArray, doubled: FloatArray) -> None:
@@ -33,14 +31,6 @@ def _kernel() -> Compiled:
     kernel(np.array([1.0, 2.0]), result)
     assert result.tolist() == [2.0, 4.0]
     return kernel
-
-
-def test_warm_up_leaves_nothing_to_compile() -> None:
-    assert warm_up() > 0.0
-    needed = {"overlap_boxes", "overlap_tetrahedra", "precise_boxes", "precise_tetrahedra", "_sphere_loop"}
-    ready = {kernel.name.split(".")[-1] for kernel in imported_kernels() if kernel.ready}
-    assert needed <= ready
-    assert all(kernel.ready for kernel in imported_kernels() if kernel.name.startswith("robot_side."))
 
 
 def test_machine_code_is_kept_on_disk_until_any_source_changes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -76,14 +66,6 @@ def test_damaged_machine_code_is_compiled_anew(
     (file,) = tmp_path.iterdir()
     file.write_bytes(file.read_bytes()[:50] if content is None else content)
     assert not kernel.is_kept
-    assert _kernel().cache_hits == 0
-    assert _kernel().cache_hits == 1
-
-
-def test_what_is_whole_but_no_machine_code_is_compiled_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    kernel = _kernel()
-    keep(kernel.name, kernel._key(), b"of another make")
     assert _kernel().cache_hits == 0
     assert _kernel().cache_hits == 1
 

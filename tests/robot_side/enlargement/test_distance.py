@@ -95,12 +95,6 @@ def test_the_plain_enlargement_is_eq_10_for_each_sphere_with_the_trace_and_all_o
         assert found[i] == pytest.approx(expected, rel=1e-12)
 
 
-def test_equal_means_along_all_axes_are_root_three_of_one() -> None:
-    uncertainty = Uncertainty(0.5, (-0.001,) * 3, 0.001, (0.0, -0.002, 0.0))
-    none = np.zeros((1, 3, 3)), np.zeros((1, 3)), 0.1
-    assert plain_enlargements_m(uncertainty, *none)[0] == pytest.approx(0.002 + math.sqrt(3.0) * 0.001)
-
-
 @settings(derandomize=True, deadline=None, max_examples=40)
 @given(seed=st.integers(0, 2**32 - 1), p=st.floats(0.5, 0.999))
 def test_along_any_one_direction_less_is_needed_than_plainly(seed: int, p: float) -> None:

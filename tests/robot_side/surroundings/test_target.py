@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from common.arrays import FloatArray
 from common.roles import Role
 from robot_side.surroundings.perceived import PerceivedObjects
+from robot_side.surroundings.scene_table import scene_table
 from robot_side.surroundings.surroundings import Surroundings
 from robot_side.surroundings.target import next_target, object_centers
 from tests.helpers.perceived_scenes import Scene
@@ -28,22 +29,22 @@ def following(
     objects: PerceivedObjects, tool_position_m: FloatArray = ORIGIN, approach: FloatArray = AHEAD
 ) -> str | None:
     present = Surroundings().target(objects)
-    return next_target(objects, present, object_centers(objects), tool_position_m, approach)
+    return next_target(objects, present, object_centers(scene_table(objects)), tool_position_m, approach)
 
 
 def test_centres_are_the_mean_of_the_primitives_centres() -> None:
     scene = Scene().add().sphere([1.0, 0.0, 0.0], 0.1).box([0.0, 2.0, 0.0], [0.1, 0.1, 0.1])
     scene.tetrahedron([[0.0, 0.0, 0.0], [0.0, 0.0, 4.0], [0.0, 4.0, 4.0], [8.0, 0.0, 4.0]])
     scene.add().box([0.5, 0.5, 0.5], [0.1, 0.2, 0.3])
-    np.testing.assert_allclose(object_centers(scene.objects()), [[1.0, 1.0, 1.0], [0.5, 0.5, 0.5]])
+    np.testing.assert_allclose(object_centers(scene_table(scene.objects())), [[1.0, 1.0, 1.0], [0.5, 0.5, 0.5]])
 
 
 def test_what_has_no_middle_has_no_centre() -> None:
     scene = Scene().add(Role.SUPPORT).half_space(AHEAD, 0.0).add(Role.IGNORED).add().sphere([0.1, 0.2, 0.3], 0.1)
-    centers = object_centers(scene.objects())
+    centers = object_centers(scene_table(scene.objects()))
     assert np.isnan(centers[:2]).all()
     np.testing.assert_array_equal(centers[2], [0.1, 0.2, 0.3])
-    assert object_centers(Scene().objects()).shape == (0, 3)
+    assert object_centers(scene_table(Scene().objects())).shape == (0, 3)
 
 
 def test_the_target_is_found_by_its_role() -> None:

@@ -39,12 +39,6 @@ def test_noise_of_a_frame_counts_little() -> None:
     assert np.std(found[10:]) < 0.008
 
 
-@pytest.mark.parametrize("window_s", [0.0, -1.0, np.nan])
-def test_a_window_that_is_none_is_refused(window_s: float) -> None:
-    with pytest.raises(ValueError, match=r"window_s = .*; valid: above 0"):
-        ObjectVelocities(window_s)
-
-
 def test_another_number_of_objects_is_refused() -> None:
     seen = ObjectVelocities()
     seen.see(0.0, np.zeros((2, 3)))

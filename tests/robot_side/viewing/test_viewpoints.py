@@ -3,8 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from common.protocol.view_messages import VIEW_NAMES, ViewName
 from robot_side.drivers.mujoco.scene import load_scene
-from robot_side.viewing.viewpoints import first_person_eye, viewpoints
+from robot_side.viewing.viewpoints import first_person_eye, overview_eye, viewpoints
 from tests.helpers.arm_models import planar_arm
 from tests.robot_side.viewing.picture_taking import HEIGHT, WIDTH, project
 
@@ -54,16 +55,29 @@ def test_the_first_person_is_behind_the_palm_and_beside_it(tmp_path: Path) -> No
         assert 0 < column < WIDTH
 
 
+@pytest.mark.parametrize("view", VIEW_NAMES)
 @pytest.mark.parametrize("built_in", [True, False])
-def test_the_eye_in_the_tool_frame_sees_points_where_the_picture_has_them(built_in: bool, tmp_path: Path) -> None:
+def test_an_eye_sees_points_where_the_picture_has_them(built_in: bool, view: ViewName, tmp_path: Path) -> None:
     scene = load_scene() if built_in else load_scene(planar_arm(tmp_path, yaw_deg=70.0), "tcp")
-    tool, eye = scene.data.site(scene.robot.site), first_person_eye(scene)
-    for point_m in ((0.0, 0.0, 0.1), (0.03, -0.02, 0.3)):
-        row, column, depth_m = project(
-            scene, viewpoints(scene)["first_person"], tool.xpos + tool.xmat.reshape(3, 3) @ point_m
-        )
-        seen = np.array(point_m) - eye.position_m
+    tool = scene.data.site(scene.robot.site)
+    origin_m, axes, eye = tool.xpos, tool.xmat.reshape(3, 3), overview_eye(scene)
+    if view == "overview":
+        origin_m, axes = np.zeros(3), np.eye(3)
+    else:
+        eye = first_person_eye(scene)
+    assert eye is not None
+    for ahead_m in ((0.0, 0.0, 0.1), (0.03, -0.02, 0.3)):
+        point_m = tool.xpos + tool.xmat.reshape(3, 3) @ ahead_m
+        row, column, depth_m = project(scene, viewpoints(scene)[view], point_m)
+        seen = axes.T @ (point_m - origin_m) - eye.position_m
         half_m = depth_m * np.tan(np.radians(0.5 * eye.fovy_deg))
         assert seen @ eye.forward == pytest.approx(depth_m)
         assert 0.5 * HEIGHT * (1.0 - seen @ eye.up / half_m) == pytest.approx(row)
         assert 0.5 * (WIDTH + HEIGHT * (seen @ np.cross(eye.forward, eye.up)) / half_m) == pytest.approx(column)
+
+
+def test_a_moving_overview_has_no_eye(tmp_path: Path) -> None:
+    still = planar_arm(tmp_path, world=CAMERA.format("overview"))
+    assert overview_eye(load_scene(still, "tcp")) is not None
+    moving = f'<body><joint type="hinge"/><geom size="0.01"/>{CAMERA.format("overview")}</body>'
+    assert overview_eye(load_scene(planar_arm(tmp_path, world=moving), "tcp")) is None

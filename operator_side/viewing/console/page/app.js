@@ -30,7 +30,7 @@ for (const [id, title] of Object.entries(FIGURES)) {
 
 const clock = new Clock();
 const views = VIEWS.map((name) => new View(byId(name), clock));
-const overlay = new Overlay(byId("first_person"));
+const overlay = new Overlay(VIEWS.map(byId));
 const triggers = { l2: new Trigger(byId("l2"), "L2"), r2: new Trigger(byId("r2"), "R2") };
 const charts = {
   delay: new Chart(byId("delay_chart"), "delay", "ms", [["to here", "--l2"], ["to the robot", "--r2", [5, 3]]]),
@@ -125,8 +125,8 @@ function showFacts(message) {
   showLink(status);
   text("target", status.target ?? "none");
   text("holding", said.holding);
-  triggers.l2.show(facts.l2, message.fingers[0], facts.advancing === "L2");
-  triggers.r2.show(facts.r2, message.fingers[1], facts.advancing === "R2");
+  triggers.l2.show(facts.l2, message.fingers[0], facts.advancing === "L2", facts.page?.yields?.[0]);
+  triggers.r2.show(facts.r2, message.fingers[1], facts.advancing === "R2", facts.page?.yields?.[1]);
   charts.delay.add(clock.nowMs, [facts.to_operator.newest_ms, facts.to_robot.newest_ms]);
   const asked = [["robot", facts.to_robot.asked], ["operator", facts.to_operator.asked]].filter(([, words]) => words);
   charts.delay.said = asked.map(([side, words]) => `emulated to the ${side}: ${words}`).join("; ");

@@ -43,6 +43,7 @@ export class Hands {
   #confirmed = false; // since that press, the arm was stopped: the same press stops it no second time
   #giveBack = false;
   #reset = false;
+  #marked = null; // mark whose button of a gamepad is held
   #why = "";
 
   #shownS;
@@ -196,6 +197,13 @@ export class Hands {
     this.#say(REST);
   }
 
+  // A controller that the operator side reads itself may be a gamepad of this browser, too: it marks once.
+  #markNow(mark) {
+    const before = this.#marked;
+    this.#marked = mark;
+    if (mark !== null && mark !== before && this.#hands?.may_drive) this.#send({ mark });
+  }
+
   get #stops() {
     if (this.#stopMs === null) return false;
     const sinceMs = performance.now() - this.#stopMs;
@@ -211,6 +219,7 @@ export class Hands {
     const there = this.#document.hasFocus();
     this.#stop("gamepad", there && pads.stop);
     if (there && pads.reset) this.#resetNow();
+    this.#markNow(there ? pads.mark : null);
     this.#panel.showGamepad(pads, there);
     if (this.#state !== "watching") {
       if (passedMs > HELD_UP_MS) this.#release("This page was suspended.");

@@ -23,11 +23,12 @@ export const KEYS = [
   ["hand_over", ["KeyH"], "hand the robot over"],
 ];
 export const MARKS = [
-  ["start", ["KeyN"], "episode: start"],
-  ["success", ["KeyY"], "success"],
-  ["failure", ["KeyX"], "failure"],
-  ["discard", ["KeyU"], "discard"],
-  ["reset", ["KeyB"], "put the scene back"],
+  // mark, codes of its keys, label, button of a gamepad: directional pad and right stick, as on a DualSense
+  ["start", ["KeyN"], "episode: start", 12],
+  ["success", ["KeyY"], "success", 15],
+  ["failure", ["KeyX"], "failure", 14],
+  ["discard", ["KeyU"], "discard", 13],
+  ["reset", ["KeyB"], "put the scene back", 11],
 ];
 export const MARK_OF = new Map(MARKS.flatMap(([mark, codes]) => codes.map((code) => [code, mark])));
 const DOES = new Map(KEYS.flatMap(([does, codes]) => codes.map((code) => [code, does])));
@@ -38,8 +39,8 @@ const PULLED = 0.05; // dead zone of a gamepad's trigger
 const DEFLECTED = 0.12; // dead zone of a gamepad's sticks
 
 export const REST = Object.freeze({
-  run: false, l2: 0, r2: 0, lateral: [0, 0], turning: [0, 0], gripper: 0, next_target: false, next_speed: false,
-  next_frame: false, home: false, hand_over: false,
+  run: false, l2: 0, r2: 0, keyed: false, lateral: [0, 0], turning: [0, 0], gripper: 0, next_target: false,
+  next_speed: false, next_frame: false, home: false, hand_over: false,
 });
 
 export const atRest = (hands) =>
@@ -82,6 +83,7 @@ export class Keys {
     };
     const axis = (plus, minus) => way(plus, minus) - way(minus, plus);
     const hands = {
+      keyed: true,
       run: held.has("run"),
       r2: way("advance", "retreat"),
       l2: way("retreat", "advance"),
@@ -116,7 +118,7 @@ function stick(x, y) {
 export function readGamepads(swapped) {
   const found = [...(navigator.getGamepads?.() ?? [])].filter((pad) => pad?.connected);
   const known = found.filter((pad) => pad.mapping === "standard");
-  let hands = REST, stop = false, reset = false;
+  let hands = REST, stop = false, reset = false, mark = null;
   for (const pad of known) {
     const value = (number) => pad.buttons[number]?.value ?? 0;
     const pressed = (number) => pad.buttons[number]?.pressed ?? false;
@@ -125,7 +127,9 @@ export function readGamepads(swapped) {
     if (swapped) sticks.reverse();
     stop ||= pressed(1);
     reset ||= pressed(9);
+    mark ??= MARKS.find(([, , , button]) => pressed(button))?.[0] ?? null;
     hands = both(hands, {
+      keyed: false,
       run: pressed(swapped ? 5 : 4),
       l2: swapped ? right : left,
       r2: swapped ? left : right,
@@ -139,7 +143,7 @@ export function readGamepads(swapped) {
       hand_over: pressed(8),
     });
   }
-  return { hands, stop, reset, name: known[0]?.id ?? null, unknown: known.length ? null : found[0]?.id ?? null };
+  return { hands, stop, reset, mark: stop ? null : mark, name: known[0]?.id ?? null, unknown: known.length ? null : found[0]?.id ?? null };
 }
 
 // Merge two sets of inputs: the larger value of each input.
@@ -149,6 +153,7 @@ export function both(one, other) {
     run: one.run || other.run,
     l2: Math.max(one.l2, other.l2),
     r2: Math.max(one.r2, other.r2),
+    keyed: Math.max(one.l2, one.r2) >= Math.max(other.l2, other.r2) ? one.keyed : other.keyed,
     lateral: farther(one.lateral, other.lateral),
     turning: farther(one.turning, other.turning),
     gripper: Math.sign(one.gripper + other.gripper),

@@ -4,6 +4,7 @@ import { make } from "./make.js";
 import { Doing, Hands, LinkState, MotionState, SessionState } from "./names.js";
 
 const FULL = "Travel of keys: 1 to 9";
+const YIELDS = "Stiff zones stop the pull of keys, as they stop a finger of 2 N";
 
 export class Panel {
   #document;
@@ -53,7 +54,7 @@ export class Panel {
     keyWords().then((word) => {
       keys.replaceChildren(...[...KEYS, ...MARKS].flatMap(([, codes, does]) => [
         make("dt", {}, ...codes.flatMap((code, k) => [k ? " or " : "", make("kbd", {}, word(code))])), make("dd", {}, does),
-      ]), make("dt", {}, make("kbd", {}, "1"), " … ", make("kbd", {}, "9")), make("dd", {}, "travel of keys"),
+      ]), make("dt", {}, make("kbd", {}, "1"), " … ", make("kbd", {}, "9")), make("dd", {}, `travel of keys. ${YIELDS}`),
       make("dt", {}, make("kbd", {}, "Esc")), make("dd", {}, "emergency stop, for any driver"),
       make("dt", {}, make("kbd", {}, word("KeyX"))), make("dd", {}, "reset a stop"));
     });
@@ -109,7 +110,7 @@ export class Panel {
       running: hands?.counts < 1 ? "Pictures are old: the hands are off until they are fresh." : moves ? "You drive." : facts?.status.person === Doing.AT_REST_FIRST ? "Release all but hold-to-run." : "Arming: keep holding.",
     }[state]);
     this.#text("rest", state === "resting" && !hands?.reset_first ? `still ${(restMs / 1000).toFixed(1)} s` : "");
-    this.#text("level", state === "watching" ? "" : `${FULL}; now ${level}`);
+    this.#text("level", state === "watching" ? "" : `${FULL}; now ${level}. ${YIELDS}.`);
     this.#text("stopped", this.#aboutStop(stop, facts, hands));
   }
 

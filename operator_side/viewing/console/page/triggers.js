@@ -22,7 +22,8 @@ export class Trigger {
     this.#words = Array.from({ length: 2 }, () => add("p", place));
   }
 
-  show(facts, finger, advances) {
+  // yields: whether the pull of a key yields to the zones.
+  show(facts, finger, advances, yields) {
     this.#title.textContent = advances ? `▲ ${this.#name} advances` : `▼ ${this.#name} retreats`;
     this.#meets.textContent = `meets ${facts.meets} of ${STRONGEST}`;
     facts.zones.forEach((strength, zone) => {
@@ -33,7 +34,9 @@ export class Trigger {
     this.#finger.textContent = finger === null ? "no finger" : "▲";
     this.#finger.style.left = `${100 * Math.min(Math.max(finger ?? 0.1, 0.02), 0.98)}%`;
     const percent = (value) => (value === null ? "?" : `${Math.round(100 * value)} %`);
-    this.#words[0].textContent = `pulled ${percent(facts.travel)} · free to ${percent(facts.free)}`;
+    const until = yields ? "yields: a 2 N finger" : `free to ${percent(facts.free)}`;
+    this.#words[0].textContent = `pulled ${percent(facts.travel)} · ${until}`;
+    this.#words[0].classList.toggle("yields", Boolean(yields));
     const mm = facts.needed_m === null ? null : Math.round(1000 * facts.needed_m);
     const ahead = mm === null ? "?" : `${Math.abs(mm)} mm ${mm < 0 ? "behind" : "ahead"}`;
     const stiffness = facts.stiffness === null ? "?" : facts.stiffness.toFixed(2);

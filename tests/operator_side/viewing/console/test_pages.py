@@ -131,6 +131,7 @@ def test_a_page_that_reports_slow_counts_until_it_is_gone() -> None:
         '{"tune": []}',
         '{"arm": {}}',
         '{"hands": {"keys": NaN}}',
+        f'{{"hands": {{"number": {1 << 64}}}}}',
         pytest.param("[" * 30_000, id="nested"),
     ],
 )

@@ -8,7 +8,7 @@ import pytest
 
 from common.protocol.messages import Telemetry
 from common.status.codes import Hands
-from operator_side.controller.feel import Feel
+from operator_side.controller.feel import SENSED_TRAVEL, Feel
 from operator_side.controller.state import Button, ControllerState
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.intent import OperatorIntent, operator_intent
@@ -100,6 +100,21 @@ def test_trigger_effects_change_no_travel_and_go_to_the_persons_device(person: b
     assert not person or desk.device.strengths == (stiff.l2, stiff.r2)
     desk.hands.close()
     assert desk.hands.released
+
+
+@pytest.mark.parametrize("swap_sides", [False, True])
+def test_the_pull_of_keys_stops_where_a_finger_of_2_n_does(swap_sides: bool) -> None:
+    desk = Desk(swap_sides=swap_sides)
+    desk.arm()
+    pull: dict[str, Any] = {"run": True, "r2": 1.0, "keyed": True}
+    assert desk.let_pass(0.4, **pull)[-1].r2 == pytest.approx(1.0, abs=1e-3)
+    desk.hands.write(Feel(l2=feedback(3, 8)) if swap_sides else Feel(r2=feedback(3, 8)), desk.now_s)
+    assert desk.let_pass(0.4, **pull)[-1].r2 == pytest.approx(0.3 / SENSED_TRAVEL, abs=1e-3)
+    assert desk.pages.yields == (swap_sides, not swap_sides)
+    desk.hands.write(Feel(l2=feedback(0, 4)) if swap_sides else Feel(r2=feedback(0, 4)), desk.now_s)
+    assert desk.let_pass(0.4, **pull)[-1].r2 == pytest.approx((2.0 - 0.5 - 4 * 0.25) / 4.0 / SENSED_TRAVEL, abs=1e-3)
+    assert desk.let_pass(0.02, run=True)[-1].r2 == 0.0
+    assert desk.pages.yields == (False, False)
 
 
 def test_silence_releases_everything() -> None:
