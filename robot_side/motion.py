@@ -54,8 +54,9 @@ class Motion:
             command = assisted(command, felt.l2, felt.r2)
         if homeward is None:
             where = pose, state.joint_positions_rad, self._limits, self._settings
-            velocity, self.told_m_s, *missed = commanded(command, *where, stands=grip.touchdown.stands)
-            self.hindrance.update(*missed)
+            motion = commanded(command, *where, stands=grip.touchdown.stands)
+            velocity, self.told_m_s = motion.velocity_rad_s, motion.told_m_s
+            self.hindrance.update(motion.undone, motion.cause, motion.joint)
         elif isinstance(homeward, str):
             velocity, self.told_m_s = self._still, 0.0
             self.hindrance.refuse(homeward)
