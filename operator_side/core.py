@@ -9,7 +9,6 @@ view payloads ─▶ receive_view ─▶ screen
 import contextlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 from msgspec import UNSET
@@ -17,15 +16,16 @@ from msgspec import UNSET
 from common.errors import OtherVersionError, RemoteProtocolError
 from common.protocol.codec import decode, encode
 from common.protocol.link_end import Arrival, LinkEnd
-from common.protocol.messages import Compensation, Hello, LeaseNotice, LinkReport, StiffnessUpdate, Telemetry
+from common.protocol.messages import Hello, LeaseNotice, LinkReport, StiffnessUpdate, Telemetry
 from common.status.codes import LinkState
 from common.status.statuses import OperatorStatus
 from operator_side.controller.feel import Feel
 from operator_side.controller.state import ControllerState
+from operator_side.core_settings import CoreSettings
 from operator_side.events import Input, Listener
 from operator_side.feel.blindness import Blindness
 from operator_side.feel.haptics import Haptics
-from operator_side.feel.rendering import RenderingSettings
+from operator_side.hands.choices import Choices
 from operator_side.hands.intent import OperatorIntent
 from operator_side.hands.newest import Hands
 from operator_side.hands.travel_calibration import TravelCalibration
@@ -34,24 +34,6 @@ from operator_side.robot_link.lease_state import LeaseState
 from operator_side.robot_link.marker import Marker
 from operator_side.robot_link.newest import STIFFNESS_EXPIRES_S, NewestStiffness, overtakes
 from operator_side.robot_link.tuner import Tuner
-
-
-@dataclass(frozen=True, kw_only=True)
-class CoreSettings:
-    """Settings of the core: rendering and commands."""
-
-    haptics: bool = True
-    """Whether the triggers resist and the motors rumble"""
-    calibration: TravelCalibration = field(default_factory=TravelCalibration)
-    rendering: RenderingSettings = field(default_factory=RenderingSettings)
-    compensation: Compensation = "operator"
-    swap_sides: bool = False
-    """Whether left and right are exchanged: triggers, sticks and hold-to-run"""
-    seed: int = 0
-    asymmetry_s: float = 0.0
-    """Minimum delay to the robot side minus minimum delay to the operator side, in seconds, if known"""
-    full_rate: bool = False
-    """Whether to send a command in every turn of the loop, without waiting for changes"""
 
 
 class OperatorSide:
@@ -70,7 +52,8 @@ class OperatorSide:
         self.felt = NewestStiffness(settings.seed)
         self.screen: Telemetry | None = None
         """Newest telemetry of the robot side; None before the first."""
-        self.hands = Hands(settings.calibration, swap_sides=settings.swap_sides)
+        choices = Choices(settings.speed_scale, settings.stick_frame)
+        self.hands = Hands(settings.calibration, choices, swap_sides=settings.swap_sides)
         self.haptics = Haptics(
             settings.rendering,
             settings.calibration,
@@ -160,11 +143,13 @@ class OperatorSide:
         known = None if self.screen is None else self.screen.header
         if message.header.epoch == self.link.peer_epoch and overtakes(message.header, known):
             self.screen = message
+            self.hands.choices.see(message, now_s)
 
     def read_state(self, state: ControllerState, now_s: float) -> None:
         """Take one state of the controller."""
         self._hear("state", state, now_s)
         intent = self.hands.read(state, now_s)
+        self.haptics.scale(self.hands.choices.speed_scale)
         self._blindness.see_hands(released=intent.triggers_released)
         self.marker.press(intent.mark, now_s)
 
@@ -232,7 +217,7 @@ class OperatorSide:
         # After a loss the arm may still be armed; sending nothing disarms it.
         if intent is None or (self.hands.lost_s is not None and not intent.emergency_stop):
             return None
-        return intent.resting() if self._blindness.holds else intent
+        return intent.resting() if self._blindness.holds else self.hands.choices.commanded(intent, now_s)
 
     def _look(self, now_s: float) -> None:
         """Forget an expired stiffness message; an operator with the lease is blind from then on."""
@@ -272,12 +257,15 @@ class OperatorSide:
             l2_free=rendering.l2.free_travel,
             r2_free=rendering.r2.free_travel,
             haptics=self.settings.haptics,
+            speed_scale=self.hands.choices.speed_scale,
+            stick_frame=self.hands.choices.stick_frame,
             feel=self._blindness.sight,
             delay_ms=None if mean_s is None else 1e3 * mean_s,
             stands=None if felt is None else felt.stands,
             target=UNSET if seen is None else seen.target,
             target_centre_mm=None if centre_m is None else 1e3 * math.hypot(*centre_m),
             holding=None if seen is None else seen.holding,
+            hindrance=None if seen is None else seen.hindrance,
             offset_s=self.link.clock_offset.offset_at(now_s),
         )
 

@@ -14,6 +14,7 @@ from common.protocol.messages import Compensation
 from common.sockets.turns import CONNECTIONS, MOST_CONNECTIONS_EACH
 from operator_side.controller.port import check_choice
 from operator_side.feel.rendering import RenderingSettings
+from operator_side.hands.choices import SpeedScale, StickFrame
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.people.settings import PersonSettings
 
@@ -30,7 +31,8 @@ class OperatorSettings(SideOptions):
     moves across, the right stick turns. Cross closes the gripper, square opens it, triangle changes the target, circle
     stops everything, and create hands the robot over to the observer that has waited longest.
     In a recording the directional pad marks episodes: up starts one, right is success, left failure, down discards it.
-    R3 puts a simulated scene back, disarmed.
+    L3 changes the speed scale, the touchpad the frame of the sticks. Mute, held, moves the
+    arm back to its start. R3 puts a simulated scene back, disarmed.
     """
 
     connect: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT")] = "tcp://127.0.0.1:5555"
@@ -55,6 +57,12 @@ class OperatorSettings(SideOptions):
     """Whether the triggers resist and the motors rumble."""
     compensation: Compensation = "operator"
     """Side that compensates the delay. operator: by the commands still under way. robot: by eq. 8."""
+    speed_scale: SpeedScale = 1.0
+    """Share of the full speed that full travel and full deflection command at first, 0.05 to 1. L3 changes it to 100,
+    50 or 25 %."""
+    stick_frame: StickFrame = "tool"
+    """Frame in which the sticks move and turn the tool at first: the tool's, the base's or that of the overview's
+    picture. The touchpad changes it. The triggers always move along the tool."""
     swap_sides: bool = False
     """Swap left and right: L2 advances, R2 retreats, R1 is held to run, the right stick moves across, the left stick
     turns."""

@@ -12,17 +12,20 @@ from typing import Any
 
 import msgspec
 
+from common.arrays import FloatArray
 from common.status.codes import LinkState
 from common.status.statuses import RobotStatus
 from common.timing.ages import LoopAge
 from robot_side.arm.ability import JointLimits
 from robot_side.arm.joint_estimate import JointEstimate, lateness_s
 from robot_side.arm.port import Arm, ArmState, GripperKinematics
+from robot_side.arm.stick_frames import StickFrames
 from robot_side.arm.tool_motion import ToolMotionSettings
 from robot_side.events import Found, Listener, Listeners, Tick
 from robot_side.gripper.grip import Grip
 from robot_side.gripper.held_covers import HeldCovers
 from robot_side.gripper.perceived_distances import perceived_distances
+from robot_side.homing import Homing
 from robot_side.laws.law import Law, Situation
 from robot_side.laws.sensed import Sensed
 from robot_side.motion import Motion
@@ -51,6 +54,10 @@ class RobotParts:
     loop_age: LoopAge
     limits: JointLimits
     motion: ToolMotionSettings
+    home_rad: FloatArray | None = None
+    """(n,) joint positions of the start pose; None: there is no way home"""
+    frames: StickFrames | None = None
+    """Frames in which an operator may steer besides the tool's; None: as the tool's"""
     truth: Observer | None = None
     """Observer of true contacts and distances, for the figures; None if these are unknown"""
     held_covers: HeldCovers | None = None
@@ -72,7 +79,9 @@ class RobotSide:
         self.sight = Sight(parts.camera, parts.surroundings)
         self.grip = Grip(parts.surroundings, parts.held_covers)
         self.motion = Motion(parts.arm, parts.limits, parts.motion, assists=parts.assists)
-        self.reports = Reports(parts.session, parts.law, full_rate=parts.full_rate)
+        home = parts.kinematics, parts.surroundings
+        self.homing = None if parts.home_rad is None else Homing(parts.home_rad, parts.limits, *home)
+        self.reports = Reports(parts.session, parts.law, parts.frames, full_rate=parts.full_rate)
         self.figures = RunFigures(parts.seed, parts.truth)
         self.newest: tuple[Sensed, Situation] | None = None
         """Result of the law in the last tick, and the situation for which it was computed"""
@@ -132,7 +141,11 @@ class RobotSide:
         whole = grip.joined(pose)
         begin("motion")
         permission = self.session.permission(now_s)
-        self.motion.follow(permission, pose, state, grip, None if self.newest is None else self.newest[0], now_s)
+        felt = None if self.newest is None else self.newest[0]
+        homeward = None
+        if self.homing is not None and felt is not None:
+            homeward = self.homing.follow(permission.command, state, grip, objects, felt.enlargement_m)
+        self.motion.follow(permission, pose, state, grip, felt, now_s, homeward)
         begin("law")
         command = permission.command
         situation = Situation(
@@ -194,6 +207,7 @@ class RobotSide:
             delay_ms=None if delay_s is None else 1e3 * delay_s,
             l2_pulled=None if command is None else command.l2,
             r2_pulled=None if command is None else command.r2,
+            hindrance=self.motion.hindrance.text,
             offset_s=self.session.link.clock_offset.offset_at(now_s),
         )
         if self.newest is None or (objects := self.sight.frame) is None:

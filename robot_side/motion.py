@@ -5,6 +5,7 @@ import numpy as np
 from common.arrays import FloatArray
 from robot_side.arm.ability import JointLimits
 from robot_side.arm.commanded import commanded
+from robot_side.arm.hindrance import Hindrance
 from robot_side.arm.port import Arm, ArmState, GripperPose
 from robot_side.arm.speed_assist import assisted
 from robot_side.arm.tool_motion import ToolMotionSettings
@@ -22,24 +23,46 @@ class Motion:
         """(n,) commanded joint velocities; None: the arm is to stand still"""
         self.told_m_s = self.rises_m_s = 0.0
         """Commanded speeds of the tool: in the direction in which R2 advances; and upwards (0 if nothing is held)"""
+        self.hindrance = Hindrance()
         self._arm, self._limits, self._settings, self._assists = arm, limits, settings, assists
         self._still: FloatArray = np.zeros(arm.joint_count)
 
     def follow(
-        self, permission: Permission, pose: GripperPose, state: ArmState, grip: Grip, felt: Sensed | None, now_s: float
+        self,
+        permission: Permission,
+        pose: GripperPose,
+        state: ArmState,
+        grip: Grip,
+        felt: Sensed | None,
+        now_s: float,
+        homeward: FloatArray | str | None = None,
     ) -> None:
-        """Command the arm; stop it if there is no permission. felt: the law's result in the tick before."""
+        """Command the arm; stop it if there is no permission.
+
+        felt: the law's result in the tick before. homeward: result of `Homing.follow`, instead of the command's motion.
+        """
         command = permission.command
         if command is None or grip.touchdown.gives_way:
             self.commanded_rad_s, self.told_m_s, self.rises_m_s = None, 0.0, 0.0
+            if command is None:
+                self.hindrance.end()
             # Valid until the state's time: expiry between two physics steps would let a load sink, each time.
             self._arm.command(self._still, state.time_s)
             self._arm.command_gripper(0.0, now_s)
             return
         if self._assists and felt is not None:
             command = assisted(command, felt.l2, felt.r2)
-        where = pose, state.joint_positions_rad, self._limits, self._settings
-        velocity, self.told_m_s = commanded(command, *where, stands=grip.touchdown.stands)
+        if homeward is None:
+            where = pose, state.joint_positions_rad, self._limits, self._settings
+            motion = commanded(command, *where, stands=grip.touchdown.stands)
+            velocity, self.told_m_s = motion.velocity_rad_s, motion.told_m_s
+            self.hindrance.update(motion.undone, motion.cause, motion.joint)
+        elif isinstance(homeward, str):
+            velocity, self.told_m_s = self._still, 0.0
+            self.hindrance.refuse(homeward)
+        else:
+            velocity, self.told_m_s = homeward, float(pose.tool_rotation[:, 2] @ pose.tool_jacobian[:3] @ homeward)
+            self.hindrance.end()
         self.commanded_rad_s = velocity
         self.rises_m_s = 0.0 if grip.held is None else float(pose.tool_jacobian[2] @ velocity)
         self._arm.command(velocity, permission.valid_until_s)

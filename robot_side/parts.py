@@ -45,6 +45,7 @@ from robot_side.outcome.figures import RunFigures
 from robot_side.settings import RobotSettings
 from robot_side.surroundings.perceived import KINDS, PerceivedObjects
 from robot_side.surroundings.surroundings import Surroundings
+from robot_side.viewing.viewpoints import stick_frames
 
 _NAMED_OBJECTS = 8
 """Maximum number of objects that a note names"""
@@ -163,6 +164,8 @@ def build_parts(
         ),
         loop_age=LoopAge(settings.assumed_delay_s),
         limits=joint_limits,
+        home_rad=scene.data.qpos[scene.robot.arm_positions].copy(),
+        frames=stick_frames(scene),
         motion=settings.motion,
         scene=scene,
         any_objects=settings.objects is not None,

@@ -50,8 +50,14 @@ def _facts(view: LiveView) -> list[_Fact]:
     facts = [(0, view.phase)]
     if view.reason is not None:
         facts.append((1, view.reason))
+    if view.hindrance is not None:
+        facts.append((1, view.hindrance))
     if (real_time := number(view.robot.real_time)) is not None and real_time < SLOW:
         facts.append((1, f"{percent(real_time)} % of real time"))
+    if view.operator.speed_scale != 1.0:
+        facts.append((2, f"speed {percent(view.operator.speed_scale)}%"))
+    if view.operator.stick_frame != "tool":
+        facts.append((2, f"sticks: {view.operator.stick_frame}"))
     pulled = "/".join(percent(trigger.pulled) for trigger in view.triggers)
     resist = "/".join(percent(trigger.resists) for trigger in view.triggers)
     facts += [

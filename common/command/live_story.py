@@ -46,6 +46,7 @@ class _State(NamedTuple):
     touched: str | None = None
     holding: str | None = None
     stands: str = ""
+    hindrance: str | None = None
 
 
 class Story:
@@ -85,7 +86,8 @@ def _next_state(before: _State, view: LiveView) -> _State:
         touched = printable(view.robot.nearest)
     felt = (next_resistance(was, one.resists or 0.0) for was, one in zip(before.felt, view.triggers, strict=True))
     linked = view.side.link is LinkState.UP
-    return _State(view.phase, view.reason, linked, view.armed, tuple(felt), touched, view.holding, view.stands)
+    seen = touched, view.holding, view.stands, view.hindrance
+    return _State(view.phase, view.reason, linked, view.armed, tuple(felt), *seen)
 
 
 def _news(reported: _State, state: _State, view: LiveView, peaks: Mapping[str, float]) -> list[str]:
@@ -105,6 +107,8 @@ def _news(reported: _State, state: _State, view: LiveView, peaks: Mapping[str, f
         news.append(f"lets go of {reported.holding}" if state.holding is None else f"holds {state.holding}")
     if state.stands and not reported.stands:
         news.append("the held object stands on something")
+    if state.hindrance is not None and state.hindrance != reported.hindrance:
+        news.append(f"the arm does not follow: {state.hindrance}")
     return news
 
 

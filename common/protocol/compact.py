@@ -1,7 +1,7 @@
-"""Packed form of stiffness and telemetry: all but the header and the target's name is in one binary field.
+"""Packed form of stiffness and telemetry: all but the header and texts are in one binary field.
 
     stiffness    [tag, header, field]            110 bytes of field, some 260 with distances around
-    telemetry    [tag, header, name, field]      57 bytes
+    telemetry    [tag, header, texts, field]     69 bytes
 
 Onset distances are whole steps of 2^-14 m, a sixteenth of a millimetre, in 16 bits. They are rounded towards the
 gripper, never up. The step is a power of two, so that packing unpacked values again loses nothing. Speeds,
@@ -46,12 +46,12 @@ _PAST: Final = -(2**15)
 """Code for a negative distance that 16 bits cannot hold."""
 _PAST_M: Final = -100.0
 _STATES: Final[tuple[MotionState, ...]] = get_args(MotionState)
-_STANDS = 4
+_STANDS, _HINDERED = 4, 8
 _LARGEST_SINGLE: Final = (2.0 - 2.0**-23) * 2.0**127
 
 _STIFFNESS: Final = struct.Struct("<32h10fiBB")
 """Fields in order: onset distances (L2 fast, L2 slow, R2 fast, R2 slow); v_max, a, δ and s of L2, then of R2; v;
-commanded speed, NaN for None; horizon; rumble; one byte with the state and a bit for `stands`."""
+commanded speed, NaN for None; horizon; rumble; one byte with the state and bits for `stands` and `hindered`."""
 _AROUND: Final = struct.Struct(f"<f{LISTS * PROBES}s")
 """Optional part after _STIFFNESS: `full_s` and `steps` of an Around; its `changes` follow, to the end of the field."""
 
@@ -86,6 +86,7 @@ class TelemetryOnWire(Message, frozen=True, tag="telemetry"):
     """Telemetry in packed form."""
 
     target: str | None
+    hindrance: str | None
     field: bytes
 
 
@@ -97,7 +98,7 @@ def packed(message: Message) -> Message:
     if isinstance(message, StiffnessUpdate):
         return StiffnessOnWire(message.header, _pack_stiffness(message))
     if isinstance(message, Telemetry):
-        return TelemetryOnWire(message.header, message.target, _pack_telemetry(message))
+        return TelemetryOnWire(message.header, message.target, message.hindrance, _pack_telemetry(message))
     return message
 
 
@@ -123,7 +124,7 @@ def _pack_stiffness(update: StiffnessUpdate) -> bytes:
         math.nan if told_m_s is None else told_m_s,
         math.floor(horizon_m * _STEPS),
         math.ceil(8.0 * update.rumble),
-        _STATES.index(update.state) + _STANDS * update.stands,
+        _STATES.index(update.state) + _STANDS * update.stands + _HINDERED * update.hindered,
     )
     around = update.around
     return field if around is None else field + _AROUND.pack(around.full_s, around.steps) + around.changes
@@ -134,8 +135,8 @@ def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
     behind = message.field[_STIFFNESS.size :]
     speed_m_s, told_m_s, horizon, rumble, bits = content[40:]
     state = bits % _STANDS
-    if state >= len(_STATES) or bits >= 2 * _STANDS:
-        raise ValueError(f"bits = {bits}; valid: a state from 0 to {len(_STATES) - 1}, and one flag above it")
+    if state >= len(_STATES) or bits >= 2 * _HINDERED:
+        raise ValueError(f"bits = {bits}; valid: a state from 0 to {len(_STATES) - 1}, and two flags above it")
     horizon_m = horizon * STEP_M
     return StiffnessUpdate(
         message.header,
@@ -151,6 +152,7 @@ def _unpack_stiffness(message: StiffnessOnWire) -> StiffnessUpdate:
         _STATES[state],
         told_m_s if told_m_s == told_m_s else None,  # noqa: PLR0124  # faster than a call
         bool(bits & _STANDS),
+        bool(bits & _HINDERED),
         _unpack_around(behind) if behind else None,
     )
 
@@ -211,4 +213,4 @@ def _unpack_telemetry(message: TelemetryOnWire) -> Telemetry:
         known = name not in _KNOWN or bits & _BITS[name]
         fields[name] = None if not known else numbers[first] if count == 1 else tuple(numbers[first : first + count])
         first += count
-    return Telemetry(message.header, state=_STATES[state], target=message.target, **fields)
+    return Telemetry(message.header, state=_STATES[state], target=message.target, hindrance=message.hindrance, **fields)

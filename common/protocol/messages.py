@@ -7,8 +7,6 @@
 A field out of range or not finite makes the whole message invalid: no part is applied.
 """
 
-import math
-from collections.abc import Iterable
 from typing import Annotated, Literal
 
 import msgspec
@@ -17,6 +15,7 @@ from msgspec import Meta
 from common.episode import EpisodeMark
 from common.limits import Finite, Share, check_limits
 from common.protocol.around import Around
+from common.protocol.ranges import FARTHEST_M, all_in_range, both_or_neither, finite, in_range, rising
 from common.protocol.session import SessionState
 
 Vector2 = tuple[float, float]
@@ -27,50 +26,17 @@ Compensation = Literal["operator", "robot"]
 """Side that compensates the delay: "operator" by its commands under way, "robot" by v t_d (eq. 8)."""
 
 _LARGEST = 2**63 - 1
-_FARTHEST_M = 100.0
 _SLOWEST = 2.0**-20
 _Words = Annotated[str, Meta(max_length=200)]
 _Number = Annotated[int, Meta(ge=0, le=_LARGEST)]
 _Few = Annotated[int, Meta(ge=0, le=1000)]
-_Far = Annotated[float, Meta(ge=0.0, le=_FARTHEST_M)]
+_Far = Annotated[float, Meta(ge=0.0, le=FARTHEST_M)]
 _Place = tuple[Finite, Finite, Finite]
+_Turn = Annotated[float, Meta(ge=-4.0, le=4.0)]
 _Component = Annotated[float, Meta(ge=-1.0 - 2.0**-10, le=1.0 + 2.0**-10)]
 """Component of a unit vector, with room for rounding."""
 
 # Every limit is exact in single precision: a valid message stays valid on the wire.
-# Messages made up to 1000 times a second check their ranges by hand: `check_limits` takes four times as long.
-
-
-def _in_range(name: str, low: float, high: float, value: float) -> None:
-    if not low <= value <= high:  # false for NaN, too
-        raise ValueError(f"{name} = {value}; valid: {low} to {high}")
-
-
-def _all_in_range(name: str, low: float, high: float, values: Iterable[float]) -> None:
-    for value in values:
-        _in_range(name, low, high, value)
-
-
-def _finite(name: str, value: float) -> None:
-    if not math.isfinite(value):
-        raise ValueError(f"{name} = {value}; valid: a finite number")
-
-
-def _rising(name: str, onsets: OnsetDistances) -> None:
-    a, b, c, d, e, f, g, h = onsets
-    if -_FARTHEST_M <= a <= b <= c <= d <= e <= f <= g <= h <= _FARTHEST_M:  # fast path: two in each tick
-        return
-    _all_in_range(name, -_FARTHEST_M, _FARTHEST_M, onsets)
-    raise ValueError(f"{name} = {onsets}; valid: eight distances, each at least as long as the one before")
-
-
-def _both_or_neither(name: str, sent_s: float | None, held_s: float | None) -> None:
-    if sent_s is None or held_s is None:
-        if sent_s is not held_s:
-            raise ValueError(f"only one of {name}_sent_s and {name}_held_s is given; valid: both or neither")
-        return
-    _finite(f"{name}_sent_s", sent_s)
-    _in_range(f"{name}_held_s", 0.0, 1e9, held_s)
 
 
 class Header(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -93,12 +59,12 @@ class Header(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields
     """Time from the arrival of the message of `last_sent_s` to `sent_s`, on the sender's clock."""
 
     def __post_init__(self) -> None:
-        _in_range("epoch", 0, _LARGEST, self.epoch)
-        _in_range("sequence", 0, _LARGEST, self.sequence)
-        _finite("sent_s", self.sent_s)
-        _both_or_neither("echo", self.echo_sent_s, self.echo_held_s)
+        in_range("epoch", 0, _LARGEST, self.epoch)
+        in_range("sequence", 0, _LARGEST, self.sequence)
+        finite("sent_s", self.sent_s)
+        both_or_neither("echo", self.echo_sent_s, self.echo_held_s)
         if self.last_sent_s is not None or self.last_held_s is not None:  # rare
-            _both_or_neither("last", self.last_sent_s, self.last_held_s)
+            both_or_neither("last", self.last_sent_s, self.last_held_s)
 
 
 class Message(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=True):
@@ -137,6 +103,8 @@ class MotionCommand(Message, frozen=True, tag="motion"):
     """Whether the arming button is down."""
     emergency_stop: bool = False
     next_target: bool = False
+    home: float = 0.0
+    """Share of full speed at which to move to the start pose, 0 for not at all; only while triggers and sticks rest."""
     hand_over: bool = False
     """Whether the hand-over button is down: the lease then passes to the observer who has waited longest."""
     token: int = 0
@@ -145,12 +113,13 @@ class MotionCommand(Message, frozen=True, tag="motion"):
     """Side that compensates the delay; eq. 10 uses the prediction errors of that side's compensation."""
 
     def __post_init__(self) -> None:
-        _in_range("l2", 0.0, 1.0, self.l2)
-        _in_range("r2", 0.0, 1.0, self.r2)
-        _all_in_range("lateral", -1.0, 1.0, self.lateral)
-        _all_in_range("turning", -1.0, 1.0, self.turning)
-        _in_range("gripper", -1.0, 1.0, self.gripper)
-        _in_range("token", 0, _LARGEST, self.token)
+        in_range("l2", 0.0, 1.0, self.l2)
+        in_range("r2", 0.0, 1.0, self.r2)
+        all_in_range("lateral", -1.0, 1.0, self.lateral)
+        all_in_range("turning", -1.0, 1.0, self.turning)
+        in_range("gripper", -1.0, 1.0, self.gripper)
+        in_range("home", 0.0, 1.0, self.home)
+        in_range("token", 0, _LARGEST, self.token)
 
 
 class Watch(Message, frozen=True, tag="watch"):
@@ -246,12 +215,12 @@ class TriggerField(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
     """Stiffness s(δ) by `fast_m`, 0 to 1."""
 
     def __post_init__(self) -> None:
-        _rising("fast_m", self.fast_m)
-        _rising("slow_m", self.slow_m)
-        _in_range("full_speed_m_s", _SLOWEST, _FARTHEST_M, self.full_speed_m_s)
-        _in_range("acceleration_m_s2", _SLOWEST, 1e6, self.acceleration_m_s2)
-        _in_range("displacement_m", -_FARTHEST_M, _FARTHEST_M, self.displacement_m)
-        _in_range("stiffness", 0.0, 1.0, self.stiffness)
+        rising("fast_m", self.fast_m)
+        rising("slow_m", self.slow_m)
+        in_range("full_speed_m_s", _SLOWEST, FARTHEST_M, self.full_speed_m_s)
+        in_range("acceleration_m_s2", _SLOWEST, 1e6, self.acceleration_m_s2)
+        in_range("displacement_m", -FARTHEST_M, FARTHEST_M, self.displacement_m)
+        in_range("stiffness", 0.0, 1.0, self.stiffness)
 
 
 class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
@@ -271,15 +240,17 @@ class StiffnessUpdate(Message, frozen=True, tag="stiffness"):
     discarded or stopped. None if unknown: the arm then counts as following the command."""
     stands: bool = False
     """Whether the held object is supported, so that it cannot move farther down."""
+    hindered: bool = False
+    """Whether something keeps the arm from following the command (`Telemetry.hindrance`)."""
     around: Around | None = None
     """Onset distances around the gripper. Only a few messages have them; they hold until the next."""
 
     def __post_init__(self) -> None:
-        _in_range("speed_m_s", -_FARTHEST_M, _FARTHEST_M, self.speed_m_s)
+        in_range("speed_m_s", -FARTHEST_M, FARTHEST_M, self.speed_m_s)
         if self.told_m_s is not None:
-            _in_range("told_m_s", -_FARTHEST_M, _FARTHEST_M, self.told_m_s)
-        _in_range("horizon_m", 0.0, _FARTHEST_M, self.horizon_m)
-        _in_range("rumble", 0.0, 1.0, self.rumble)
+            in_range("told_m_s", -FARTHEST_M, FARTHEST_M, self.told_m_s)
+        in_range("horizon_m", 0.0, FARTHEST_M, self.horizon_m)
+        in_range("rumble", 0.0, 1.0, self.rumble)
 
 
 class Telemetry(Message, frozen=True, tag="telemetry", array_like=False):
@@ -305,6 +276,16 @@ class Telemetry(Message, frozen=True, tag="telemetry", array_like=False):
     """Largest D_σ of the gripper's spheres; 0 before the loop age is known."""
     l2: Share
     r2: Share
+    base_turn_rad: _Turn = 0.0
+    """Angle across the approach axis from the tool's right to the base's, positive towards the tool's up"""
+    camera_turn_rad: _Turn = 0.0
+    """The same angle to the right of the overview's picture"""
+    camera_faces: bool = False
+    """Whether the tool faces the overview's camera, so that up in the picture lies clockwise of right"""
+    undone: Share = 0.0
+    """Share of the commanded motion that the tool does not make, 0 to 1"""
+    hindrance: _Words | None = None
+    """What keeps the arm from following the command, for people; None if nothing worth a word"""
 
 
 AnyMessage = Hello | MotionCommand | Watch | Tune | Mark | LeaseNotice | LinkReport | StiffnessUpdate | Telemetry

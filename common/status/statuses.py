@@ -42,6 +42,8 @@ class SideStatus(msgspec.Struct, frozen=True, kw_only=True, rename=_KEYS):
     """Name of the target, None for none"""
     stands: bool | None = None
     """Whether the held object is supported"""
+    hindrance: str | None = None
+    """What keeps the arm from following the command, for people"""
     rate_kbit_s: float | None = None
     """This field and the next four: as in LinkReport"""
     queue_ms: float | None = None
@@ -89,6 +91,10 @@ class OperatorStatus(SideStatus, frozen=True, kw_only=True):
     """Number of observers"""
     haptics: bool = True
     """Whether the triggers are stiffened; if not, L2 and R2 are the stiffnesses that they would have"""
+    speed_scale: float = 1.0
+    """Share of the full speed that full travel commands"""
+    stick_frame: str = "tool"
+    """Frame in which the sticks move and turn the tool: tool, base or camera"""
     feel: Sight | None = None
     l2_free: float | None = None
     """Calibrated travel of L2 at which its stiffness begins, 0 to 1"""

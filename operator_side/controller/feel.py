@@ -24,6 +24,9 @@ FREE_TRIGGER: Final[Strengths] = (0,) * ZONE_COUNT
 Byte = Annotated[int, Meta(ge=0, le=255)]
 Color = tuple[Byte, Byte, Byte]
 """Red, green and blue."""
+STANDS_DRIVE: Final = 0.7
+HINDERED_DRIVE: Final = 0.4
+"""Drives of the right motor: in the pulse by which a held object stands, and in the two by which the arm is hindered"""
 WARNING_LIGHT: Final[Color] = (255, 0, 0)
 USUAL_LIGHT: Final[Color] = (0, 0, 128)
 """Colour that Linux hid-playstation sets; restored after a warning"""

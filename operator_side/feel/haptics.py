@@ -46,11 +46,19 @@ class Haptics:
         self._mapped: StiffnessUpdate | None = None
         self._traced: CourseOnMap | None = None
         self._traced_s = -math.inf
+        self._scale = 1.0
         self.calibrate(calibration)
 
     def calibrate(self, calibration: TravelCalibration) -> None:
         """Render for a controller with this calibration from now on."""
         self.rendering = TriggerRendering(self._settings, calibration, swap_sides=self._swap_sides)
+        self.rendering.scale(self._scale)
+
+    def scale(self, speed_scale: float) -> None:
+        """Render for commands that are travel times `speed_scale` from now on."""
+        if speed_scale != self._scale:
+            self._scale = speed_scale
+            self.rendering.scale(speed_scale)
 
     def controller_found(self) -> None:
         """Forget the last write, as the found controller's state is unknown: release it first, then write again."""
@@ -62,6 +70,8 @@ class Haptics:
         A command without hold-to-run counts as travel 0. Whether the arm is armed does not matter here: rendering
         begins with a report that the arm is armed, and the arm follows all commands that are then under way.
         """
+        if command.home > 0.0:  # the arm moves as we cannot know: the robot side's δ is used until a later echo
+            self._commands = CommandsUnderWay()
         travel, sticks = command.r2 - command.l2, (*command.lateral, *command.turning)
         self._commands.sent(command.header.sent_s, *((travel, sticks) if command.run else (0.0,)))
         self._commanding = True
@@ -143,7 +153,7 @@ class Haptics:
         pulled: calibrated travel of the trigger that retreats, and of the one that advances.
         """
         back, forth = moving_along(felt, self._displacement(felt, now_s))
-        (retreating, advancing), horizon_s = pulled, self._settings.horizon_s
+        (retreating, advancing), horizon_s = (self._scale * travel for travel in pulled), self._settings.horizon_s
         return (
             needed_m(felt.l2, max(0.0, retreating - advancing) * felt.l2.full_speed_m_s, back, horizon_s),
             needed_m(felt.r2, max(0.0, advancing - retreating) * felt.r2.full_speed_m_s, forth, horizon_s),

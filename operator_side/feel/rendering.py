@@ -14,9 +14,11 @@ from common.protocol.messages import StiffnessUpdate, TriggerField
 from common.reaction import HORIZON_S
 from operator_side.controller.feel import (
     FREE_TRIGGER,
+    HINDERED_DRIVE,
     MAX_STRENGTH,
     RELEASED,
     SENSED_TRAVEL,
+    STANDS_DRIVE,
     ZONE_COUNT,
     Feel,
     Rumble,
@@ -29,10 +31,11 @@ from operator_side.hands.travel_calibration import TravelCalibration, TriggerTra
 
 FALL_S: Final = 0.1
 """Seconds in which a strength falls from 8 to 0; at a release it falls at once"""
-PULSE_S: Final = 0.08
-"""Duration of the right motor's pulse when a held object is set down, in seconds"""
-_PULSE: Final = 0.7
-"""Drive of the right motor in the pulse. The left motor alone signals danger; both together signal blindness."""
+Pulses = tuple[float, tuple[tuple[float, float], ...]]
+STANDS: Final[Pulses] = (STANDS_DRIVE, ((0.0, 0.08),))
+HINDERED: Final[Pulses] = (HINDERED_DRIVE, ((0.0, 0.06), (0.14, 0.2)))
+"""Pulses of the right motor: drive, and begin and end of each pulse in seconds. The left motor alone signals danger;
+both together signal blindness."""
 _ROUNDING: Final = 1e-9
 _TOUCHED: Final = MAX_STRENGTH // 2
 """Maximum strength in slow zones for an object that is meant to be touched"""
@@ -57,12 +60,16 @@ class RenderedTrigger:
         """Number of zones, summed over all renderings, that had full strength because D exceeded the horizon."""
         self._settings = settings
         self._travel = travel
-        self._travels = zone_travels(travel)
+        self.scale(1.0)
         self._levels = [0.0] * ZONE_COUNT
         self._last_s = -math.inf
-        self._traced: CourseOnMap | None = None
         self._zones = FREE
         self._strengths = FREE_TRIGGER
+
+    def scale(self, speed_scale: float) -> None:
+        """Render for commands that are travel times `speed_scale` from now on."""
+        self._travels = tuple(speed_scale * travel for travel in zone_travels(self._travel))
+        self._traced: CourseOnMap | None = None
 
     def render(
         self,
@@ -123,7 +130,8 @@ class RenderedTrigger:
 class TriggerRendering:
     """Rendering of both triggers and the motors.
 
-    The left motor warns of objects where the sticks lead; the right one pulses when a held object is set down.
+    The left motor warns of objects where the sticks lead. The right one pulses when a held object is set down, and when
+    the arm begins not to follow.
     """
 
     def __init__(
@@ -133,8 +141,15 @@ class TriggerRendering:
         self.l2 = RenderedTrigger(settings, calibration.l2)
         self.r2 = RenderedTrigger(settings, calibration.r2)
         self._swap_sides = swap_sides
-        self._stands = False
-        self._pulse_ends_s = -math.inf
+        self._stands = self._hindered = False
+        self._pulses, self._pulsed_s = STANDS, -math.inf
+        self._scale = 1.0
+
+    def scale(self, speed_scale: float) -> None:
+        """Render for commands that are travel times `speed_scale` from now on."""
+        self._scale = speed_scale
+        for trigger in (self.l2, self.r2):
+            trigger.scale(speed_scale)
 
     def render(
         self,
@@ -155,16 +170,20 @@ class TriggerRendering:
             self.r2.release()
             return RELEASED
         retreating, advancing = (self.r2, self.l2) if self._swap_sides else (self.l2, self.r2)
-        back, forth = moving_along(felt, known)
+        (back, forth), scale = moving_along(felt, known), self._scale
         strengths = (
-            retreating.render(felt.l2, felt.horizon_m, pulled[1], back, now_s, aside, forth=False),
-            advancing.render(felt.r2, felt.horizon_m, pulled[0], forth, now_s, aside),
+            retreating.render(felt.l2, felt.horizon_m, scale * pulled[1], back, now_s, aside, forth=False),
+            advancing.render(felt.r2, felt.horizon_m, scale * pulled[0], forth, now_s, aside),
         )
         l2, r2 = reversed(strengths) if self._swap_sides else strengths
         if felt.stands and not self._stands:
-            self._pulse_ends_s = now_s + PULSE_S
-        self._stands = felt.stands
-        return Feel(l2=l2, r2=r2, rumble=Rumble(felt.rumble, _PULSE if now_s < self._pulse_ends_s else 0.0))
+            self._pulses, self._pulsed_s = STANDS, now_s
+        elif felt.hindered and not self._hindered:
+            self._pulses, self._pulsed_s = HINDERED, now_s
+        self._stands, self._hindered = felt.stands, felt.hindered
+        (drive, pulses_s), since_s = self._pulses, now_s - self._pulsed_s
+        pulses = any(begin_s <= since_s < end_s for begin_s, end_s in pulses_s)
+        return Feel(l2=l2, r2=r2, rumble=Rumble(felt.rumble, drive if pulses else 0.0))
 
     def zones(self) -> dict[str, Any]:
         """Return, for each of the controller's triggers, its first stiff zone and its maximum strength in the run."""

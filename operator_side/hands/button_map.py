@@ -18,6 +18,9 @@ class Action(Enum):
     CLOSE_GRIPPER = "close the gripper while held"
     OPEN_GRIPPER = "open the gripper while held"
     NEXT_TARGET = "next target"
+    NEXT_SPEED = "speed scale: 100, 50, 25 %"
+    NEXT_FRAME = "frame of the sticks: tool, base, camera"
+    HOME = "go home while held (triggers and sticks at rest)"
     HAND_OVER = "hand the robot over to the observer that has waited longest"
     START = "episode: start"
     SUCCESS = "episode: success"
@@ -34,6 +37,9 @@ BUTTON_OF: Final[Mapping[Action, Button]] = MappingProxyType(
         Action.CLOSE_GRIPPER: Button.CROSS,
         Action.OPEN_GRIPPER: Button.SQUARE,
         Action.NEXT_TARGET: Button.TRIANGLE,
+        Action.NEXT_SPEED: Button.L3,
+        Action.NEXT_FRAME: Button.TOUCHPAD,
+        Action.HOME: Button.MUTE,
         Action.HAND_OVER: Button.CREATE,
         Action.START: Button.UP,
         Action.SUCCESS: Button.RIGHT,

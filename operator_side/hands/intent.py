@@ -31,6 +31,12 @@ class OperatorIntent:
     hand_over: bool = False
     mark: EpisodeMark | None = None
     """Mark of an episode whose button is held; each change to another one but None makes that mark"""
+    next_speed: bool = False
+    """True while the button is held; each change from false to true selects the next speed scale."""
+    next_frame: bool = False
+    """Likewise, for the next frame of the sticks."""
+    home: float = 0.0
+    """Share of full speed at which to go home: 1 while the button is held, else 0."""
     gripper: Literal[-1, 0, 1] = 0
     """-1 opens the gripper, 1 closes it, 0 leaves it, also while both buttons are held."""
     raw: tuple[float, float] = field(default=(0.0, 0.0), compare=False)
@@ -41,10 +47,23 @@ class OperatorIntent:
         """Whether both triggers are within their dead zones, which arming requires."""
         return self.l2 == 0.0 and self.r2 == 0.0
 
+    @property
+    def rests(self) -> bool:
+        """Whether triggers and sticks are at rest."""
+        return self.triggers_released and self.lateral == self.turning == (0.0, 0.0)
+
+    def scaled(self, share: float) -> "OperatorIntent":
+        """Return the same intent with triggers and sticks multiplied by `share`."""
+        (right, up), (turn_right, turn_up) = self.lateral, self.turning
+        sticks = (share * right, share * up), (share * turn_right, share * turn_up)
+        return replace(
+            self, l2=share * self.l2, r2=share * self.r2, lateral=sticks[0], turning=sticks[1], home=share * self.home
+        )
+
     def resting(self) -> "OperatorIntent":
         """Return the same intent without triggers, sticks, gripper and arming; the other buttons stay."""
         rest = (0.0, 0.0)
-        return replace(self, l2=0.0, r2=0.0, lateral=rest, turning=rest, gripper=0, arm=False)
+        return replace(self, l2=0.0, r2=0.0, lateral=rest, turning=rest, gripper=0, home=0.0, arm=False)
 
 
 def operator_intent(
@@ -75,6 +94,9 @@ def operator_intent(
         emergency_stop=Action.EMERGENCY_STOP in held,
         next_target=Action.NEXT_TARGET in held,
         hand_over=Action.HAND_OVER in held,
+        next_speed=Action.NEXT_SPEED in held,
+        next_frame=Action.NEXT_FRAME in held,
+        home=float(Action.HOME in held),
         mark=next((mark for action, mark in MARKS.items() if action in held), None),
         gripper=gripper,
         raw=(state.l2, state.r2),

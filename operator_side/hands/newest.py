@@ -3,6 +3,7 @@
 from typing import Final
 
 from operator_side.controller.state import ControllerState
+from operator_side.hands.choices import Choices
 from operator_side.hands.intent import OperatorIntent, operator_intent
 from operator_side.hands.travel_calibration import TravelCalibration
 
@@ -13,8 +14,8 @@ INTENT_EXPIRES_S: Final = 0.1
 class Hands:
     """Newest intent of the operator, from a controller's states."""
 
-    def __init__(self, calibration: TravelCalibration, *, swap_sides: bool) -> None:
-        self.calibration = calibration
+    def __init__(self, calibration: TravelCalibration, choices: Choices, *, swap_sides: bool) -> None:
+        self.calibration, self.choices = calibration, choices
         self.intent: OperatorIntent | None = None
         """Newest intent; None before the first state, and once the controller is lost"""
         self.lost_s: float | None = None
@@ -26,6 +27,7 @@ class Hands:
         """Take a controller's state and return the intent made from it."""
         self.intent = intent = operator_intent(state, self.calibration, swap_sides=self._swap_sides)
         self._read_s = now_s
+        self.choices.follow(intent)
         return intent
 
     def lose(self, now_s: float) -> None:

@@ -20,7 +20,7 @@ import numpy as np
 
 from common.protocol.messages import Telemetry, Vector2, Vector3
 from common.status.codes import Doing
-from operator_side.controller.feel import WARNING_LIGHT
+from operator_side.controller.feel import HINDERED_DRIVE, STANDS_DRIVE, WARNING_LIGHT
 from operator_side.controller.state import Button
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.hands.button_map import BUTTON_OF, Action
@@ -52,6 +52,8 @@ _CLEARS_S: Final = 3.0
 """Rise before the person draws back (first, in metres), and maximum time for it (second, in seconds)"""
 _FROM_ABOVE: Final = -0.5
 """Part of the upward direction along the tool, below which the tool comes from above"""
+_HARD: Final = 0.5 * (HINDERED_DRIVE + STANDS_DRIVE)
+"""Drive of the right motor above which the person takes a pulse for the one of a held object that stands"""
 _BACK_M: Final = 0.1
 """Distance by which the person draws back from an object that was set down, in metres"""
 
@@ -142,7 +144,7 @@ class SimulatedOperator:
         self._gently_along |= stiff
         self._gently_across |= rumbles
         seeing = self._device.commanded.light != WARNING_LIGHT
-        self._stands |= self._pulse.acted_on(now_s, seeing and self._device.rumble.right > 0.0)
+        self._stands |= self._pulse.acted_on(now_s, seeing and self._device.rumble.right > _HARD)
 
     def _enter(self, phase: Doing, now_s: float) -> None:
         if self._settings.marks and (action := _marked(self.phase, phase)):

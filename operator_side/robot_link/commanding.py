@@ -21,7 +21,7 @@ _LATEST_S: Final = LONGEST_HELD_S - MOTION_PERIOD_S / 2.0
 STOPPING: Final = OperatorIntent(emergency_stop=True)
 """Intent while a stop is held, whatever the controller's inputs are"""
 
-_BUTTONS: Final = ("run", "arm", "emergency_stop", "next_target", "hand_over")
+_BUTTONS: Final = ("run", "arm", "emergency_stop", "next_target", "home", "hand_over")
 _NAMES: Final = ("l2", "r2", "lateral", "turning", *_BUTTONS)
 _PRESSED: Final[Any] = attrgetter(*_BUTTONS)
 _MEANT: Final[Any] = attrgetter(*_NAMES)

@@ -115,6 +115,25 @@ def _of_rows(jacobian: FloatArray, wide: bool, row: int, k: int) -> float:
 
 
 @building_block
+def _fill_gram(jacobian: FloatArray, wide: bool, gram: FloatArray) -> None:
+    """Fill G = A Aᵀ (k, k), of the rows of A."""
+    for row in range(gram.shape[0]):
+        for column in range(gram.shape[0]):
+            gram[row, column] = 0.0
+            for k in range(jacobian.shape[1] if wide else 6):
+                gram[row, column] += _of_rows(jacobian, wide, row, k) * _of_rows(jacobian, wide, column, k)
+
+
+@building_block
+def is_damped(jacobian: FloatArray) -> bool:
+    """Return whether `resolve` damps here, because the Jacobian (6, n) is near a singularity."""
+    wide, size = jacobian.shape[1] >= 6, min(jacobian.shape[1], 6)
+    gram = _gram()[:size, :size]
+    _fill_gram(jacobian, wide, gram)
+    return not _factorise(gram, _THRESHOLD_2, _factor())
+
+
+@building_block
 def resolve(
     jacobian: FloatArray,
     twist: FloatArray,
@@ -129,11 +148,8 @@ def resolve(
     wide = velocity.size >= 6
     size, length = (6, velocity.size) if wide else (velocity.size, 6)
     gram, solution = _gram()[:size, :size], _solution()
+    _fill_gram(jacobian, wide, gram)
     for row in range(size):
-        for column in range(size):
-            gram[row, column] = 0.0
-            for k in range(length):
-                gram[row, column] += _of_rows(jacobian, wide, row, k) * _of_rows(jacobian, wide, column, k)
         solution[row] = twist[row] if wide else 0.0
         for k in range(0 if wide else length):
             solution[row] += jacobian[k, row] * twist[k]

@@ -10,7 +10,9 @@ from common.protocol.around import Around
 from common.protocol.codec import encode
 from common.protocol.messages import Header, MotionState, StiffnessUpdate, Telemetry
 from common.protocol.view_messages import SCENE_TOPIC, VIDEO_TOPIC
+from robot_side.arm.hindrance import Hindrance
 from robot_side.arm.port import ArmState, GripperPose
+from robot_side.arm.stick_frames import StickFrames
 from robot_side.laws.law import Law
 from robot_side.laws.sensed import L2, R2, Sensed
 from robot_side.operators.operator_session import Receiver
@@ -65,11 +67,13 @@ def stiffness_message(
     told_m_s: float,
     state: MotionState,
     stands: bool = False,
+    hindered: bool = False,
     around: Around | None = None,
 ) -> Outgoing:
     """Return the stiffness message for `receiver`; told_m_s: commanded speed in the direction in which R2 advances.
 
-    stands: whether the held object stands on something. around: the map, if one is due in this message.
+    stands: whether the held object stands on something. hindered: whether something keeps the arm from following.
+    around: the map, if one is due in this message.
     """
     update = StiffnessUpdate(
         receiver.header,
@@ -81,6 +85,7 @@ def stiffness_message(
         state=state,
         told_m_s=min(max(told_m_s, -_FASTEST_M_S), _FASTEST_M_S),
         stands=stands,
+        hindered=hindered,
         around=around,
     )
     return Outgoing("haptics", receiver.peer, encode(update), receiver.everywhere)
@@ -92,6 +97,8 @@ def telemetry(
     sensed: Sensed,
     arm: ArmState,
     target: tuple[str, FloatArray | None] | None,
+    hindrance: Hindrance,
+    frames: StickFrames | None,
     *,
     holding: bool,
     settled: bool,
@@ -100,7 +107,8 @@ def telemetry(
 
     target: the target's name, and its centre (3,) in metres, NaN if unknown. settled: whether the loop age is.
     """
-    target_in_tool = None
+    target_in_tool, tool = None, pose.tool_rotation
+    faces = frames is not None and frames.camera.faces(tool)
     if target is not None and target[1] is not None and np.isfinite(target[1]).all():
         target_in_tool = (target[1] - pose.tool_position_m) @ pose.tool_rotation
     return Telemetry(
@@ -116,6 +124,11 @@ def telemetry(
         enlargement_m=min(sensed.enlargement_m, _LARGEST_M) if settled else 0.0,
         l2=sensed.stiffness(L2),
         r2=sensed.stiffness(R2),
+        undone=hindrance.undone,
+        hindrance=hindrance.text,
+        base_turn_rad=0.0 if frames is None else frames.base.turn_rad(tool),
+        camera_turn_rad=0.0 if frames is None else frames.camera.turn_rad(tool, mirrored=faces),
+        camera_faces=faces,
     )
 
 

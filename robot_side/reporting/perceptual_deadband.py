@@ -49,6 +49,7 @@ _EIGHTHS: Final = 8.0
 _STATES: Final[dict[MotionState, int]] = {state: number for number, state in enumerate(get_args(MotionState))}
 _ARMED: Final = _STATES["armed"]
 _STANDS: Final = len(_STATES)
+_HINDERED: Final = 2 * _STANDS
 _BELIEF: Final = np.dtype(
     [
         *((name, np.float64) for name in ("sent", "now", "displacement", "speed", "target", "commanded")),
@@ -58,7 +59,8 @@ _BELIEF: Final = np.dtype(
 """What the receiver computes from the last message. sent, now: times of that message and of the last update, in s.
 displacement, speed, target: motion along R2 by commands since that message, in m and m/s. commanded: the arm's
 commanded speed in the message, in m/s. known: whether a message has been sent. state: number of the state of motion,
-plus _STANDS if the held object stands. obeyed: sequence number of the newest command when the message was sent."""
+plus _STANDS if the held object stands, plus _HINDERED if the arm is hindered. obeyed: sequence number of the newest
+command when the message was sent."""
 
 _follow = inlined(follow)
 
@@ -84,13 +86,14 @@ class StiffnessDeadband:
         told_m_s: float,
         state: MotionState,
         stands: bool,
+        hindered: bool,
         command: MotionCommand | None,
         now_s: float,
     ) -> bool:
         """Return whether a stiffness message leaves at `now_s`; if it does, it counts as received.
 
         told_m_s: commanded speed from this tick on, in the direction in which R2 advances. command: the command from
-        which that speed follows; None if nothing moves. stands: whether the held object stands on something.
+        which that speed follows; None if nothing moves. stands, hindered: as in StiffnessUpdate.
         """
         obeyed, travel, by_operator = 0, 0.0, True
         if command is not None:
@@ -98,7 +101,7 @@ class StiffnessDeadband:
             by_operator = command.compensation == "operator"
         due: bool = _due(
             *(self._belief, self._sent, sensed.numbers, told_m_s),
-            *(_STATES[state] + _STANDS * stands, obeyed, travel, by_operator),
+            *(_STATES[state] + _STANDS * stands + _HINDERED * hindered, obeyed, travel, by_operator),
             *(self.interval_s, self._full_rate, now_s),
         )
         return due
@@ -253,4 +256,4 @@ def _lengths(view: Telemetry) -> tuple[float, ...]:
 
 
 def _shares(view: Telemetry) -> tuple[float, ...]:
-    return view.l2, view.r2, *view.up_in_tool
+    return view.l2, view.r2, view.undone, *view.up_in_tool, view.base_turn_rad, view.camera_turn_rad

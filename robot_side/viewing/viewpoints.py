@@ -4,6 +4,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.protocol.view_messages import Eye, ViewName
+from robot_side.arm.stick_frames import Frame, StickFrames
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.viewing.exchange import Triple, Viewpoint
 
@@ -51,15 +52,38 @@ def _eye(scene: Scene, view: Viewpoint, frame_m: FloatArray, frame: FloatArray) 
     return Eye(_triple(frame.T @ (place_m - frame_m)), _triple(frame.T @ forward), _triple(frame.T @ up), fovy_deg)
 
 
+def stick_frames(scene: Scene) -> StickFrames:
+    """Return the frames in which an operator may steer, for a scene at its start."""
+    yaw, view, data, sky = _yaw_rad(scene), _overview(scene), scene.data, np.array([0.0, 0.0, 1.0])
+    ahead = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    if view.camera is not None:
+        # A camera looks along its own -z, with y upwards.
+        axes = data.cam_xmat[view.camera].reshape(3, 3)
+        camera = Frame(axes[:, 0].copy(), axes[:, 1].copy(), -axes[:, 2])
+    else:
+        forward, up = np.array(view.forward), np.array(view.up)
+        camera = Frame(np.cross(forward, up), up, forward)
+    return StickFrames(Frame(np.cross(ahead, sky), sky, ahead), camera)
+
+
+def _reach_m(scene: Scene) -> float:
+    data, robot = scene.data, scene.robot
+    return max(float(np.linalg.norm(data.site_xpos[robot.site] - data.xpos[robot.root_body])), _SHORTEST_REACH_M)
+
+
+def _yaw_rad(scene: Scene) -> float:
+    """Return the direction in which the tool stands as seen from the base; 0 if it stands above the base."""
+    ahead = (scene.data.site_xpos[scene.robot.site] - scene.data.xpos[scene.robot.root_body])[:2]
+    return float(np.arctan2(ahead[1], ahead[0])) if np.linalg.norm(ahead) > 0.05 * _reach_m(scene) else 0.0
+
+
 def _overview(scene: Scene) -> Viewpoint:
     model, data, robot = scene.model, scene.data, scene.robot
     for camera in range(model.ncam):
         if model.camera(camera).name.rpartition("/")[2] == _OVERVIEW:
             return Viewpoint(camera=camera)
     base_m, tool_m = data.xpos[robot.root_body], data.site_xpos[robot.site]
-    ahead = (tool_m - base_m)[:2]
-    reach_m = max(float(np.linalg.norm(tool_m - base_m)), _SHORTEST_REACH_M)
-    yaw = np.arctan2(ahead[1], ahead[0]) if np.linalg.norm(ahead) > 0.05 * reach_m else 0.0
+    reach_m, yaw = _reach_m(scene), _yaw_rad(scene)
     looked_at_m = np.array([*tool_m[:2], 0.5 * (base_m[2] + tool_m[2])])
     looked_at_m[:2] += 0.1 * reach_m * np.array([np.cos(yaw), np.sin(yaw)])
     down, around = np.radians(_DOWN_DEG), yaw + np.radians(_ASIDE_DEG)

@@ -249,14 +249,16 @@ def drive(page: Page) -> tuple[Hand, str]:
         page.raw.keyboard.up("Space")
 
 
-def run_once(one: Browser, delay_ms: float, seed: int) -> dict[str, object]:
-    """Start a demo with this delay each way and this seed, drive it, and return its row."""
+def run_once(one: Browser, delay_ms: float, seed: int, given: Sequence[str]) -> dict[str, object]:
+    """Start a demo with this delay each way, this seed and the `given` flags; drive it, and return its row."""
     with tempfile.TemporaryDirectory(prefix="feelahead-") as folder:
         summary, idle = Path(folder) / "summary.json", Path(folder) / "idle.toml"
         idle.write_text("[person]\npull_n = 0.0\n")  # the scripted person does nothing
         link = ("--link", f"delay {delay_ms:g}ms") if delay_ms else ()
         with (
-            running([*link, "--seed", str(seed), "--summary", str(summary), "--operator-config", str(idle)]) as run,
+            running(
+                [*link, "--seed", str(seed), "--summary", str(summary), "--operator-config", str(idle), *given]
+            ) as run,
             one.page(run.address) as page,
         ):
             hand, end = drive(page)
@@ -283,13 +285,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--delays", type=float, nargs="+", default=[0.0, 150.0, 300.0], help="milliseconds each way")
     parser.add_argument("--seeds", type=int, default=5, help="number of runs at each delay, with seeds from 0")
     parser.add_argument("--csv", type=Path, help="file for the rows")
+    parser.add_argument("--demo", nargs=argparse.REMAINDER, default=[], help="flags for feelahead demo; the last ones")
     asked = parser.parse_args(arguments)
     rows = []
     print(*COLUMNS, sep="\t", flush=True)
     with browser(Path("console-pictures").absolute()) as one:
         for delay_ms in asked.delays:
             for seed in range(asked.seeds):
-                rows.append(row := run_once(one, delay_ms, seed))
+                rows.append(row := run_once(one, delay_ms, seed, asked.demo))
                 print(*row.values(), sep="\t", flush=True)
     if asked.csv is not None:
         with asked.csv.open("w", newline="") as file:

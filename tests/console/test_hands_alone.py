@@ -57,6 +57,7 @@ def test_every_key_does_what_it_says(browser: Browser) -> None:
             "ArrowLeft": ("turning", (-1.0, 0.0)), "ArrowRight": ("turning", (1.0, 0.0)),
             "KeyI": ("turning", (0.0, 1.0)), "KeyK": ("turning", (0.0, -1.0)),
             "KeyC": ("gripper", 1), "KeyO": ("gripper", -1), "KeyT": ("next_target", True), "KeyH": ("hand_over", True),
+            "KeyV": ("next_speed", True), "KeyG": ("next_frame", True), "KeyP": ("home", 1.0),
         }  # fmt: skip
         keyboard.press("Digit9")
         for code, (name, value) in expected.items():
@@ -103,7 +104,7 @@ def test_keys_mark_episodes_in_any_state_and_drive_nothing(browser: Browser) -> 
         assert alone.page.ask(marks) == ["start"]
         alone.run()
         alone.page.ask("window.sent.splice(0)")
-        for code in ("KeyY", "KeyX", "KeyU", "KeyB"):
+        for code in ("KeyY", "KeyM", "KeyU", "KeyB"):
             keyboard.press(code)
         assert alone.page.ask(marks) == ["success", "failure", "discard", "reset"]
         alone.let_pass(0.1)

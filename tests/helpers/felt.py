@@ -30,11 +30,13 @@ def felt(
     rumble: float = 0.0,
     state: MotionState = "armed",
     stands: bool = False,
+    hindered: bool = False,
 ) -> StiffnessUpdate:
     """Return an update that gives each zone of a trigger the same strength, `l2` or `r2` (0 to 8), at every speed."""
     return StiffnessUpdate(
         *(header, uniform_field(l2), uniform_field(r2), 0.0, FAR_M, rumble, state),
         stands=stands,
+        hindered=hindered,
     )
 
 

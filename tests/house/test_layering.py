@@ -61,6 +61,7 @@ ARROWS = """
         robot_side/gripper robot_side/outcome/truth.py robot_side/overlap/meshes robot_side/surroundings
         robot_side/surroundings/kinds
     robot_side/drivers/mujoco/checks: common robot_side/drivers/mujoco
+    robot_side/homing.py: common common/protocol robot_side/arm robot_side/gripper robot_side/surroundings
     robot_side/motion.py: common robot_side/arm robot_side/gripper robot_side/laws robot_side/operators
     robot_side/reporting: common common/emulation common/protocol common/rate common/sockets robot_side/arm
         robot_side/compiled robot_side/gripper robot_side/laws robot_side/motion.py robot_side/operators
@@ -68,12 +69,12 @@ ARROWS = """
     robot_side/events.py: common robot_side/arm robot_side/laws robot_side/operators robot_side/reporting
         robot_side/surroundings
     robot_side/outcome: common robot_side/events.py robot_side/laws robot_side/outcome/truth.py
-    robot_side/core.py: common/status common/timing robot_side/arm robot_side/events.py robot_side/gripper
-        robot_side/laws robot_side/motion.py robot_side/operators robot_side/outcome robot_side/reporting
-        robot_side/surroundings
+    robot_side/core.py: common common/status common/timing robot_side/arm robot_side/events.py robot_side/gripper
+        robot_side/homing.py robot_side/laws robot_side/motion.py robot_side/operators robot_side/outcome
+        robot_side/reporting robot_side/surroundings
     robot_side/drivers/remote: common common/sockets common/timing robot_side/arm robot_side/surroundings
-    robot_side/viewing: common common/companion common/protocol robot_side/core.py robot_side/drivers/mujoco
-        robot_side/gripper robot_side/laws robot_side/reporting robot_side/surroundings
+    robot_side/viewing: common common/companion common/protocol robot_side/arm robot_side/core.py
+        robot_side/drivers/mujoco robot_side/gripper robot_side/laws robot_side/reporting robot_side/surroundings
     robot_side/settings.py: common common/command robot_side/arm robot_side/drivers/mujoco robot_side/enlargement
         robot_side/laws/named.py robot_side/operators robot_side/viewing
     robot_side/recording: common common/recording robot_side/arm robot_side/compiled robot_side/events.py
@@ -81,7 +82,7 @@ ARROWS = """
     robot_side/parts.py: common common/protocol common/timing robot_side/compiled robot_side/core.py
         robot_side/drivers/mujoco robot_side/drivers/mujoco/checks robot_side/drivers/remote robot_side/enlargement
         robot_side/gripper robot_side/laws robot_side/laws/named.py robot_side/operators robot_side/outcome
-        robot_side/settings.py robot_side/surroundings
+        robot_side/settings.py robot_side/surroundings robot_side/viewing
     robot_side: common common/command common/emulation common/loop common/protocol common/realtime common/sockets
         common/status robot_side/arm robot_side/compiled robot_side/core.py robot_side/drivers/remote
         robot_side/events.py robot_side/parts.py robot_side/recording robot_side/reporting robot_side/settings.py
@@ -95,7 +96,7 @@ ARROWS = """
     operator_side/dualsense/uhid: common common/realtime operator_side/dualsense/reports
         operator_side/dualsense/simulated
     operator_side/evdev: common operator_side/controller
-    operator_side/hands: common operator_side/controller
+    operator_side/hands: common common/protocol operator_side/controller
     operator_side/robot_link: common common/emulation common/protocol common/rate common/sockets common/status
         operator_side/hands
     operator_side/events.py: operator_side/controller operator_side/robot_link
@@ -103,8 +104,9 @@ ARROWS = """
     operator_side/calibration: common common/files operator_side/controller operator_side/hands
     operator_side/people: common common/protocol common/status operator_side/calibration operator_side/controller
         operator_side/dualsense/simulated operator_side/hands
-    operator_side/core.py: common common/protocol common/status operator_side/controller operator_side/events.py
-        operator_side/feel operator_side/hands operator_side/robot_link
+    operator_side/core_settings.py: common/protocol operator_side/feel operator_side/hands
+    operator_side/core.py: common common/protocol common/status operator_side/controller operator_side/core_settings.py
+        operator_side/events.py operator_side/feel operator_side/hands operator_side/robot_link
     operator_side/settings.py: common common/command common/protocol common/sockets operator_side/controller
         operator_side/feel operator_side/hands operator_side/people
     operator_side/viewing/facts.py: common/protocol common/status
@@ -117,11 +119,12 @@ ARROWS = """
     operator_side/viewing: common common/command common/protocol common/rate common/recording common/status
         operator_side/controller operator_side/core.py operator_side/settings.py operator_side/viewing/console
         operator_side/viewing/facts.py operator_side/viewing/pages
-    operator_side: common common/command common/emulation common/loop common/protocol common/recording common/sockets
-        common/status operator_side/calibration operator_side/controller operator_side/core.py
-        operator_side/dualsense/hid operator_side/dualsense/simulated operator_side/evdev operator_side/events.py
-        operator_side/hands operator_side/people operator_side/robot_link operator_side/settings.py
-        operator_side/viewing operator_side/viewing/console operator_side/viewing/pages operator_side/viewing/terminal
+    operator_side: common common/command common/emulation common/loop common/protocol common/recording
+        common/sockets common/status operator_side/calibration operator_side/controller operator_side/core.py
+        operator_side/core_settings.py operator_side/dualsense/hid operator_side/dualsense/simulated
+        operator_side/evdev operator_side/events.py operator_side/hands operator_side/people
+        operator_side/robot_link operator_side/settings.py operator_side/viewing operator_side/viewing/console
+        operator_side/viewing/pages operator_side/viewing/terminal
 
     feelahead/both_sides: common/* robot_side/* operator_side/*
     feelahead/recordings: common/* robot_side/* operator_side/*

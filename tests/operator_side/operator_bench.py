@@ -7,7 +7,8 @@ from common.protocol.link_end import LinkEnd
 from common.protocol.messages import LeaseNotice, MotionCommand, MotionState, StiffnessUpdate
 from common.protocol.session import SessionState
 from operator_side.controller.state import Button, ControllerState
-from operator_side.core import CoreSettings, OperatorSide
+from operator_side.core import OperatorSide
+from operator_side.core_settings import CoreSettings
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from tests.helpers.felt import felt
 

@@ -258,3 +258,11 @@ def test_buttons_and_rest_go_everywhere_and_what_the_fingers_do_in_turn(bench: B
         assert [one.everywhere for one in sent] == [everywhere], (buttons, r2)
     bench.notice(SessionState.DISARMED, token=2)
     assert next(one.everywhere for one in bench.side.motion(bench.now_s + 0.004))
+
+
+def test_the_way_home_is_asked_for_at_the_chosen_speed() -> None:
+    bench = Bench(speed_scale=0.5)
+    bench.notice(SessionState.ARMED)
+    for buttons in ((), (Button.MUTE,), ()):
+        bench.hands(Button.L1, *buttons)
+        assert {command.home for command in sent(bench, MotionCommand, 0.02)} == {0.5 if buttons else 0.0}

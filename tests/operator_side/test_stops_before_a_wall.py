@@ -17,7 +17,8 @@ from common.protocol.messages import Compensation, Hello, LeaseNotice, Message, 
 from common.protocol.session import SessionState
 from common.protocol.uniform_field import uniform_field
 from operator_side.controller.state import Button
-from operator_side.core import CoreSettings, OperatorSide
+from operator_side.core import OperatorSide
+from operator_side.core_settings import CoreSettings
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from tests.helpers.felt import field, onsets
 
@@ -34,8 +35,10 @@ def line(delay_s: float, jitter_s: float, seed: int) -> DelayLine[bytes]:
 class Approach:
     """Operator side whose R2 a finger presses with a constant force, and an arm on a line before a wall."""
 
-    def __init__(self, delay_s: float, jitter_s: float = 0.0, compensation: Compensation = "operator") -> None:
-        self.side = OperatorSide(2, "clock", CoreSettings(compensation=compensation))
+    def __init__(
+        self, delay_s: float, jitter_s: float = 0.0, compensation: Compensation = "operator", speed_scale: float = 1.0
+    ) -> None:
+        self.side = OperatorSide(2, "clock", CoreSettings(compensation=compensation, speed_scale=speed_scale))
         self.robot = LinkEnd("robot", 1, "clock")
         self.device = SimulatedDualSense()
         self.device.set_buttons(frozenset({Button.L1}))
@@ -137,3 +140,27 @@ def test_by_the_robot_sides_reckoning_it_stops_too_while_the_link_is_quick() -> 
     approach.pull(0.0, 1.0)
     approach.pull(2.0, 8.0)
     assert 2.0 < 1e3 * approach.left_m < 4.0
+
+
+@pytest.mark.parametrize("delay_ms", [0, 200])
+@pytest.mark.parametrize("scale", [1.0, 0.5, 0.25])
+def test_at_any_speed_scale_it_stops_at_the_wall_and_is_never_faster_than_the_scale(
+    delay_ms: int, scale: float
+) -> None:
+    approach = Approach(1e-3 * delay_ms, speed_scale=scale)
+    approach.pull(0.0, 1.0)
+    speeds = approach.pull(2.0, 14.0)
+    # As at full scale, less the way that the first zone's lower speed saves: at most 1.4 mm.
+    assert 1.8 < 1e3 * approach.left_m < 3.5
+    assert speeds.max() == pytest.approx(0.48 * scale * FULL_M_S, rel=0.01)  # 2 N pull the trigger by 48 %.
+
+
+def test_a_higher_scale_waits_for_the_release_and_is_felt_in_time() -> None:
+    approach = Approach(0.2, speed_scale=0.25)
+    approach.pull(0.0, 1.0)
+    for buttons in ({Button.L1}, {Button.L1, Button.L3}, {Button.L1}):
+        approach.device.set_buttons(frozenset(buttons))
+        assert approach.pull(2.0, 0.5).max() < 0.031
+    approach.pull(0.0, 0.5)
+    assert approach.pull(2.0, 8.0).max() > 0.1
+    assert 1e3 * approach.left_m == pytest.approx(3.3, abs=0.2)

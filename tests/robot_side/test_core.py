@@ -177,8 +177,11 @@ def test_an_operator_hears_that_a_joint_is_at_its_end(bench: Bench) -> None:
     bench.robot.motion._limits = replace(limits, lower_rad=ends)
     bench.drive(KEEP_ALIVE_S, operator, r2=0.4)
     assert told_m_s(operator) < 0.9 * free
+    assert operator.felt[-1].hindered
+    assert bench.robot.status(bench.now_s).hindrance == "joint 3 at its limit"
     bench.drive(KEEP_ALIVE_S, operator, l2=0.4)
     assert told_m_s(operator) == pytest.approx(-free, rel=0.01)
+    assert not operator.felt[-1].hindered
 
 
 def test_full_speed_is_reckoned_with_until_the_operator_has_echoed(bench: Bench, listening: Listening) -> None:

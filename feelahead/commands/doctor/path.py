@@ -20,7 +20,8 @@ from common.rate.pieces import PIECE, Joining
 from common.sockets.operator import OperatorSockets
 from common.sockets.tcp_figures import TcpFigures, connected_to, tcp_figures
 from feelahead.commands.doctor.port import RobotAddress
-from operator_side.core import CoreSettings, OperatorSide
+from operator_side.core import OperatorSide
+from operator_side.core_settings import CoreSettings
 from operator_side.dualsense.simulated.controller import SimulatedDualSense
 
 MEASURE_S: Final = 5.0

@@ -20,7 +20,8 @@ from common.sockets.operator import OperatorSockets
 from common.sockets.robot import RobotSockets
 from common.timing.ages import LoopAge
 from operator_side.controller.state import ControllerState
-from operator_side.core import CoreSettings, OperatorSide
+from operator_side.core import OperatorSide
+from operator_side.core_settings import CoreSettings
 from operator_side.robot_link.commanding import ToRobot
 from robot_side.laws.sensed import Sensed
 from robot_side.operators.operator_session import OperatorSession

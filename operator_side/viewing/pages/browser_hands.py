@@ -20,7 +20,14 @@ from operator_side.viewing.pages.yielding_pull import YieldingPull
 _PRESS_S: Final = 0.2
 """Seconds for which the arming button is pressed, then released, and so on until the arm is armed"""
 _MOVES_GRIPPER: Final = 0.5
-"""Share of the hands that must count for the gripper to move"""
+"""Share of the hands that must count for the gripper, or the arm on its way home, to move"""
+_BUTTONS: Final = {
+    "next_target": Action.NEXT_TARGET,
+    "next_speed": Action.NEXT_SPEED,
+    "next_frame": Action.NEXT_FRAME,
+    "home": Action.HOME,
+    "hand_over": Action.HAND_OVER,
+}
 _GRIPPER: Final = {1: Action.CLOSE_GRIPPER, -1: Action.OPEN_GRIPPER}
 
 
@@ -111,10 +118,11 @@ class BrowserHands:
         self._commanded = self._commanded.farewell
 
     def _held(self, hands: PageHands, pressed: set[Action], passed_s: float) -> ControllerState:
-        pressed |= {Action.NEXT_TARGET} if hands.next_target else set()
-        pressed |= {Action.HAND_OVER} if hands.hand_over else set()
+        pressed |= {action for name, action in _BUTTONS.items() if getattr(hands, name)}
         counts = self._pages.pictures.hands
-        if self._moves and counts > _MOVES_GRIPPER and hands.gripper in _GRIPPER:
+        if not self._moves or counts <= _MOVES_GRIPPER:
+            pressed.discard(Action.HOME)
+        elif hands.gripper in _GRIPPER:
             pressed.add(_GRIPPER[hands.gripper])
         button = button_of(swap_sides=self._swap_sides)
         held = frozenset(button[action] for action in pressed)

@@ -37,6 +37,9 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     gripper: Literal[-1, 0, 1] = 0
     """-1 opens the gripper, 1 closes it, 0 leaves it"""
     next_target: bool = False
+    next_speed: bool = False
+    next_frame: bool = False
+    home: bool = False
     hand_over: bool = False
     stop: bool = False
     """Whether the emergency stop is pressed"""
@@ -55,8 +58,9 @@ class PageHands(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     @property
     def all_up(self) -> bool:
         """Whether no trigger, stick, key or button is used."""
-        pressed = self.run or self.gripper != 0 or self.next_target or self.hand_over or self.stop or self.reset
-        return self.moves_nothing and not pressed
+        pressed = self.run or self.gripper != 0 or self.stop or self.reset
+        chosen = self.next_target or self.next_speed or self.next_frame or self.home or self.hand_over
+        return self.moves_nothing and not (pressed or chosen)
 
 
 class TuneWish(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

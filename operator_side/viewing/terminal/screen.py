@@ -103,10 +103,13 @@ def _standing(facts: OperatorFacts, view: LiveView) -> list[Text]:
     enlarged_m = 0.0 if facts.screen is None else facts.screen.enlargement_m
     enlarged = UNKNOWN if enlarged_m == 0.0 else f"{_figure(1e3 * enlarged_m)} mm"
     grown = f"enlargement {enlarged}   rumble {_figure(facts.rumble)}"
+    chosen = f"   speed {percent(status.speed_scale)} %   sticks {status.stick_frame}"
+    if view.hindrance is not None:
+        lines.append(_line("the arm does not follow: ", (view.hindrance, _FELT)))
     return [
         *(*lines, _named(round_trip=round_trip, field_age=field_age, loop_age=loop_age)),
         _named(nearest=nearest, target=target, holding=f"{view.holding or 'nothing'}{view.stands}"),
-        _line(grown, asked, "" if status.haptics else "   haptics off"),
+        _line(grown, chosen, asked, "" if status.haptics else "   haptics off"),
     ]
 
 

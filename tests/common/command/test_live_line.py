@@ -177,6 +177,7 @@ def test_a_run_reads_as_a_story() -> None:
         advancing(**near | {"nearest_mm": -0.5, "target_mm": -0.5}, r2=1.0),
         advancing(**held, person=Doing.LIFTING),
         advancing(**held, person=Doing.LOWERING, stands=True),
+        advancing(**held, person=Doing.LOWERING, stands=True, hindrance="joint 4 at its limit"),
         advancing(link=LinkState.LOST, link_reason="nothing heard", state=None),
     )
     assert lines == [
@@ -187,7 +188,8 @@ def test_a_run_reads_as_a_story() -> None:
         "   4.0 s  R2 resists fully; touches carton, as perceived  (R2 pulled 50 %, nearest 0 mm, target 0 mm)",
         "   5.0 s  lifting; R2 eases to 50 %; touches nothing; holds carton  (R2 pulled 50 %, nearest 10 mm)",
         "   6.0 s  lowering; the held object stands on something  (R2 pulled 50 %, nearest 10 mm)",
-        "   7.0 s  LINK LOST: nothing heard; R2 yields freely, after up to 100 %; lets go of carton",
+        "   7.0 s  the arm does not follow: joint 4 at its limit  (R2 pulled 50 %, nearest 10 mm)",
+        "   8.0 s  LINK LOST: nothing heard; R2 yields freely, after up to 100 %; lets go of carton",
     ]
 
 

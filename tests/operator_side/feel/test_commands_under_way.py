@@ -10,7 +10,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from common.protocol.messages import Header, MotionCommand
+from operator_side.feel.blindness import Blindness
 from operator_side.feel.commands_under_way import MAX_DELAY_S, CommandsUnderWay, Displacement, Report
+from operator_side.feel.haptics import Haptics
+from operator_side.feel.rendering import RenderingSettings
+from operator_side.hands.travel_calibration import TravelCalibration
+from tests.helpers.felt import felt
 
 FULL_M_S = 0.25
 PERIOD_S = 0.004
@@ -192,3 +198,20 @@ def test_what_cannot_be_is_refused() -> None:
     for call in refused:
         with pytest.raises(ValueError, match="valid: "):
             call()
+
+
+@pytest.mark.parametrize(("homes", "expected"), [(1, [False, True, True]), (2, [False, False, True])])
+def test_on_the_way_home_the_robot_sides_reckoning_holds_until_the_last_such_command_is_echoed(
+    homes: int, expected: list[bool]
+) -> None:
+    haptics = Haptics(RenderingSettings(), TravelCalibration(), enabled=True, swap_sides=False, compensation="operator")
+    for number in range(4):
+        header, home = Header(2, number, 0.1 * number), float(1 <= number <= homes)
+        haptics.commanded(MotionCommand(header, l2=0.0, r2=0.0, run=True, home=home))
+    known = []
+    for echo in (0, 1, 2):
+        before = haptics.without_history
+        header = Header(1, 1, 0.4, echo_sent_s=0.1 * echo, echo_held_s=0.0)
+        haptics.due(felt(header), (0.0, 0.0), Blindness(), 0.4)
+        known.append(haptics.without_history == before)
+    assert known == expected

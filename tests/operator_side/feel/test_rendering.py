@@ -70,6 +70,20 @@ def test_a_contact_is_signalled_by_one_short_pulse_of_the_right_motor() -> None:
     assert motors(True, 20.0) == Rumble()
 
 
+def test_an_arm_that_begins_not_to_follow_is_signalled_by_two_short_pulses() -> None:
+    rendering = TriggerRendering(USUAL, TravelCalibration())
+    rendering.render(felt(HEADER), LET_GO, None, 0.9995)
+    drives = []
+    for now_ms in range(1000, 2000):
+        rumble = rendering.render(felt(HEADER, hindered=True, rumble=0.5), LET_GO, None, 1e-3 * now_ms).rumble
+        assert rumble is not None
+        assert rumble.left == 0.5
+        drives.append(rumble.right)
+    edges = [now_ms for now_ms in range(1, 1000) if drives[now_ms] != drives[now_ms - 1]]
+    assert drives[0] == 0.4
+    assert edges == pytest.approx([60, 140, 200], abs=1)
+
+
 @given(st.lists(st.tuples(st.integers(0, 8), st.floats(0.0, 0.2)), max_size=30), st.integers(0, 8))
 def test_after_any_past_it_is_never_weaker_than_asked_for_and_soon_no_stronger(
     past: list[tuple[int, float]], last: int

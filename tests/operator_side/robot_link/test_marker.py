@@ -8,7 +8,8 @@ from common.protocol.codec import decode, encode
 from common.protocol.messages import LeaseNotice, Mark
 from common.protocol.session import SessionState
 from operator_side.controller.state import Button
-from operator_side.core import CoreSettings, OperatorSide
+from operator_side.core import OperatorSide
+from operator_side.core_settings import CoreSettings
 from operator_side.events import Input, Listener
 from tests.operator_side.operator_bench import Bench
 

@@ -14,6 +14,7 @@ from common.arrays import FloatArray
 from common.protocol.messages import Header, MotionCommand
 from robot_side.arm.ability import JointLimits, ability
 from robot_side.arm.commanded import commanded
+from robot_side.arm.hindrance import Cause, Hindrance
 from robot_side.arm.port import GripperPose
 from robot_side.arm.resolved_rate import joint_velocities
 from robot_side.arm.tool_motion import ToolMotionSettings, tool_motion
@@ -206,14 +207,56 @@ def test_it_is_the_twist_resolved_and_what_joints_at_their_ends_let_through(
     )
     told_m_s = rotation[:, 2] @ jacobian[:3] @ np.where(stays, 0.0, expected)
 
-    velocity, told = commanded(hands, pose_with(jacobian, rotation), positions, limits, SETTINGS)
-    np.testing.assert_allclose(velocity, expected, rtol=1e-12, atol=1e-12)
-    assert told == pytest.approx(told_m_s, abs=1e-12)
+    found = commanded(hands, pose_with(jacobian, rotation), positions, limits, SETTINGS)
+    np.testing.assert_allclose(found.velocity_rad_s, expected, rtol=1e-12, atol=1e-12)
+    assert found.told_m_s == pytest.approx(told_m_s, abs=1e-12)
+    # A turn counts as the speed 0.2 m from the tool's point.
+    asked = np.concatenate([linear, 0.2 * angular])
+    missed = asked - np.concatenate([jacobian[:3], 0.2 * jacobian[3:]]) @ np.where(stays, 0.0, expected)
+    undone = min(float(np.linalg.norm(missed) / np.linalg.norm(asked)), 1.0)
+    assert found.undone == pytest.approx(undone if undone > 0.01 else 0.0, abs=1e-9)
+    assert (found.cause is None) == (found.undone == 0.0)
 
-    stands, told = commanded(hands, pose_with(jacobian, rotation), positions, limits, SETTINGS, stands=True)
+    stands = commanded(hands, pose_with(jacobian, rotation), positions, limits, SETTINGS, stands=True).velocity_rad_s
     linear[2] = max(0.0, linear[2])
     expected = joint_velocities(jacobian, np.concatenate([linear, angular]), limits.velocity_rad_s)
     np.testing.assert_allclose(stands, expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("jacobian", "ends_rad", "fastest_rad_s", "expected"),
+    [
+        (np.eye(6), 1.0, 1.0, (0.0, None, 0)),
+        (np.eye(6), 0.0, 1.0, (1.0, Cause.END, 3)),
+        (np.diag([1.0, 1.0, 0.003, 1.0, 1.0, 1.0]), 1.0, 9.0, (1.0, Cause.SINGULARITY, 0)),
+        (np.eye(6), 1.0, 0.05, (0.8, Cause.SPEED, 3)),
+        (np.eye(6)[:, [0, 1, 3, 4, 5]].copy(order="C"), 1.0, 1.0, (1.0, Cause.JOINTS, 0)),
+    ],
+)
+def test_what_is_left_undone_has_a_cause(
+    jacobian: FloatArray, ends_rad: float, fastest_rad_s: float, expected: tuple[float, Cause | None, int]
+) -> None:
+    joints = jacobian.shape[1]
+    limits = JointLimits(
+        np.full(joints, fastest_rad_s), np.ones(joints), np.full(joints, -1.0), np.full(joints, ends_rad)
+    )
+    found = commanded(command(r2=1.0), pose_with(jacobian, np.eye(3)), np.zeros(joints), limits, SETTINGS)
+    assert found.undone == pytest.approx(expected[0], abs=0.01)
+    assert (found.cause, found.joint) == expected[1:]
+
+
+def test_a_hindrance_is_told_once_and_in_words() -> None:
+    hindrance, said = Hindrance(), []
+    for undone in (0.2, 0.3, 0.2, 0.1, 0.2):
+        hindrance.update(undone, Cause.END, 4)
+        said.append(hindrance.text)
+    assert said == [None, "joint 4 at its limit", "joint 4 at its limit", None, None]
+    for cause in Cause:
+        hindrance.update(1.0, cause, 2)
+        said.append(hindrance.text)
+    assert said[-3:] == ["near a singularity", "joint 2 at its fastest", "too few joints for this motion"]
+    hindrance.end()
+    assert (hindrance.text, hindrance.undone) == (None, 0.0)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])

@@ -57,7 +57,7 @@ class Run:
         header = Header(1, 1 + round(1e3 * self.now_s), self.now_s)
         command = MotionCommand(header, max(0.0, -travel), max(0.0, travel), run=True, compensation=compensation)
         now = how.get("now") or sensed(self.left_m, self.speed_m_s)
-        felt = now, how.get("made_of_it_m_s", told_m_s), state, how.get("stands", False)
+        felt = now, how.get("made_of_it_m_s", told_m_s), state, how.get("stands", False), how.get("hindered", False)
         due = self.deadband.due(*felt, command, self.now_s)
         if due:
             self.sent_s.append(self.now_s)
@@ -148,7 +148,7 @@ def test_a_state_and_a_rumble_that_rises_are_said_at_once_and_one_that_falls_lat
     assert run.tick()
     rumbling = sensed(0.3, rumble=0.5)
     assert run.tick(now=rumbling)
-    assert run.deadband.due(rumbling, 0.0, "armed", False, None, run.now_s + 0.009) is False
+    assert run.deadband.due(rumbling, 0.0, "armed", False, False, None, run.now_s + 0.009) is False
     assert run.tick(now=sensed(0.3, rumble=0.625))
     while not run.tick(now=rumbling):
         pass
@@ -160,6 +160,8 @@ def test_that_something_stands_is_said_at_once_and_so_is_its_end() -> None:
     run.tick()
     assert run.tick(stands=True)
     assert not run.tick(stands=True)
+    assert run.tick(stands=True, hindered=True)
+    assert run.tick(stands=True)
     assert run.tick()
     run.tick(stands=True)
     assert run.tick(stands=True, now=sensed(0.3, rumble=0.5))

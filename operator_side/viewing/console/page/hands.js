@@ -104,11 +104,11 @@ export class Hands {
       return;
     }
     if (event.target.matches?.(EDITS)) return;
-    if (event.code === "KeyX" && !event.repeat) this.#resetNow();
     if (event.ctrlKey || event.altKey || event.metaKey) {
       this.#release("A browser shortcut was pressed."); // the browser may not report its release
       return;
     }
+    if (event.code === "KeyX" && !event.repeat) this.#resetNow();
     if (MARK_OF.has(event.code) && !event.repeat) this.#send({ mark: MARK_OF.get(event.code) });
     // Also while watching: a key that is already down when driving begins must come up first.
     if (!this.#keys.press(event.code) || this.#state === "watching") return;

@@ -17,13 +17,16 @@ export const KEYS = [
   ["close", ["KeyC"], "close the gripper"],
   ["open", ["KeyO"], "open it"],
   ["next_target", ["KeyT"], "next target"],
+  ["next_speed", ["KeyV"], "speed scale: 100, 50, 25 %"],
+  ["next_frame", ["KeyG"], "frame of the sticks: tool, base, camera"],
+  ["home", ["KeyP"], "go home while held (all else at rest)"],
   ["hand_over", ["KeyH"], "hand the robot over"],
 ];
 export const MARKS = [
   // mark, codes of its keys, label, button of a gamepad: directional pad and right stick, as on a DualSense
   ["start", ["KeyN"], "episode: start", 12],
   ["success", ["KeyY"], "success", 15],
-  ["failure", ["KeyX"], "failure", 14],
+  ["failure", ["KeyM"], "failure", 14],
   ["discard", ["KeyU"], "discard", 13],
   ["reset", ["KeyB"], "put the scene back", 11],
 ];
@@ -36,11 +39,13 @@ const PULLED = 0.05; // dead zone of a gamepad's trigger
 const DEFLECTED = 0.12; // dead zone of a gamepad's sticks
 
 export const REST = Object.freeze({
-  run: false, l2: 0, r2: 0, keyed: false, lateral: [0, 0], turning: [0, 0], gripper: 0, next_target: false, hand_over: false,
+  run: false, l2: 0, r2: 0, keyed: false, lateral: [0, 0], turning: [0, 0], gripper: 0, next_target: false,
+  next_speed: false, next_frame: false, home: false, hand_over: false,
 });
 
 export const atRest = (hands) =>
-  !hands.run && hands.l2 === 0 && hands.r2 === 0 && hands.gripper === 0 && !hands.next_target && !hands.hand_over &&
+  !hands.run && hands.l2 === 0 && hands.r2 === 0 && hands.gripper === 0 && !hands.next_target && !hands.next_speed &&
+  !hands.next_frame && !hands.home && !hands.hand_over &&
   [...hands.lateral, ...hands.turning].every((part) => part === 0);
 
 // Keys that are down, and the travel of each action, which rises over RAMP_S and falls to zero at once.
@@ -86,6 +91,9 @@ export class Keys {
       turning: [axis("turn_right", "turn_left"), axis("turn_up", "turn_down")],
       gripper: Number(held.has("close")) - Number(held.has("open")),
       next_target: held.has("next_target"),
+      next_speed: held.has("next_speed"),
+      next_frame: held.has("next_frame"),
+      home: held.has("home"),
       hand_over: held.has("hand_over"),
     };
     return { hands, pressed: held.size > 0 };
@@ -129,6 +137,9 @@ export function readGamepads(swapped) {
       turning: sticks[1],
       gripper: Number(pressed(0)) - Number(pressed(2)),
       next_target: pressed(3),
+      next_speed: pressed(10),
+      next_frame: pressed(17),
+      home: false,
       hand_over: pressed(8),
     });
   }
@@ -147,6 +158,9 @@ export function both(one, other) {
     turning: farther(one.turning, other.turning),
     gripper: Math.sign(one.gripper + other.gripper),
     next_target: one.next_target || other.next_target,
+    next_speed: one.next_speed || other.next_speed,
+    next_frame: one.next_frame || other.next_frame,
+    home: one.home || other.home,
     hand_over: one.hand_over || other.hand_over,
   };
 }

@@ -93,6 +93,9 @@ export class Overlay {
       drop && ["height", `${mm(drop.height_m)} mm over ${drop.name}`],
       most?.overlap_mm3[column] > 0 && ["ahead", most.name, true],
       near.held !== null && ["holding", near.held + (facts.status.stands ? ", it stands" : "")],
+      facts.status.speed_scale < 1 && ["speed", `${(100 * facts.status.speed_scale).toFixed(0)} %`],
+      facts.status.stick_frame !== "tool" && ["sticks", `as the ${facts.status.stick_frame} sees it`],
+      facts.status.hindrance && ["arm", facts.status.hindrance, true],
       rumble > 0 && ["rumble", `${rumble} of ${EIGHTHS}: near where the stick leads`, true],
     ].filter(Boolean);
     const text = JSON.stringify(rows);
