@@ -3,12 +3,15 @@
 from pathlib import Path
 
 import mujoco  # type: ignore[import-untyped]
+import numpy as np
 import pytest
 
+from robot_side.drivers.mujoco.arm import MujocoArm
 from robot_side.drivers.mujoco.brought.table import fit_target
 from robot_side.drivers.mujoco.checks.cost import cost_findings
 from robot_side.drivers.mujoco.checks.joints import joint_findings
 from robot_side.drivers.mujoco.checks.reach import reach_findings
+from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from tests.helpers.arm_models import planar_arm
@@ -87,6 +90,12 @@ def test_a_hand_without_driven_fingers_is_said(tmp_path: Path) -> None:
     assert any("nothing can be grasped" in line for line in joint_lines(load_scene(bare, "tcp")))
 
 
+def test_fingers_that_do_not_close_on_the_target_are_said(tmp_path: Path) -> None:
+    barely = ('ctrlrange="0 0.085"', 'ctrlrange="0.06 0.085"')
+    [line] = joint_lines(load_scene(brought(tmp_path, barely), "tool"))
+    assert line.startswith("the fingers close from 85 to 60 mm only")
+
+
 @pytest.mark.parametrize(("reading_s", "said"), [(0.004, 1), (0.0, 0)])
 def test_physics_that_is_slower_than_real_time_is_said(reading_s: float, said: int) -> None:
     class Readings:
@@ -102,3 +111,17 @@ def test_physics_that_is_slower_than_real_time_is_said(reading_s: float, said: i
     lines = cost_findings(load_scene(), Readings())
     assert len(lines) == said
     assert not said or "4.0 ms for each step of 1 ms" in lines[0]
+
+
+def test_loads_are_those_behind_the_joints_dry_friction(tmp_path: Path) -> None:
+    loads_nm = {}
+    for rubs in ("", 'frictionloss="8" '):
+        axis = ("<joint axis", f"<joint {rubs}axis")
+        arm = MujocoArm(load_scene(brought(tmp_path, axis), "tool"), Encoder(0.0, 0.0))
+        arm.state(0.0)
+        arm.command(np.array([0.0, 0.3, 0.0, 0.0, 0.0, 0.0]), 1.0)
+        loads_nm[rubs] = arm.state(0.5).joint_loads_nm
+    free, rubbing = loads_nm.values()
+    assert free is not None
+    assert rubbing is not None
+    assert np.abs(rubbing - free).max() < 0.5

@@ -45,6 +45,10 @@ def test_fingers_that_meet_before_the_inputs_end_keep_a_monotone_travel() -> Non
     assert found is not None
     np.testing.assert_allclose(found.references, [0.0, 1.0 / 3.0, 2.0 / 3.0])
     np.testing.assert_allclose(found.openings_m, [0.08, 0.04, 0.0])
+    # A pair that is always 20 mm nearer passes through itself, and grips nothing.
+    passing = travel_from_sweep(sweep(np.array([0.06, 0.02, -0.02, -0.02]), np.array([0.0, 0.4, 0.8, 0.8])), 0.0, 0.0)
+    assert passing is not None
+    np.testing.assert_allclose(passing.openings_m, [0.08, 0.04, 0.0])
     assert travel_from_sweep(sweep(np.full(4, 0.05), np.linspace(0.0, 1.0, 4)), 0.0, 0.0) is None
 
 
