@@ -21,6 +21,7 @@ from feelahead.lab.trial import Trial, run_trial
 from operator_side.people.settings import PersonSettings
 from robot_side.drivers.mujoco.built_in_scenes import SceneName
 from robot_side.drivers.mujoco.robot_model import SiteAxis
+from robot_side.main import TICK_PERIOD_S
 
 _COLUMNS: Final = {
     "seed": ("seed", 0),
@@ -57,6 +58,8 @@ class DemoSettings(Sweep):
     """datagram: messages may be lost and reordered. stream: messages stay in order and losses delay them."""
     duration: Annotated[float, Meta(gt=0.0, lt=1e4), tyro.conf.arg(metavar="SECONDS")] = 40.0
     """Maximum duration of each run, in virtual time."""
+    tick_period: Annotated[float, Meta(gt=0.0, le=0.02), tyro.conf.arg(metavar="SECONDS")] = TICK_PERIOD_S
+    """Period of the robot side's ticks; a longer one costs less time."""
     person: PersonSettings = field(default_factory=PersonSettings)
 
     def __post_init__(self) -> None:
@@ -75,7 +78,8 @@ def cells(settings: DemoSettings) -> Iterator[Trial]:
     """Yield one cell for each link."""
     for link in settings.link[: 1 if settings.quick else None]:
         one = Trial(settings.scene, link, "reacting", settings.person, settings.duration, settings.link_model)
-        yield replace(one, model=settings.model, site=settings.site, site_axis=settings.site_axis)
+        own = replace(one, model=settings.model, site=settings.site, site_axis=settings.site_axis)
+        yield replace(own, tick_period_s=settings.tick_period)
 
 
 def run(cell: Trial, seed: int) -> Iterator[Row]:
