@@ -79,7 +79,7 @@ def load_forces(address: str) -> ControllerForces:
 
 def stored_forces(path: Path, address: str) -> ControllerForces:
     """Return the content of the file `path`, or nothing measured without a file; errors as in `load_forces`."""
-    return read_forces(path, address) if path.is_file() else ControllerForces()
+    return read_forces(path, address) if path.exists() else ControllerForces()
 
 
 def read_forces(path: Path, address: str) -> ControllerForces:

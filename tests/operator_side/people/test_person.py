@@ -202,7 +202,9 @@ def test_the_stick_goes_to_where_the_target_is_seen(
 def test_lifting_goes_up_whichever_way_the_tool_points(up: Vector3) -> None:
     desk = Desk()
     desk.arm()
-    screen = armed(holding=True, up_in_tool=up)
+    # From above they grasp as far above the target's centre as they grasp beyond it from elsewhere.
+    ahead_m = GRASP_M if up[2] < -0.5 else -GRASP_M
+    screen = armed((0.0, 0.0, ahead_m), holding=True, up_in_tool=up)
     desk.until(Doing.LIFTING, screen, 3.0)
     hands = desk.watch(screen, 1.0)[-1]
     x, y = CALIBRATION.left_stick.deflection(hands.left)

@@ -287,6 +287,8 @@ def test_a_port_that_is_taken_is_said() -> None:
 def test_without_the_viser_that_we_know_there_is_none_which_is_said(
     module: str, note: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "viser.py").write_text(module)
+    (tmp_path / "viser").mkdir()
+    (tmp_path / "viser" / "__init__.py").write_text(module)
+    (tmp_path / "viser" / "transforms.py").write_text("SO3 = None")
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{ROOT}")
     assert notes_of(Console("a test")) == [note]
