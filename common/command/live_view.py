@@ -45,7 +45,7 @@ class LiveView:
         self.holding = printable(held) if isinstance(held, str) else "something" if held else None
         """Name of the object between the fingers, "something" if the name is unknown, None for no object."""
         self.hindrance = None if self.scene.hindrance is None else printable(self.scene.hindrance)
-        """What keeps the arm from following the command; None for nothing"""
+        """Cause for which the arm does not follow the command, in words; None if it follows"""
         self.stands = ", it stands" if self.scene.stands else ""
 
 

@@ -279,13 +279,13 @@ class Telemetry(Message, frozen=True, tag="telemetry", array_like=False):
     base_turn_rad: _Turn = 0.0
     """Angle across the approach axis from the tool's right to the base's, positive towards the tool's up"""
     camera_turn_rad: _Turn = 0.0
-    """The same angle to the right of the overview's picture"""
+    """Angle across the approach axis from the tool's right to the right of the overview's picture, signed alike"""
     camera_faces: bool = False
     """Whether the tool faces the overview's camera, so that up in the picture lies clockwise of right"""
     undone: Share = 0.0
     """Share of the commanded motion that the tool does not make, 0 to 1"""
     hindrance: _Words | None = None
-    """What keeps the arm from following the command, for people; None if nothing worth a word"""
+    """Cause for which the arm does not follow the command, in words; None if it follows"""
 
 
 AnyMessage = Hello | MotionCommand | Watch | Tune | Mark | LeaseNotice | LinkReport | StiffnessUpdate | Telemetry

@@ -109,9 +109,9 @@ class SceneShapes(Message, frozen=True, tag="shapes"):
     """(objects, 7) float32, rows as in SceneState: poses of all objects, for those that SceneState leaves out. Empty if
     SceneState has all of them"""
     eye: Eye | None = None
-    """Of the first-person view; None without pictures"""
+    """Viewpoint of the first-person view in the tool's frame; None without pictures"""
     overview_eye: Eye | None = None
-    """None without pictures, and for a camera that moves"""
+    """Viewpoint of the overview in the world frame; None without pictures, and for a camera that moves"""
 
     def __post_init__(self) -> None:
         if len(self.object_poses) not in (0, _POSE_BYTES * len(self.objects)):

@@ -43,7 +43,7 @@ class SideStatus(msgspec.Struct, frozen=True, kw_only=True, rename=_KEYS):
     stands: bool | None = None
     """Whether the held object is supported"""
     hindrance: str | None = None
-    """What keeps the arm from following the command, for people"""
+    """Cause for which the arm does not follow the command, in words"""
     rate_kbit_s: float | None = None
     """This field and the next four: as in LinkReport"""
     queue_ms: float | None = None
