@@ -11,7 +11,7 @@ import numpy as np
 from common.arrays import BoolArray, FloatArray, IntArray
 from common.errors import ConfigurationError
 from robot_side.drivers.mujoco.gripper_cover import GripperCover, link_solids
-from robot_side.drivers.mujoco.robot_model import Simulated
+from robot_side.drivers.mujoco.robot_model import RobotModel, Simulated
 
 _GRIPPER_SAMPLES = 9
 _SHORTEST_SETTLING_S, _LONGEST_SETTLING_S = 0.05, 2.0
@@ -196,11 +196,7 @@ def open_gap(scene: Simulated, cover: GripperCover) -> tuple[float, float] | Non
     data.qpos[:] = scene.data.qpos
     data.qpos[robot.finger_positions] = travel.open_fingers
     mujoco.mj_forward(model, data)
-    bodies = model.geom_bodyid[robot.gripper_geoms]
-    gaps = {
-        pair: mujoco.mj_geomDistance(model, data, *pair, _FARTHEST_GAP_M, None)
-        for pair in jaw_pairs(robot.gripper_geoms, bodies, robot.geom_on_finger)
-    }
+    gaps = _gaps_m(model, data, robot)
     opening_m = min(gaps.values(), key=lambda gap: abs(gap - travel.openings_m[0]))
     kept_m = opening_m
     for pair in (pair for pair, gap in gaps.items() if abs(gap - opening_m) < _ALIKE_M):
@@ -208,6 +204,20 @@ def open_gap(scene: Simulated, cover: GripperCover) -> tuple[float, float] | Non
         apart = np.linalg.norm(one[0][:, None] - other[0], axis=2) - one[1][:, None] - other[1]
         kept_m = min(kept_m, float(apart.min(initial=np.inf)))
     return float(opening_m), max(kept_m, 0.0)
+
+
+def nearest_points(model: Any, data: Any, robot: RobotModel, opening_m: float) -> FloatArray:
+    """Return the nearest points (2, 3), in the world, of the two geoms of the gripper that are `opening_m` apart."""
+    gaps, ends_m = _gaps_m(model, data, robot), np.zeros(6)
+    pair = min(gaps, key=lambda one: abs(gaps[one] - opening_m))
+    mujoco.mj_geomDistance(model, data, *pair, _FARTHEST_GAP_M, ends_m)
+    return ends_m.reshape(2, 3)
+
+
+def _gaps_m(model: Any, data: Any, robot: RobotModel) -> dict[tuple[int, int], float]:
+    """Return the distances, in m, between the gripper's geoms that can grip an object between them."""
+    pairs = jaw_pairs(robot.gripper_geoms, model.geom_bodyid[robot.gripper_geoms], robot.geom_on_finger)
+    return {pair: mujoco.mj_geomDistance(model, data, *pair, _FARTHEST_GAP_M, None) for pair in pairs}
 
 
 def _spheres_of(scene: Simulated, cover: GripperCover, data: Any, geom: int) -> tuple[FloatArray, FloatArray]:

@@ -144,6 +144,14 @@ def turn_site(model: Any, site: int, axis: SiteAxis) -> None:
     model.site_sameframe[site] = 0
 
 
+def put_site(model: Any, site: int, place_m: FloatArray) -> None:
+    """Put the site at `place_m` (3,) in the frame of its body, in a compiled model."""
+    if (model.site_pos[site] != place_m).any():
+        model.site_pos[site] = place_m
+        # MuJoCo takes the body's frame for a site that had the same one.
+        model.site_sameframe[site] = 0
+
+
 def _strongest(model: Any, actuators: IntArray) -> FloatArray:
     """Return the greatest torque or force (n,) of the `actuators` (n,) at their joints; infinite without a limit."""
     most: FloatArray = np.abs(model.actuator_gear[actuators, 0]) * model.actuator_forcerange[actuators, 1]

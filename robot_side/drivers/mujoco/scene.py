@@ -26,6 +26,7 @@ from robot_side.drivers.mujoco.robot_model import (
     can_touch,
     find_robot,
     machines,
+    put_site,
     turn_site,
 )
 from robot_side.surroundings.roles import assign_roles
@@ -37,6 +38,7 @@ _FOUND_START = (
     "a pose that was searched for, in which it reaches the target, as the model has no keyframe (to choose a pose: a"
     " keyframe named 'home')"
 )
+_MOVED = "; the tool's point is {1:.0f} mm from the site {0!r}, between the fingertips"
 # Longer steps make the arm's servos oscillate; shorter ones are too slow for real time on any machine.
 _SHORTEST_STEP_S, _LONGEST_STEP_S = 1e-5, 0.02
 
@@ -116,9 +118,10 @@ def load_scene(
             table = _read(_ASSETS / f"{name}_scene.xml")
             furnish(table, name, seed)
             if model_path is not None and name == "table":
-                start, place, found = settle(table, model, robot, start, may_search=model.nkey == 0)
-                if found:
-                    start_pose = _FOUND_START
+                start, place, moved_m, found = settle(table, model, robot, start, may_search=model.nkey == 0)
+                start_pose = _FOUND_START if found else start_pose
+                if moved_m:
+                    start_pose += _MOVED.format(site, 1e3 * moved_m)
             else:
                 place = usual_place(model, robot, start)
             # Attaching extends the keyframes by the attached joints, so that a keyframe preserves the configuration.
@@ -127,9 +130,11 @@ def load_scene(
                 start_key += "_"
             spec.add_key(name=start_key, qpos=start)
             attach(table, spec, model, robot, start, place)
+            place_m = model.site_pos[robot.site].copy()
             model = _compile(spec)
             robot = find_robot(model, site)
             turn_site(model, robot.site, site_axis)
+            put_site(model, robot.site, place_m)
             start = model.key(start_key).qpos
     data = mujoco.MjData(model)
     data.qpos[:] = start

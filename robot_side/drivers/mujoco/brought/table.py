@@ -11,6 +11,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
+from robot_side.drivers.mujoco.brought.fingertips import closing_direction, move_site, room_m
 from robot_side.drivers.mujoco.brought.reach import FROM_ABOVE, NEAR_M, go, grasp_places
 from robot_side.drivers.mujoco.built_in_scenes import make_room
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
@@ -61,6 +62,8 @@ class Settled(NamedTuple):
     start: FloatArray
     """(nq,) configuration"""
     place: Place
+    moved_m: float
+    """Distance by which the tool's site was moved, so that it is between the fingertips"""
     found: bool
     """Whether the start was searched for, because from the given one the target is out of reach"""
 
@@ -78,20 +81,24 @@ def usual_place(model: Any, robot: RobotModel, start: FloatArray) -> Place:
 def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_search: bool) -> Settled:
     """Give the hand room and a target that it can span; return where the robot and the table stand.
 
+    The tool's site is moved between the fingertips if it is far from them.
+
     table: the MjSpec of the table's scene, which is changed. The table is at its usual place if the tool reaches the
     target there, else nearer or lower. may_search: whether another start may be searched for.
     """
     travel = _travel(model, robot, start)
+    moved_m = 0.0 if travel is None else move_site(model, robot, start, travel)
     fit_target(table, None if travel is None else _clear_m(model, robot, start, travel))
     most = _MOST_STARTS if may_search and robot.arm_joints.size >= _FEWEST_JOINTS else 0
     for number, tried in enumerate(chain([start], islice(_other_starts(model, robot, start), most))):
         if (place := _find_place(table, model, robot, tried)) is not None:
-            settled = Settled(tried, place, number > 0)
+            settled = Settled(tried, place, moved_m, number > 0)
             break
     else:
-        settled = Settled(start, usual_place(model, robot, start), found=False)
+        settled = Settled(start, usual_place(model, robot, start), moved_m, found=False)
     if travel is not None:
-        _turn_target(table, _closing(model, robot, settled.start, travel), settled.place.yaw_rad)
+        closing = closing_direction(model, _placed(model, settled.start), robot, travel)
+        _turn_target(table, closing, settled.place.yaw_rad)
     make_room(table, *hand_reach_m(model, robot, settled.start, settled.place.yaw_rad)[:2])
     return settled
 
@@ -172,19 +179,6 @@ def _travel(model: Any, robot: RobotModel, start: FloatArray) -> GripperTravel |
     return None
 
 
-def _closing(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> FloatArray:
-    """Return the direction (3,) across the tool, in the world, along which the fingers close."""
-    data, middles_m = _placed(model, start), []
-    for fingers in (travel.open_fingers, travel.closed_fingers):
-        data.qpos[robot.finger_positions] = fingers
-        mujoco.mj_kinematics(model, data)
-        middles_m.append(data.geom_xpos[robot.gripper_geoms])
-    across = data.site_xmat[robot.site].reshape(3, 3)[:, :2]
-    moved_m = np.subtract(*middles_m) @ across
-    closing: FloatArray = across @ np.linalg.eigh(moved_m.T @ moved_m)[1][:, -1]
-    return closing
-
-
 def _turn_target(table: Any, closing: FloatArray, yaw_rad: float) -> None:
     """Turn a face of the target towards fingers that close along `closing`; `yaw_rad` is the table's direction."""
     if np.hypot(*closing[:2]) < _LEVEL:
@@ -202,13 +196,11 @@ def _clear_m(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTr
     data = _placed(model, start)
     data.qpos[robot.finger_positions] = travel.open_fingers
     mujoco.mj_kinematics(model, data)
-    tool, own = data.site_xmat[robot.site].reshape(3, 3), model.geom_bodyid[robot.gripper_geoms]
-    nearest_m, hit = 0.5 * float(travel.openings_m[0]), np.zeros(1, dtype=np.int32)
+    tool_m, tool = data.site_xpos[robot.site], data.site_xmat[robot.site].reshape(3, 3)
+    nearest_m = 0.5 * float(travel.openings_m[0])
     for angle in np.linspace(0.0, 2.0 * math.pi, _RAYS, endpoint=False):
-        ray = tool @ np.array([math.cos(angle), math.sin(angle), 0.0])
-        away_m = mujoco.mj_ray(model, data, data.site_xpos[robot.site], ray, None, 1, -1, hit)
-        if away_m >= 0.0 and model.geom_bodyid[hit[0]] in own:
-            nearest_m = min(nearest_m, away_m)
+        way = tool @ np.array([math.cos(angle), math.sin(angle), 0.0])
+        nearest_m = room_m(model, data, robot, tool_m, way, nearest_m)
     return 2.0 * nearest_m
 
 
