@@ -1,10 +1,14 @@
 """Surfaces of mesh geoms and of height fields, read from the shared arrays of a compiled MuJoCo model."""
 
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from robot_side.drivers.mujoco.model_enums import GeomKind
+
+_CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 def mesh_vertices(model: Any, geom: int) -> FloatArray:
@@ -21,6 +25,16 @@ def mesh_triangles(model: Any, geom: int) -> IntArray:
     first = int(model.mesh_faceadr[mesh])
     triangles: IntArray = model.mesh_face[first : first + int(model.mesh_facenum[mesh])].astype(np.int64)
     return triangles
+
+
+def geom_points(model: Any, data: Any, geoms: IntArray) -> FloatArray:
+    """Return points (p, 3), in the world, whose convex hull contains the geoms: a mesh's vertices, corners of a box."""
+    placed = [np.empty((0, 3))]
+    for geom in geoms.tolist():
+        is_mesh, box = model.geom_type[geom] == GeomKind.MESH, model.geom_aabb[geom]
+        points = mesh_vertices(model, geom) if is_mesh else box[:3] + _CORNERS * box[3:]
+        placed.append(points @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
+    return np.concatenate(placed)
 
 
 def height_field_surface(model: Any, geom: int) -> tuple[FloatArray, IntArray]:

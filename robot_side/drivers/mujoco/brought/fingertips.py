@@ -6,14 +6,16 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.arrays import FloatArray
-from robot_side.drivers.mujoco.gripper_cover import placed_corners
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, nearest_points
+from robot_side.drivers.mujoco.mesh_arrays import geom_points
 from robot_side.drivers.mujoco.robot_model import RobotModel, put_site
 
 _INSIDE_M: Final = 0.015
 """Distance of the tool from the ends of the fingertips, as in the built-in arm"""
 _AWAY_M: Final = 0.02
 """Distance up to which a site stays where it is: a person grasps as far past the tool's point"""
+_INTO_M: Final = 0.02
+"""Distance from the tool's point, into the hand, over which a grasped object needs room"""
 
 
 def move_site(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> float:
@@ -43,11 +45,16 @@ def closing_direction(model: Any, data: Any, robot: RobotModel, travel: GripperT
 
 
 def room_m(model: Any, data: Any, robot: RobotModel, from_m: FloatArray, way: FloatArray, most_m: float) -> float:
-    """Return the distance from a point (3,) along the unit vector `way` to the hand, at most `most_m`."""
-    hit = np.zeros(1, dtype=np.int32)
-    away_m = mujoco.mj_ray(model, data, from_m, way, None, 1, -1, hit)
-    own = away_m >= 0.0 and model.geom_bodyid[hit[0]] in model.geom_bodyid[robot.gripper_geoms]
-    return min(most_m, away_m) if own else most_m
+    """Return the distance along the unit vector `way` to the hand, at most `most_m`.
+
+    It is the least one from points between `from_m` (3,) and the depth to which a grasped object reaches into the hand.
+    """
+    approach, hit = data.site_xmat[robot.site].reshape(3, 3)[:, 2], np.zeros(1, dtype=np.int32)
+    for depth_m in (0.0, _INTO_M):
+        away_m = mujoco.mj_ray(model, data, from_m - depth_m * approach, way, None, 1, -1, hit)
+        if away_m >= 0.0 and model.geom_bodyid[hit[0]] in model.geom_bodyid[robot.gripper_geoms]:
+            most_m = min(most_m, away_m)
+    return most_m
 
 
 def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> FloatArray:
@@ -60,14 +67,11 @@ def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) ->
         data.qpos[robot.finger_positions] = positions
         mujoco.mj_kinematics(model, data)
         site_m, approach = data.site_xpos[robot.site], data.site_xmat[robot.site].reshape(3, 3)[:, 2]
-        ends_m.append(float(((placed_corners(model, data, fingers) - site_m) @ approach).max()))
+        ends_m.append(float(((geom_points(model, data, fingers) - site_m) @ approach).max()))
     closing = closing_direction(model, data, robot, travel)
     apart_m = float(travel.openings_m[0])
     across_m = float((nearest_points(model, data, robot, apart_m).mean(axis=0) - site_m) @ closing)
     middle_m = across_m * closing + (max(ends_m) - _INSIDE_M) * approach
-    left_m, right_m = (
-        room_m(model, data, robot, site_m + middle_m, way, 0.5 * apart_m)
-        for way in (-closing, closing)
-    )
+    left_m, right_m = (room_m(model, data, robot, site_m + middle_m, way, 0.5 * apart_m) for way in (-closing, closing))
     between_m: FloatArray = middle_m + 0.5 * (right_m - left_m) * closing
     return between_m

@@ -8,7 +8,8 @@ import numpy as np
 
 from common.arrays import FloatArray, IntArray
 from robot_side.arm.resolved_rate import joint_velocities
-from robot_side.drivers.mujoco.robot_model import RobotModel
+from robot_side.drivers.mujoco.mesh_arrays import geom_points
+from robot_side.drivers.mujoco.robot_model import RobotModel, can_touch
 
 NEAR_M: Final = 0.01
 """Distance from a place within which the tool has reached it"""
@@ -33,6 +34,8 @@ class Gone(NamedTuple):
     """Index of that place"""
     turned_rad: float
     """Angle by which the tool's approach has turned against the start"""
+    lowest_m: float
+    """Least height of the robot beyond its first link, at the start and at the places"""
     at_end: IntArray
     """Indices of the arm's joints that are at an end of their ranges"""
 
@@ -52,7 +55,8 @@ def go(model: Any, robot: RobotModel, start: FloatArray, places_m: Sequence[Floa
     joints, fastest = robot.arm_positions, np.full(robot.arm_joints.size, _FASTEST)
     mujoco.mj_kinematics(model, data)
     began = data.site_xmat[robot.site].reshape(3, 3)[:, 2].copy()
-    left_m, reached = 0.0, 0
+    moving = _moving_geoms(model, robot)
+    left_m, reached, lowest_m = 0.0, 0, _lowest_m(model, data, moving)
     for place_m in places_m:
         before_m = np.inf
         while True:
@@ -69,11 +73,26 @@ def go(model: Any, robot: RobotModel, start: FloatArray, places_m: Sequence[Floa
             mujoco.mj_kinematics(model, data)
         if left_m > NEAR_M:
             break
-        reached += 1
+        reached, lowest_m = reached + 1, min(lowest_m, _lowest_m(model, data, moving))
     at, approach = data.qpos[joints], data.site_xmat[robot.site].reshape(3, 3)[:, 2]
     return Gone(
         left_m,
         min(reached, len(places_m) - 1),
         float(np.arccos(np.clip(approach @ began, -1.0, 1.0))),
+        lowest_m,
         np.flatnonzero((at <= robot.lower_rad) | (at >= robot.upper_rad)),
     )
+
+
+def _moving_geoms(model: Any, robot: RobotModel) -> IntArray:
+    """Return the colliding geoms of the robot beyond its first link."""
+    beyond = np.zeros(model.nbody, dtype=bool)
+    # A body comes after its parent.
+    for body in range(model.jnt_bodyid[robot.arm_joints[:2][-1]], model.nbody):
+        beyond[body] = body == model.jnt_bodyid[robot.arm_joints[:2][-1]] or beyond[model.body_parentid[body]]
+    geoms = np.flatnonzero(beyond[model.geom_bodyid])
+    return geoms[[can_touch(model, int(geom)) for geom in geoms]].astype(np.int64)
+
+
+def _lowest_m(model: Any, data: Any, geoms: IntArray) -> float:
+    return float(geom_points(model, data, geoms)[:, 2].min(initial=np.inf))

@@ -15,6 +15,7 @@ from robot_side.drivers.mujoco.brought.fingertips import closing_direction, move
 from robot_side.drivers.mujoco.brought.reach import FROM_ABOVE, NEAR_M, go, grasp_places
 from robot_side.drivers.mujoco.built_in_scenes import make_room
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
+from robot_side.drivers.mujoco.mesh_arrays import geom_points
 from robot_side.drivers.mujoco.model_enums import GeomKind
 from robot_side.drivers.mujoco.robot_model import RobotModel, Simulated
 
@@ -91,7 +92,7 @@ def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_
     fit_target(table, None if travel is None else _clear_m(model, robot, start, travel))
     most = _MOST_STARTS if may_search and robot.arm_joints.size >= _FEWEST_JOINTS else 0
     for number, tried in enumerate(chain([start], islice(_other_starts(model, robot, start), most))):
-        if (place := _find_place(table, model, robot, tried)) is not None:
+        if (place := _find_place(table, model, robot, tried, travel)) is not None:
             settled = Settled(tried, place, moved_m, number > 0)
             break
     else:
@@ -115,8 +116,16 @@ def fit_target(table: Any, clear_m: float | None) -> None:
     target.size, body.pos = [length_m, width_m, height_m], [*body.pos[:2], height_m]
 
 
-def _find_place(table: Any, model: Any, robot: RobotModel, start: FloatArray) -> Place | None:
-    """Return the first place of the table at which the tool reaches the target from `start`; None if there is none."""
+def _find_place(
+    table: Any, model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel | None
+) -> Place | None:
+    """Return the first place of the table at which the tool reaches the target from `start`; None if there is none.
+
+    None if the fingers close upwards, too: the target is upright.
+    """
+    data = _placed(model, start)
+    if travel is not None and np.hypot(*closing_direction(model, data, robot, travel)[:2]) < _STRAIGHT:
+        return None
     data, usual = _placed(model, start), usual_place(model, robot, start)
     tool_m, approach = data.site_xpos[robot.site], data.site_xmat[robot.site].reshape(3, 3)[:, 2]
     lowest_m = tool_m[2] - hand_reach_m(model, robot, start, usual.yaw_rad)[2]
@@ -124,15 +133,14 @@ def _find_place(table: Any, model: Any, robot: RobotModel, start: FloatArray) ->
     height_m = 2.0 * from_target_m[2] if approach[2] < FROM_ABOVE else 0.0
     if approach[2] > -FROM_ABOVE:
         return None
-    links_m = _lowest_link_m(model, data, robot)
     for top_m, nearer_m in product((usual.top_m, *(tool_m[2] - drop_m for drop_m in _DROPS_M)), _NEARER_M):
-        if lowest_m < top_m + height_m + _ABOVE_M or links_m < top_m - _ABOVE_M:
+        if lowest_m < top_m + height_m + _ABOVE_M:
             continue
         ahead_m = from_target_m[0] - nearer_m
         direction = np.array([math.cos(usual.yaw_rad), math.sin(usual.yaw_rad)])
         target_m = np.array([*(tool_m[:2] + ahead_m * direction), top_m + from_target_m[2]])
         gone = go(model, robot, start, grasp_places(tool_m, approach, target_m))
-        if gone.left_m <= NEAR_M and gone.turned_rad <= _TURNED_RAD:
+        if gone.left_m <= NEAR_M and gone.turned_rad <= _TURNED_RAD and gone.lowest_m >= top_m:
             return usual._replace(top_m=float(top_m), nearer_m=nearer_m)
     return None
 
@@ -160,16 +168,6 @@ def _other_starts(model: Any, robot: RobotModel, start: FloatArray) -> Iterator[
         mujoco.mj_forward(model, data)
         if float(data.contact.dist.min(initial=0.0)) >= deepest_m - _MORE_M:
             yield data.qpos.copy()
-
-
-def _lowest_link_m(model: Any, data: Any, robot: RobotModel) -> float:
-    """Return the height of the lowest part of the arm's links beyond the first one."""
-    links = np.isin(model.geom_bodyid, model.jnt_bodyid[robot.arm_joints[1:]])
-    touches = links & ((model.geom_contype != 0) | (model.geom_conaffinity != 0))
-    turns = data.geom_xmat[touches].reshape(-1, 3, 3)[:, 2]
-    middles_m = data.geom_xpos[touches, 2] + (turns * model.geom_aabb[touches, :3]).sum(axis=1)
-    lowest_m = middles_m - (np.abs(turns) * model.geom_aabb[touches, 3:]).sum(axis=1)
-    return float(lowest_m.min(initial=np.inf))
 
 
 def _travel(model: Any, robot: RobotModel, start: FloatArray) -> GripperTravel | None:
@@ -221,12 +219,9 @@ def hand_reach_m(model: Any, robot: RobotModel, start: FloatArray, yaw_rad: floa
         data.qpos[:] = start
         data.qpos[fingers] = placed
         mujoco.mj_kinematics(model, data)
-        turns = data.geom_xmat[geoms].reshape(-1, 3, 3)
-        middles_m = data.geom_xpos[geoms] + np.einsum("gij,gj->gi", turns, model.geom_aabb[geoms, :3])
-        halves_m = np.einsum("gij,gj->gi", np.abs(turns), model.geom_aabb[geoms, 3:]) @ np.abs(axes.T)
-        out_m = (middles_m - data.site_xpos[robot.site]) @ axes.T
+        out_m = (geom_points(model, data, geoms) - data.site_xpos[robot.site]) @ axes.T
         out_m[:, 1] = np.abs(out_m[:, 1])
-        reach_m = np.maximum(reach_m, (out_m + halves_m).max(axis=0))
+        reach_m = np.maximum(reach_m, out_m.max(axis=0))
     return reach_m
 
 
