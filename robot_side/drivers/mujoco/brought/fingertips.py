@@ -6,6 +6,7 @@ import mujoco  # type: ignore[import-untyped]
 import numpy as np
 
 from common.arrays import FloatArray
+from robot_side.drivers.mujoco.gripper_cover import placed_corners
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, nearest_points
 from robot_side.drivers.mujoco.mesh_arrays import geom_points
 from robot_side.drivers.mujoco.robot_model import RobotModel, put_site
@@ -14,7 +15,7 @@ _INSIDE_M: Final = 0.015
 """Distance of the tool from the ends of the fingertips, as in the built-in arm"""
 _AWAY_M: Final = 0.02
 """Distance up to which a site stays where it is: a person grasps as far past the tool's point"""
-_INTO_M: Final = 0.02
+_INTO_M: Final = 0.04
 """Distance from the tool's point, into the hand, over which a grasped object needs room"""
 
 
@@ -44,17 +45,36 @@ def closing_direction(model: Any, data: Any, robot: RobotModel, travel: GripperT
     return closing
 
 
-def room_m(model: Any, data: Any, robot: RobotModel, from_m: FloatArray, way: FloatArray, most_m: float) -> float:
-    """Return the distance along the unit vector `way` to the hand, at most `most_m`.
+def room_m(corners_m: FloatArray, from_m: FloatArray, way: FloatArray, most_m: float, *, into: FloatArray) -> float:
+    """Return the distance along the unit vector `way` to the triangles `corners_m` (t, 3, 3), at most `most_m`.
 
-    It is the least one from points between `from_m` (3,) and the depth to which a grasped object reaches into the hand.
+    It is the least one from the points `from_m` (3,), `from_m + into`, and midway.
     """
-    approach, hit = data.site_xmat[robot.site].reshape(3, 3)[:, 2], np.zeros(1, dtype=np.int32)
-    for depth_m in (0.0, _INTO_M):
-        away_m = mujoco.mj_ray(model, data, from_m - depth_m * approach, way, None, 1, -1, hit)
-        if away_m >= 0.0 and model.geom_bodyid[hit[0]] in model.geom_bodyid[robot.gripper_geoms]:
-            most_m = min(most_m, away_m)
+    one, other = corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0]
+    across = np.cross(way, other)
+    scale = (one * across).sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for part in (0.0, 0.5, 1.0):
+            # Shares of both edges at the place where the ray crosses a triangle's plane, and the way to there.
+            back = from_m + part * into - corners_m[:, 0]
+            turned = np.cross(back, one)
+            first, second = (back * across).sum(axis=1) / scale, turned @ way / scale
+            away_m = (other * turned).sum(axis=1) / scale
+            hits = (first >= 0.0) & (second >= 0.0) & (first + second <= 1.0) & (away_m >= 0.0)
+            most_m = min(most_m, float(away_m[hits].min(initial=np.inf)))
     return most_m
+
+
+def rooms_m(
+    model: Any, data: Any, robot: RobotModel, from_m: FloatArray, closing: FloatArray, most_m: float
+) -> tuple[float, float]:
+    """Return the room, at most `most_m`, for a grasped object on either side of `from_m` (3,): against, along `closing`.
+
+    The object reaches into the hand.
+    """
+    hand = placed_corners(model, data, robot.gripper_geoms)
+    into = -_INTO_M * data.site_xmat[robot.site].reshape(3, 3)[:, 2]
+    return room_m(hand, from_m, -closing, most_m, into=into), room_m(hand, from_m, closing, most_m, into=into)
 
 
 def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> FloatArray:
@@ -72,6 +92,6 @@ def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) ->
     apart_m = float(travel.openings_m[0])
     across_m = float((nearest_points(model, data, robot, apart_m).mean(axis=0) - site_m) @ closing)
     middle_m = across_m * closing + (max(ends_m) - _INSIDE_M) * approach
-    left_m, right_m = (room_m(model, data, robot, site_m + middle_m, way, 0.5 * apart_m) for way in (-closing, closing))
+    left_m, right_m = rooms_m(model, data, robot, site_m + middle_m, closing, 0.5 * apart_m)
     between_m: FloatArray = middle_m + 0.5 * (right_m - left_m) * closing
     return between_m

@@ -11,7 +11,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.drivers.mujoco.brought.fingertips import closing_direction, move_site, room_m
+from robot_side.drivers.mujoco.brought.fingertips import closing_direction, move_site, rooms_m
 from robot_side.drivers.mujoco.brought.reach import FROM_ABOVE, NEAR_M, go, grasp_places
 from robot_side.drivers.mujoco.built_in_scenes import make_room
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
@@ -26,7 +26,9 @@ _DROPS_M: Final = (0.2, 0.25, 0.3, 0.35, 0.4, 0.5)
 _NEARER_M: Final = (0.0, 0.06, 0.11, 0.15, 0.18)
 _SPANNED: Final = 0.6
 """Largest share of the open gripper's gap that the target fills"""
-_RAYS: Final = 32
+_BESIDE_M: Final = 0.013
+"""Least room between the target and each finger: 3 mm by which the spheres protrude, and 10 mm of the arm's and the
+camera's errors at the usual probability"""
 _LEVEL: Final = 0.5
 """Least horizontal part of the fingers' direction of closing at which the target turns"""
 _THINNEST_M: Final = 0.005
@@ -109,7 +111,7 @@ def fit_target(table: Any, clear_m: float | None) -> None:
     if not clear_m:
         return
     target, body = table.geom("target"), table.body("target")
-    most_m = max(0.5 * _SPANNED * clear_m, _THINNEST_M)
+    most_m = max(min(0.5 * _SPANNED * clear_m, 0.5 * clear_m - _BESIDE_M), _THINNEST_M)
     length_m, width_m, height_m = target.size
     length_m, width_m = min(length_m, most_m), min(width_m, most_m)
     height_m = min(height_m, max(_SLIMMEST * width_m, _LOWEST_M))
@@ -192,14 +194,9 @@ def _clear_m(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTr
     One jaw may be nearer to the point than the other.
     """
     data = _placed(model, start)
-    data.qpos[robot.finger_positions] = travel.open_fingers
-    mujoco.mj_kinematics(model, data)
-    tool_m, tool = data.site_xpos[robot.site], data.site_xmat[robot.site].reshape(3, 3)
-    nearest_m = 0.5 * float(travel.openings_m[0])
-    for angle in np.linspace(0.0, 2.0 * math.pi, _RAYS, endpoint=False):
-        way = tool @ np.array([math.cos(angle), math.sin(angle), 0.0])
-        nearest_m = room_m(model, data, robot, tool_m, way, nearest_m)
-    return 2.0 * nearest_m
+    closing = closing_direction(model, data, robot, travel)
+    most_m = 0.5 * float(travel.openings_m[0])
+    return 2.0 * min(rooms_m(model, data, robot, data.site_xpos[robot.site], closing, most_m))
 
 
 def hand_reach_m(model: Any, robot: RobotModel, start: FloatArray, yaw_rad: float) -> FloatArray:
