@@ -68,7 +68,7 @@ def room_m(corners_m: FloatArray, from_m: FloatArray, way: FloatArray, most_m: f
 def rooms_m(
     model: Any, data: Any, robot: RobotModel, from_m: FloatArray, closing: FloatArray, most_m: float
 ) -> tuple[float, float]:
-    """Return the room, at most `most_m`, for a grasped object on either side of `from_m` (3,): against, along `closing`.
+    """Return the room for a grasped object on either side of `from_m` (3,), at most `most_m`: against, along `closing`.
 
     The object reaches into the hand.
     """
