@@ -11,6 +11,7 @@ import numpy as np
 from common.arrays import BoolArray, FloatArray, IntArray
 from common.errors import ConfigurationError
 from robot_side.drivers.mujoco.gripper_cover import GripperCover, link_solids
+from robot_side.drivers.mujoco.mesh_arrays import geom_points
 from robot_side.drivers.mujoco.robot_model import RobotModel, Simulated
 
 _GRIPPER_SAMPLES = 9
@@ -22,6 +23,8 @@ _DEFAULT_FORCE_LEAD = 0.3
 # Pairs of surfaces within this distance of the nearest pair, in the closed gripper, take part in the grasp.
 _GRASP_BAND_M = 2e-3
 _SMALLEST_STROKE_M = 1e-3
+# Distance from the gripper's farthest end within which its geoms are fingertips; links of the fingers end before.
+_TIPS_M = 0.03
 
 
 @dataclass(frozen=True)
@@ -107,7 +110,8 @@ def _sweep_gripper(model: Any, scene: Simulated, first: FloatArray, last: FloatA
     robot, data = scene.robot, mujoco.MjData(model)
     data.qpos[:] = scene.data.qpos
     held = scene.data.qpos[robot.arm_positions].copy()
-    pairs = jaw_pairs(robot.gripper_geoms, model.geom_bodyid[robot.gripper_geoms], robot.geom_on_finger)
+    mujoco.mj_kinematics(model, data)
+    pairs = _pairs(model, data, robot)
     samples = []
     for share in np.linspace(0.0, 1.0, _GRIPPER_SAMPLES):
         control = first + share * (last - first)
@@ -206,18 +210,26 @@ def open_gap(scene: Simulated, cover: GripperCover) -> tuple[float, float] | Non
     return float(opening_m), max(kept_m, 0.0)
 
 
-def nearest_points(model: Any, data: Any, robot: RobotModel, opening_m: float) -> FloatArray:
-    """Return the nearest points (2, 3), in the world, of the two geoms of the gripper that are `opening_m` apart."""
-    gaps, ends_m = _gaps_m(model, data, robot), np.zeros(6)
-    pair = min(gaps, key=lambda one: abs(gaps[one] - opening_m))
-    mujoco.mj_geomDistance(model, data, *pair, _FARTHEST_GAP_M, ends_m)
-    return ends_m.reshape(2, 3)
+def nearest_pair(model: Any, data: Any, robot: RobotModel, opening_m: float) -> tuple[int, int]:
+    """Return those two of the gripper's geoms whose distance is nearest to `opening_m`."""
+    gaps = _gaps_m(model, data, robot)
+    return min(gaps, key=lambda pair: abs(gaps[pair] - opening_m))
 
 
 def _gaps_m(model: Any, data: Any, robot: RobotModel) -> dict[tuple[int, int], float]:
     """Return the distances, in m, between the gripper's geoms that can grip an object between them."""
-    pairs = jaw_pairs(robot.gripper_geoms, model.geom_bodyid[robot.gripper_geoms], robot.geom_on_finger)
+    pairs = _pairs(model, data, robot)
     return {pair: mujoco.mj_geomDistance(model, data, *pair, _FARTHEST_GAP_M, None) for pair in pairs}
+
+
+def _pairs(model: Any, data: Any, robot: RobotModel) -> list[tuple[int, int]]:
+    """Return the pairs of the gripper's geoms that can grip an object; those at the fingertips, if there are any."""
+    geoms, approach = robot.gripper_geoms, data.site_xmat[robot.site].reshape(3, 3)[:, 2]
+    ends_m = np.array([float((geom_points(model, data, geoms[[k]]) @ approach).max()) for k in range(geoms.size)])
+    at_tips = ends_m > ends_m.max(initial=-np.inf) - _TIPS_M
+    pairs = jaw_pairs(geoms, model.geom_bodyid[geoms], robot.geom_on_finger)
+    tips = set(geoms[at_tips].tolist())
+    return [pair for pair in pairs if tips.issuperset(pair)] or pairs
 
 
 def _spheres_of(scene: Simulated, cover: GripperCover, data: Any, geom: int) -> tuple[FloatArray, FloatArray]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from robot_side.drivers.mujoco.gripper_cover import placed_corners
-from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, nearest_points
+from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, nearest_pair
 from robot_side.drivers.mujoco.mesh_arrays import geom_points
 from robot_side.drivers.mujoco.robot_model import RobotModel, put_site
 
@@ -43,6 +43,18 @@ def closing_direction(model: Any, data: Any, robot: RobotModel, travel: GripperT
     moved_m = np.subtract(*middles_m) @ across
     closing: FloatArray = across @ np.linalg.eigh(moved_m.T @ moved_m)[1][:, -1]
     return closing
+
+
+def jaws_turn_rad(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> float:
+    """Return the angle by which the two jaws turn against each other between open and closed; leave them open."""
+    turns = []
+    for fingers in (travel.closed_fingers, travel.open_fingers):
+        data.qpos[robot.finger_positions] = fingers
+        mujoco.mj_kinematics(model, data)
+        turns.append(data.geom_xmat.reshape(-1, 3, 3).copy())
+    one, other = nearest_pair(model, data, robot, float(travel.openings_m[0]))
+    closed, opened = (turn[one].T @ turn[other] for turn in turns)
+    return float(np.arccos(np.clip(0.5 * (np.trace(closed.T @ opened) - 1.0), -1.0, 1.0)))
 
 
 def room_m(corners_m: FloatArray, from_m: FloatArray, way: FloatArray, most_m: float, *, into: FloatArray) -> float:
@@ -90,7 +102,9 @@ def _between(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) ->
         ends_m.append(float(((geom_points(model, data, fingers) - site_m) @ approach).max()))
     closing = closing_direction(model, data, robot, travel)
     apart_m = float(travel.openings_m[0])
-    across_m = float((nearest_points(model, data, robot, apart_m).mean(axis=0) - site_m) @ closing)
+    ends = np.zeros(6)
+    mujoco.mj_geomDistance(model, data, *nearest_pair(model, data, robot, apart_m), 2.0 * apart_m, ends)
+    across_m = float((ends.reshape(2, 3).mean(axis=0) - site_m) @ closing)
     middle_m = across_m * closing + (max(ends_m) - _INSIDE_M) * approach
     left_m, right_m = rooms_m(model, data, robot, site_m + middle_m, closing, 0.5 * apart_m)
     between_m: FloatArray = middle_m + 0.5 * (right_m - left_m) * closing

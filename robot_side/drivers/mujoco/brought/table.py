@@ -11,7 +11,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.drivers.mujoco.brought.fingertips import closing_direction, move_site, rooms_m
+from robot_side.drivers.mujoco.brought.fingertips import closing_direction, jaws_turn_rad, move_site, rooms_m
 from robot_side.drivers.mujoco.brought.reach import FROM_ABOVE, NEAR_M, go, grasp_places
 from robot_side.drivers.mujoco.built_in_scenes import make_room
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
@@ -31,6 +31,10 @@ _BESIDE_M: Final = 0.013
 camera's errors at the usual probability"""
 _LEVEL: Final = 0.5
 """Least horizontal part of the fingers' direction of closing at which the target turns"""
+_WEDGE_RAD: Final = math.radians(30.0)
+"""Largest angle between fingers that turn, at the target: a friction of 0.27 holds it"""
+_TARGET_M: Final = (0.0315, 0.02, 0.06)
+"""Half sizes of the built-in target"""
 _THINNEST_M: Final = 0.005
 _SLIMMEST: Final = 4.0
 """Largest ratio of the target's height to its thickness, beyond the built-in one's"""
@@ -42,6 +46,8 @@ _FEWEST_JOINTS: Final = 5
 """Number of joints below which no start helps an arm to hold the tool's direction on the way"""
 _LEAST_AHEAD_M: Final = 0.15
 _MORE_M: Final = 1e-3
+_LEAN: Final = 0.3
+"""Largest vertical part of the fingers' direction of closing: the target is upright"""
 _STRAIGHT: Final = 0.95
 """Cosine of the largest angle between the tool's approach and the way ahead, or down, at a start that is found"""
 TABLE_PREFIX: Final = "table_scene/"
@@ -91,13 +97,15 @@ def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_
     """
     travel = _travel(model, robot, start)
     moved_m = 0.0 if travel is None else move_site(model, robot, start, travel)
-    fit_target(table, None if travel is None else _clear_m(model, robot, start, travel))
+    thick_m = math.inf if travel is None else _thickest_m(model, robot, start, travel)
     most = _MOST_STARTS if may_search and robot.arm_joints.size >= _FEWEST_JOINTS else 0
     for number, tried in enumerate(chain([start], islice(_other_starts(model, robot, start), most))):
+        fit_target(table, thick_m, 0.0 if travel is None else _lean(model, robot, tried, travel))
         if (place := _find_place(table, model, robot, tried, travel)) is not None:
             settled = Settled(tried, place, moved_m, number > 0)
             break
     else:
+        fit_target(table, thick_m)
         settled = Settled(start, usual_place(model, robot, start), moved_m, found=False)
     if travel is not None:
         closing = closing_direction(model, _placed(model, settled.start), robot, travel)
@@ -106,15 +114,15 @@ def settle(table: Any, model: Any, robot: RobotModel, start: FloatArray, *, may_
     return settled
 
 
-def fit_target(table: Any, clear_m: float | None) -> None:
-    """Make the target so thin that a gripper with `clear_m` of room spans it, and so low that it stands safely."""
-    if not clear_m:
-        return
+def fit_target(table: Any, thick_m: float, lean: float = 0.0) -> None:
+    """Make the target at most `thick_m` thick, and so low that it stands safely.
+
+    lean: vertical part of the fingers' direction of closing; fingers askew need room beside an upright target.
+    """
     target, body = table.geom("target"), table.body("target")
-    most_m = max(min(0.5 * _SPANNED * clear_m, 0.5 * clear_m - _BESIDE_M), _THINNEST_M)
-    length_m, width_m, height_m = target.size
-    length_m, width_m = min(length_m, most_m), min(width_m, most_m)
-    height_m = min(height_m, max(_SLIMMEST * width_m, _LOWEST_M))
+    most_m = max(0.5 * thick_m - lean * _TARGET_M[2], _THINNEST_M)
+    length_m, width_m = min(_TARGET_M[0], most_m), min(_TARGET_M[1], most_m)
+    height_m = min(_TARGET_M[2], max(_SLIMMEST * width_m, _LOWEST_M))
     target.size, body.pos = [length_m, width_m, height_m], [*body.pos[:2], height_m]
 
 
@@ -125,8 +133,7 @@ def _find_place(
 
     None if the fingers close upwards, too: the target is upright.
     """
-    data = _placed(model, start)
-    if travel is not None and np.hypot(*closing_direction(model, data, robot, travel)[:2]) < _STRAIGHT:
+    if travel is not None and _lean(model, robot, start, travel) > _LEAN:
         return None
     data, usual = _placed(model, start), usual_place(model, robot, start)
     tool_m, approach = data.site_xpos[robot.site], data.site_xmat[robot.site].reshape(3, 3)[:, 2]
@@ -188,15 +195,21 @@ def _turn_target(table: Any, closing: FloatArray, yaw_rad: float) -> None:
     table.body("target").quat = [math.cos(0.5 * turn_rad), 0.0, 0.0, math.sin(0.5 * turn_rad)]
 
 
-def _clear_m(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> float:
-    """Return how thick an object around the tool's point the open gripper spans.
+def _thickest_m(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> float:
+    """Return how thick an object around the tool's point the gripper grasps well.
 
-    One jaw may be nearer to the point than the other.
+    One jaw may be nearer to the point than the other. Jaws that turn are a wedge, the more so the wider they are open.
     """
     data = _placed(model, start)
+    opening_m, turned_rad = float(travel.openings_m[0]), jaws_turn_rad(model, data, robot, travel)
     closing = closing_direction(model, data, robot, travel)
-    most_m = 0.5 * float(travel.openings_m[0])
-    return 2.0 * min(rooms_m(model, data, robot, data.site_xpos[robot.site], closing, most_m))
+    clear_m = 2.0 * min(rooms_m(model, data, robot, data.site_xpos[robot.site], closing, 0.5 * opening_m))
+    return min(_SPANNED * clear_m, clear_m - 2.0 * _BESIDE_M, opening_m * _WEDGE_RAD / max(turned_rad, _WEDGE_RAD))
+
+
+def _lean(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> float:
+    """Return the vertical part of the direction along which the fingers close at the start."""
+    return abs(float(closing_direction(model, _placed(model, start), robot, travel)[2]))
 
 
 def hand_reach_m(model: Any, robot: RobotModel, start: FloatArray, yaw_rad: float) -> FloatArray:

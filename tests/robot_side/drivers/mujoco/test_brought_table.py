@@ -62,15 +62,17 @@ def test_a_second_arm_is_no_surroundings(tmp_path: Path) -> None:
     assert "target" in load_scene(brought(tmp_path, *changes), "tool").roles
 
 
-@pytest.mark.parametrize("opening_m", [0.023, 0.057, 0.2])
-def test_the_target_is_so_thin_that_the_fingers_span_it(opening_m: float) -> None:
+@pytest.mark.parametrize("thick_m", [0.014, 0.034, 0.12])
+def test_the_target_is_so_thin_that_the_fingers_span_it(thick_m: float) -> None:
     table = mujoco.MjSpec.from_file(str(ASSETS / "table_scene.xml"))
     before = list(table.geom("target").size)
-    fit_target(table, opening_m)
+    fit_target(table, thick_m)
     length_m, width_m, height_m = table.geom("target").size
-    assert max(length_m, width_m) <= 0.3 * opening_m + 1e-12
+    assert max(length_m, width_m) <= 0.5 * thick_m + 1e-12
     assert table.body("target").pos[2] == pytest.approx(height_m)
-    assert (list(table.geom("target").size) == before) == (opening_m > 0.11)
+    assert (list(table.geom("target").size) == before) == (thick_m > 0.063)
+    fit_target(table, 0.04, lean=0.1)
+    assert max(table.geom("target").size[:2]) == pytest.approx(0.02 - 0.1 * 0.06)
 
 
 def test_a_start_out_of_reach_is_said(tmp_path: Path) -> None:
