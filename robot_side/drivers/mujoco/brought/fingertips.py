@@ -45,18 +45,6 @@ def closing_direction(model: Any, data: Any, robot: RobotModel, travel: GripperT
     return closing
 
 
-def jaws_turn_rad(model: Any, data: Any, robot: RobotModel, travel: GripperTravel) -> float:
-    """Return the angle by which the two jaws turn against each other between open and closed; leave them open."""
-    turns = []
-    for fingers in (travel.closed_fingers, travel.open_fingers):
-        data.qpos[robot.finger_positions] = fingers
-        mujoco.mj_kinematics(model, data)
-        turns.append(data.geom_xmat.reshape(-1, 3, 3).copy())
-    one, other = nearest_pair(model, data, robot, float(travel.openings_m[0]))
-    closed, opened = (turn[one].T @ turn[other] for turn in turns)
-    return float(np.arccos(np.clip(0.5 * (np.trace(closed.T @ opened) - 1.0), -1.0, 1.0)))
-
-
 def room_m(corners_m: FloatArray, from_m: FloatArray, way: FloatArray, most_m: float, *, into: FloatArray) -> float:
     """Return the distance along the unit vector `way` to the triangles `corners_m` (t, 3, 3), at most `most_m`.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from common.errors import ConfigurationError
-from robot_side.drivers.mujoco.brought.fingertips import closing_direction, jaws_turn_rad, move_site, rooms_m
+from robot_side.drivers.mujoco.brought.fingertips import closing_direction, move_site, rooms_m
 from robot_side.drivers.mujoco.brought.reach import FROM_ABOVE, NEAR_M, go, grasp_places
 from robot_side.drivers.mujoco.built_in_scenes import make_room
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel, measure_gripper
@@ -31,8 +31,6 @@ _BESIDE_M: Final = 0.013
 camera's errors at the usual probability"""
 _LEVEL: Final = 0.5
 """Least horizontal part of the fingers' direction of closing at which the target turns"""
-_WEDGE_RAD: Final = math.radians(30.0)
-"""Largest angle between fingers that turn, at the target: a friction of 0.27 holds it"""
 _TARGET_M: Final = (0.0315, 0.02, 0.06)
 """Half sizes of the built-in target"""
 _THINNEST_M: Final = 0.005
@@ -198,13 +196,12 @@ def _turn_target(table: Any, closing: FloatArray, yaw_rad: float) -> None:
 def _thickest_m(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> float:
     """Return how thick an object around the tool's point the gripper grasps well.
 
-    One jaw may be nearer to the point than the other. Jaws that turn are a wedge, the more so the wider they are open.
+    One jaw may be nearer to the point than the other.
     """
     data = _placed(model, start)
-    opening_m, turned_rad = float(travel.openings_m[0]), jaws_turn_rad(model, data, robot, travel)
-    closing = closing_direction(model, data, robot, travel)
-    clear_m = 2.0 * min(rooms_m(model, data, robot, data.site_xpos[robot.site], closing, 0.5 * opening_m))
-    return min(_SPANNED * clear_m, clear_m - 2.0 * _BESIDE_M, opening_m * _WEDGE_RAD / max(turned_rad, _WEDGE_RAD))
+    closing, most_m = closing_direction(model, data, robot, travel), 0.5 * float(travel.openings_m[0])
+    clear_m = 2.0 * min(rooms_m(model, data, robot, data.site_xpos[robot.site], closing, most_m))
+    return min(_SPANNED * clear_m, clear_m - 2.0 * _BESIDE_M)
 
 
 def _lean(model: Any, robot: RobotModel, start: FloatArray, travel: GripperTravel) -> float:

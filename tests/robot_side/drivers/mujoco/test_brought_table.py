@@ -56,6 +56,22 @@ def test_without_a_keyframe_a_start_is_found_from_which_the_target_is_in_reach(t
     assert (again.data.qpos == scene.data.qpos).all()
 
 
+@pytest.mark.parametrize("place", ["0 0 0.045", "0 0 0.245", "0 0.04 0.145"])
+def test_a_site_far_from_the_fingertips_is_moved_between_them(tmp_path: Path, place: str) -> None:
+    own, built_in = load_scene(brought(tmp_path, ('pos="0 0 0.145"', f'pos="{place}"')), "tool"), load_scene()
+    tool_m, expected_m = (scene.data.site_xpos[scene.robot.site] for scene in (own, built_in))
+    assert tool_m == pytest.approx(expected_m, abs=2e-3)
+    assert "from the site 'tool', between the fingertips" in own.start_pose
+
+
+def test_fingers_that_would_close_up_and_down_get_another_start(tmp_path: Path) -> None:
+    # Without a keyframe, this wrist starts with one finger above the other.
+    wrist = ('<joint name="wrist_3"/>', '<joint name="wrist_3" range="-1.5708 4.7124"/>')
+    scene = load_scene(brought(tmp_path, no_keyframe(), wrist), "tool")
+    across = scene.data.site_xmat[scene.robot.site].reshape(3, 3)[:, 0]
+    assert abs(across[2]) < 0.3
+
+
 def test_a_second_arm_is_no_surroundings(tmp_path: Path) -> None:
     motor = '<actuator>\n    <motor name="other" joint="other"/>'
     changes = (no_keyframe(), ("</worldbody>", SECOND_ARM), ("<actuator>", motor))
