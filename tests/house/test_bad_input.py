@@ -114,6 +114,7 @@ def complaint(command: str) -> str:
         ("feelahead-robot --bind tcp://127.0.0.1:0 --model / --site tip", "--model /: is a directory", "MJCF"),
         (f"feelahead-robot --bind tcp://127.0.0.1:0 --model {ARM} --site hand", "'hand'", "tool"),
         ("feelahead-robot --bind tcp://127.0.0.1:0 --site tip", "--site", "--model"),
+        ("feelahead-robot --bind tcp://127.0.0.1:0 --site-axis x", "--site-axis x is given without --model", "valid"),
         ("feelahead-robot --keys missing", "missing", "feelahead keys make robot --folder missing"),
         ("feelahead-robot --keys missing --insecure", "--insecure and --keys", "one of them"),
         ("feelahead-robot --camera.sd-m -1", "-1", "0"),

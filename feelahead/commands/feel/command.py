@@ -51,7 +51,7 @@ class FeelSettings:
     """A real DualSense, or a simulated one with simulated hands in virtual time, which stores only with --out."""
     controller: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
     """Take only the DualSense with this address, as `feelahead doctor` prints it."""
-    pattern: PatternName | None = None
+    pattern: Annotated[PatternName | None, tyro.conf.arg(metavar="{free,wall,ramp,strengths}")] = None
     """Stay in one pattern; by default all in turn. On a terminal, keys choose, too."""
     duration: Annotated[Annotated[float, Meta(gt=0.0, lt=1e6)] | None, tyro.conf.arg(metavar="SECONDS")] = None
     """End after this time from the controller's first report; by default at Ctrl-C, simulated after one round."""

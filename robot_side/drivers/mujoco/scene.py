@@ -39,6 +39,9 @@ _FOUND_START = (
 )
 # Longer steps make the arm's servos oscillate; shorter ones are too slow for real time on any machine.
 _SHORTEST_STEP_S, _LONGEST_STEP_S = 1e-5, 0.02
+_FARTHEST_M = 1e6
+_MOST_ACCELERATION = 1e10
+"""Acceleration above which MuJoCo calls a simulation unstable, in m/s² or rad/s²"""
 
 
 @dataclass(frozen=True)
@@ -140,10 +143,14 @@ def load_scene(
         raise ConfigurationError(
             f"model: MuJoCo cannot simulate it: {' '.join(str(error).split())}; valid: a model that fits its memory"
         ) from error
-    for geom in np.flatnonzero(~np.isfinite(data.geom_xpos).all(axis=1)):
+    for geom in np.flatnonzero(~(np.abs(data.geom_xpos) < _FARTHEST_M).all(axis=1)):
         stray = model.geom(int(geom)).name or f"geom{geom}"
         raise ConfigurationError(
             f"model: {stray!r} is at the position {data.geom_xpos[geom]}; valid: a finite position"
+        )
+    if not (np.abs(data.qacc) < _MOST_ACCELERATION).all():
+        raise ConfigurationError(
+            "model: at its start its joints accelerate without bound; valid: finite gravity, masses and lengths"
         )
     objects, shared_names = _objects(model, robot)
     return Scene(

@@ -68,6 +68,7 @@ def test_the_demo_offers_every_scene_says_what_each_is_and_tells_the_robot_side_
     with pytest.raises(SystemExit):
         demo(["--help"])
     said = capsys.readouterr().out
+    assert "--scene {table,wall,slot,shelf}" in said
     for scene in get_args(SceneName):
         assert f"{scene}:" in said
         robot, operator = passed_on("--scene", scene)
