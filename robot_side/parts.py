@@ -115,8 +115,6 @@ def build_parts(
     if (settings.model is None) != (settings.site is None):
         given, missing = ("--model", "--site") if settings.site is None else ("--site", "--model")
         raise ConfigurationError(f"{given} is given without {missing}; valid: both, or neither for the built-in arm")
-    if settings.model is None and settings.site_axis != "z":
-        raise ConfigurationError(f"--site-axis {settings.site_axis} is given without --model; valid: with --model")
     # A driver's objects are not known yet.
     roles = settings.roles if settings.objects is None else {}
     scene = scene or load_scene(

@@ -69,8 +69,9 @@ class FeelSettings:
         require_output_file("--out", self.out)
         if self.measure and (self.pattern is not None or self.duration is not None):
             raise ValueError("--measure excludes --pattern and --duration; valid: --measure alone, or without it")
-        if self.out is not None and not self.measure:
-            raise ValueError("--out without --measure; valid: both")
+        if (self.out is not None or self.trigger != "r2") and not self.measure:
+            given = "--out" if self.out is not None else f"--trigger {self.trigger}"
+            raise ValueError(f"{given} without --measure; valid: both")
 
 
 def feel(arguments: Sequence[str], backend: HidBackend | None = None) -> int:

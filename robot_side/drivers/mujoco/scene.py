@@ -103,6 +103,8 @@ def load_scene(
     roles: override the roles that objects' names tell. The tool's z axis is the site's `site_axis`.
     ConfigurationError, of one line, for a file, model or site that cannot be used.
     """
+    if model_path is None and site_axis != "z":
+        raise ConfigurationError(f"--site-axis {site_axis} is given without --model; valid: with --model")
     mujoco.set_mju_user_warning(_log_warning)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
