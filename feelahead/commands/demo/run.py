@@ -100,9 +100,10 @@ def robot_arguments(
     # With a file of settings, the file decides whether tuning is permitted.
     config = "--permit-tuning" if settings.robot_config is None else f"--config={settings.robot_config}"
     small = SMALL_PICTURES if has_small_pictures(settings) else ()
+    watched = ["--cameras.at-once"] if settings.has_pages else []
     own = _flags(settings, given, *_SHARED, "scene", "model", "site", "site_axis", "probability", "assist", "law")
     ports = f"--bind={listening['control']}", f"--view-bind={listening['view']}"
-    return [*_files(settings, summary), *ports, config, *small, *own]
+    return [*_files(settings, summary), *ports, config, *watched, *small, *own]
 
 
 def operator_arguments(

@@ -44,7 +44,8 @@ def test_only_what_was_said_goes_over_the_sides_own_files(tmp_path: Path) -> Non
     config.write_text("seed = 3\nprobability = 0.5\n")
     robot, operator = passed_on("--robot-config", str(config))
     ports = ["--bind=tcp://127.0.0.1:1", "--view-bind=tcp://127.0.0.1:2"]
-    assert robot == ["--summary=summary.json", *ports, f"--config={config}"]
+    assert robot == ["--summary=summary.json", *ports, f"--config={config}", "--cameras.at-once"]
+    assert "--cameras.at-once" not in passed_on("--no-console")[0]
     unsaid = ("--seed", "--link", "--haptics", "--no-haptics", "--law", "--compensation")
     assert not [flag for flag in operator if flag.startswith(unsaid)]
 
