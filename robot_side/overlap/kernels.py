@@ -19,6 +19,7 @@ from functools import cache
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
+from common.processors import usable_processors
 from robot_side.compiled.kernel import BOOL, Compiled, compiled, inlined, input_array, output_array
 from robot_side.compiled.vectors import load
 from robot_side.overlap.checks.arguments import LARGEST, SMALLEST_NORMAL
@@ -125,7 +126,7 @@ def _many(
     # The kernels do not write the results of pairs without contact.
     results = np.zeros(total), np.zeros((total, 3)), np.zeros(total)
     if threads is None:
-        threads = min(total // PAIRS_PER_THREAD, os.cpu_count() or 1) if total >= 2 * PAIRS_PER_THREAD else 1
+        threads = min(total // PAIRS_PER_THREAD, usable_processors()) if total >= 2 * PAIRS_PER_THREAD else 1
     if threads <= 1:
         parts = [_part(overlap, precise, arguments, results, trusted)]
     else:
@@ -167,7 +168,7 @@ def _part(
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="overlap")
+    return ThreadPoolExecutor(usable_processors(), thread_name_prefix="overlap")
 
 
 # A forked process has none of the threads, and would wait for them forever.
