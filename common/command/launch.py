@@ -74,7 +74,7 @@ def _end_with_parent() -> None:
     import ctypes  # noqa: PLC0415  # not needed by a command that a person starts
 
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
-    if str(os.getppid()) != parent:
+    if not Path(f"/proc/{parent}").exists():
         os._exit(0)
 
 

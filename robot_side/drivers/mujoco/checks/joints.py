@@ -56,7 +56,10 @@ def _dead(scene: Scene) -> list[str]:
 def _grip(scene: Scene, travel: GripperTravel | None) -> list[str]:
     """Return a line if nothing can be gripped, or not the target."""
     if travel is None:
-        return ["no actuator opens and closes fingers beyond the arm's last joint: nothing can be grasped"]
+        why = "no actuator opens and closes fingers beyond the arm's last joint"
+        if scene.robot.gripper_actuators.size:
+            why = "the hand's actuators do not bring its fingers together over the whole of their ctrlrange"
+        return [f"{why}: nothing can be grasped"]
     targets = [thing for thing in scene.objects if scene.roles[thing.name] is Role.TARGET]
     opening_m, closed_m = float(travel.openings_m[0]), float(travel.openings_m[-1])
     for thing in targets[:1]:

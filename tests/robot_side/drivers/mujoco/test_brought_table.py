@@ -14,7 +14,7 @@ from robot_side.drivers.mujoco.checks.reach import reach_findings
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from tests.helpers.arm_models import planar_arm
+from tests.helpers.arm_models import TENDON_GRIPPER, planar_arm
 
 ASSETS = Path(load_scene.__code__.co_filename).parent / "assets"
 SECOND_ARM = """<body name="second" pos="0 1 0"><joint name="other"/><geom size="0.05"/></body></worldbody>"""
@@ -87,7 +87,9 @@ def test_joints_that_do_not_move_as_expected_are_named(tmp_path: Path) -> None:
 
 def test_a_hand_without_driven_fingers_is_said(tmp_path: Path) -> None:
     bare = planar_arm(tmp_path, gripper_actuators="")
-    assert any("nothing can be grasped" in line for line in joint_lines(load_scene(bare, "tcp")))
+    assert any("no actuator opens and closes" in line for line in joint_lines(load_scene(bare, "tcp")))
+    idle = planar_arm(tmp_path, gripper_actuators=TENDON_GRIPPER.replace("0 255", "0 0.1"))
+    assert any("the hand's actuators do not bring" in line for line in joint_lines(load_scene(idle, "tcp")))
 
 
 def test_fingers_that_do_not_close_on_the_target_are_said(tmp_path: Path) -> None:
