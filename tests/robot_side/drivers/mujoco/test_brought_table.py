@@ -85,6 +85,16 @@ def test_joints_that_do_not_move_as_expected_are_named(tmp_path: Path) -> None:
     assert line.startswith("joints elbow: turn farther than")
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [('qpos="-0.45168', 'qpos="-9.4', "shoulder_pan"), ("0.0425 0.0425", "5 5", "left_finger, right_finger")],
+)
+def test_joints_that_start_outside_their_ranges_are_named(old: str, new: str, said: str, tmp_path: Path) -> None:
+    lines = joint_lines(load_scene(brought(tmp_path, (old, new)), "tool"))
+    assert lines[0] == f"joints {said}: start outside their ranges"
+    assert not any("at an end" in line for line in lines)
+
+
 def test_a_hand_without_driven_fingers_is_said(tmp_path: Path) -> None:
     bare = planar_arm(tmp_path, gripper_actuators="")
     assert any("no actuator opens and closes" in line for line in joint_lines(load_scene(bare, "tcp")))
