@@ -13,7 +13,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 # A file that is only half made is made again.
 .DELETE_ON_ERROR:
-.PHONY: figures demo test quick types test-kernel test-netem test-two-hosts wide-area test-containers test-console pictures driving latency-experiment lock clean
+.PHONY: figures demo test quick types test-kernel test-two-hosts wide-area test-containers test-console pictures driving latency-experiment lock clean
 
 PIP = $(BIN)/python -m pip install --disable-pip-version-check
 PIP_LOG = $(VENV)/pip.log
@@ -75,9 +75,6 @@ test-two-hosts: $(VENV)/.installed $(VENV)/.kernels ## docs/two-machines.md, fol
 # Needs root, iproute2 and /dev/net/tun: make wide-area ARGS="--loss 0 1 --control reno bbr --csv wide.csv"
 wide-area: $(VENV)/.installed $(VENV)/.kernels ## both sides over the kernel's own TCP with delay, loss, rate and queue: a table
 	$(BIN)/python -m tests.two_hosts.wide_area $(ARGS)
-
-test-netem: $(VENV)/.installed ## the kernel's own netem, in User-Mode Linux, beside our emulated link
-	$(SUITE) -m netem tests/netem $(ARGS)
 
 # Needs Docker; in CI, root gets Debian's for the time being.
 test-containers: $(VENV)/.installed ## both sides and the router in containers, built, killed and brought back
