@@ -11,7 +11,7 @@ import numpy as np
 
 from common.errors import ConfigurationError
 from feelahead.lab.figures import figure
-from feelahead.lab.propagation import PosedGripper
+from feelahead.lab.posed_gripper import PosedGripper
 from feelahead.lab.table import Row, Table
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.posed_scene import PosedScene
