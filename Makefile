@@ -92,7 +92,7 @@ pictures: $(VENV)/.installed $(VENV)/.kernels ## the documents' pictures of cons
 figures/haptics.csv: asks = try haptics --seeds 10
 figures/camera.csv: asks = try haptics --scenes shelf --delays 0 200 --seeds 4 --camera-mm 1
 figures/demo.csv: asks = try demo --seeds 10
-figures/definition.csv: asks = bench felt --definition
+figures/definition.csv: asks = bench felt
 figures/tick.csv: asks = bench tick --quick
 figures/cover.csv: asks = bench felt --cover
 FIGURES = $(patsubst %,figures/%.csv,haptics camera demo definition tick cover)
