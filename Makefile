@@ -85,7 +85,7 @@ test-console: $(VENV)/.installed $(VENV)/.kernels ## the console in a real brows
 	$(SUITE) -m console tests/console $(ARGS)
 
 # Needs Chromium, and a machine with nothing else to do: its runs are real ones.
-pictures: $(VENV)/.installed $(VENV)/.kernels ## the documents' pictures of console, terminal view and plot, made anew
+pictures: $(VENV)/.installed $(VENV)/.kernels ## the documents' pictures of console and terminal view, made anew
 	$(BIN)/python -m tests.console.pictures $(ARGS)
 
 # An hour and more, on a machine with nothing else to do. A stopped run goes on; a new commit starts anew.
