@@ -1,28 +1,19 @@
 """The compiled law agrees with its definition, and `feelahead bench felt` measures what its help says."""
 
 import csv
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import feelahead.main
 from feelahead.lab import cover
-from feelahead.lab.approaches.frozen import frozen_hash
 from feelahead.lab.approaches.ticks import DEMO
 from feelahead.lab.cover import STANDS_OUT, Gripper
-from feelahead.lab.field import strength_column
 from feelahead.lab.questions.felt import run
-from feelahead.lab.table import Table
 from robot_side.drivers.mujoco.gripper_cover import GripperCover, cover_gripper
 from tests.helpers.arm_models import planar_arm
-from tests.helpers.repository import DATA
-
-WALL = str(DATA / "wall.xml")
-COVER_MM, RAMP_MM = 3.0, 12.0
 
 
 @pytest.mark.long
@@ -74,27 +65,3 @@ def test_spheres_that_are_too_small_are_found_out(monkeypatch: pytest.MonkeyPatc
     for row in run(Gripper("built-in", None, None, 2000), 0):
         assert 0.1 < row["sticks_out_mm"] <= 0.5 + 1e-6
         assert 2.0 < row["stands_out_mm"] <= 2.5 + 1e-6
-
-
-def test_strengths_begin_as_far_before_each_thing_however_far_it_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    summary, picture = tmp_path / "out.json", tmp_path / "out.png"
-    models = ["--model", WALL, str(DATA / "rod_5mm.xml")]
-    written = ["--summary", str(summary), "--picture", str(picture)]
-    assert feelahead.main.command(["bench", "felt", "--field", "--step-mm", "50", *models, *written]) == 0
-    assert f"frozen scenes and limits: {frozen_hash()}" in " ".join(capsys.readouterr().out.split())
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    for (scene,), rows in Table(json.loads(summary.read_text())["runs"]).groups("scene"):
-        assert scene in ("wall", "rod_5mm")
-        assert rows.values("free_mm") == [0.0, 50.0, 100.0, 150.0]
-        far = rows.rows[1:]
-        before_mm = np.array(
-            [[row["free_mm"] - row[strength_column(strength)] for strength in range(1, 9)] for row in far]
-        )
-        np.testing.assert_allclose(before_mm, np.broadcast_to(before_mm[0], before_mm.shape), atol=0.1)
-        assert (np.diff(before_mm, axis=1) <= 0.0).all()
-        # The eighth at D_σ and the spheres' stand-out, or a little earlier, as strengths are rounded; the first before.
-        begins_mm = before_mm[0] - far[0]["sigma_mm"]
-        assert 0.0 < begins_mm[7] < COVER_MM + 0.25 * RAMP_MM
-        assert begins_mm[7] < begins_mm[0] < COVER_MM + RAMP_MM
