@@ -1,7 +1,5 @@
-"""How pairs are grouped into blocks, lanes and threads changes no result."""
+"""How pairs are grouped into blocks and lanes changes no result."""
 
-import subprocess
-import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -12,7 +10,6 @@ from robot_side.overlap import kernels
 from robot_side.overlap.closed_forms.solid import Overlaps
 from robot_side.overlap.kernels import PairCounts
 from robot_side.overlap.lanes.lanes import LANES
-from tests.helpers.repository import ROOT
 
 Arrays = tuple[FloatArray, ...]
 Pairs = Callable[..., Overlaps]
@@ -69,14 +66,6 @@ def test_blocks_in_which_all_pairs_are_cut_change_nothing(
 
 
 @KINDS
-def test_threads_change_nothing(pairs: Pairs, make: Callable[[int], Arrays]) -> None:
-    arguments = make(5000)
-    one, three = PairCounts(), PairCounts()
-    assert_same(pairs(*arguments, threads=1, counts=one), pairs(*arguments, threads=3, counts=three))
-    assert one == three
-
-
-@KINDS
 def test_the_ways_are_counted(pairs: Pairs, make: Callable[[int], Arrays]) -> None:
     centers, radii, *solids = make(1000)
     counts = PairCounts()
@@ -88,23 +77,3 @@ def test_the_ways_are_counted(pairs: Pairs, make: Callable[[int], Arrays]) -> No
     # The bounds leave every pair whose surfaces cut to the lanes, and few others.
     assert cut <= 2000 - counts.early <= 1.2 * cut
     assert 0 <= counts.precise <= 0.02 * cut
-
-
-@pytest.mark.processes
-def test_a_forked_process_shares_work_among_threads_of_its_own() -> None:
-    program = (
-        "import multiprocessing, numpy as np\n"
-        "from robot_side.overlap import sphere_sphere, sphere_tetrahedron\n"
-        "def total(_): return float(sphere_tetrahedron(np.zeros((20000, 3)), 1.0, np.eye(4, 3)).sum())\n"
-        "expected = total(None)\n"
-        "pool = multiprocessing.get_context('fork').Pool(1)\n"
-        "assert pool.map_async(total, [0]).get(240.0) == [expected]\n"
-        "pool.terminate()\n"
-        "import atexit\n"
-        "atexit.register(lambda: print('the same' if total(None) == expected else 'another'))\n"
-    )
-    root = ROOT
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=root, capture_output=True, text=True, check=False, timeout=300.0
-    )
-    assert (done.stdout, done.stderr, done.returncode) == ("the same\n", "", 0)
