@@ -11,8 +11,6 @@ For boxes and tetrahedra there are three methods. Bounds settle most pairs in wh
 loops compute the others. The precise forms recompute the few for which doubles do not suffice (see `lane_result`).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
@@ -28,17 +26,6 @@ from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
 from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
 
 _RESULTS = output_array(1), output_array(2), output_array(1)
-
-
-@dataclass
-class PairCounts:
-    """Number of pairs of a sphere with a box or tetrahedron, in all and by method; each call adds to these."""
-
-    pairs: int = 0
-    early: int = 0
-    """Pairs that bounds alone settled"""
-    precise: int = 0
-    """Pairs that the precise forms recomputed"""
 
 
 class DoubtfulNumbersError(ValueError):
@@ -78,14 +65,13 @@ def box_pairs(
     box_half_sizes: FloatArray,
     *,
     trusted: bool = True,
-    counts: PairCounts | None = None,
 ) -> Overlaps:
     """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with boxes.
 
     box_centers (p, 3), box_rotations (p, 3, 3) from the box's frame to the spheres', box_half_sizes (p, 3).
     """
     arguments = centers, radii, box_centers, box_rotations, box_half_sizes
-    return _many(overlap_boxes, precise_boxes, arguments, trusted, counts)
+    return _many(overlap_boxes, precise_boxes, arguments, trusted)
 
 
 def tetrahedron_pairs(
@@ -94,34 +80,24 @@ def tetrahedron_pairs(
     vertices: FloatArray,
     *,
     trusted: bool = True,
-    counts: PairCounts | None = None,
 ) -> Overlaps:
     """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with tetrahedra.
 
     vertices (p, 4, 3): each tetrahedron's corners in any order.
     """
-    return _many(overlap_tetrahedra, precise_tetrahedra, (centers, radii, vertices), trusted, counts)
+    return _many(overlap_tetrahedra, precise_tetrahedra, (centers, radii, vertices), trusted)
 
 
-def _many(
-    overlap: Compiled, precise: Compiled, arguments: tuple[FloatArray, ...], trusted: bool, counts: PairCounts | None
-) -> Overlaps:
+def _many(overlap: Compiled, precise: Compiled, arguments: tuple[FloatArray, ...], trusted: bool) -> Overlaps:
     total = len(arguments[1])
     # The kernels do not write the results of pairs without contact.
     results = np.zeros(total), np.zeros((total, 3)), np.zeros(total)
     rows: IntArray = np.empty(total + 1, dtype=np.int64)
     unsettled = overlap(*arguments, *results, rows)
-    partial = rows.item(-1)
-    if partial < 0:
-        if not trusted:
-            raise DoubtfulNumbersError
-        partial = ~partial
+    if rows.item(-1) < 0 and not trusted:
+        raise DoubtfulNumbersError
     if unsettled:
         precise(*arguments, rows[:unsettled], *results)
-    if counts is not None:
-        counts.pairs += total
-        counts.early += total - partial
-        counts.precise += unsettled
     return results
 
 
