@@ -81,6 +81,10 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         unused = unused_clauses(settings.link_spec(), [("to_operator", stream) for stream in sent])
         for text in unused:
             process.note(text)
+        cameras = Cameras(parts.scene, settings.cameras, process.note) if settings.cameras.on else None
+        if cameras is not None and settings.cameras.at_once:
+            now_s = loop.clock.now()
+            cameras.update(now_s, now_s, (), expected=True)
         warm_up(lambda ready, of: process.note(_COMPILING.format(ready, of)), parts.kernels)
         beside.wait()
         if recording is not None:
@@ -88,7 +92,6 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         model = PerceivedModel(parts.scene) if parts.any_objects else SceneModel(parts.scene)
         eyes = (first_person_eye(parts.scene), overview_eye(parts.scene)) if settings.cameras.on else (None, None)
         view = SceneView(model, parts.kinematics, parts.explains, parts.surroundings, *eyes)
-        cameras = Cameras(parts.scene, settings.cameras, process.note) if settings.cameras.on else None
 
         def open_side() -> RobotTurns:
             sockets = process.stack.enter_context(open_sockets())
