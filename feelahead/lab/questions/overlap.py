@@ -1,4 +1,4 @@
-"""How fast and how exact are the overlaps, compared with the published package?
+"""How fast and how exact are the overlaps, compared with other methods?
 
 feelahead bench overlap --quick --peer-header overlap-0.2.0/include/overlap/overlap.hpp
 """
@@ -18,8 +18,10 @@ from rich.table import Table as Shown
 from common.arrays import FloatArray
 from common.clock import MonotonicClock
 from common.files.input_file import require_input_file
+from feelahead.lab.figures import figure
 from feelahead.lab.goals import Goal
 from feelahead.lab.reference import errors
+from feelahead.lab.reference.approximations import SLOW, satellites
 from feelahead.lab.reference.classes import DEPTHS, MAKERS, family, frozen_class
 from feelahead.lab.reference.meshes import around_torus, torus
 from feelahead.lab.reference.oracle import true_overlaps
@@ -36,6 +38,7 @@ FASTER, BOXES_A_QUERY, FEW_TRIANGLES = 13.0, 20.0, 50
 Groups = Iterable[tuple[tuple[Any, ...], Table]]
 _BATCH = 4096
 _SPEED = ("random", "far away", "solid swallowed", "sphere swallowed")
+_TRADED = ("random", "tangent vertex", "flat 1e-3", "R/L 1e-2", "R/L 1e2", "edge depth 1e-3")
 _RADII = (0.004, 0.01, 0.02, 0.03, 0.045, 0.07, 0.1, 0.12, 0.15, 0.25, 0.4, 0.6)
 _CLASSES = [(solid, name, grid) for solid, makers in MAKERS.items() for name in makers for grid in (False, True)]
 _FLAT_FACED = ("tetrahedron", "box")
@@ -44,11 +47,11 @@ _COUNTS = ("pairs", "undefined", "negative", "false_zeros", "false_positives")
 
 @dataclass(frozen=True)
 class OverlapSweep(Sweep):
-    """Measure run time and error of the overlaps and of the published package, on the same pairs in the same run.
+    """Measure run time and error of the overlaps and of their alternatives, on the same pairs in the same run.
 
-    The package `overlap` 0.2.0 is called in C++ for its run time, and from Python for its errors. What this machine
-    lacks of it is named. The package comes with: pip install '.[bench]' in the clone. The C++ row needs a compiler,
-    Eigen (apt-get install libeigen3-dev) and the package's header:
+    The alternatives are the published package `overlap` 0.2.0 from Python and in C++, 29 satellite points, Monte Carlo
+    and more. Those that this machine lacks are named. The package comes with: pip install '.[bench]' in the clone. The
+    C++ row needs a compiler, Eigen (apt-get install libeigen3-dev) and the package's header:
 
         pip download --no-deps --no-binary overlap overlap==0.2.0 && tar xzf overlap-0.2.0.tar.gz
     """
@@ -72,7 +75,7 @@ class OverlapSweep(Sweep):
 class Piece:
     """Cell: one class of pairs, one set of timed pairs, or one radius of mesh queries."""
 
-    part: Literal["speed", "accuracy", "adversarial", "mesh"]
+    part: Literal["speed", "accuracy", "adversarial", "tradeoff", "mesh"]
     solid: str
     case: str
     grid: bool
@@ -91,6 +94,8 @@ def cells(settings: OverlapSweep) -> Iterator[Piece]:
         yield Piece("speed", solid, case, False, timed, turns, header)
     for radius in _RADII:
         yield Piece("mesh", "mesh", f"{radius:g}", False, min(timed, 500), turns)
+    for solid, case in product(_FLAT_FACED, _TRADED):
+        yield Piece("tradeoff", solid, case, False, truths, 2 if settings.quick else 4)
     for one in _CLASSES:
         yield Piece("accuracy", *one, truths, turns)
     for one in _CLASSES:
@@ -99,7 +104,7 @@ def cells(settings: OverlapSweep) -> Iterator[Piece]:
 
 def run(cell: Piece, seed: int) -> Iterator[Row]:
     """Measure one cell; yield a row for each method."""
-    parts = {"speed": _speed, "accuracy": _accuracy, "adversarial": _failures, "mesh": _mesh}
+    parts = {"speed": _speed, "accuracy": _accuracy, "adversarial": _failures, "tradeoff": _tradeoff, "mesh": _mesh}
     yield from parts[cell.part](cell, seed)
 
 
@@ -167,6 +172,28 @@ def _failures(cell: Piece, seed: int) -> Iterator[Row]:
         yield {"method": PACKAGE, **asdict(errors.count_failures(pairs, theirs))}
 
 
+def _tradeoff(cell: Piece, seed: int) -> Iterator[Row]:
+    """Measure time and worst error of every method; slow methods get only a few pairs, all of which intersect."""
+    clock, pairs = MonotonicClock(), _pairs(cell, seed)
+    truths = true_overlaps(pairs)
+    methods: dict[str, tuple[Callable[[Pairs], FloatArray], int]]
+    methods = {"ours, batch": (errors.kernel_volumes, _BATCH), "29 points": (satellites, _BATCH)}
+    methods |= {name: (volumes_of, cell.turns) for name, volumes_of in SLOW.items()}
+    if not (package := PythonPackage()).missing:
+        methods[PACKAGE] = package.volumes, len(pairs)
+    cut = np.flatnonzero([truth.faces_cut > 0 and truth.area != 0 for truth in truths])
+    for method, (volumes_of, count) in methods.items():
+        rows = cut[:count] if count < len(pairs) and len(cut) else np.arange(len(pairs))
+        start_s = clock.now()
+        volumes = volumes_of(pairs[rows])
+        time_ns = 1e9 * (clock.now() - start_s) / len(rows)
+        wrong = errors.volume_errors(pairs[rows], [truths[row] for row in rows], volumes)
+        if count == _BATCH:
+            many = pairs[np.resize(np.arange(len(pairs)), _BATCH)]
+            time_ns = float(least_ns([functools.partial(volumes_of, many)], clock)[0]) / _BATCH
+        yield {"method": method, "ns": time_ns, "volume": float(np.minimum(wrong, 1.0).max())}
+
+
 def _mesh(cell: Piece, seed: int) -> Iterator[Row]:
     """Measure the time of overlaps of spheres with a torus of 10 000 triangles, around whose surface they lie."""
     clock, radius, rng = MonotonicClock(), float(cell.case), np.random.default_rng([seed, 5])
@@ -180,15 +207,20 @@ def _mesh(cell: Piece, seed: int) -> Iterator[Row]:
 
 def show(_: OverlapSweep, table: Table) -> Iterator[Shown | str]:
     """Yield a table for each part of the question: a row for each method, class, count or radius."""
-    parts = ("speed", "accuracy", "adversarial", "mesh")
-    speed, accuracy, adversarial, meshes = (table.where(part=part) for part in parts)
-    columns = list(speed.groups("solid", "case"))
-    headings = ("method", *(", ".join(key) for key, _ in columns))
-    by_method = (
-        (method, *(_most(one.where(method=method), "ns") for _, one in columns))
-        for (method,), _ in speed.groups("method")
-    )
-    yield shown("run time, ns a pair, gradients included (the package gives volumes only)", headings, by_method)
+    parts = ("speed", "tradeoff", "accuracy", "adversarial", "mesh")
+    speed, tradeoff, accuracy, adversarial, meshes = (table.where(part=part) for part in parts)
+    for rows, name, title in (
+        (speed, "ns", "run time, ns a pair, gradients included (the package gives volumes only)"),
+        (tradeoff, "ns", "run time, ns a pair, volumes alone"),
+        (tradeoff, "volume", "and the worst error, of the sphere"),
+    ):
+        columns = list(rows.groups("solid", "case"))
+        headings = ("method", *(", ".join(key) for key, _ in columns))
+        by_method = (
+            (method, *(_most(one.where(method=method), name) for _, one in columns))
+            for (method,), _ in rows.groups("method")
+        )
+        yield shown(title, headings, by_method)
     yield from dict.fromkeys(f"not measured: {row['method']}: {row['missing']}" for row in speed if "missing" in row)
     names = ("volume", "gradient", "area", "relative", "direction")
     every = [*((name, "ours") for name in names), ("volume", PACKAGE)]
@@ -248,4 +280,21 @@ def goals(_: OverlapSweep, table: Table) -> Iterator[Goal]:
     yield Goal(f"mesh query with up to {FEW_TRIANGLES} triangles, in boxes", few, BOXES_A_QUERY)
 
 
-QUESTION = Question("bench overlap", OverlapSweep, cells, run, show, goals=goals, timed=True)
+def draw(_: OverlapSweep, table: Table, path: Path) -> None:
+    """Draw run time against error, and the time of a mesh query against the number of triangles that it visits."""
+    with figure(path, 1, 2, figsize=(13.0, 4.6)) as (_, (left, right)):
+        for number, ((method,), rows) in enumerate(table.where(part="tradeoff").groups("method")):
+            errors = np.maximum(rows.values("volume"), 1e-18)
+            left.scatter(rows.values("ns"), errors, 16, label=method, marker="ox^"[number // 5], color=f"C{number % 5}")
+        left.axhline(1e-15, color="black", linewidth=0.6, linestyle=":")
+        left.set(xscale="log", yscale="log", xlabel="time, ns a pair", ylabel="worst error / sphere volume")
+        meshes = table.where(part="mesh")
+        for name, label in (("ns", "volume"), ("gradient_ns", "with gradient")):
+            right.plot(meshes.values("triangles"), meshes.values(name), "o", label=label)
+        right.set(xscale="symlog", yscale="log", xlabel="triangles evaluated", ylabel="ns a query")
+        for axes in (left, right):
+            axes.grid(alpha=0.3)
+            axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+QUESTION = Question("bench overlap", OverlapSweep, cells, run, show, draw, goals, timed=True)

@@ -1,6 +1,7 @@
-"""`feelahead bench overlap` with its smallest grid, and the package that it compares."""
+"""`feelahead bench overlap` with its smallest grid, and the methods that it compares."""
 
 import csv
+import math
 import shutil
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,10 @@ import pytest
 import feelahead.main
 from feelahead.lab.questions.overlap import HEADER, KERNEL, OURS, OverlapSweep, goals
 from feelahead.lab.reference import published
+from feelahead.lab.reference.approximations import monte_carlo, satellite_points, satellites
 from feelahead.lab.reference.classes import frozen_class
+from feelahead.lab.reference.errors import kernel_volumes
+from feelahead.lab.reference.pairs import Pairs
 from feelahead.lab.reference.published import CompiledHeader, package_corners
 from feelahead.lab.table import Row, Table
 
@@ -39,8 +43,9 @@ template<int N> double overlap_volume(const Sphere& s, const Element<N>& e) {
 
 @pytest.mark.long
 def test_the_command_prints_its_goals_and_writes_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    written, summary = tmp_path / "out.csv", tmp_path / "out.json"
-    arguments = ["bench", "overlap", *SMALL, f"--csv={written}", f"--summary={summary}"]
+    written, picture = tmp_path / "out.csv", tmp_path / "out.png"
+    summary = tmp_path / "out.json"
+    arguments = ["bench", "overlap", *SMALL, f"--csv={written}", f"--picture={picture}", f"--summary={summary}"]
     assert feelahead.main.command(arguments) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "not measured: overlap, C++: its header is not given; to get it: pip download" in said
@@ -48,8 +53,11 @@ def test_the_command_prints_its_goals_and_writes_its_files(tmp_path: Path, capsy
     assert "met false zeros of " in said
     with written.open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert {row["part"] for row in rows} == {"speed", "accuracy", "adversarial", "mesh"}
+    assert {row["part"] for row in rows} == {"speed", "accuracy", "adversarial", "tradeoff", "mesh"}
     assert all(float(row["volume"]) <= 1e-15 for row in rows if row["part"] == "accuracy" and row["method"] == "ours")
+    methods = {row["method"] for row in rows if row["part"] == "tradeoff"}
+    assert {"ours, batch", "29 points", "Monte Carlo 1e3"} <= methods
+    assert picture.read_bytes().startswith(b"\x89PNG")
     assert not {"Infinity", "NaN"} & set(summary.read_text().replace(",", "").split())
 
 
@@ -74,6 +82,21 @@ def test_goals_take_the_worst_class_and_the_ratio_to_the_package() -> None:
     assert found["times faster than the C++ package, box, checked, with gradient"] == (13.0, "met")
     assert found["times faster than the C++ package, tetrahedron, checked, with gradient"] == (None, "not measured")
     assert found["mesh query with up to 50 triangles, in boxes"] == (20.0, "met")
+
+
+def test_approximations_converge_to_the_overlap() -> None:
+    # A unit sphere whose lower half is within a large box.
+    shape = np.array([[0.0, 0.0, -5.0]]), np.eye(3)[None], np.full((1, 3), 5.0)
+    pairs, half = Pairs("box", np.zeros((1, 3)), np.ones(1), shape), 2.0 / 3.0 * math.pi
+    assert len(satellite_points()) == 29
+    assert np.linalg.norm(satellite_points(), axis=1).max() < 1.0
+    # 11 of 29 points are below the plane, and 7 on it, where they count as within.
+    assert satellites(pairs)[0] == pytest.approx(2.0 * half * 19.0 / 29.0, rel=1e-12)
+    assert monte_carlo(pairs, 10_000)[0] == pytest.approx(half, rel=0.03)
+    for solid in ("tetrahedron", "box"):
+        _, some = frozen_class(solid, "random", 10)
+        exact = kernel_volumes(some) / some.sphere_volumes
+        np.testing.assert_allclose(monte_carlo(some, 10_000) / some.sphere_volumes, exact, atol=0.02)
 
 
 @pytest.mark.processes
