@@ -116,7 +116,7 @@ driving: $(VENV)/.installed $(VENV)/.kernels ## grasp and place by keyboard alon
 
 # Also in virtual time and over loopback, the same links: half an hour and more. Needs Docker.
 latency-experiment: $(VENV)/.installed ## links by name, in containers and emulated: what the delay does to the hand
-	$(BIN)/feelahead try latency --compose --csv latency.csv $(ARGS)
+	$(BIN)/feelahead try latency --compose --csv latency.csv --picture latency.png $(ARGS)
 
 EXPORT = uv export --quiet --no-emit-project --no-header
 lock: ## pin every dependency anew (needs uv); the files hold hashes and no addresses

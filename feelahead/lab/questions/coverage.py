@@ -6,6 +6,7 @@ feelahead bench coverage --quick --laws swept none
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Final
 
 import tyro
@@ -18,6 +19,7 @@ from feelahead.lab.approaches.evaluation import LINKS, Placement, Pulls, evaluat
 from feelahead.lab.approaches.frozen import AHEAD, PASSED, frozen_hash
 from feelahead.lab.approaches.laws import LAWS, Law
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
+from feelahead.lab.figures import LAW_COLOURS, figure
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
 from feelahead.lab.table import Row, Table
@@ -30,6 +32,7 @@ QUICK_SIZES: Final = (10, 4)
 """Number of approaches of each motion, and of placements of the objects for each, with --quick."""
 QUICK_JUDGED_S, JUDGED_S = 60.0, 600.0
 """Minimum time judged for false alarms, in seconds, over all cells of one kind of motion."""
+_MARKS: Final = ("o", "s", "^", "D")
 _CELL: Final = ("scene", "pull", "link", "camera_mm", "encoder_factor", "probability")
 _Probability = Annotated[float, Meta(gt=0.0, le=0.9999)]
 """Probability P; the greatest takes 100 000 draws for each cell."""
@@ -209,10 +212,10 @@ def by_law(table: Table, laws: Sequence[str]) -> Shown:
     return shown(title, (*headings, "false alarms a minute", "share"), entries)
 
 
-def mean(rows: Table, name: str) -> str:
+def mean(rows: Table, name: str, form: str = ".3f") -> str:
     """Return the mean of the figures in a column as text; an empty text without figures."""
     values = rows.values(name)
-    return format(sum(values) / len(values), ".3f") if values else ""
+    return format(sum(values) / len(values), form) if values else ""
 
 
 def pooled_alarms(rows: Table) -> tuple[str, str]:
@@ -221,12 +224,38 @@ def pooled_alarms(rows: Table) -> tuple[str, str]:
     return (f"{60.0 * number / judged_s:.2f}", f"{alarm_s / judged_s:.2%}") if judged_s else ("", "")
 
 
+def draw(settings: CoverageSettings, table: Table, path: Path) -> None:
+    """Draw coverage against false alarms: a point for each law and P, at the means over the cells."""
+    table = judged(table)
+    marks = dict(zip(sorted(set(table.values("probability"))), _MARKS, strict=False))
+    with figure(path, figsize=(7.2, 4.6)) as (_, axes):
+        for law in settings.laws:
+            axes.plot([], [], color=LAW_COLOURS[law], linewidth=4.0, label=law)
+            points = []
+            for probability, mark in marks.items():
+                rows = table.where(law=law, probability=probability)
+                (alarms, _), covered = pooled_alarms(rows), mean(rows, "coverage", ".17g")
+                if alarms and covered:
+                    points.append((float(alarms), float(covered)))
+                    axes.plot(*points[-1], mark, color=LAW_COLOURS[law], alpha=0.8)
+            axes.plot([x for x, _ in points], [y for _, y in points], color=LAW_COLOURS[law], linewidth=0.8)
+        for probability, mark in marks.items():
+            axes.plot([], [], mark, color="black", label=f"P = {probability:g}")
+        axes.set(xlabel="false alarms a minute", ylabel="covered: full strength in time", ylim=(-0.03, 1.03))
+        axes.set_xscale("symlog", linthresh=0.1)
+        axes.set_xlim(-0.02, 200.0)
+        axes.grid(alpha=0.3)
+        axes.legend(loc="center", fontsize=8)
+        axes.set_title(f"all cells together (frozen {frozen_hash()})", fontsize=9)
+
+
 QUESTION = Question(
     "bench coverage",
     CoverageSettings,
     cells,
     run,
     show,
+    draw=draw,
     frozen=lambda _: frozen_hash(),
     prepare=compile_kernels,
 )

@@ -26,6 +26,7 @@ from feelahead.lab.approaches.prediction import (
 )
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
 from feelahead.lab.approaches.recording import record_approach
+from feelahead.lab.figures import figure
 from feelahead.lab.posed_gripper import PosedGripper
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
@@ -39,7 +40,12 @@ DELAYS_MS: Final = (0, 25, 50, 100, 200, 400)
 QUICK_DELAYS_MS: Final = (0, 50, 200, 400)
 QUICK_PULLS: Final[tuple[PullKind, ...]] = ("bell", "on_off", "random")
 _SCENE: Final = "empty"
-_NAMES: Final[dict[Compensation, str]] = {"operator": "own commands under way", "robot": "v t_d (eq. 8)"}
+_KINDS: Final[dict[Compensation, tuple[str, str]]] = {
+    "operator": ("own commands under way", "#0072b2"),
+    "robot": ("v t_d (eq. 8)", "#d55e00"),
+}
+_LEAST_MM: Final = 0.01
+"""Lower end of the figure's logarithmic axis, in mm."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +119,7 @@ def write_table(settings: ErrorSettings, table: Table) -> None:
 
 def show(_: ErrorSettings, table: Table) -> Iterator[Shown]:
     """Yield tables of the prediction by loop age and pull."""
-    columns = ("pull", "loop age, ms", "moments", *_NAMES.values())
+    columns = ("pull", "loop age, ms", "moments", *(name for name, _ in _KINDS.values()))
     title = "Displacement until a command takes effect, truth less prediction, mm: mean, sd, 99 %, greatest"
     yield shown(title, columns, _spreads(table, COMPENSATIONS, within_reach=True))
     edge = _spreads(table, COMPENSATIONS, within_reach=False)
@@ -135,12 +141,28 @@ def cell_of(found: Spread) -> str:
     return "-" if not found.moments else f"{found.mean_mm:+.2f} {found.sd_mm:.2f} {found.p99_mm:.2f} {found.max_mm:.2f}"
 
 
+def draw(_: ErrorSettings, table: Table, path: Path) -> None:
+    """Draw the prediction errors against the loop age."""
+    with figure(path, 1, 1, f"frozen {frozen_hash()}", figsize=(5.5, 4.4)) as (_, axes):
+        for kind, (label, colour) in _KINDS.items():
+            every = (over(table, kind, ages_s) for ages_s in AGE_BINS_S)
+            found = [one for one in every if one.moments]
+            for of, style, said in (("p99_mm", "o-", f"{label}: 99 %"), ("sd_mm", ".--", "standard deviation")):
+                errors_mm = [max(getattr(one, of), _LEAST_MM) for one in found]
+                axes.plot([one.loop_age_ms for one in found], errors_mm, style, color=colour, label=said)
+        axes.set(yscale="log", xlabel="loop age, ms", ylabel="error, mm")
+        axes.set_title("Displacement until a command takes effect, what predictions miss", fontsize=9)
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=7)
+
+
 QUESTION = Question(
     "bench error",
     ErrorSettings,
     cells,
     run,
     show,
+    draw=draw,
     also=write_table,
     frozen=lambda _: frozen_hash(),
 )

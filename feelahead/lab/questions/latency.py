@@ -1,6 +1,6 @@
 """How do realistic links change what a finger of constant force hits, and do the emulations of a link agree?
 
-feelahead try latency --links lan wifi lte --seeds 5 --csv latency.csv
+feelahead try latency --links lan wifi lte --seeds 5 --csv latency.csv --picture latency.png
 """
 
 import atexit
@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import combinations, product
+from pathlib import Path
 from statistics import fmean, median
 from typing import Annotated, Final, Literal
 
@@ -28,6 +29,7 @@ from feelahead.both_sides.summary import merge_summaries
 from feelahead.both_sides.trial import Trial, figures_of
 from feelahead.containers.medium import ContainerMedium
 from feelahead.lab.approaches.links import require_young_loop
+from feelahead.lab.figures import figure
 from feelahead.lab.intervals import student_interval, welch_interval
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
@@ -40,6 +42,9 @@ _DIRECTIONS: Final = ("to_robot", "to_operator")
 _LOOK_S: Final = 0.01
 _COMPARED: Final = (("mean_ms", "mean", "ms", 2.0), ("sd_ms", "sd", "ms", 1.0), ("lost_percent", "lost", "%", 0.1))
 """Figures in which the media should agree: column, name, unit and permitted difference of each."""
+_COLOURS: Final[Mapping[str, str]] = {"virtual": "#0072b2", "loopback": "#d55e00", "containers": "#009e73"}
+_WIDE: Final = 0.7
+"""Share of a link's width in the figure that its media take up."""
 
 
 @dataclass(frozen=True)
@@ -218,4 +223,33 @@ def verdict(first: list[float], second: list[float], margin: float, unit: str) -
     return f"{said} [{low:+.2f}, {high:+.2f}] {unit}"
 
 
-QUESTION = Question("try latency", LatencySettings, cells, run, show, timed=True)
+def draw(_: LatencySettings, table: Table, path: Path) -> None:
+    """Draw the delays in each direction (a dot for each seed, mean and 95 % interval), and contact speeds."""
+    links, media = (list(dict.fromkeys(row[name] for row in table)) for name in ("link", "medium"))
+    with figure(path, 1, 3, figsize=(13.0, 4.2)) as (_, panels):
+        for (link, medium), group in table.groups("link", "medium"):
+            place = links.index(link) + _WIDE * ((media.index(medium) + 0.5) / len(media) - 0.5)
+            options = {"color": _COLOURS[medium], "label": medium if link == links[0] else ""}
+            for panel, direction in zip(panels, _DIRECTIONS, strict=False):
+                means = by_seed(group, f"{direction}_mean_ms")
+                if not means:
+                    continue
+                low, high = student_interval(means) or (means[0], means[0])
+                panel.plot([place] * len(means), means, ".", color=_COLOURS[medium], alpha=0.35)
+                panel.errorbar(place, fmean(means), (high - low) / 2.0, fmt="o", capsize=4, markersize=4, **options)
+                panel.set(yscale="log", ylabel="ms", title=f"mean delay {direction.replace('_', ' ')}")
+            for row in group:
+                # Such a run ended by the robot side's stop, not by what was felt.
+                mark, filled = "x" if row["stops"] else "o", row["haptics"] == "on"
+                face = _COLOURS[medium] if filled else "none"
+                panels[2].plot(
+                    place, row["contact_speed_mm_s"] or 0.0, mark, color=_COLOURS[medium], markerfacecolor=face
+                )
+        panels[2].set(ylabel="mm/s", title="first contact (none: 0; x: robot side stopped; hollow: no haptics)")
+        panels[2].set_ylim(-5.0, 1.1 * max(panels[2].get_ylim()[1], 10.0))
+        panels[0].legend()
+        for panel in panels:
+            panel.set_xticks(range(len(links)), links, rotation=20, ha="right")
+
+
+QUESTION = Question("try latency", LatencySettings, cells, run, show, draw, timed=True)

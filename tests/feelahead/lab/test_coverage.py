@@ -229,9 +229,10 @@ def test_the_question_is_answered_whole(
 ) -> None:
     monkeypatch.setattr("feelahead.lab.questions.coverage.QUICK_SIZES", (1, 2))
     flags = ["--quick", "--workers", "1", "--laws", "swept", "none", "--only", "wall/bell", "--probabilities", "0.5"]
-    table = tmp_path / "out.csv"
-    assert ask(QUESTION, [*flags, "--csv", str(table)]) == 0
+    table, picture = tmp_path / "out.csv", tmp_path / "out.png"
+    assert ask(QUESTION, [*flags, "--csv", str(table), "--picture", str(picture)]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert "covered: full strength stood in time" in shown
     assert "| bell | 200 ms |" in shown
+    assert picture.read_bytes().startswith(b"\x89PNG")
     assert len(table.read_text().splitlines()) == 1 + 2

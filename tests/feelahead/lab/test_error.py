@@ -166,10 +166,12 @@ def test_the_question_is_answered_whole_and_the_same_again(
     monkeypatch.setattr(module, "QUICK_DELAYS_MS", (200,))
     monkeypatch.setattr(module, "QUICK_PULLS", ("bell",))
     tables = [tmp_path / "one.toml", tmp_path / "two.toml"]
+    picture = tmp_path / "out.png"
     arguments = ["--quick", "--seeds", "1", "--workers", "1"]
-    assert ask(QUESTION, [*arguments, "--table", str(tables[0])]) == 0
+    assert ask(QUESTION, [*arguments, "--table", str(tables[0]), "--picture", str(picture)]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert "own commands under way" in shown
+    assert picture.read_bytes().startswith(b"\x89PNG")
     [own], [eq_8] = (load_prediction_errors(tables[0]).rows[kind] for kind in ("operator", "robot"))
     assert own[2] < 0.002 < 0.15 * eq_8[2]
     assert tomllib.loads(tables[0].read_text())["arm"] == load_scene().robot.fingerprint
