@@ -19,7 +19,7 @@ COMMANDS = {
     "feelahead-operator": operator_side.main.command,
 }
 ARM = ROOT / "robot_side" / "drivers" / "mujoco" / "assets" / "arm.xml"
-WALL, EMPTY = DATA / "wall.xml", DATA / "empty.xml"
+WALL = DATA / "wall.xml"
 KEY = "ab" * 32
 
 
@@ -77,18 +77,12 @@ def complaint(command: str) -> str:
         ("feelahead bench overlap --truths 1", "truths = 1", "2 to"),
         ("feelahead bench overlap --workers 2", "--workers 2", "measures time"),
         ("feelahead bench overlap --peer-header /nowhere/overlap.hpp", "/nowhere/overlap.hpp", "pip download"),
-        ("feelahead bench felt --definition --picture out.png", "--definition has no figure", "valid"),
-        ("feelahead bench felt --definition --field", "--definition and --field exclude each other", "one of them"),
-        (f"feelahead bench felt --model {WALL}", "--model and --site", "--cover and --field"),
-        ("feelahead bench felt --cover --site tcp", "--cover is given with only one of --model and --site", "valid"),
-        ("feelahead bench felt --field --step-mm nan", "--step-mm = nan", "1 to 150"),
-        ("feelahead bench felt --field --model no_such.xml", "no_such.xml: there is no such file", "MJCF"),
-        (f"feelahead bench felt --field --model {WALL} --site hand", "'hand'", "tool"),
-        (f"feelahead bench felt --field --model {EMPTY}", "nothing is ahead of the gripper", "valid"),
-        ("feelahead bench felt --field --workers 2", "--workers 2", "valid"),
-        ("feelahead bench error --draws 100001", "--draws 100001", "a multiple of 20"),
+        ("feelahead bench felt --picture out.png", "--picture out.png: errors have no figure", "valid: with --cover"),
+        (f"feelahead bench felt --model {WALL}", "--model and --site", "all three"),
+        ("feelahead bench felt --cover --site tcp", "--model and --site are given without one another", "valid"),
+        ("feelahead bench felt --cover --model no_such.xml --site tool", "no_such.xml: there is no such file", "MJCF"),
+        (f"feelahead bench felt --cover --model {WALL} --site hand", "'hand'", "tool"),
         ("feelahead bench error --table /", "--table /: is a folder", "a file in an existing folder"),
-        ("feelahead bench error --workers 2", "--workers 2: bench error measures time", "valid"),
         ("feelahead bench link --link 'delay 5'", "'5'", "50ms"),
         ("feelahead bench link --rate 0", "0", "1 to 100000"),
         ("feelahead bench link --against x.csv", "--against", "--virtual"),

@@ -27,7 +27,7 @@ class Bytes:
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
         del views
         now_s, content = noted
-        return now_s, entry(Kind.REPORT, now_s, content)
+        return now_s, entry(Kind.HANDS, now_s, content)
 
     def begin_epoch(self) -> None:
         """Do nothing, as no note is encoded as a difference from an earlier one."""
