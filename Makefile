@@ -13,7 +13,7 @@ export PYTHONDONTWRITEBYTECODE :=
 
 # A file that is only half made is made again.
 .DELETE_ON_ERROR:
-.PHONY: figures demo test quick types test-kernel test-netem test-two-hosts wide-area test-containers test-console pictures driving latency-experiment lock clean
+.PHONY: figures demo test quick types test-kernel test-two-hosts wide-area test-containers test-console pictures driving latency-experiment lock clean
 
 PIP = $(BIN)/python -m pip install --disable-pip-version-check
 PIP_LOG = $(VENV)/pip.log
@@ -76,9 +76,6 @@ test-two-hosts: $(VENV)/.installed $(VENV)/.kernels ## docs/two-machines.md, fol
 wide-area: $(VENV)/.installed $(VENV)/.kernels ## both sides over the kernel's own TCP with delay, loss, rate and queue: a table
 	$(BIN)/python -m tests.two_hosts.wide_area $(ARGS)
 
-test-netem: $(VENV)/.installed ## the kernel's own netem, in User-Mode Linux, beside our emulated link
-	$(SUITE) -m netem tests/netem $(ARGS)
-
 # Needs Docker; in CI, root gets Debian's for the time being.
 test-containers: $(VENV)/.installed ## both sides and the router in containers, built, killed and brought back
 	$(SUITE) -m containers tests/containers $(ARGS)
@@ -88,14 +85,14 @@ test-console: $(VENV)/.installed $(VENV)/.kernels ## the console in a real brows
 	$(SUITE) -m console tests/console $(ARGS)
 
 # Needs Chromium, and a machine with nothing else to do: its runs are real ones.
-pictures: $(VENV)/.installed $(VENV)/.kernels ## the documents' pictures of console, terminal view and plot, made anew
+pictures: $(VENV)/.installed $(VENV)/.kernels ## the documents' pictures of console and terminal view, made anew
 	$(BIN)/python -m tests.console.pictures $(ARGS)
 
 # An hour and more, on a machine with nothing else to do. A stopped run goes on; a new commit starts anew.
 figures/haptics.csv: asks = try haptics --seeds 10
 figures/camera.csv: asks = try haptics --scenes shelf --delays 0 200 --seeds 4 --camera-mm 1
 figures/demo.csv: asks = try demo --seeds 10
-figures/definition.csv: asks = bench felt --definition
+figures/definition.csv: asks = bench felt
 figures/tick.csv: asks = bench tick --quick
 figures/cover.csv: asks = bench felt --cover
 FIGURES = $(patsubst %,figures/%.csv,haptics camera demo definition tick cover)

@@ -208,3 +208,9 @@ class SlidingMinimum:
     def value(self) -> float | None:
         """Present minimum; None before the first value."""
         return self._candidates[0][1] if self._candidates else None
+
+
+def microseconds(time_s: RunningStatistics) -> dict[str, float | None]:
+    """Return `p50`, `p99` and `max` in microseconds, of samples in seconds."""
+    values_s = {"p50": time_s.quantile(0.50), "p99": time_s.quantile(0.99), "max": time_s.maximum}
+    return {name: None if value is None else 1e6 * value for name, value in values_s.items()}

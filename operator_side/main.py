@@ -17,7 +17,7 @@ from operator_side.core import OperatorSide
 from operator_side.dualsense.hid.device import HidBackend
 from operator_side.recorded import OperatorEncoder, build_recorded
 from operator_side.settings import OperatorSettings
-from operator_side.turns import REMEDIES, Devices, OperatorTurns
+from operator_side.turns import REMEDY, Devices, OperatorTurns
 from operator_side.viewing.console.console import Console
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.terminal.status import TerminalStatus
@@ -32,7 +32,7 @@ def command(arguments: Sequence[str], backend: HidBackend | None = None) -> int:
     settings = parse_settings(OperatorSettings, "feelahead-operator", arguments)
     keys = None if settings.keys is None else OperatorKeys.load(settings.keys, settings.robot_key)
     status = TerminalStatus("operator") if settings.tui else Status(settings.status, "operator")
-    loop = Loop(MOTION_PERIOD_S, REMEDIES, settings.seed)
+    loop = Loop(MOTION_PERIOD_S, REMEDY, settings.seed)
     with Process(settings, "operator", status, OperatorEncoder(), loop) as process:
         # The console first, as its process takes longest to start, and before the priority is raised, which the process
         # would inherit.

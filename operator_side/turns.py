@@ -24,17 +24,8 @@ from operator_side.viewing.pages.browser_hands import BrowserHands
 from operator_side.viewing.pages.driving_page import DrivingPage
 from operator_side.viewing.viewing import Viewing
 
-REMEDIES: Final = {
-    "sockets": "a slower link",
-    "messages": "a slower link",
-    "feeling": "--no-haptics",
-    "hands": "another controller",
-    "": "a page of the console fewer, or a faster machine,",
-}
-"""Remedy to suggest if a stage of the turn takes too long, keyed by stage.
-
-Stages: sending and receiving; handling messages; writing to the controller; reading the controller and sending
-commands; "" for all else, such as the display."""
+REMEDY: Final = "--no-haptics, a page of the console fewer, a slower link, or a faster machine"
+"""Remedy to suggest if turns take too long"""
 _GUARD_PERIOD_S: Final = 0.5
 """Seconds between checks of the watchdog"""
 
@@ -75,9 +66,6 @@ class OperatorTurns:
             *(process.status, self._pages, console, process.recording),
         )
         self._travel = StoredTravel(self._connection, core, self._viewing.note) if stored_travel else None
-        timed = process.loop.stages.timed
-        self._take, self._feel = timed("messages", self._take_in), timed("feeling", self._tell_controller)
-        self.turn = timed("hands", self._move)
         self.wait, self.next_due, self.note = sockets.wait, self._sending.line.next_due, self._viewing.note
         self._guard_s, self._second_writers = 0.0, SecondWriters()
         self._person_waits_s = settings.person_waits if console is not None else 0.0
@@ -96,8 +84,35 @@ class OperatorTurns:
 
     def take(self, received: tuple[Sequence[bytes], Sequence[tuple[bytes, bytes]]], now_s: float) -> None:
         """Handle the messages, and write the resulting effects to the controller."""
-        self._take(*received, now_s)
-        self._feel(now_s)
+        control, seen = received
+        for payload in control:
+            self._core.receive(payload, now_s)
+        for topic, payload in seen:
+            if not self._viewing.take(topic, payload, now_s):
+                self._core.receive_view(payload, now_s)
+        self._connection.beat(now_s)
+        if (feel := self._core.feel_now(now_s)) is not None:
+            self._connection.write(feel, now_s)
+
+    def turn(self, now_s: float) -> None:
+        """Read the controller, and queue commands and requests."""
+        core, connection = self._core, self._connection
+        self._pages.follow(core, now_s)
+        # First, so that the tuning request, sent over the new link, arrives after all messages of the old one.
+        if (words := core.tuner.take_link()) is not None:
+            self._sending.tune(words)
+            self._pages.pictures.video_later_s = self._sending.video_later_s
+        if self._person is not None:
+            screen = core.screen if self._person_sees(now_s) else None
+            self._person.tick(now_s, screen, core.link.round_trip.mean or 0.0)
+        connection.update(now_s)
+        self._say_what_is_new()
+        if self._travel is not None:
+            self._travel.follow()
+        if (state := connection.read(now_s)) is not None:
+            core.read_state(state, now_s)
+        self._sending.push([*core.motion(now_s), *map(ToRobot, self._viewing.requests(now_s))], now_s)
+        self._sending.measure(core.link.outgoing, now_s)
 
     def send(self) -> None:
         """Send the messages that are due."""
@@ -140,37 +155,6 @@ class OperatorTurns:
             "pages": {"rejected": pages.rejected, "stale": pages.stale, "silences": pages.silences},
         }
         return self._core.summary() | self._sending.summary() | figures
-
-    def _take_in(self, received: Sequence[bytes], seen: Sequence[tuple[bytes, bytes]], now_s: float) -> None:
-        for payload in received:
-            self._core.receive(payload, now_s)
-        for topic, payload in seen:
-            if not self._viewing.take(topic, payload, now_s):
-                self._core.receive_view(payload, now_s)
-
-    def _tell_controller(self, now_s: float) -> None:
-        self._connection.beat(now_s)
-        if (feel := self._core.feel_now(now_s)) is not None:
-            self._connection.write(feel, now_s)
-
-    def _move(self, now_s: float) -> None:
-        core, connection = self._core, self._connection
-        self._pages.follow(core, now_s)
-        # First, so that the tuning request, sent over the new link, arrives after all messages of the old one.
-        if (words := core.tuner.take_link()) is not None:
-            self._sending.tune(words)
-            self._pages.pictures.video_later_s = self._sending.video_later_s
-        if self._person is not None:
-            screen = core.screen if self._person_sees(now_s) else None
-            self._person.tick(now_s, screen, core.link.round_trip.mean or 0.0)
-        connection.update(now_s)
-        self._say_what_is_new()
-        if self._travel is not None:
-            self._travel.follow()
-        if (state := connection.read(now_s)) is not None:
-            core.read_state(state, now_s)
-        self._sending.push([*core.motion(now_s), *map(ToRobot, self._viewing.requests(now_s))], now_s)
-        self._sending.measure(core.link.outgoing, now_s)
 
     def _person_sees(self, now_s: float) -> bool:
         """Return whether a page has a picture, or the scripted person has waited long enough for one."""

@@ -7,6 +7,7 @@ waiting ─▶ checking ─▶ moving ─▶ home
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
@@ -16,7 +17,7 @@ from common.arrays import FloatArray
 from common.protocol.messages import MotionCommand
 from common.roles import Role
 from robot_side.arm.ability import JointLimits
-from robot_side.arm.port import ArmState, GripperKinematics, GripperPose
+from robot_side.arm.port import ArmState, GripperKinematics
 from robot_side.gripper.grip import Grip
 from robot_side.surroundings.distances import object_distances
 from robot_side.surroundings.perceived import PerceivedObjects
@@ -34,8 +35,14 @@ _APPROACH_1_S: Final = 3.0
 """Rate of each rad that is left, in 1/s: the arm slows down before it is home"""
 _HOME_RAD: Final = 0.001
 _STILL_RAD_S: Final = 0.02
+_LINK_SLACK_M: Final = 0.002
+"""Distance by which a link may come nearer to what it was near to at the beginning"""
+_FAR_M: Final = 0.1
 _NAME: Final = 100
 """Characters to which an object's name is cut"""
+
+
+_Spheres = tuple[FloatArray, FloatArray]
 
 
 class Homing:
@@ -52,6 +59,7 @@ class Homing:
     def _begin(self) -> None:
         self._refused: str | None = None
         self._clear_m = math.nan
+        self._near_m: dict[str, float] = {}
         self._place = self._ticks = 0
         self._free = False
 
@@ -65,7 +73,8 @@ class Homing:
     ) -> FloatArray | str | None:
         """Return joint velocities (n,) towards home, why there are none, or None if nothing asks for the way home.
 
-        enlargement_m: the present D_incr. The arm's links are not looked at, only the gripper and what it holds.
+        enlargement_m: the present D_incr. Gripper, held object, and coarse spheres around the links are looked at.
+        A link may stay as near to a thing as it is at the beginning, and to a support as it is at home.
         """
         if command is None or not _asks(command):
             self._begin()
@@ -77,6 +86,7 @@ class Homing:
             if not still:
                 return np.zeros(self._home_rad.size)
             self._clear_m = _CLEAR_M + enlargement_m
+            self._note_near(state, grip, objects)
         self._look(state, grip, objects)
         if self._refused is not None:
             return self._refused
@@ -91,27 +101,51 @@ class Homing:
         places = max(1, math.ceil(np.abs(left_rad).max(initial=0.0) / _STEP_RAD))
         self._place = min(self._place, places)
         here, there = (
-            grip.joined(self._pose(state, state.joint_positions_rad + share * left_rad))
+            self._spheres(state, grip, state.joint_positions_rad + share * left_rad)
             for share in (self._place / places, min(self._place + 1, places) / places)
         )
         self._kinematics.pose(state)  # the scene shows the pose of the last call
         # Between two places no sphere moves farther than this from the nearer one.
-        moved_m = 0.5 * float(np.linalg.norm(there.sphere_centers_m - here.sphere_centers_m, axis=1).max(initial=0.0))
+        moved_m = 0.5 * max(
+            float(np.linalg.norm(after[0] - before[0], axis=1).max(initial=0.0))
+            for before, after in zip(here, there, strict=True)
+        )
         clear_m = self._clear_m + moved_m
-        scene = self._surroundings.see(objects)
-        distances_m = object_distances(here.sphere_centers_m, here.sphere_radii_m, scene, clear_m)
-        for index in np.flatnonzero(np.isfinite(distances_m)).tolist():
-            if index != grip.index and objects.roles[index] is not Role.IGNORED:
-                apart_mm, needed_mm = 1e3 * max(float(distances_m[index]), 0.0), 1e3 * clear_m
-                name = objects.names[index][:_NAME]
-                self._refused = f"no way home: {name} is {apart_mm:.0f} mm from it, {needed_mm:.0f} must be free"
-                return
+        for spheres, what, near_m in zip(here, ("it", "a link"), ({}, self._near_m), strict=True):
+            for name, apart_m, _ in self._apart(spheres, grip, objects, clear_m):
+                needed_m = min(clear_m, near_m.get(name, math.inf))
+                if apart_m <= needed_m:
+                    apart_mm, needed_mm = 1e3 * max(apart_m, 0.0), 1e3 * max(needed_m, 0.0)
+                    self._refused = (
+                        f"no way home: {name[:_NAME]} is {apart_mm:.0f} mm from {what}, {needed_mm:.0f} must be free"
+                    )
+                    return
         self._place += 1
         if self._place > places:
             self._free, self._place = True, 0
 
-    def _pose(self, state: ArmState, positions_rad: FloatArray) -> GripperPose:
-        return self._kinematics.pose(replace(state, joint_positions_rad=np.ascontiguousarray(positions_rad)))
+    def _note_near(self, state: ArmState, grip: Grip, objects: PerceivedObjects) -> None:
+        """Note how near the links may come to things: as near as here, and to supports as at home."""
+        for positions_rad, any_role in ((state.joint_positions_rad, True), (self._home_rad, False)):
+            links = self._spheres(state, grip, positions_rad)[1]
+            for name, apart_m, role in self._apart(links, grip, objects, _FAR_M):
+                if any_role or role is Role.SUPPORT:
+                    self._near_m[name] = min(self._near_m.get(name, math.inf), apart_m - _LINK_SLACK_M)
+
+    def _apart(
+        self, spheres: _Spheres, grip: Grip, objects: PerceivedObjects, reach_m: float
+    ) -> Iterator[tuple[str, float, Role]]:
+        """Yield name, distance and role of each object within `reach_m`, but of the held and of ignored ones."""
+        distances_m = object_distances(*spheres, self._surroundings.see(objects), reach_m)
+        for index in np.flatnonzero(np.isfinite(distances_m)).tolist():
+            if index != grip.index and objects.roles[index] is not Role.IGNORED:
+                yield objects.names[index], float(distances_m[index]), objects.roles[index]
+
+    def _spheres(self, state: ArmState, grip: Grip, positions_rad: FloatArray) -> tuple[_Spheres, _Spheres]:
+        """Return the spheres of the gripper with what it holds, and of the links, at joint positions (n,)."""
+        there = replace(state, joint_positions_rad=np.ascontiguousarray(positions_rad))
+        gripper = grip.joined(self._kinematics.pose(there))
+        return (gripper.sphere_centers_m, gripper.sphere_radii_m), self._kinematics.link_spheres(there)
 
     def _velocity(self, state: ArmState, share: float) -> FloatArray:
         left_rad = self._home_rad - state.joint_positions_rad

@@ -23,7 +23,7 @@ from robot_side.parts import build_parts
 from robot_side.recording.recorder import Recorder, RobotEncoder, robot_header
 from robot_side.reporting.sending import SENT_STREAMS
 from robot_side.settings import RobotSettings
-from robot_side.turn_stages import REMEDIES, StageTiming
+from robot_side.tick_times import PhysicsTime
 from robot_side.turns import RobotTurns
 from robot_side.viewing.perceived_shapes import PerceivedModel
 from robot_side.viewing.pictures import Cameras
@@ -36,6 +36,7 @@ _COMPILING: Final = (
     "compiling for this processor, half a minute at the first start (or beforehand: feelahead doctor --compile):"
     " {} of {} kernels are ready"
 )
+_REMEDY: Final = "fewer or simpler objects, a coarser cover (cover_m), fewer views and observers, or a faster machine"
 _OPEN_TO_ALL: Final = "WITHOUT KEYS: anyone who reaches the port can move the arm"
 
 
@@ -62,7 +63,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
     keys = None if settings.keys is None else RobotKeys.load(settings.keys)
     raise_descriptor_limit()
     open_sockets = partial(RobotSockets, settings.bind, settings.view_bind, insecure=settings.insecure, keys=keys)
-    status, loop = Status(settings.status, "robot"), Loop(TICK_PERIOD_S, REMEDIES, settings.seed)
+    status, loop = Status(settings.status, "robot"), Loop(TICK_PERIOD_S, _REMEDY, settings.seed)
     with Process(settings, "robot", status, RobotEncoder(), loop) as process:
         epoch, recording = secrets.randbits(53), process.recording
         # Fail at once for an occupied port; open meanwhile, so that a driver's flag with the same port is named.
@@ -74,11 +75,16 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         parts = build_parts(settings, epoch, clock_domain(), announce=process.note, beside=beside)
         recorder = [] if recording is None else [Recorder(recording.noted.append)]
         core_parts, others = adapt(parts)
-        core = RobotSide(core_parts, [StageTiming(loop.stages), *recorder, *others])
+        physics = PhysicsTime(loop.clock, settings.seed)
+        core = RobotSide(core_parts, [physics, *recorder, *others])
         sent = [stream for stream in SENT_STREAMS if settings.cameras.on or stream != "video"]
         unused = unused_clauses(settings.link_spec(), [("to_operator", stream) for stream in sent])
         for text in unused:
             process.note(text)
+        cameras = Cameras(parts.scene, settings.cameras, process.note) if settings.cameras.on else None
+        if cameras is not None and settings.cameras.at_once:
+            now_s = loop.clock.now()
+            cameras.update(now_s, now_s, (), expected=True)
         warm_up(lambda ready, of: process.note(_COMPILING.format(ready, of)), parts.kernels)
         beside.wait()
         if recording is not None:
@@ -86,7 +92,6 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
         model = PerceivedModel(parts.scene) if parts.any_objects else SceneModel(parts.scene)
         eyes = (first_person_eye(parts.scene), overview_eye(parts.scene)) if settings.cameras.on else (None, None)
         view = SceneView(model, parts.kinematics, parts.explains, parts.surroundings, *eyes)
-        cameras = Cameras(parts.scene, settings.cameras, process.note) if settings.cameras.on else None
 
         def open_side() -> RobotTurns:
             sockets = process.stack.enter_context(open_sockets())
@@ -94,7 +99,7 @@ def command(arguments: Sequence[str], adapt: Callable[[RobotParts], Adapted] = a
             for text in keys.notes() if keys is not None else [_OPEN_TO_ALL] if settings.insecure else []:
                 process.note(text)
             status.event("listening", control=sockets.control_endpoint, view=sockets.view_endpoint)
-            return RobotTurns(settings, core, view, cameras, sockets, process, beside)
+            return RobotTurns(settings, core, view, cameras, sockets, process, beside, physics)
 
         return process.run(open_side)
 

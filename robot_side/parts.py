@@ -232,6 +232,8 @@ def _notes(scene: Scene, settings: RobotSettings, travel: GripperTravel | None) 
     if settings.objects is not None:
         return tuple(notes)
     notes.append(f"objects: {_roles(scene.roles)}")
+    if scene.model.nflex:
+        notes.append("the model's flexes (deformable bodies) are not perceived: nothing warns of them")
     if Role.TARGET not in scene.roles.values():
         notes.append(
             "no object is a target, so there is nothing to advance to; to name one: let its name begin with target, or"

@@ -92,7 +92,7 @@ class RobotSettings(SideOptions):
     --model describes the arm. With --keys the driver needs an allowed key, as an operator does."""
     objects: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
     """Address at which your perception process connects, instead of a simulated camera (docs/drivers.md)."""
-    scene: SceneName | None = None
+    scene: Annotated[SceneName | None, tyro.conf.arg(metavar="{table,wall,slot,shelf}")] = None
     """Scene of the built-in arm. table (the default): a cluttered table. wall: a wall 10 to 60 mm behind the target.
     slot: two posts on the way, with 15 to 40 mm of clearance on each side. shelf: a shelf with a raised front edge to
     reach over. The last three are drawn from the seed."""

@@ -1,24 +1,42 @@
-"""Durations of ticks, and the arm's simulated time as a share of real time."""
+"""Durations of ticks and of their physics, and the arm's simulated time as a share of real time."""
 
 from collections import deque
 from collections.abc import Callable
 from typing import Any, Final
 
+from common.clock import Clock
 from common.command.live_view import SLOW
 from common.loop.loop import Loop
-from common.realtime.stages import microseconds
-from common.statistics import RunningStatistics
+from common.statistics import RunningStatistics, microseconds
 from robot_side.arm.port import Arm
+from robot_side.events import Listener, Step
 
 _LATEST: Final = 1000
+
+
+class PhysicsTime(Listener):
+    """Measures how long the arm's state takes in each tick: a simulated arm advances its physics there."""
+
+    steps = ("arm", "pose")
+
+    def __init__(self, clock: Clock, seed: int) -> None:
+        self.took = RunningStatistics(seed)
+        self._clock, self._began_s = clock, 0.0
+
+    def on_step(self, step: Step) -> None:
+        """Begin with the step `arm`, and end with the next one."""
+        if step == "arm":
+            self._began_s = self._clock.now()
+        else:
+            self.took.add(self._clock.now() - self._began_s)
 
 
 class TickTimes:
     """Measures the duration of each tick; `paced` returns the figures of the ticks since its last call."""
 
-    def __init__(self, loop: Loop, arm: Arm, note: Callable[[str], None], seed: int) -> None:
+    def __init__(self, loop: Loop, arm: Arm, physics: PhysicsTime, note: Callable[[str], None], seed: int) -> None:
         """note: called once if the simulation does not keep up with real time."""
-        self._loop, self._arm, self._note = loop, arm, note
+        self._loop, self._arm, self._physics, self._note = loop, arm, physics, note
         self._wall, self._processor = RunningStatistics(seed), RunningStatistics(seed)
         self._latest_s: deque[float] = deque(maxlen=_LATEST)
         self._told_slow = False
@@ -59,5 +77,6 @@ class TickTimes:
         return {
             "tick_us": microseconds(self._wall),
             "tick_cpu_us": microseconds(self._processor),
+            "physics_us": microseconds(self._physics.took),
             "simulation": {"share_of_real_time": self._arm.share_of_real_time},
         }

@@ -16,7 +16,7 @@ from robot_side.drivers.remote.connected_drivers import ConnectedDrivers
 from robot_side.reporting.link_reporter import LinkReporter
 from robot_side.reporting.sending import Sending
 from robot_side.settings import RobotSettings
-from robot_side.tick_times import TickTimes
+from robot_side.tick_times import PhysicsTime, TickTimes
 from robot_side.viewing.pictures import Cameras
 from robot_side.viewing.scene_view import SceneView
 from robot_side.viewing.view_scheduler import ViewScheduler
@@ -37,12 +37,12 @@ class RobotTurns:
         sockets: RobotSockets,
         process: Process,
         beside: ConnectedDrivers,
+        physics: PhysicsTime,
     ) -> None:
         """cameras: None if no pictures are made."""
         self._process, self._core, self._sockets, self._beside = process, core, sockets, beside
         core.parts.arm.give_way(process.loop.clock)
-        self._times = TickTimes(process.loop, core.parts.arm, process.note, settings.seed)
-        self._hear = process.loop.stages.timed("messages", core.receive)
+        self._times = TickTimes(process.loop, core.parts.arm, physics, process.note, settings.seed)
         self._admission = Admission()
         self._sending = Sending(settings.link_spec(), sockets, secrets.randbits(32))
         always = () if process.recording is None else (*VIEW_NAMES, "scene")
@@ -62,7 +62,7 @@ class RobotTurns:
     def take(self, received: Sequence[tuple[bytes, bytes]], now_s: float) -> None:
         """Give the payloads that are admitted to the core."""
         for peer, payload in self._admission.admitted(received, self._core.session.owner_peer):
-            self._hear(peer, payload, now_s)
+            self._core.receive(peer, payload, now_s)
 
     def turn(self, now_s: float) -> None:
         """Run one tick and queue its messages."""
@@ -114,9 +114,8 @@ class RobotTurns:
 
     def summary(self) -> dict[str, Any]:
         """Return the figures of the core and of the process."""
-        sockets, stages = self._sockets, self._process.loop.stages.summary()
+        sockets = self._sockets
         figures = {
-            "physics_us": stages["physics"]["wall_us"],
             **self._process.loop.pacer.summary(),
             "link": self._sending.summary(),
             "rate": {"robot": self._sending.budget.summary() | {"pictures": self._looking.pictures}},

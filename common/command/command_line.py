@@ -160,6 +160,7 @@ def _one_line(box: str, program: str, settings_type: type) -> str:
             words += text.split()
     said = " ".join(words).removeprefix("Error parsing ")
     said = re.sub(r"^[A-Z]\w*: ", "", said)  # the class that checked
+    said = re.sub(r"'None', |, 'None'", "", said)  # what an unset flag has
     if named := re.match(r"(?:([\w.]+): )?(\w+) = ", said):
         place = f"{named[1]}.{named[2]}" if named[1] else named[2]
         if place.partition(".")[0] in get_type_hints(settings_type):

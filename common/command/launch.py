@@ -17,6 +17,9 @@ Command = Callable[[Sequence[str]], int]
 
 _OURS = ("common", "robot_side", "operator_side", "feelahead")
 _BAD_INPUT = 2
+PARENT_VARIABLE = "FEELAHEAD_PARENT"
+"""Environment variable with the id of the process with which this one ends"""
+_PR_SET_PDEATHSIG = 1
 
 
 def launch(program: str, load: Callable[[], Command], extra: str | None = None, *, has_summary: bool = False) -> None:
@@ -28,6 +31,7 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
     import.
     """
     LeavingAtOnce(_summary_path(sys.argv[1:]) if has_summary else None)
+    _end_with_parent()
     _open_closed_streams()
     _write_in_any_locale()
     if sys.argv[1:] == ["--version"]:
@@ -61,6 +65,17 @@ def launch(program: str, load: Callable[[], Command], extra: str | None = None, 
         if not isinstance(error.__cause__, KeyboardInterrupt):
             raise
         sys.exit(0)
+
+
+def _end_with_parent() -> None:
+    """Let Linux send SIGTERM when the parent that asked for it ends, even if that is killed."""
+    if (parent := os.environ.pop(PARENT_VARIABLE, None)) is None:
+        return
+    import ctypes  # noqa: PLC0415  # not needed by a command that a person starts
+
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
+    if not Path(f"/proc/{parent}").exists():
+        os._exit(0)
 
 
 def _summary_path(arguments: Sequence[str]) -> str | None:

@@ -1,18 +1,14 @@
 """Loop of a side: turns at absolute deadlines, messages when they arrive, other work after sending."""
 
-from collections.abc import Mapping
-from typing import Any, Final, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from common.clock import Clock, MonotonicClock, ThreadClock
 from common.command.stop_signal import StopSignal
 from common.realtime.garbage import IdleCollection
 from common.realtime.pacing import Pacer, wait_for_turn
 from common.realtime.period_monitor import PeriodMonitor
-from common.realtime.stages import Stages
 
 Received = TypeVar("Received")
-SOCKETS: Final = "sockets"
-"""Stage of receiving and sending."""
 
 
 class Side(Protocol[Received]):
@@ -50,27 +46,25 @@ class Side(Protocol[Received]):
 class Loop:
     """Loop that runs a side, and measures whether it keeps the period."""
 
-    def __init__(self, period_s: float, remedies: Mapping[str, str], seed: int, clock: Clock | None = None) -> None:
-        """remedies: for each stage of a turn, a remedy if it takes too long; "" is the time outside of all stages."""
+    def __init__(self, period_s: float, remedy: str, seed: int, clock: Clock | None = None) -> None:
+        """remedy: what would shorten the turns, to be named if they take too long."""
         self.clock = MonotonicClock() if clock is None else clock
         self.computed = ThreadClock()
         """Processor time of the loop's thread"""
-        self.stages = Stages(tuple(filter(None, remedies)), self.clock, self.computed, seed)
         self.start_s = self.clock.now()
         self.pacer = Pacer(period_s, self.start_s, seed)
-        self._period = PeriodMonitor(self.pacer, self.stages, self.clock, self.computed, remedies)
+        self._period = PeriodMonitor(self.pacer, self.clock, self.computed, remedy)
         self._collection = IdleCollection(self.clock)
 
     def run(self, side: Side[Received], stop: StopSignal, duration_s: float | None) -> None:
         """Run until `stop` is set or `duration_s` has passed; show a note, once, if the period cannot be kept."""
-        receive, send = self.stages.timed(SOCKETS, side.receive), self.stages.timed(SOCKETS, side.send)
         pacer, clock = self.pacer, self.clock
         with self._collection:
             self.start_s = clock.now()
             pacer.restart(self.start_s)
             while not stop.is_set:
                 self._period.begin()
-                received = receive()
+                received = side.receive()
                 # Read after receiving: a process that was paused in between must not take old messages for new.
                 now_s = clock.now()
                 if duration_s is not None and now_s - self.start_s >= duration_s:
@@ -80,7 +74,7 @@ class Loop:
                 if turned:
                     pacer.begin(now_s)
                     side.turn(now_s)
-                send()
+                side.send()
                 if turned:
                     rest_s = clock.now()
                     side.rest(rest_s, now_s)
@@ -90,10 +84,9 @@ class Loop:
                 wait_for_turn(pacer, clock, side.wait, side.next_due())
 
     def summary(self, side: str) -> dict[str, Any]:
-        """Return the loop's part of a run's summary: duration, pacing of the turns, and times of the stages."""
+        """Return the loop's part of a run's summary: duration and pacing of the turns."""
         return {
             "duration_s": self.clock.now() - self.start_s,
-            "stages": {side: self.stages.summary()},
             "machine": {side: self._period.summary()},
             "pacing": {side: self.pacer.summary() | {"garbage": self._collection.summary()}},
         }

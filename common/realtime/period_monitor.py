@@ -1,11 +1,10 @@
 """Check that a loop keeps its period; if it does not, one sentence per run names the cause and a remedy."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, Final
 
 from common.clock import Clock
 from common.realtime.pacing import Pacer
-from common.realtime.stages import Stages
 from common.realtime.stolen_time import StolenTime, read_stolen_time
 
 WINDOW_S: Final = 5.0
@@ -23,22 +22,20 @@ class PeriodMonitor:
     def __init__(
         self,
         pacer: Pacer,
-        stages: Stages,
         wall: Clock,
         processor: Clock,
-        remedies: Mapping[str, str],
+        remedy: str,
         taken: Callable[[], StolenTime] = read_stolen_time,
     ) -> None:
-        """remedies: for each stage's name, a remedy if it takes too long; "" is the time outside of all stages."""
+        """remedy: what would shorten the loop's turns."""
         self.said: str | None = None
         """The sentence about a period that was not kept; None before."""
-        self.stages = stages
-        self._pacer, self._wall, self._processor, self._remedies, self._taken = pacer, wall, processor, remedies, taken
+        self._pacer, self._wall, self._processor, self._remedy, self._taken = pacer, wall, processor, remedy, taken
         self._began_s = self._computed_s = 0.0
         self._worked_s = [0.0, 0.0]
         """Wall time and processor time of the loop's work in this window, without waiting."""
         self._first: tuple[float, StolenTime] | None = None
-        self._window: tuple[float, StolenTime, int, int, list[float]] | None = None
+        self._window: tuple[float, StolenTime, int, int] | None = None
 
     def begin(self) -> None:
         """Note that the loop begins to work, after waiting."""
@@ -51,7 +48,6 @@ class PeriodMonitor:
         self._worked_s[1] += self._processor.now() - self._computed_s
         if not turned:
             return None
-        self.stages.end_turn()
         if self._window is not None and now_s - self._window[0] < WINDOW_S:
             return None
         said, before = None, self._window
@@ -60,8 +56,7 @@ class PeriodMonitor:
             self.said = said = self._judge(now_s, taken, *before)
         if self._first is None:
             self._first = now_s, taken
-        self.stages.take_in()
-        self._window = now_s, taken, self._pacer.turns, self._pacer.overruns, list(self.stages.spent_s)
+        self._window = now_s, taken, self._pacer.turns, self._pacer.overruns
         self._worked_s = [0.0, 0.0]
         return said
 
@@ -74,14 +69,7 @@ class PeriodMonitor:
         return {"said": self.said, "waited": waited, "stolen": stolen}
 
     def _judge(
-        self,
-        now_s: float,
-        taken: StolenTime,
-        since_s: float,
-        before: StolenTime,
-        turns: int,
-        overruns: int,
-        spent_s: list[float],
+        self, now_s: float, taken: StolenTime, since_s: float, before: StolenTime, turns: int, overruns: int
     ) -> str | None:
         turns, overruns = self._pacer.turns - turns, self._pacer.overruns - overruns
         if turns == 0 or overruns <= _LEFT_OUT * (turns + overruns):
@@ -92,12 +80,9 @@ class PeriodMonitor:
         left_out = f"{100.0 * overruns / (turns + overruns):.0f} % of the turns are left out"
         undisturbed = wall_s < _UNDISTURBED * computed_s and lost < _LEFT_OUT
         if computed_s >= _FULL * self._pacer.period_s or undisturbed:
-            self.stages.take_in()
-            stage, share = self._longest(spent_s, computed_s * turns)
-            most = f", {100.0 * share:.0f} % of it {stage}" if stage else ""
             return (
                 f"this machine is too slow: a turn computes for {1e3 * computed_s:.2g} ms where there are"
-                f" {1e3 * self._pacer.period_s:.2g} ms{most}, and {left_out}; {self._remedies[stage]} would help"
+                f" {1e3 * self._pacer.period_s:.2g} ms, and {left_out}; {self._remedy} would help"
             )
         whose = "closing other programs, or --realtime,"
         if stolen is not None and stolen > max(waited or 0.0, _LEFT_OUT):
@@ -108,14 +93,3 @@ class PeriodMonitor:
             f"this machine is too busy: a turn lasts {1e3 * wall_s:.2g} ms and computes for {1e3 * computed_s:.2g} ms,"
             f" and {left_out}; {whose} would help"
         )
-
-    def _longest(self, before_s: list[float], computed_s: float) -> tuple[str, float]:
-        """Return the stage with the most processor time in the window, and its share of `computed_s`.
-
-        The stage is "" if more time was spent outside of all stages. before_s: `stages.spent_s` at the window's begin.
-        """
-        spent_s = [now_s - then_s for now_s, then_s in zip(self.stages.spent_s[1::2], before_s[1::2], strict=True)]
-        longest_s = max(spent_s)
-        if longest_s < computed_s - sum(spent_s):
-            return "", 0.0
-        return self.stages.names[spent_s.index(longest_s)], min(1.0, longest_s / computed_s)

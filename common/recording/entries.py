@@ -37,8 +37,6 @@ class Kind(IntEnum):
     SEEN = 6
     """The operator side received a view payload that a control message could hold, such as Telemetry. Longer ones,
     which no core uses, are recorded only as messages of kind VIEW (wire.py)."""
-    REPORT = 7
-    """Input report of a DualSense, in old recordings, which have no HANDS."""
     CALIBRATED = 8
     """Calibration of the travel of the controller's triggers, as JSON."""
     FOUND = 9
@@ -48,11 +46,7 @@ class Kind(IntEnum):
     MOTION = 11
     """The operator side's core was asked for messages to send; they follow as SENT."""
     OUTPUT = 12
-    """The operator side's core was asked for the controller's effects; they follow as TOLD, in old recordings as
-    WRITTEN.
-    """
-    WRITTEN = 13
-    """Output report for a DualSense on USB, in old recordings, which have no TOLD."""
+    """The operator side's core was asked for the controller's effects; they follow as TOLD."""
     STOPPED = 14
     """The emergency stop was pressed elsewhere than on the controller, as on a page."""
     TUNED = 15

@@ -81,6 +81,8 @@ class RecordingFile:
         if self.error is None and self._attempt(self._writer.flush):
             self.kept_bytes = self._output.end
             self.kept_s = 0.0 if self._first_s is None else self._last_s - self._first_s
+        if self.error is None and self._output.deleted:
+            self.error, self.kept_bytes, self.kept_s = "the file was deleted", 0, 0.0
 
     def close(self) -> None:
         """Finish the file with its index; after a failure, cut it off after the last complete chunk."""
@@ -130,6 +132,10 @@ class _Output:
         self._position = 0
         """Position that the library expects; at any other it panics"""
         self._file = path.open("xb", buffering=0)
+
+    @property
+    def deleted(self) -> bool:
+        return os.fstat(self._file.fileno()).st_nlink == 0
 
     def write(self, data: bytes | bytearray) -> int:
         if not self._given_up:

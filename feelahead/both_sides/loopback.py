@@ -13,9 +13,8 @@ from common.emulation.delay_line import DelayLine, link_summary
 from common.emulation.spec import Stream
 from common.emulation.tuned import tuned_link
 from common.protocol.messages import Telemetry
-from common.realtime.stages import microseconds
 from common.silence import MOTION_PERIOD_S
-from common.statistics import RunningStatistics
+from common.statistics import RunningStatistics, microseconds
 from feelahead.both_sides.summary import merge_summaries
 from operator_side import events as operator_events
 from operator_side.assembly import build_operator_side

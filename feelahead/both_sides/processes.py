@@ -1,6 +1,7 @@
 """Sides as child processes, which report events to this process as lines of JSON."""
 
 import json
+import os
 import queue
 import signal
 import subprocess
@@ -10,6 +11,7 @@ import threading
 from collections.abc import Sequence
 from typing import Any, Self
 
+from common.command.launch import PARENT_VARIABLE
 from common.errors import ConfigurationError, FeelaheadError
 
 _BAD_INPUT = 2
@@ -32,6 +34,7 @@ class StartedSide:
             stderr=self._errors,
             stdin=subprocess.DEVNULL,
             text=True,
+            env={**os.environ, PARENT_VARIABLE: str(os.getpid())},
             # Ctrl-C reaches only this process, which then ends the sides in order.
             start_new_session=True,
         )

@@ -10,7 +10,7 @@ import numpy as np
 
 from common.arrays import FloatArray
 from feelahead.lab.figures import figure
-from feelahead.lab.propagation import PosedGripper
+from feelahead.lab.posed_gripper import PosedGripper
 from feelahead.lab.table import Row, Table
 from robot_side.drivers.mujoco.gripper_cover import cover_gripper, link_solids, placed_corners
 from robot_side.drivers.mujoco.gripper_measurement import open_gap

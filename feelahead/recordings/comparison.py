@@ -12,7 +12,7 @@ from common.protocol.codec import decode
 from common.protocol.messages import StiffnessUpdate
 from common.recording.entries import Block, Entry, unpack_block
 from common.recording.reading import Recording
-from feelahead.recordings.controller import recorded_feel
+from feelahead.recordings.controller import read_value
 from operator_side.controller.feel import Feel
 
 WITHIN_EIGHTHS = 1.0
@@ -44,12 +44,12 @@ class Comparison:
         """Whether the differences are no larger than those between two kinds of processor."""
         return self.worst_eighths <= WITHIN_EIGHTHS and self.worst_m <= WITHIN_M
 
-    def take(self, first: bytes | None, second: bytes | None, feel_kind: int | None = None) -> None:
+    def take(self, first: bytes | None, second: bytes | None, *, feel: bool = False) -> None:
         """Compare the recorded message `first` with the recomputed `second`; None for a missing one.
 
-        feel_kind: kind of entry, one of FEELS, if the two are effects for the controller instead.
+        feel: whether the two are effects for the controller instead.
         """
-        counts = feel_kind is not None or _is_stiffness(first if second is None else second) or self.side == "operator"
+        counts = feel or _is_stiffness(first if second is None else second) or self.side == "operator"
         same = first == second
         if counts:
             self.made += second is not None
@@ -61,18 +61,14 @@ class Comparison:
             return
         eighths, metres = math.inf, 0.0
         if first is not None and second is not None:
-            eighths, metres = _difference(first, second, feel_kind)
+            eighths, metres = _difference(first, second, feel=feel)
         self.worst_eighths = max(self.worst_eighths, eighths)
         self.worst_m = max(self.worst_m, metres)
 
-    def missed(self, made: deque[Any], feel_kind: int | None = None) -> None:
-        """Count each recomputed item left in `made` as missing in the recording, and remove it.
-
-        The items are messages, or effects for the controller.
-        """
+    def missed(self, made: deque[bytes], *, feel: bool = False) -> None:
+        """Count each recomputed item left in `made` as missing in the recording, and remove it."""
         while made:
-            one = made.popleft()
-            self.take(None, one if isinstance(one, bytes) else b"", feel_kind)
+            self.take(None, made.popleft(), feel=feel)
 
     def lines(self) -> list[str]:
         """Return the lines that report the comparison."""
@@ -146,11 +142,11 @@ def _is_stiffness(payload: bytes | None) -> bool:
         return False
 
 
-def _difference(first: bytes, second: bytes, feel_kind: int | None) -> tuple[float, float]:
+def _difference(first: bytes, second: bytes, *, feel: bool) -> tuple[float, float]:
     """Return the largest difference in eighths of strength and in metres; infinite eighths if anything else differs."""
     with contextlib.suppress(RemoteProtocolError):
-        if feel_kind is not None:
-            return _feel_difference(recorded_feel(feel_kind, first), recorded_feel(feel_kind, second))
+        if feel:
+            return _feel_difference(read_value(first, Feel), read_value(second, Feel))
         one, other = decode(first), decode(second)
         if isinstance(one, StiffnessUpdate) and isinstance(other, StiffnessUpdate):
             return _message_difference(one, other)

@@ -1,6 +1,5 @@
 """Run both cores again with their recorded inputs, and compare their outputs with the recorded ones."""
 
-import contextlib
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -9,15 +8,15 @@ from typing import Final
 import msgspec
 
 from common.arrays import FloatArray
-from common.errors import ConfigurationError, RemoteProtocolError
+from common.errors import ConfigurationError
 from common.recording.entries import Kind, split_text
 from common.recording.provenance import processor_name, settings_from
 from common.recording.reading import Recording
 from common.roles import Role
 from feelahead.recordings.comparison import Comparison, differing_origin, recorded_entries, require_side
-from feelahead.recordings.controller import FEELS, STATES, as_recorded, recorded_state
+from feelahead.recordings.controller import read_value
 from operator_side.assembly import build_operator_side
-from operator_side.controller.feel import Feel
+from operator_side.controller.state import ControllerState
 from operator_side.core import OperatorSide
 from operator_side.hands.travel_calibration import TravelCalibration
 from operator_side.settings import OperatorSettings
@@ -137,27 +136,26 @@ def replay_operator(recording: Recording) -> Comparison:
     core = build_operator_side(settings, header["epoch"], header["clock_domain"])
     compared = Comparison("operator", "commands and reports to the controller")
     sent: deque[bytes] = deque()
-    feels: deque[Feel] = deque()
+    feels: deque[bytes] = deque()
     for entry in recorded_entries(recording, "operator", compared.notes):
         now_s, content = entry.now_s, entry.content
         if (give := _INPUTS.get(entry.kind)) is not None:
             give(core, content, now_s)
-        elif entry.kind in STATES:
-            with contextlib.suppress(RemoteProtocolError):  # invalid reports were ignored in the recorded run, too
-                core.read_state(recorded_state(entry.kind, content), now_s)
-        elif entry.kind in FEELS:
-            compared.take(content, as_recorded(entry.kind, feels.popleft()) if feels else None, entry.kind)
         match entry.kind:
+            case Kind.HANDS:
+                core.read_state(read_value(content, ControllerState), now_s)
+            case Kind.TOLD:
+                compared.take(content, feels.popleft() if feels else None, feel=True)
             case Kind.MOTION:
                 compared.missed(sent)
                 sent.extend(message.payload for message in core.motion(now_s))
             case Kind.OUTPUT:
-                compared.missed(feels, Kind.TOLD)
+                compared.missed(feels, feel=True)
                 if (feel := core.feel_now(now_s)) is not None:
-                    feels.append(feel)
+                    feels.append(msgspec.msgpack.encode(feel))
             case Kind.SENT:
                 payload = split_text(split_text(content)[1])[1]
                 compared.take(payload, sent.popleft() if sent else None)
     compared.missed(sent)
-    compared.missed(feels, Kind.TOLD)
+    compared.missed(feels, feel=True)
     return compared

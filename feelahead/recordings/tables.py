@@ -17,7 +17,9 @@ from common.arrays import FloatArray
 from common.errors import RemoteProtocolError
 from common.recording.entries import Entry, Kind, unpack_block
 from common.recording.reading import Recording
-from feelahead.recordings.controller import FEELS, STATES, recorded_feel, recorded_state
+from feelahead.recordings.controller import read_value
+from operator_side.controller.feel import Feel
+from operator_side.controller.state import ControllerState
 from robot_side.recording.inputs import unpack_state
 
 JOINED_HZ: Final = 100.0
@@ -133,11 +135,11 @@ def _row(entry: Entry, zones: dict[str, tuple[float, ...]]) -> tuple[str, dict[s
                 row |= {f"position_rad.{index}": float(position), f"velocity_rad_s.{index}": float(velocity)}
             row |= {"gripper_opening_m": state.gripper_opening_m, "gripper_holding": state.gripper_holding}
             return "arm", row
-        if entry.kind in STATES:
-            hands = recorded_state(entry.kind, entry.content)
+        if entry.kind == Kind.HANDS:
+            hands = read_value(entry.content, ControllerState)
             return "controller", {"l2_raw": hands.l2, "r2_raw": hands.r2}
-        if entry.kind in FEELS:
-            feel = recorded_feel(entry.kind, entry.content)
+        if entry.kind == Kind.TOLD:
+            feel = read_value(entry.content, Feel)
             zones.update((name, strengths) for name, strengths in (("l2", feel.l2), ("r2", feel.r2)) if strengths)
             return "felt", {f"{name}.{zone}": value for name in zones for zone, value in enumerate(zones[name])}
     except (RemoteProtocolError, ValueError):

@@ -5,22 +5,14 @@ controllers/aa-bb-cc-dd-ee-ff.forces.toml
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
-import msgspec
-
-from common.errors import ConfigurationError
-from common.files.output_file import output_file
-from common.files.toml_complaint import explain
-from common.files.toml_file import read_toml
-from operator_side.calibration.store import calibration_path
+from operator_side.calibration.controller_file import controller_file, read_controller_file, write_controller_file
 from operator_side.controller.feel import MAX_STRENGTH
-from operator_side.controller.port import checked_address
 
 STRENGTHS: Final = MAX_STRENGTH + 1
 """Number of measured strengths: 0, the spring alone, to 8"""
 LARGEST_N: Final = 50.0
-_LARGEST_BYTES: Final = 10_000
 _MEND: Final = "measure it again with: feelahead feel --measure; or delete the file"
 
 
@@ -66,7 +58,7 @@ class _Stored:
 
 def forces_path(address: str) -> Path:
     """Return the path of the forces of the controller with the address "aa:bb:cc:dd:ee:ff"; else ValueError."""
-    return calibration_path(address).with_suffix(".forces.toml")
+    return controller_file(address, ".forces.toml")
 
 
 def load_forces(address: str) -> ControllerForces:
@@ -79,41 +71,20 @@ def load_forces(address: str) -> ControllerForces:
 
 def stored_forces(path: Path, address: str) -> ControllerForces:
     """Return the content of the file `path`, or nothing measured without a file; errors as in `load_forces`."""
-    return read_forces(path, address) if path.exists() else ControllerForces()
-
-
-def read_forces(path: Path, address: str) -> ControllerForces:
-    """Read the file `path`; errors as in `load_forces`."""
-    try:
-        content: dict[str, Any] = read_toml(path, _LARGEST_BYTES)
-        try:
-            stored = msgspec.convert(content, _Stored)
-        except msgspec.ValidationError as error:
-            raise ValueError(explain(str(error), content, _Stored)) from error
-        if stored.address != address:
-            raise ValueError(f"address = {stored.address[:80]!r}; valid: {address}")
-    except OSError as error:
-        raise ConfigurationError(f"{path}: cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise ConfigurationError(f"{path}: {error}; {_MEND}") from error
+    if not path.exists():
+        return ControllerForces()
+    stored, _ = read_controller_file(path, _Stored, _MEND, address)
     return ControllerForces(stored.l2, stored.r2)
 
 
 def write_forces(path: Path, address: str, forces: ControllerForces) -> None:
     """Write the file atomically, and make the folder of controllers if needed; ConfigurationError if that fails."""
-    checked_address(address)
-    lines = [
-        "# Forces at which one controller's triggers yielded, in newtons. Made by: feelahead feel --measure",
-        "version = 1",
-        f'address = "{address}"',
-    ]
+    lines = []
     for name, trigger in (("l2", forces.l2), ("r2", forces.r2)):
         if trigger is not None:
             lines += ["", f"[{name}]", f"pulls_n = {[round(pull_n, 3) for pull_n in trigger.pulls_n]}"]
-    if path == forces_path(address):
-        path.parent.mkdir(parents=True, exist_ok=True)
-    with output_file("forces", path) as file:
-        file.write("\n".join(lines) + "\n")
+    made_by = "Forces at which one controller's triggers yielded, in newtons. Made by: feelahead feel --measure"
+    write_controller_file(path, "forces", address, made_by, lines)
 
 
 def forces_in_words(name: str, forces: TriggerForces) -> str:

@@ -35,6 +35,8 @@ class Choices:
         self._screen: Telemetry | None = None
         self._seen_s = -math.inf
         self._mirrored = False
+        self._camera_turn_rad: float | None = None
+        """Newest angle that was computed for the same side of the camera as `_mirrored` says"""
 
     def follow(self, intent: OperatorIntent) -> None:
         """Take the buttons of the newest intent."""
@@ -47,20 +49,28 @@ class Choices:
         if intent.rests:
             self.speed_scale, self.stick_frame = self._next_scale, self._next_frame
             self._mirrored = self._screen is not None and self._screen.camera_faces
+            self._aim()
 
     def see(self, screen: Telemetry, now_s: float) -> None:
         """Take the newest telemetry, which has the frames' angles at the moment that its pictures show."""
         self._screen, self._seen_s = screen, now_s
+        self._aim()
+
+    def _aim(self) -> None:
+        # Where the tool turns to face the camera, the angle for the other side may be half a turn away.
+        if self._screen is not None and self._screen.camera_faces == self._mirrored:
+            self._camera_turn_rad = self._screen.camera_turn_rad
 
     def commanded(self, intent: OperatorIntent, now_s: float) -> OperatorIntent:
         """Return the intent to send. Sticks in a frame that is unknown at present count as at rest."""
         scaled = intent if self.speed_scale == 1.0 else intent.scaled(self.speed_scale)
         if self.stick_frame == "tool" or scaled.lateral == scaled.turning == (0.0, 0.0):
             return scaled
-        if self._screen is None or now_s - self._seen_s > _OLD_S:
-            return replace(scaled, lateral=(0.0, 0.0), turning=(0.0, 0.0))
         of_camera = self.stick_frame == "camera"
-        turn_rad = self._screen.camera_turn_rad if of_camera else self._screen.base_turn_rad
+        base_rad = None if self._screen is None else self._screen.base_turn_rad
+        turn_rad = self._camera_turn_rad if of_camera else base_rad
+        if turn_rad is None or now_s - self._seen_s > _OLD_S:
+            return replace(scaled, lateral=(0.0, 0.0), turning=(0.0, 0.0))
         mirrored = of_camera and self._mirrored
         return replace(
             scaled,

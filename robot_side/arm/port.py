@@ -111,3 +111,7 @@ class GripperKinematics(Protocol):
     def pose(self, state: ArmState) -> GripperPose:
         """Return the gripper's pose for the measured `state`."""
         ...
+
+    def link_spheres(self, state: ArmState) -> tuple[FloatArray, FloatArray]:
+        """Return centres (k, 3) and radii (k,) of coarse spheres around the links for the measured `state`."""
+        ...

@@ -1,6 +1,5 @@
 """Compilation of all kernels before a run, so that no tick waits for a compilation."""
 
-import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -10,6 +9,7 @@ from pkgutil import walk_packages
 from typing import Final
 
 from common.clock import MonotonicClock
+from common.processors import usable_processors
 from robot_side.compiled.helper_processes import compile_in_helpers
 from robot_side.compiled.kernel import Compiled, imported_kernels
 from robot_side.compiled.machine_code import can_keep
@@ -38,7 +38,7 @@ def warm_up(
     clock = MonotonicClock()
     start_s = clock.now()
     kernels = imported_kernels() if kernels is None else kernels
-    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    processors = usable_processors()
     # Other processes find only the kernels of our modules.
     missing = [kernel for kernel in kernels if kernel.is_ours and not (kernel.ready or kernel.is_kept)]
     sizes = {part: size for kernel in missing for part, size in code_sizes(kernel.function).items()}

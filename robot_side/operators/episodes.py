@@ -29,7 +29,7 @@ class Episodes:
         """
         why = "" if owns else "only the owner may"
         if kind == "reset":
-            why = why or ("the arm is armed; valid while it is disarmed" if armed else "")
+            why = why or ("the arm is armed; valid while it is disarmed or stopped" if armed else "")
             why = why or (self._refuses if self._put_back is None else "")
             self._notes.append(f"reset refused: {why}" if why else "the scene was put back")
             if not why and self._put_back is not None:

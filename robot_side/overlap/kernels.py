@@ -11,11 +11,6 @@ For boxes and tetrahedra there are three methods. Bounds settle most pairs in wh
 loops compute the others. The precise forms recompute the few for which doubles do not suffice (see `lane_result`).
 """
 
-import os
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from functools import cache
-
 import numpy as np
 
 from common.arrays import FloatArray, IntArray
@@ -30,21 +25,7 @@ from robot_side.overlap.lanes.lanes import reach
 from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
 from robot_side.overlap.precise.kernels import precise_boxes, precise_tetrahedra
 
-PAIRS_PER_THREAD = 8192
-"""Number of pairs with boxes or tetrahedra for each thread: nearly a millisecond of work"""
-
 _RESULTS = output_array(1), output_array(2), output_array(1)
-
-
-@dataclass
-class PairCounts:
-    """Number of pairs of a sphere with a box or tetrahedron, in all and by method; each call adds to these."""
-
-    pairs: int = 0
-    early: int = 0
-    """Pairs that bounds alone settled"""
-    precise: int = 0
-    """Pairs that the precise forms recomputed"""
 
 
 class DoubtfulNumbersError(ValueError):
@@ -84,16 +65,13 @@ def box_pairs(
     box_half_sizes: FloatArray,
     *,
     trusted: bool = True,
-    counts: PairCounts | None = None,
-    threads: int | None = None,
 ) -> Overlaps:
     """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with boxes.
 
-    box_centers (p, 3), box_rotations (p, 3, 3) from the box's frame to the spheres', box_half_sizes (p, 3). threads:
-    their number; None chooses it by the number of pairs.
+    box_centers (p, 3), box_rotations (p, 3, 3) from the box's frame to the spheres', box_half_sizes (p, 3).
     """
     arguments = centers, radii, box_centers, box_rotations, box_half_sizes
-    return _many(overlap_boxes, precise_boxes, arguments, trusted, counts, threads)
+    return _many(overlap_boxes, precise_boxes, arguments, trusted)
 
 
 def tetrahedron_pairs(
@@ -102,76 +80,25 @@ def tetrahedron_pairs(
     vertices: FloatArray,
     *,
     trusted: bool = True,
-    counts: PairCounts | None = None,
-    threads: int | None = None,
 ) -> Overlaps:
     """Return overlaps of spheres `centers` (p, 3), `radii` (p,) with tetrahedra.
 
-    vertices (p, 4, 3): each tetrahedron's corners in any order. threads: their number; None chooses it by the number of
-    pairs.
+    vertices (p, 4, 3): each tetrahedron's corners in any order.
     """
-    return _many(overlap_tetrahedra, precise_tetrahedra, (centers, radii, vertices), trusted, counts, threads)
+    return _many(overlap_tetrahedra, precise_tetrahedra, (centers, radii, vertices), trusted)
 
 
-def _many(
-    overlap: Compiled,
-    precise: Compiled,
-    arguments: tuple[FloatArray, ...],
-    trusted: bool,
-    counts: PairCounts | None,
-    threads: int | None,
-) -> Overlaps:
+def _many(overlap: Compiled, precise: Compiled, arguments: tuple[FloatArray, ...], trusted: bool) -> Overlaps:
     total = len(arguments[1])
     # The kernels do not write the results of pairs without contact.
     results = np.zeros(total), np.zeros((total, 3)), np.zeros(total)
-    if threads is None:
-        threads = min(total // PAIRS_PER_THREAD, os.cpu_count() or 1) if total >= 2 * PAIRS_PER_THREAD else 1
-    if threads <= 1:
-        parts = [_part(overlap, precise, arguments, results, trusted)]
-    else:
-        ends = np.linspace(0, total, threads + 1).astype(int).tolist()
-
-        def part_of(first: int, last: int) -> tuple[int, int]:
-            rows = slice(first, last)
-            own = results[0][rows], results[1][rows], results[2][rows]
-            return _part(overlap, precise, tuple(argument[rows] for argument in arguments), own, trusted)
-
-        try:
-            shared = _pool().map(part_of, ends[:-1], ends[1:])
-        except RuntimeError:
-            # The interpreter is shutting down and starts no more threads.
-            shared = map(part_of, ends[:-1], ends[1:])
-        parts = list(shared)
-    if counts is not None:
-        counts.pairs += total
-        counts.early += total - sum(partial for partial, _ in parts)
-        counts.precise += sum(unsettled for _, unsettled in parts)
-    return results
-
-
-def _part(
-    overlap: Compiled, precise: Compiled, arguments: tuple[FloatArray, ...], results: Overlaps, trusted: bool
-) -> tuple[int, int]:
-    """Fill `results`; return the number of pairs that bounds did not settle, and that of pairs with precise forms."""
-    rows: IntArray = np.empty(len(arguments[1]) + 1, dtype=np.int64)
+    rows: IntArray = np.empty(total + 1, dtype=np.int64)
     unsettled = overlap(*arguments, *results, rows)
-    partial = rows.item(-1)
-    if partial < 0:
-        if not trusted:
-            raise DoubtfulNumbersError
-        partial = ~partial
+    if rows.item(-1) < 0 and not trusted:
+        raise DoubtfulNumbersError
     if unsettled:
         precise(*arguments, rows[:unsettled], *results)
-    return partial, unsettled
-
-
-@cache
-def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="overlap")
-
-
-# A forked process has none of the threads, and would wait for them forever.
-os.register_at_fork(after_in_child=_pool.cache_clear)
+    return results
 
 
 @inlined

@@ -28,5 +28,8 @@ class CamerasSettings:
     codec: Literal["auto", "jpeg"] = "auto"
     """Codec of pictures. auto: H.264 if PyAV is here and at all viewers, and nothing is recorded here; else JPEG."""
 
+    at_once: bool = False
+    """Start the drawing process together with the robot side, as somebody will soon watch."""
+
     def __post_init__(self) -> None:
         check_limits(self)

@@ -7,6 +7,7 @@ and waits: it holds keys for as long as the shown distance needs, and reads agai
 import argparse
 import csv
 import json
+import os
 import re
 import sys
 import tempfile
@@ -16,6 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from common.errors import ConfigurationError
 from tests.console.browser import Browser, Page, browser
 from tests.console.run import running
 
@@ -280,25 +282,29 @@ def run_once(one: Browser, delay_ms: float, seed: int, given: Sequence[str]) -> 
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print a row for each run as it ends, and write them all to a file if asked to."""
+    """Print a row for each run as it ends, and write it to a file if asked to."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--delays", type=float, nargs="+", default=[0.0, 150.0, 300.0], help="milliseconds each way")
     parser.add_argument("--seeds", type=int, default=5, help="number of runs at each delay, with seeds from 0")
     parser.add_argument("--csv", type=Path, help="file for the rows")
     parser.add_argument("--demo", nargs=argparse.REMAINDER, default=[], help="flags for feelahead demo; the last ones")
     asked = parser.parse_args(arguments)
-    rows = []
-    print(*COLUMNS, sep="\t", flush=True)
-    with browser(Path("console-pictures").absolute()) as one:
-        for delay_ms in asked.delays:
-            for seed in range(asked.seeds):
-                rows.append(row := run_once(one, delay_ms, seed, asked.demo))
-                print(*row.values(), sep="\t", flush=True)
-    if asked.csv is not None:
-        with asked.csv.open("w", newline="") as file:
+    try:
+        with (
+            Path(os.devnull if asked.csv is None else asked.csv).open("w", newline="") as file,
+            browser(Path("console-pictures").absolute()) as one,
+        ):
             table = csv.DictWriter(file, COLUMNS)
             table.writeheader()
-            table.writerows(rows)
+            print(*COLUMNS, sep="\t", flush=True)
+            for delay_ms in asked.delays:
+                for seed in range(asked.seeds):
+                    row = run_once(one, delay_ms, seed, asked.demo)
+                    print(*row.values(), sep="\t", flush=True)
+                    table.writerow(row)
+                    file.flush()
+    except (ConfigurationError, OSError) as error:
+        parser.error(str(error))
     return 0
 
 

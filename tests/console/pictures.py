@@ -10,16 +10,14 @@ import pytest
 
 from common.errors import FeelaheadError
 from tests.console.film_of_compare import make_compare_film
-from tests.console.film_of_replay import make_film
+from tests.console.picture_of_terminal import make_picture_of_terminal
 from tests.console.pictures_of_page import SIZES, STATES, make_first_minute, make_states
-from tests.console.pictures_of_recording import make_pictures_of_recording
 from tests.helpers.repository import ROOT
 
 DOCS: Final = ROOT / "docs"
 PARTS: Final[Mapping[str, tuple[Sequence[str], Callable[[Path, Sequence[Path]], None]]]] = {
     "first-minute": ([f"console/first-minute-{step}.png" for step in range(1, 6)], make_first_minute),
-    "recording": (["console/terminal.svg", "recording/run.png"], make_pictures_of_recording),
-    "film": (["console/demo.webp"], make_film),
+    "terminal": (["console/terminal.svg"], make_picture_of_terminal),
     "compare": (["console/compare.webp"], make_compare_film),
     "states": (
         [f"../console-pictures/{state}-{width}x{height}.png" for state in STATES for width, height in SIZES],

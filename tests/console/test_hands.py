@@ -24,6 +24,14 @@ def test_space_drives(browser: Browser, demo: Run) -> None:
         demo.wait_until("disarmed or at rest", lambda run: not _runs(run), 5.0)
 
 
+def test_a_key_marks_an_episode(browser: Browser, demo: Run) -> None:
+    """N starts an episode, though a scripted person drives; the page stays connected."""
+    with browser.page(demo.address) as page:
+        page.wait("document.querySelector('#drive:enabled') !== null", "a page with facts", 20.0)
+        page.press("KeyN")
+        demo.wait_until("marked", lambda run: "operator: episode: start" in run.notes, 10.0)
+
+
 def test_escape_stops(browser: Browser, fresh_demo: Run) -> None:
     """Esc stops whoever drives: here the scripted person, while another element of the page has the focus."""
     with browser.page(fresh_demo.address) as page:

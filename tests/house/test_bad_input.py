@@ -19,7 +19,7 @@ COMMANDS = {
     "feelahead-operator": operator_side.main.command,
 }
 ARM = ROOT / "robot_side" / "drivers" / "mujoco" / "assets" / "arm.xml"
-WALL, EMPTY = DATA / "wall.xml", DATA / "empty.xml"
+WALL = DATA / "wall.xml"
 KEY = "ab" * 32
 
 
@@ -77,18 +77,12 @@ def complaint(command: str) -> str:
         ("feelahead bench overlap --truths 1", "truths = 1", "2 to"),
         ("feelahead bench overlap --workers 2", "--workers 2", "measures time"),
         ("feelahead bench overlap --peer-header /nowhere/overlap.hpp", "/nowhere/overlap.hpp", "pip download"),
-        ("feelahead bench felt --definition --picture out.png", "--definition has no figure", "valid"),
-        ("feelahead bench felt --definition --field", "--definition and --field exclude each other", "one of them"),
-        (f"feelahead bench felt --model {WALL}", "--model and --site", "--cover and --field"),
-        ("feelahead bench felt --cover --site tcp", "--cover is given with only one of --model and --site", "valid"),
-        ("feelahead bench felt --field --step-mm nan", "--step-mm = nan", "1 to 150"),
-        ("feelahead bench felt --field --model no_such.xml", "no_such.xml: there is no such file", "MJCF"),
-        (f"feelahead bench felt --field --model {WALL} --site hand", "'hand'", "tool"),
-        (f"feelahead bench felt --field --model {EMPTY}", "nothing is ahead of the gripper", "valid"),
-        ("feelahead bench felt --field --workers 2", "--workers 2", "valid"),
-        ("feelahead bench error --draws 100001", "--draws 100001", "a multiple of 20"),
+        ("feelahead bench felt --picture out.png", "--picture out.png: errors have no figure", "valid: with --cover"),
+        (f"feelahead bench felt --model {WALL}", "--model and --site", "all three"),
+        ("feelahead bench felt --cover --site tcp", "--model and --site are given without one another", "valid"),
+        ("feelahead bench felt --cover --model no_such.xml --site tool", "no_such.xml: there is no such file", "MJCF"),
+        (f"feelahead bench felt --cover --model {WALL} --site hand", "'hand'", "tool"),
         ("feelahead bench error --table /", "--table /: is a folder", "a file in an existing folder"),
-        ("feelahead bench error --workers 2", "--workers 2: bench error measures time", "valid"),
         ("feelahead bench link --link 'delay 5'", "'5'", "50ms"),
         ("feelahead bench link --rate 0", "0", "1 to 100000"),
         ("feelahead bench link --against x.csv", "--against", "--virtual"),
@@ -99,6 +93,8 @@ def complaint(command: str) -> str:
         ("feelahead bench coverage --laws swept swept", "--laws swept swept", "each once"),
         ("feelahead bench coverage --only 'no such cell'", "--only no such cell", "wall/bell/200 ms"),
         ("feelahead try aproach", "aproach", "approach"),
+        ("feelahead try demo --site-axis x", "--site-axis x is given without --model", "valid"),
+        ("feelahead feel --trigger l2", "--trigger l2 without --measure", "both"),
         ("feelahead-robot --probability nan", "nan", "0 < probability < 1"),
         ("feelahead-robot --link 'delay -5ms'", "-5ms", "0"),
         ("feelahead-robot --bind udp://127.0.0.1:5555", "udp://127.0.0.1:5555", "tcp://HOST:PORT"),
@@ -114,6 +110,7 @@ def complaint(command: str) -> str:
         ("feelahead-robot --bind tcp://127.0.0.1:0 --model / --site tip", "--model /: is a directory", "MJCF"),
         (f"feelahead-robot --bind tcp://127.0.0.1:0 --model {ARM} --site hand", "'hand'", "tool"),
         ("feelahead-robot --bind tcp://127.0.0.1:0 --site tip", "--site", "--model"),
+        ("feelahead-robot --bind tcp://127.0.0.1:0 --site-axis x", "--site-axis x is given without --model", "valid"),
         ("feelahead-robot --keys missing", "missing", "feelahead keys make robot --folder missing"),
         ("feelahead-robot --keys missing --insecure", "--insecure and --keys", "one of them"),
         ("feelahead-robot --camera.sd-m -1", "-1", "0"),
@@ -150,6 +147,10 @@ def test_one_line_names_the_value_and_what_is_valid(
         text = complaint(command.format(**given))
     assert named.format(**given) in text
     assert valid in text
+
+
+def test_an_unset_flag_is_no_choice() -> None:
+    assert "None" not in complaint("feelahead feel --pattern hill")
 
 
 @pytest.mark.processes

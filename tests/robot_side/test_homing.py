@@ -116,6 +116,30 @@ def test_an_object_on_the_way_refuses_it_whatever_its_role_until_it_is_asked_for
     assert off_rad(bench) < begun_rad - 0.05
 
 
+def test_an_object_where_a_link_would_come_refuses_it_and_one_beside_the_base_does_not() -> None:
+    camera = Seen(ball_at(FAR_M))
+    bench = Bench(parts=replace(build_parts(QUICK, 1, "clock"), camera=camera, truth=None))
+    centers_m, _ = bench.robot.parts.kinematics.link_spheres(bench.arm.state(bench.now_s))
+    elbow_m = centers_m[np.argmax(centers_m[:, 2] * (centers_m[:, 0] > 0.0))]
+    operator = bench.join(2)
+    bench.arm_it(operator)
+    bench.drive(0.8, operator, l2=0.8)
+    bench.drive(0.3, operator)
+    begun_rad = off_rad(bench)
+    camera.objects = ball_at(elbow_m)
+    bench.drive(0.5, operator, home=1.0)
+    assert off_rad(bench) == pytest.approx(begun_rad, abs=5e-3)
+    said = bench.robot.status(bench.now_s).hindrance
+    assert said is not None
+    assert "from a link" in said
+    bench.drive(0.1, operator)
+    # Beside the shoulder, which only turns: nearer than what must be free, and no nearer on the way.
+    camera.objects = ball_at(np.array([-0.11, 0.0, 0.14]))
+    bench.drive(0.5, operator, home=1.0)
+    assert off_rad(bench) < begun_rad - 0.05
+    assert bench.robot.motion.hindrance.text is None
+
+
 def test_an_object_that_comes_into_the_way_stops_the_arm() -> None:
     camera = Seen(ball_at(FAR_M))
     bench, start_m = moved_away(camera)

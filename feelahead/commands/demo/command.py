@@ -69,7 +69,7 @@ def demo(arguments: Sequence[str]) -> int:
 def _report(summary: dict[str, Any]) -> list[str]:
     """Return the lines that report the run to the person at the terminal."""
     if not summary.get("ticks"):
-        return ["no results: the robot side ended before it had computed any"]
+        return ["no results: the robot side ended before it had written any"]
     delays = summary.get("delay_ms", {})
     shown = [
         f"{name.replace('_', ' ')} {delay['mean']:.1f} ± {delay['sd']:.1f} ms"

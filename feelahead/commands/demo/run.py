@@ -6,12 +6,13 @@ import time
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import msgspec
 
 from common.command.status import Status
 from common.command.stop_signal import StopSignal
+from common.processors import usable_processors
 from common.status.codes import LinkState
 from common.status.statuses import OperatorStatus, RobotStatus
 from feelahead.both_sides.processes import SideFailedError, SideProcess
@@ -25,6 +26,9 @@ _START_TIMEOUT_S = 600.0
 _LINK_TIMEOUT_S = 30.0
 _WITHOUT_PAGES_S = 30.0
 """Duration of a run without pages, in seconds, unless --duration is given"""
+_FEW_PROCESSORS: Final = 2
+SMALL_PICTURES: Final = ("--cameras.width=320", "--cameras.height=240", "--cameras.rate-hz=15")
+"""Pictures that few processors can draw, code and show beside both sides (docs/console.md)"""
 _SHARED = ("link", "link_model", "asymmetry", "full_rate", "seed", "realtime")
 """Flags that the demo passes to both sides."""
 
@@ -47,6 +51,8 @@ def run_both(
         SideProcess("robot_side", "robot", robot_arguments(settings, given, summaries["robot"], listening)) as robot,
     ):
         status.event("started", side="robot", process_id=robot.process_id)
+        if settings.has_pages and has_small_pictures(settings):
+            status.note("pictures are 320x240 at 15 Hz, as this machine has at most two processors (docs/console.md)")
         operator_flags = operator_arguments(settings, given, summaries["operator"], listening, page)
         with SideProcess("operator_side", "operator", operator_flags) as operator:
             status.event("started", side="operator", process_id=operator.process_id)
@@ -67,6 +73,14 @@ def run_both(
     return errors
 
 
+def has_small_pictures(settings: DemoSettings) -> bool:
+    """Return whether pictures are small, as large ones would make keys late; a file for the robot side decides itself.
+
+    Both sides, the drawing process and a browser share this machine's processors.
+    """
+    return settings.robot_config is None and usable_processors() <= _FEW_PROCESSORS
+
+
 def too_slow(settings: DemoSettings) -> str | None:
     """Return an error text if the delay of the given link is too long for the sides to connect in time, else None."""
     link = settings.link_spec()
@@ -85,9 +99,11 @@ def robot_arguments(
     """Return the robot side's flags; of the demo's flags only those that the user gave: they override its file."""
     # With a file of settings, the file decides whether tuning is permitted.
     config = "--permit-tuning" if settings.robot_config is None else f"--config={settings.robot_config}"
+    small = SMALL_PICTURES if has_small_pictures(settings) else ()
+    watched = ["--cameras.at-once"] if settings.has_pages else []
     own = _flags(settings, given, *_SHARED, "scene", "model", "site", "site_axis", "probability", "assist", "law")
     ports = f"--bind={listening['control']}", f"--view-bind={listening['view']}"
-    return [*_files(settings, summary), *ports, config, *own]
+    return [*_files(settings, summary), *ports, config, *watched, *small, *own]
 
 
 def operator_arguments(

@@ -26,7 +26,9 @@ class DemoSettings(RunOptions):
     compare: bool = False
     """Run the same seed without and with haptics, by a person who misjudges depth, and play both side by side. Computed
     first, in virtual time. Default scene: wall."""
-    scene: Literal["table", "wall", "slot", "shelf"] | None = None
+    scene: Annotated[
+        Literal["table", "wall", "slot", "shelf"] | None, tyro.conf.arg(metavar="{table,wall,slot,shelf}")
+    ] = None
     """Objects around the built-in arm's target. table: a cluttered table (default). wall: a wall 10 to 60 mm behind the
     target. slot: two posts in front of the target, with 15 to 40 mm to spare on each side. shelf: the target stands on
     a shelf with a raised front edge. The exact sizes of the last three are drawn from the seed."""

@@ -51,7 +51,7 @@ class FeelSettings:
     """A real DualSense, or a simulated one with simulated hands in virtual time, which stores only with --out."""
     controller: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
     """Take only the DualSense with this address, as `feelahead doctor` prints it."""
-    pattern: PatternName | None = None
+    pattern: Annotated[PatternName | None, tyro.conf.arg(metavar="{free,wall,ramp,strengths}")] = None
     """Stay in one pattern; by default all in turn. On a terminal, keys choose, too."""
     duration: Annotated[Annotated[float, Meta(gt=0.0, lt=1e6)] | None, tyro.conf.arg(metavar="SECONDS")] = None
     """End after this time from the controller's first report; by default at Ctrl-C, simulated after one round."""
@@ -69,8 +69,9 @@ class FeelSettings:
         require_output_file("--out", self.out)
         if self.measure and (self.pattern is not None or self.duration is not None):
             raise ValueError("--measure excludes --pattern and --duration; valid: --measure alone, or without it")
-        if self.out is not None and not self.measure:
-            raise ValueError("--out without --measure; valid: both")
+        if (self.out is not None or self.trigger != "r2") and not self.measure:
+            given = "--out" if self.out is not None else f"--trigger {self.trigger}"
+            raise ValueError(f"{given} without --measure; valid: both")
 
 
 def feel(arguments: Sequence[str], backend: HidBackend | None = None) -> int:

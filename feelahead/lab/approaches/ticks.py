@@ -1,9 +1,7 @@
 """Ticks of runs of both sides, recorded once in virtual time, so that any law can be given the same inputs."""
 
-from dataclasses import dataclass, replace
-from typing import Any, Final
-
-import numpy as np
+from dataclasses import dataclass
+from typing import Final
 
 from common.protocol.messages import Vector2
 from feelahead.both_sides.loopback import Loopback, LoopbackSettings, robot_parts
@@ -14,8 +12,6 @@ from operator_side.dualsense.simulated.controller import SimulatedDualSense
 from operator_side.people.pulling_hands import PullingHands, constant_force
 from operator_side.settings import OperatorSettings
 from robot_side import events
-from robot_side.arm.port import ArmState
-from robot_side.drivers.mujoco.kinematics import MujocoKinematics
 from robot_side.drivers.mujoco.scene import Scene, load_scene
 from robot_side.events import Listener
 from robot_side.laws.law import Situation
@@ -32,11 +28,10 @@ _BEFORE_S: Final = 0.5
 
 @dataclass(frozen=True)
 class Tick:
-    """Input of the law in one tick, and the arm's state from which the pose was computed."""
+    """Input of the law in one tick."""
 
     now_s: float
     situation: Situation
-    state: ArmState
 
 
 @dataclass(frozen=True)
@@ -58,7 +53,7 @@ class Recorded:
 
 
 class _Noting(Listener):
-    """Listener that stores the law's inputs, and the arm's state, in each tick."""
+    """Listener that stores the law's inputs in each tick."""
 
     def __init__(self) -> None:
         self.ticks: list[Tick] = []
@@ -66,7 +61,7 @@ class _Noting(Listener):
     def on_tick(self, tick: events.Tick) -> None:
         """Store one tick."""
         if tick.found is not None:
-            self.ticks.append(Tick(tick.now_s, tick.found.situation, tick.found.state))
+            self.ticks.append(Tick(tick.now_s, tick.found.situation))
 
 
 def record(name: str, duration_s: float, seed: int = 0, sticks: tuple[Vector2, Vector2] | None = None) -> Recorded:
@@ -94,23 +89,3 @@ def record(name: str, duration_s: float, seed: int = 0, sticks: tuple[Vector2, V
 def scene_of(name: str) -> Scene:
     """Load the scene of the run called `name`, as it is at the start."""
     return load_scene(None) if name == DEMO else load_scene(frozen_scene(name), SITE)
-
-
-def with_cover(recorded: Recorded, cover_m: float) -> tuple[Tick, ...]:
-    """Return the ticks with spheres that protrude from the gripper by up to `cover_m`; held objects keep theirs."""
-    scene = scene_of(recorded.name)
-    own, other = MujocoKinematics(scene), MujocoKinematics(scene, cover_m)
-    first = len(own.cover.radii_m)
-    return tuple(_covered(tick, other, first) for tick in recorded.ticks)
-
-
-def _covered(tick: Tick, kinematics: MujocoKinematics, first: int) -> Tick:
-    """Replace the gripper's spheres in one tick, which are the `first` ones; the held object's spheres follow them."""
-    before, pose = tick.situation.pose, kinematics.pose(tick.state)
-
-    def joined(name: str) -> Any:
-        return np.concatenate([getattr(pose, name), getattr(before, name)[first:]])
-
-    names = "sphere_centers_m", "sphere_radii_m", "sphere_on_finger"
-    pose = replace(pose, **{name: joined(name) for name in names})
-    return replace(tick, situation=replace(tick.situation, pose=pose))

@@ -19,7 +19,6 @@ from feelahead.lab.approaches.evaluation import LINKS, Placement, Pulls, evaluat
 from feelahead.lab.approaches.frozen import AHEAD, PASSED, frozen_hash
 from feelahead.lab.approaches.laws import LAWS, Law
 from feelahead.lab.approaches.pulls import PULL_KINDS, PullKind
-from feelahead.lab.approaches.race import RACED, race
 from feelahead.lab.figures import LAW_COLOURS, figure
 from feelahead.lab.shown import shown
 from feelahead.lab.sweep import Question, Sweep
@@ -46,7 +45,7 @@ class CoverageSettings(Sweep):
     Covered: full strength came in time. That is, 0.25 s before the last release that avoids the contact, the farthest
     zone that the trigger had reached by then was at full strength. False alarm: strength of 4 or more under the
     finger, although the gripper, pulled to this zone and then stopped, would keep D_σ(P) + 15 mm from all objects,
-    whether the sticks continue or end. Slowdown: time to a goal in free space, divided by the time without haptics.
+    whether the sticks continue or end.
     Pulls are recorded over the emulated link without haptics, and judged for every scene, camera error, law and P.
     --quick: a few cells in three minutes, instead of all in two hours.
     """
@@ -55,8 +54,6 @@ class CoverageSettings(Sweep):
     """Laws to compare."""
     probabilities: Annotated[tuple[_Probability, ...], tyro.conf.arg(metavar="P...")] = ()
     """Judge only these P, instead of those planned for each cell; each takes n >= 10/(1 - P) draws for each cell."""
-    raced: Annotated[Annotated[int, Meta(ge=0)] | None, tyro.conf.arg(metavar="N")] = None
-    """Number of seeds for measuring the slowdown; 10 unless given, 2 with --quick; 0 leaves it out."""
     only: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TEXT...")] = ()
     """Judge only cells whose name, such as 'wall/bell/200 ms', contains one of these texts."""
 
@@ -95,20 +92,9 @@ class CoverageSettings(Sweep):
         return sorted(motions, key=lambda pulls: -len(pulls.cells))
 
 
-@dataclass(frozen=True)
-class Race:
-    """Cell that measures the time to a goal in one scene with one law."""
-
-    scene: str
-    law: Law
-    count: int
-
-
-def cells(settings: CoverageSettings) -> Iterator[Pulls | Race]:
-    """Yield the cells: motions to record and judge, and races to a goal."""
-    yield from settings.pulls()
-    if count := settings.raced if settings.raced is not None else (2 if settings.quick else 10):
-        yield from (Race(scene, law, count) for scene in RACED for law in settings.laws)
+def cells(settings: CoverageSettings) -> Sequence[Pulls]:
+    """Return the cells: motions to record and judge."""
+    return settings.pulls()
 
 
 def full_cells() -> Iterator[tuple[PullKind, str, Placement]]:
@@ -140,13 +126,9 @@ def quick_cells() -> Iterator[tuple[PullKind, str, Placement]]:
         yield "bell", "200 ms", Placement(name)
 
 
-def run(cell: Pulls | Race, seed: int) -> Iterator[Row]:
-    """Record one motion and judge its cells, or run one race."""
-    if isinstance(cell, Pulls):
-        yield from evaluate(cell, seed)
-    else:
-        first = cell.count * seed
-        yield race(cell.scene, cell.law, range(first, first + cell.count))
+def run(cell: Pulls, seed: int) -> Iterator[Row]:
+    """Record one motion and judge its cells."""
+    yield from evaluate(cell, seed)
 
 
 def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
@@ -163,8 +145,8 @@ def show(settings: CoverageSettings, table: Table) -> Iterator[RenderableType]:
 
 
 def judged(table: Table) -> Table:
-    """Return the rows of judged cells, without races, sorted by cell."""
-    return Table(sorted((row for row in table if "cell" in row), key=lambda row: row["cell"]))
+    """Return the rows sorted by cell."""
+    return Table(sorted(table, key=lambda row: row["cell"]))
 
 
 def _by_cell(found: Table, laws: Sequence[str], title: str, entry: Callable[[Row], str]) -> Shown:
@@ -214,26 +196,20 @@ def _where(rows: Table, name: str, value: float, form: str) -> str:
 
 
 def by_law(table: Table, laws: Sequence[str]) -> Shown:
-    """Return a table with a row for each law and P, over all cells, and the slowdown."""
-    found, raced = judged(table), Table(row for row in table if "slowdown" in row)
+    """Return a table with a row for each law and P, over all cells."""
+    found = judged(table)
     entries = [
         (
             *(law, f"{probability:g}", f"{sum(rows.values('holds'))} of {len(rows.values('coverage'))}"),
             mean(rows, "coverage"),
             *pooled_alarms(rows),
-            *(_slowdown(row) for scene in RACED for row in raced.where(law=law, scene=scene)),
         )
         for law in laws
         for (probability,), rows in found.where(law=law).groups("probability")
     ]
     headings = ("law", "P", "cells that hold", "covered")
-    slow = (f"slowdown, {scene}" for scene in RACED if len(raced))
-    title = "the laws side by side, means over the cells, alarms over all their time; slowdown at 200 ms (arrived)"
-    return shown(title, (*headings, "false alarms a minute", "share", *slow), entries)
-
-
-def _slowdown(row: Row) -> str:
-    return f"{'-' if row['slowdown'] is None else format(row['slowdown'], '.2f')} ({row['arrived']}/{row['of']})"
+    title = "the laws side by side, means over the cells, alarms over all their time"
+    return shown(title, (*headings, "false alarms a minute", "share"), entries)
 
 
 def mean(rows: Table, name: str, form: str = ".3f") -> str:

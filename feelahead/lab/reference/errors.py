@@ -70,12 +70,12 @@ def relative_errors(truths: list[Truth], volumes: FloatArray) -> FloatArray:
     )
 
 
-def kernel_overlaps(pairs: Pairs, counts: kernels.PairCounts | None = None) -> Overlaps:
-    """Return volumes, gradients and areas by the unchecked kernels that a tick uses, in one thread."""
+def kernel_overlaps(pairs: Pairs) -> Overlaps:
+    """Return volumes, gradients and areas by the unchecked kernels that a tick uses."""
     if pairs.solid == "tetrahedron":
-        return kernels.tetrahedron_pairs(*pairs.arguments, threads=1, counts=counts)
+        return kernels.tetrahedron_pairs(*pairs.arguments)
     if pairs.solid == "box":
-        return kernels.box_pairs(*pairs.arguments, threads=1, counts=counts)
+        return kernels.box_pairs(*pairs.arguments)
     return (kernels.half_space_pairs if pairs.solid == "half-space" else kernels.sphere_pairs)(*pairs.arguments)
 
 

@@ -1,9 +1,10 @@
 """Measure looks at concave objects in turns with "mixed"; calls begin at least a millisecond apart, as ticks do."""
 
+import functools
 import itertools
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Final
 
@@ -12,17 +13,48 @@ import numpy as np
 from common.arrays import FloatArray
 from common.realtime.pacing import SPIN_S
 from feelahead.lab.approaches.frozen import SITE
-from feelahead.lab.field import Facing, looks_before
+from feelahead.lab.posed_gripper import PosedGripper
 from feelahead.lab.tick.mixed import Mixed
+from robot_side.drivers.mujoco.encoders import Encoder
+from robot_side.drivers.mujoco.posed_scene import PosedScene
+from robot_side.drivers.mujoco.scene import load_scene
+from robot_side.enlargement.distance import standard_quantile
+from robot_side.field.field import Ahead, Along, Field
+from robot_side.field.object_class import OBSTACLE
+from robot_side.settings import CameraSettings, EncoderSettings
+from robot_side.surroundings.scene_table import scene_table
 
 _FREE_MM: Final = tuple(np.linspace(5.0, 150.0, 30).tolist())
 _CHUNK: Final = 20
 _PERIOD_S: Final = 1e-3
+_PROBABILITY: Final = 0.99
+_REACH_M, _FARTHEST_M = 0.4, 2.0
+
+
+def looks_before(model: Path, free_mm: Iterable[float]) -> Iterator[Callable[[], Field]]:
+    """Yield, for each distance to the object in `free_mm`, a function that evaluates the law along R2 (a look).
+
+    The gripper stays in its home pose; the objects are moved along the approach.
+    """
+    scene = load_scene(model, SITE)
+    posed, gripper, things = PosedScene(scene), PosedGripper(scene), len(scene.objects)
+    pose = gripper.at(gripper.home_rad)
+    posed.set_pose(gripper.home_rad, gripper.fingers, np.zeros(3))
+    contact_distance_m = posed.contact_distance_m(_FARTHEST_M)
+    encoder = EncoderSettings()
+    sigma_rad = Encoder(encoder.sigma_rad, encoder.resolution_rad).standard_deviation_rad()
+    ahead, classes = Ahead(np.full(len(gripper.home_rad), sigma_rad)), np.full(things, OBSTACLE, dtype=np.int64)
+    axis = np.ascontiguousarray(pose.tool_rotation[:, 2])
+    r2 = Along(axis, 0.0, CameraSettings().sd_m ** 2, float(standard_quantile(_PROBABILITY)), _REACH_M)
+    for free in free_mm:
+        posed.set_pose(gripper.home_rad, gripper.fingers, (1e-3 * free - contact_distance_m) * axis)
+        seen = scene_table(posed.perceived(np.zeros((things, 3))))
+        yield functools.partial(ahead.look, pose, seen, classes, r2)
 
 
 def time_looks(model: Path, seconds: float) -> tuple[FloatArray, FloatArray]:
     """Measure looks at the object of `model` in chunks, with "mixed" in between; return processor times of both (s)."""
-    looks, mixed = itertools.cycle(list(looks_before(Facing(model.stem, model, SITE, 5.0), _FREE_MM))), Mixed()
+    looks, mixed = itertools.cycle(list(looks_before(model, _FREE_MM))), Mixed()
     looks_s, mixed_s = list[float](), list[float]()
     for _ in _FREE_MM:
         next(looks)()

@@ -21,7 +21,7 @@ _END_LIMIT_S: Final = 1.0
 
 
 PageWords = tuple[int, dict[str, Any] | None]
-"""Number of a page, and its message: any of `hands`, `tune`, `play` and `again`; None if the page has closed."""
+"""Number of a page, and its message: any of `PASSED_ON` (pages.py); None if the page has closed."""
 
 
 class Console:

@@ -3,11 +3,10 @@
 from typing import Any, Final
 
 import numpy as np
-from viser.transforms import SO3
 
 from common.protocol.view_messages import Eye, SceneShapes, SceneState, Shape
 from common.roles import ROLES, Role
-from operator_side.viewing.console.outlines import Floats, corners_m, moved, outline, seen
+from operator_side.viewing.console.outlines import Floats, corners_m, moved, outline, rotation, seen
 from operator_side.viewing.console.solids import solid_of
 
 _STILL: Final = np.array((0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
@@ -15,7 +14,7 @@ _FLAT: Final = 1e-12
 
 
 class _Body:
-    """Triangles (t, 3, 3) of one object in its own frame, and a sphere around them."""
+    """Triangles (t, 3, 3) of one object in its own frame, a sphere around them, and a box around each shape."""
 
     def __init__(self, shapes: list[Shape]) -> None:
         parts = []
@@ -23,14 +22,15 @@ class _Body:
             _, solid, scale = solid_of(shape)
             parts.append(moved(np.array(shape.pose), solid.vertices * np.array(scale))[solid.triangles])
         self.triangles: Floats = np.concatenate(parts)
+        self.corners: Floats = np.concatenate([corners_m(shape) for shape in shapes])
         points = self.triangles.reshape(-1, 3)
         self.centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
         self.radius_m = float(np.linalg.norm(points - self.centre, axis=1).max())
 
     def top_below_m(self, point: Floats, pose: Floats) -> float | None:
         """Return how far below a point the object's next upper side lies; None if none does."""
-        turn = SO3(pose[3:]).inverse()
-        start, down = turn.apply(point - pose[:3]), turn.apply(np.array((0.0, 0.0, -1.0)))
+        to_body = rotation(pose).T
+        start, down = to_body @ (point - pose[:3]), -to_body[:, 2]
         if np.linalg.norm(np.cross(self.centre - start, down)) > self.radius_m:
             return None
         first, second, third = self.triangles.swapaxes(0, 1)
@@ -86,13 +86,13 @@ class Cues:
         """Return the target's name, its outline in each view, and the way of its centre: right, up and ahead."""
         role = ROLES.index(Role.TARGET)
         target = state.roles.index(role) if role in state.roles else len(self._poses)
-        if (own := self._own.get(target)) is None:
+        if target not in self._own:
             return None
-        pose = self._poses[target]
-        corners = np.concatenate([corners_m(shape) for shape in own])
-        centre = moved(pose, 0.5 * (corners.min(axis=0) + corners.max(axis=0)))
-        right, down, ahead = SO3(tool[3:]).inverse().apply(centre - tool[:3]).tolist()
-        boxes = [None if eye is None else outline(own, pose, frame, eye) for eye, frame in eyes]
+        corners = self._body(target).corners
+        centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+        placed = moved(self._poses[target], np.vstack((centre, corners)))
+        right, down, ahead = ((placed[0] - tool[:3]) @ rotation(tool)).tolist()
+        boxes = [None if eye is None else outline(placed[1:], frame, eye) for eye, frame in eyes]
         return {"name": shapes.objects[target], "boxes": boxes, "way_m": (right, -down, ahead)}
 
     def _drop(self, shapes: SceneShapes, state: SceneState, tool: Floats, eyes: "_Eyes") -> dict[str, Any] | None:

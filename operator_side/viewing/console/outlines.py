@@ -1,11 +1,9 @@
 """Places of points and objects in a camera view, from the scene and the robot side's viewpoint."""
 
-from collections.abc import Iterable
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from viser.transforms import SO3
 
 from common.protocol.view_messages import Eye, Shape
 
@@ -37,7 +35,7 @@ def seen(points: Floats, eye_frame: Floats, eye: Eye) -> Floats | None:
     The result is (n, 2), right and above the picture's centre, in half heights. eye_frame: pose (7,) of the frame in
     which `eye` is given, position and quaternion, w first.
     """
-    from_eye = SO3(eye_frame[3:]).inverse().apply(points - eye_frame[:3]) - np.array(eye.position_m)
+    from_eye = (points - eye_frame[:3]) @ rotation(eye_frame) - np.array(eye.position_m)
     forward, up = np.array(eye.forward), np.array(eye.up)
     depth_m = from_eye @ forward
     if depth_m.min() < _NEAREST_M:
@@ -47,14 +45,9 @@ def seen(points: Floats, eye_frame: Floats, eye: Eye) -> Floats | None:
     return place
 
 
-def outline(shapes: Iterable[Shape], owner_pose: Floats, eye_frame: Floats, eye: Eye) -> Box | None:
-    """Return the box around the shapes of one owner as the eye sees them; None if part of it is behind the eye.
-
-    owner_pose: (7,) in the world frame, as `eye_frame` of `seen`.
-    """
-    corners = [moved(owner_pose, corners_m(shape)) for shape in shapes]
-    places = seen(np.concatenate(corners), eye_frame, eye) if corners else None
-    if places is None:
+def outline(corners: Floats, eye_frame: Floats, eye: Eye) -> Box | None:
+    """Return the box around corners (n, 3) of the world frame as the eye sees them; None if one is behind the eye."""
+    if (places := seen(corners, eye_frame, eye)) is None:
         return None
     (left, low), (right, high) = places.min(axis=0), places.max(axis=0)
     return float(left), float(low), float(right), float(high)
@@ -62,5 +55,20 @@ def outline(shapes: Iterable[Shape], owner_pose: Floats, eye_frame: Floats, eye:
 
 def moved(pose: Floats, points: Floats) -> Floats:
     """Return points (n, 3), given in the frame whose pose (7,) in the world frame is `pose`, in the world frame."""
-    placed: Floats = SO3(pose[3:]).apply(points) + pose[:3]
+    placed: Floats = points @ rotation(pose).T + pose[:3]
     return placed
+
+
+def rotation(pose: Floats) -> Floats:
+    """Return the rotation matrix (3, 3) of a pose (7,): position, then unit quaternion, w first.
+
+    viser's `SO3.apply` does the same in 25 times the time.
+    """
+    w, x, y, z = pose[3:].tolist()
+    return np.array(
+        (
+            (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+            (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+            (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+        )
+    )

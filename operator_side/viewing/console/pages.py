@@ -28,10 +28,11 @@ Heard = Callable[[str, bytes], None]
 
 
 class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Message of a page, in JSON. The operator side validates the content of the first three fields."""
+    """Message of a page, in JSON. The operator side validates the content of the first four fields."""
 
     hands: dict[str, Any] | None = None
     tune: dict[str, Any] | None = None
+    mark: str | None = None
     play: dict[str, Any] | None = None
     again: bool | None = None
     """Whether the person wants to start the run again"""
@@ -42,6 +43,10 @@ class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     taken: bool | None = None
     """Answer to ROUND_ENDS: the next batch may follow. Without this answer a slow page would fall behind without limit,
     as browsers queue all unread messages."""
+
+
+PASSED_ON: Final = ("hands", "tune", "mark", "play", "again")
+"""Fields that the operator side gets"""
 
 
 class _Page:
@@ -136,8 +141,7 @@ class Pages:
             count += 1
             try:
                 said = msgspec.json.decode(message if isinstance(message, str) else b"", type=Said)
-                words = {"hands": said.hands, "tune": said.tune, "play": said.play, "again": said.again}
-                words = {name: value for name, value in words.items() if value is not None}
+                words = {name: value for name in PASSED_ON if (value := getattr(said, name)) is not None}
                 encoded = msgspec.msgpack.encode((number, words))
             except (msgspec.DecodeError, RecursionError, OverflowError):  # an integer of more than 64 bits
                 said = None

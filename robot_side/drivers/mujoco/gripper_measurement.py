@@ -82,9 +82,10 @@ def measure_gripper(scene: Simulated) -> GripperTravel | None:
     model = copy.copy(scene.model)
     unknown = actuators[~model.actuator_ctrllimited[actuators].astype(bool)]
     if unknown.size:
+        named = model.actuator(int(unknown[0])).name or int(unknown[0])
         raise ConfigurationError(
-            f"model: the gripper's actuator {model.actuator(int(unknown[0])).name!r} has no ctrlrange; valid: the"
-            " inputs at which the gripper is open and closed"
+            f"model: the gripper's actuator {named!r} has no ctrlrange; valid: the inputs at which the gripper is open"
+            " and closed"
         )
     # The copy is in empty space; its arm is without drive and put back after every step.
     model.opt.gravity[:] = 0.0

@@ -1,6 +1,7 @@
 """Forward kinematics of the simulated robot's gripper from encoder readings (eq. 4)."""
 
-from typing import Any
+import math
+from typing import Any, Final
 
 import mujoco  # type: ignore[import-untyped]
 import numpy as np
@@ -11,12 +12,15 @@ from common.errors import ConfigurationError
 from robot_side.arm.forward_kinematics import JOINT, LINK, POINT, LinkTree, Records, place
 from robot_side.arm.port import ArmState, GripperPose
 from robot_side.drivers.mujoco.gripper_cover import cover_gripper
-from robot_side.drivers.mujoco.model_enums import JointKind
-from robot_side.drivers.mujoco.robot_model import RobotModel
+from robot_side.drivers.mujoco.model_enums import GeomKind, JointKind
+from robot_side.drivers.mujoco.robot_model import RobotModel, can_touch
 from robot_side.drivers.mujoco.scene import Scene
 from robot_side.field.scratch import CLUSTER
 from robot_side.gripper.kept_covers import SearchNotes
 from robot_side.gripper.near_order import near_order
+
+_ROUND: Final = (GeomKind.SPHERE, GeomKind.CAPSULE, GeomKind.CYLINDER)
+_MOST_FOR_A_GEOM: Final = 32
 
 
 class MujocoKinematics:
@@ -56,11 +60,18 @@ class MujocoKinematics:
             model, data, robot, self._link_of, _points(self._link_of[bodies], self.cover.centers_m[order])
         )
         self._link_poses: FloatArray = np.zeros((1 + own.size, 7))
+        bodies, centers_m, self._link_radii_m = _cover_links(model, robot)
+        self._links_tree = self._tree._replace(points=_points(self._link_of[bodies], centers_m))
 
     def body_poses(self, bodies: IntArray) -> FloatArray:
         """Return positions and quaternions (n, 7), w first, of the robot's `bodies` (n,) at the last call of `pose`."""
         poses: FloatArray = self._link_poses[self._link_of[bodies]]
         return poses
+
+    def link_spheres(self, state: ArmState) -> tuple[FloatArray, FloatArray]:
+        """Return centres (k, 3) and radii (k,) of coarse spheres around the links, by the readings of `state`."""
+        positions = state.joint_positions_rad, state.finger_positions
+        return place(self._links_tree, *positions, self._link_poses).points_m, self._link_radii_m
 
     def pose(self, state: ArmState) -> GripperPose:
         """Return the gripper's pose at the encoder readings of `state` (eq. 4).
@@ -116,3 +127,29 @@ def _points(links: IntArray, positions_m: FloatArray) -> Records:
     points = np.empty(len(links), dtype=POINT)
     points["link"], points["position"] = links, positions_m
     return points
+
+
+def _cover_links(model: Any, robot: RobotModel) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Cover the colliding geoms of all links that a joint of the arm moves, but the gripper's, by coarse spheres.
+
+    Return their bodies (k,), centres (k, 3) in the bodies' frames, and radii (k,). They stand in a row along the
+    longest side of each geom's box, half of its thickness apart.
+    """
+    moved = np.isin(model.body_weldid[model.geom_bodyid], model.jnt_bodyid[robot.arm_joints])
+    geoms, centers_m, radii_m = [], [np.zeros((0, 3))], []
+    for geom in np.setdiff1d(np.flatnonzero(moved), robot.gripper_geoms).tolist():
+        if not can_touch(model, geom):
+            continue
+        half_m = model.geom_aabb[geom, 3:]
+        longest = int(np.argmax(half_m))
+        others_m = np.delete(half_m, longest)
+        thick_m = float(others_m.max() if model.geom_type[geom] in _ROUND else np.hypot(*others_m))
+        count = min(math.ceil(2.0 * half_m[longest] / max(thick_m, 1e-4)), _MOST_FOR_A_GEOM)
+        part_m = half_m[longest] / count
+        along_m = part_m * np.arange(1 - count, count, 2)[:, None] * np.eye(3)[longest]
+        own = Rotation.from_quat(model.geom_quat[geom], scalar_first=True)
+        centers_m.append(model.geom_pos[geom] + own.apply(model.geom_aabb[geom, :3] + along_m))
+        radii_m += [math.hypot(thick_m, part_m)] * count
+        geoms += [geom] * count
+    bodies = model.geom_bodyid[np.array(geoms, dtype=np.int64)].astype(np.int64)
+    return bodies, np.concatenate(centers_m), np.array(radii_m)

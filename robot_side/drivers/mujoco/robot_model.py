@@ -257,8 +257,8 @@ def _actuator_of(model: Any, joint: int) -> int:
         )
         if not simple:
             raise ConfigurationError(
-                f"model: the actuator {model.actuator(actuator).name!r} of {_joint_name(model, joint)} is of an"
-                " unsupported kind; valid: position, velocity, motor"
+                f"model: the actuator {model.actuator(actuator).name or actuator!r} of {_joint_name(model, joint)} is"
+                " of an unsupported kind; valid: position, velocity, motor"
             )
         return actuator
     raise ConfigurationError(

@@ -41,6 +41,9 @@ _FOUND_START = (
 _MOVED = "; the tool's point is {1:.0f} mm from the site {0!r}, between the fingertips"
 # Longer steps make the arm's servos oscillate; shorter ones are too slow for real time on any machine.
 _SHORTEST_STEP_S, _LONGEST_STEP_S = 1e-5, 0.02
+_FARTHEST_M = 1e6
+_MOST_ACCELERATION = 1e10
+"""Acceleration above which MuJoCo calls a simulation unstable, in m/s² or rad/s²"""
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,8 @@ def load_scene(
     roles: override the roles that objects' names tell. The tool's z axis is the site's `site_axis`.
     ConfigurationError, of one line, for a file, model or site that cannot be used.
     """
+    if model_path is None and site_axis != "z":
+        raise ConfigurationError(f"--site-axis {site_axis} is given without --model; valid: with --model")
     mujoco.set_mju_user_warning(_log_warning)
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -145,10 +150,14 @@ def load_scene(
         raise ConfigurationError(
             f"model: MuJoCo cannot simulate it: {' '.join(str(error).split())}; valid: a model that fits its memory"
         ) from error
-    for geom in np.flatnonzero(~np.isfinite(data.geom_xpos).all(axis=1)):
+    for geom in np.flatnonzero(~(np.abs(data.geom_xpos) < _FARTHEST_M).all(axis=1)):
         stray = model.geom(int(geom)).name or f"geom{geom}"
         raise ConfigurationError(
             f"model: {stray!r} is at the position {data.geom_xpos[geom]}; valid: a finite position"
+        )
+    if not (np.abs(data.qacc) < _MOST_ACCELERATION).all():
+        raise ConfigurationError(
+            "model: at its start its joints accelerate without bound; valid: finite gravity, masses and lengths"
         )
     objects, shared_names = _objects(model, robot)
     return Scene(

@@ -53,7 +53,7 @@ class Steps:
 def side() -> Steps:
     clock = VirtualClock()
     side = Steps(clock)
-    loop = Loop(PERIOD_S, {"sockets": "", "": ""}, 0, clock)
+    loop = Loop(PERIOD_S, "", 0, clock)
     loop.run(side, StopSignal(), STOPPED_S + 10 * PERIOD_S)
     assert len(side.told) == 1
     assert "turns are left out" in side.told[0]

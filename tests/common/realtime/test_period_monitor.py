@@ -5,11 +5,10 @@ import pytest
 from common.clock import VirtualClock
 from common.realtime.pacing import Pacer
 from common.realtime.period_monitor import WINDOW_S, PeriodMonitor
-from common.realtime.stages import Stages
 from common.realtime.stolen_time import StolenTime
 
 PERIOD_S = 1e-3
-REMEDIES = {"physics": "fewer bodies", "sensing": "fewer objects", "": "a faster machine"}
+REMEDY = "a faster machine"
 
 
 class Loop:
@@ -22,9 +21,7 @@ class Loop:
         self.wall, self.processor = VirtualClock(100.0), VirtualClock(7.0)
         self._waited, self._stolen = waited, stolen
         self.pacer = Pacer(PERIOD_S, 100.0)
-        stages = Stages(("physics", "sensing"), self.wall, self.processor)
-        self._stages = {name: stages.timed(name, self._pass) for name in ("physics", "sensing")}
-        self.period_monitor = PeriodMonitor(self.pacer, stages, self.wall, self.processor, REMEDIES, self._taken)
+        self.period_monitor = PeriodMonitor(self.pacer, self.wall, self.processor, REMEDY, self._taken)
         self.said: list[str] = []
 
     def _taken(self) -> StolenTime:
@@ -37,12 +34,10 @@ class Loop:
         self.wall.advance_to(self.wall.now() + wall_s)
         self.processor.advance_to(self.processor.now() + processor_s)
 
-    def run(
-        self, for_s: float, computes_s: float, lasts_s: float | None = None, *, physics: float = 0.0, every: int = 1
-    ) -> None:
+    def run(self, for_s: float, computes_s: float, lasts_s: float | None = None, *, every: int = 1) -> None:
         """Run turns for `for_s`. Each `every`-th one computes for `computes_s`; others compute for 0.1 ms.
 
-        physics: share of the computing spent in physics. lasts_s: duration of each turn, if it is longer.
+        lasts_s: duration of each turn, if it is longer.
         """
         end_s, turn = self.wall.now() + for_s, 0
         while self.wall.now() < end_s:
@@ -51,9 +46,7 @@ class Loop:
             self.pacer.begin(self.wall.now())
             turn += 1
             spent_s = computes_s if turn % every == 0 else 1e-4
-            self._stages["physics"](physics * spent_s, physics * spent_s)
-            self._stages["sensing"](0.1 * spent_s, 0.1 * spent_s)
-            self._pass((0.9 - physics) * spent_s, (0.9 - physics) * spent_s)
+            self._pass(spent_s, spent_s)
             if lasts_s is not None:
                 self._pass(lasts_s - spent_s, 0.0)
             if (text := self.period_monitor.end(turned=True)) is not None:
@@ -68,14 +61,12 @@ def test_a_loop_that_keeps_up_is_told_nothing() -> None:
     assert loop.period_monitor.summary() == {"said": None, "waited": 0.0, "stolen": 0.0}
 
 
-def test_too_slow_names_what_takes_longest_and_what_would_help_once() -> None:
+def test_too_slow_names_the_time_and_what_would_help_once() -> None:
     loop = Loop()
-    loop.run(4 * WINDOW_S, 1.5e-3, physics=0.7)
+    loop.run(4 * WINDOW_S, 1.5e-3)
     (text,) = loop.said
-    assert text.startswith(
-        "this machine is too slow: a turn computes for 1.5 ms where there are 1 ms, 70 % of it physics"
-    )
-    assert text.endswith("33 % of the turns are left out; fewer bodies would help")
+    assert text.startswith("this machine is too slow: a turn computes for 1.5 ms where there are 1 ms, and ")
+    assert text.endswith("33 % of the turns are left out; a faster machine would help")
     assert loop.period_monitor.summary()["said"] == text
 
 

@@ -27,7 +27,7 @@ class Bytes:
     def encode(self, noted: Any, views: Callable[[float, bytes], None]) -> tuple[float, bytes]:
         del views
         now_s, content = noted
-        return now_s, entry(Kind.REPORT, now_s, content)
+        return now_s, entry(Kind.HANDS, now_s, content)
 
     def begin_epoch(self) -> None:
         """Do nothing, as no note is encoded as a difference from an earlier one."""
@@ -125,6 +125,16 @@ def test_a_full_disk_stops_the_recording_and_not_the_side(tmp_path: Path) -> Non
     if kept["bytes"]:
         found = numbers(path)
         assert found == list(range(len(found)))
+
+
+def test_a_deleted_file_stops_the_recording_and_nothing_is_said_to_be_kept(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recording = recording_to(path)
+    note_until(recording, lambda: kept_s(recording) > 0.0)
+    path.unlink()
+    _, said = note_until(recording, lambda: recording._said["error"] is not None)
+    assert [*said, *recording.idle(0.0)] == ["recording stopped: the file was deleted; kept: 0.0 s, 0.0 MB"]
+    assert recording.close() == {"dropped_blocks": 0, "kept_s": 0.0, "bytes": 0, "error": "the file was deleted"}
 
 
 def test_two_sides_share_one_file(tmp_path: Path) -> None:

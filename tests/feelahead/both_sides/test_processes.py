@@ -5,6 +5,7 @@ import json
 import os
 import pty
 import random
+import select
 import signal
 import socket
 import subprocess
@@ -179,6 +180,31 @@ def test_our_own_interrupt_of_a_side_that_has_not_begun_is_no_failure() -> None:
     with SideProcess("robot_side", "robot", [], before=UNPREPARED) as side:
         assert side.stop() != 0
         side.check()
+
+
+# Starts a side that stays in its imports, and prints its id.
+PARENT = """
+import signal, sys
+from feelahead.both_sides.processes import StartedSide
+imports = '''print('{"event": "here"}', flush=True)'''
+code = f"import signal; from common.command.launch import launch; launch('x', lambda: ({imports}, signal.pause()))"
+side = StartedSide("robot", [sys.executable, "-P", "-c", code])
+side.wait_for("here", 60.0)
+print(side.process_id, flush=True)
+signal.pause()
+"""
+
+
+def test_a_side_that_still_starts_ends_with_a_parent_that_is_killed() -> None:
+    with start("-c", PARENT) as parent:
+        assert parent.stdout is not None
+        side = os.pidfd_open(int(parent.stdout.readline()))
+        parent.kill()
+        ends, _, _ = select.select([side], [], [], 60.0)
+        if not ends:
+            signal.pidfd_send_signal(side, signal.SIGKILL)
+        os.close(side)
+    assert ends
 
 
 def test_another_processs_signal_is_a_failure() -> None:

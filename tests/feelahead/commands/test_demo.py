@@ -18,6 +18,7 @@ from common.errors import ConfigurationError
 from feelahead.both_sides.summary import merge_summaries
 from feelahead.commands import open_browser
 from feelahead.commands.demo import command as module
+from feelahead.commands.demo import run
 from feelahead.commands.demo.command import demo
 from feelahead.commands.demo.run import operator_arguments, robot_arguments, too_slow
 from feelahead.commands.demo.settings import DemoSettings
@@ -43,7 +44,8 @@ def test_only_what_was_said_goes_over_the_sides_own_files(tmp_path: Path) -> Non
     config.write_text("seed = 3\nprobability = 0.5\n")
     robot, operator = passed_on("--robot-config", str(config))
     ports = ["--bind=tcp://127.0.0.1:1", "--view-bind=tcp://127.0.0.1:2"]
-    assert robot == ["--summary=summary.json", *ports, f"--config={config}"]
+    assert robot == ["--summary=summary.json", *ports, f"--config={config}", "--cameras.at-once"]
+    assert "--cameras.at-once" not in passed_on("--no-console")[0]
     unsaid = ("--seed", "--link", "--haptics", "--no-haptics", "--law", "--compensation")
     assert not [flag for flag in operator if flag.startswith(unsaid)]
 
@@ -62,12 +64,26 @@ def test_given_flags_are_passed_on_to_the_side_that_takes_them_even_if_default(t
     assert parse_settings(OperatorSettings, "operator", operator).compensation == "robot"
 
 
+@pytest.mark.parametrize(("processors", "shape"), [(2, (320, 240, 15.0)), (4, (640, 480, 30.0))])
+def test_few_processors_get_small_pictures_unless_a_file_says_otherwise(
+    processors: int, shape: tuple[int, int, float], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run, "usable_processors", lambda: processors)
+    cameras = parse_settings(RobotSettings, "robot", passed_on()[0]).cameras
+    assert (cameras.width, cameras.height, cameras.rate_hz) == shape
+    config = tmp_path / "robot.toml"
+    config.write_text("[cameras]\nwidth = 800\n")
+    cameras = parse_settings(RobotSettings, "robot", passed_on("--robot-config", str(config))[0]).cameras
+    assert (cameras.width, cameras.height, cameras.rate_hz) == (800, 480, 30.0)
+
+
 def test_the_demo_offers_every_scene_says_what_each_is_and_tells_the_robot_side_alone(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     with pytest.raises(SystemExit):
         demo(["--help"])
     said = capsys.readouterr().out
+    assert "--scene {table,wall,slot,shelf}" in said
     for scene in get_args(SceneName):
         assert f"{scene}:" in said
         robot, operator = passed_on("--scene", scene)

@@ -228,14 +228,11 @@ def test_the_question_is_answered_whole(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("feelahead.lab.questions.coverage.QUICK_SIZES", (1, 2))
-    monkeypatch.setattr("feelahead.lab.questions.coverage.RACED", ("empty",))
     flags = ["--quick", "--workers", "1", "--laws", "swept", "none", "--only", "wall/bell", "--probabilities", "0.5"]
-    flags += ["--raced", "1"]
     table, picture = tmp_path / "out.csv", tmp_path / "out.png"
     assert ask(QUESTION, [*flags, "--csv", str(table), "--picture", str(picture)]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert "covered: full strength stood in time" in shown
     assert "| bell | 200 ms |" in shown
     assert picture.read_bytes().startswith(b"\x89PNG")
-    assert "1.00 (1/1)" in shown
-    assert len(table.read_text().splitlines()) == 1 + 2 + 2
+    assert len(table.read_text().splitlines()) == 1 + 2

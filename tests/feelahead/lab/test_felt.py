@@ -1,71 +1,25 @@
 """The compiled law agrees with its definition, and `feelahead bench felt` measures what its help says."""
 
 import csv
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import feelahead.main
 from feelahead.lab import cover
-from feelahead.lab.approaches.frozen import frozen_hash
-from feelahead.lab.approaches.ticks import DEMO, record, with_cover
+from feelahead.lab.approaches.ticks import DEMO
 from feelahead.lab.cover import STANDS_OUT, Gripper
-from feelahead.lab.field import strength_column
-from feelahead.lab.questions.felt import Run, run
-from feelahead.lab.table import Table
-from feelahead.lab.variants import COVER_M, COVERS_M, WAYS, Replayed, errors_mm, replay
+from feelahead.lab.questions.felt import run
 from robot_side.drivers.mujoco.gripper_cover import GripperCover, cover_gripper
 from tests.helpers.arm_models import planar_arm
-from tests.helpers.repository import DATA
-
-HORIZON_M = 0.5
-WALL = str(DATA / "wall.xml")
-COVER_MM, RAMP_MM = 3.0, 12.0
-
-
-def replayed(*rows_m: float) -> Replayed:
-    """Return results with a tick for each of `rows_m`, in which all onset distances have this value."""
-    ways = np.repeat(np.array(rows_m)[:, None], len(WAYS), axis=1)
-    return Replayed(np.arange(1.0, len(ways) + 1.0), ways, np.full(len(ways), HORIZON_M), 246, 200.0)
-
-
-def test_too_late_is_above_0_and_what_neither_feels_does_not_count() -> None:
-    found = errors_mm(
-        replayed(0.101, 0.2, 0.3, HORIZON_M, HORIZON_M), replayed(0.1, 0.204, 0.3, HORIZON_M, 0.49), "fast first"
-    )
-    expected = {"mean": (1.0 - 4.0 + 0.0 + 10.0) / 4.0, "earliest": -4.0, "latest": 10.0, "p95": 10.0}
-    assert found == pytest.approx(expected)
-    nothing = replayed(HORIZON_M, HORIZON_M)
-    assert errors_mm(nothing, nothing, "slow full") == {}
-
-
-@pytest.mark.long
-def test_recorded_ticks_go_through_the_law_with_other_covers() -> None:
-    recorded = record("wall", 2.0)
-    assert len(recorded.ticks) == 2001
-    for before, after in zip(recorded.ticks, with_cover(recorded, 0.008), strict=True):
-        np.testing.assert_array_equal(after.situation.pose.tool_position_m, before.situation.pose.tool_position_m)
-    own, coarse = replay(recorded, (COVER_M, 0.008), 1)
-    assert own.looks_per_s == pytest.approx(200.0, rel=0.02)
-    assert (own.spheres, coarse.spheres) == (246, 52)
-    felt = own.onsets_m[:, 0] < own.horizon_m
-    assert felt.sum() > 100
-    # Coarser spheres stand out farther.
-    assert 1e-4 < np.abs(coarse.onsets_m - own.onsets_m)[felt, 0].max() < 0.01
-    assert (own.took_us > 0.0).all()
-    rows = list(run(Run("place_held", 0.6, times=1), 0))
-    assert [row["cover_mm"] for row in rows] == [1e3 * cover_m for cover_m in COVERS_M]
-    assert [row["spheres"] for row in rows] == sorted(row["spheres"] for row in rows)
 
 
 @pytest.mark.long
 def test_onset_distances_are_a_table_goals_and_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     written = tmp_path / "out.csv"
-    assert feelahead.main.command(["bench", "felt", "--definition", "--quick", f"--csv={written}"]) == 0
+    assert feelahead.main.command(["bench", "felt", "--quick", f"--csv={written}"]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert "met onset distances later than 0.1 mm: 0" in shown
     assert "met onset distances of grazes out of their band: 0" in shown
@@ -111,27 +65,3 @@ def test_spheres_that_are_too_small_are_found_out(monkeypatch: pytest.MonkeyPatc
     for row in run(Gripper("built-in", None, None, 2000), 0):
         assert 0.1 < row["sticks_out_mm"] <= 0.5 + 1e-6
         assert 2.0 < row["stands_out_mm"] <= 2.5 + 1e-6
-
-
-def test_strengths_begin_as_far_before_each_thing_however_far_it_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    summary, picture = tmp_path / "out.json", tmp_path / "out.png"
-    models = ["--model", WALL, str(DATA / "rod_5mm.xml")]
-    written = ["--summary", str(summary), "--picture", str(picture)]
-    assert feelahead.main.command(["bench", "felt", "--field", "--step-mm", "50", *models, *written]) == 0
-    assert f"frozen scenes and limits: {frozen_hash()}" in " ".join(capsys.readouterr().out.split())
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    for (scene,), rows in Table(json.loads(summary.read_text())["runs"]).groups("scene"):
-        assert scene in ("wall", "rod_5mm")
-        assert rows.values("free_mm") == [0.0, 50.0, 100.0, 150.0]
-        far = rows.rows[1:]
-        before_mm = np.array(
-            [[row["free_mm"] - row[strength_column(strength)] for strength in range(1, 9)] for row in far]
-        )
-        np.testing.assert_allclose(before_mm, np.broadcast_to(before_mm[0], before_mm.shape), atol=0.1)
-        assert (np.diff(before_mm, axis=1) <= 0.0).all()
-        # The eighth at D_σ and the spheres' stand-out, or a little earlier, as strengths are rounded; the first before.
-        begins_mm = before_mm[0] - far[0]["sigma_mm"]
-        assert 0.0 < begins_mm[7] < COVER_MM + 0.25 * RAMP_MM
-        assert begins_mm[7] < begins_mm[0] < COVER_MM + RAMP_MM

@@ -3,7 +3,7 @@
 import dataclasses
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,19 +18,16 @@ from common.protocol import codec
 from common.protocol.codec import PROTOCOL_VERSION, decode, encode
 from common.protocol.compact import STEP_M
 from common.protocol.messages import StiffnessUpdate
-from common.recording.entries import Entry, Kind, split_text
+from common.recording.entries import Kind, split_text
 from common.recording.reading import Recording, open_recording
 from common.silence import KEEP_ALIVE_S
 from feelahead.both_sides.loopback import Loopback
 from feelahead.commands.recordings import replay
 from feelahead.recordings import replay as replaying
 from feelahead.recordings.comparison import Comparison, recorded_entries
-from feelahead.recordings.controller import recorded_feel, recorded_state
 from feelahead.recordings.playback import Playback, Seen, seen
 from feelahead.recordings.replay import replay_operator, replay_robot
 from feelahead.recordings.tables import read_tables
-from operator_side.dualsense.reports.input_report import build_input_report
-from operator_side.dualsense.reports.output_report import build_output_report
 from robot_side.compiled.warm_up import kernel_digests
 from robot_side.parts import build_parts
 from tests.feelahead.recordings.conftest import DURATION_S, record_loopback
@@ -82,29 +79,6 @@ def test_a_run_with_episodes_and_the_scene_put_back_is_made_again(tmp_path: Path
     times_s = np.array(arm.times_s)
     assert away[times_s < 3.1][-1] > 0.01
     assert away[(times_s > 3.25) & (times_s < 3.4)].max() < 0.005
-
-
-def test_a_recording_of_reports_is_made_again_too(run: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
-    kinds = set()
-
-    def as_reports(*of: Any) -> Iterator[Entry]:
-        for one in recorded_entries(*of):
-            kinds.add(one.kind)
-            if one.kind == Kind.HANDS:
-                state = recorded_state(one.kind, one.content)
-                yield Entry(Kind.REPORT, one.now_s, build_input_report(state))
-                yield Entry(Kind.REPORT, one.now_s, b"garbled")
-            elif one.kind == Kind.TOLD:
-                feel = recorded_feel(one.kind, one.content)
-                yield Entry(Kind.WRITTEN, one.now_s, build_output_report(feel))
-            else:
-                yield one
-
-    monkeypatch.setattr(replaying, "recorded_entries", as_reports)
-    compared = replay_operator(run)
-    assert kinds.issuperset({Kind.HANDS, Kind.TOLD})
-    assert compared.made == compared.equal > DURATION_S / KEEP_ALIVE_S
-    assert (compared.worst_eighths, compared.worst_m) == (0.0, 0.0)
 
 
 def test_the_command_says_so_and_another_setting_makes_other_stiffness(

@@ -56,7 +56,7 @@ def test_every_calibration_is_read_as_it_was_written(calibration: TravelCalibrat
         ("[l2]", "[l3]", "missing required field `l2`"),
         ("x = 0.02", "x = 0.5", "left_stick: x = 0.5"),
         ("aa:bb:cc:00:11:22", "AA:BB", "address = 'AA:BB'"),
-        ("aa:bb:cc:00:11:22", "aa:bb:cc:00:11:23", "belongs to the controller aa:bb:cc:00:11:23"),
+        ("aa:bb:cc:00:11:22", "aa:bb:cc:00:11:23", "address = 'aa:bb:cc:00:11:23'; valid: aa:bb:cc:00:11:22"),
         ("[l2]", "[l2", "Expected"),
         ("#", "#" * 20_000, "too large; valid: up to 10000 bytes"),
         ("dead_zone = 0.06", f"dead_zone = 1{400 * '0'}", "more than 64 bits"),

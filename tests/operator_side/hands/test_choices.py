@@ -70,9 +70,13 @@ def test_the_sticks_are_turned_by_the_newest_angle_and_rest_without_one() -> Non
 
 def test_up_changes_sides_for_a_tool_that_faces_the_camera_only_at_rest() -> None:
     choices, meant = Choices(stick_frame="camera"), OperatorIntent(lateral=(0.0, 1.0))
-    choices.see(telemetry(Header(1, 1, 0.0), camera_faces=True), 1.0)
-    assert choices.commanded(meant, 1.0).lateral == (0.0, 1.0)
-    choices.follow(meant)
-    assert choices.commanded(meant, 1.0).lateral == (0.0, 1.0)
+    choices.see(telemetry(Header(1, 1, 0.0)), 1.0)
+    for faces, turn_rad in ((False, 0.0), (True, 0.5 * math.pi)):
+        choices.see(telemetry(Header(1, 1, 0.0), camera_faces=faces, camera_turn_rad=turn_rad), 1.0)
+        choices.follow(meant)
+        assert choices.commanded(meant, 1.0).lateral == (0.0, 1.0)
     choices.follow(RELEASED)
-    assert choices.commanded(meant, 1.0).lateral == (0.0, -1.0)
+    assert choices.commanded(meant, 1.0).lateral == pytest.approx((1.0, 0.0), abs=1e-12)
+    unknown = Choices(stick_frame="camera")
+    unknown.see(telemetry(Header(1, 1, 0.0), camera_faces=True), 1.0)
+    assert unknown.commanded(meant, 1.0).lateral == (0.0, 0.0)

@@ -106,12 +106,11 @@ def test_numbers_at_their_limits_are_in_range(kind: str) -> None:
 def test_bad_unvouched_numbers_are_doubtful() -> None:
     rng = np.random.default_rng(9)
     centers, vertices = rng.normal(size=(200, 3)), rng.normal(size=(200, 4, 3))
-    for threads in (1, 2):
-        kernels.tetrahedron_pairs(centers, np.ones(200), vertices, trusted=False, threads=threads)
-        radii = np.ones(200)
-        radii[150] = -1.0
-        with pytest.raises(kernels.DoubtfulNumbersError):
-            kernels.tetrahedron_pairs(centers, radii, vertices, trusted=False, threads=threads)
+    kernels.tetrahedron_pairs(centers, np.ones(200), vertices, trusted=False)
+    radii = np.ones(200)
+    radii[150] = -1.0
+    with pytest.raises(kernels.DoubtfulNumbersError):
+        kernels.tetrahedron_pairs(centers, radii, vertices, trusted=False)
 
 
 @pytest.mark.parametrize(("kind", "name"), ARGUMENTS)

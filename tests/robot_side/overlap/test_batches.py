@@ -1,7 +1,5 @@
-"""How pairs are grouped into blocks, lanes and threads changes no result."""
+"""How pairs are grouped into blocks and lanes changes no result."""
 
-import subprocess
-import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -10,9 +8,9 @@ import pytest
 from common.arrays import FloatArray
 from robot_side.overlap import kernels
 from robot_side.overlap.closed_forms.solid import Overlaps
-from robot_side.overlap.kernels import PairCounts
+from robot_side.overlap.lanes.box_batch import overlap_boxes
 from robot_side.overlap.lanes.lanes import LANES
-from tests.helpers.repository import ROOT
+from robot_side.overlap.lanes.tetrahedron_batch import overlap_tetrahedra
 
 Arrays = tuple[FloatArray, ...]
 Pairs = Callable[..., Overlaps]
@@ -43,6 +41,15 @@ def assert_same(first: Overlaps, second: Overlaps) -> None:
         np.testing.assert_array_equal(a, b)
 
 
+def left_by_bounds(arguments: Arrays) -> tuple[int, int]:
+    """Return how many pairs the bounds leave to the lanes, and how many of these the lanes leave to precise forms."""
+    total = len(arguments[1])
+    rows = np.empty(total + 1, dtype=np.int64)
+    overlap = overlap_tetrahedra if len(arguments) == 3 else overlap_boxes
+    unsettled = overlap(*arguments, np.zeros(total), np.zeros((total, 3)), np.zeros(total), rows)
+    return rows.item(-1), unsettled
+
+
 @KINDS
 @pytest.mark.parametrize("count", [0, 1, 7, 8, 9, LANES - 1, LANES, LANES + 1, 3 * LANES + 5])
 def test_a_pair_does_not_depend_on_its_neighbours(pairs: Pairs, make: Callable[[int], Arrays], count: int) -> None:
@@ -62,49 +69,17 @@ def test_blocks_in_which_all_pairs_are_cut_change_nothing(
     arguments = make(4000)
     mixed = pairs(*arguments)
     cut = np.flatnonzero((mixed[2] > 0.0) & (np.abs(mixed[1]).max(axis=1) > 0.1 * mixed[2]))[:count]
-    counts = PairCounts()
-    alone = pairs(*(argument[cut] for argument in arguments), counts=counts)
-    assert (counts.pairs, counts.early) == (count, 0)
-    assert_same(alone, (mixed[0][cut], mixed[1][cut], mixed[2][cut]))
+    alone = tuple(np.ascontiguousarray(argument[cut]) for argument in arguments)
+    assert left_by_bounds(alone)[0] == count
+    assert_same(pairs(*alone), (mixed[0][cut], mixed[1][cut], mixed[2][cut]))
 
 
 @KINDS
-def test_threads_change_nothing(pairs: Pairs, make: Callable[[int], Arrays]) -> None:
-    arguments = make(5000)
-    one, three = PairCounts(), PairCounts()
-    assert_same(pairs(*arguments, threads=1, counts=one), pairs(*arguments, threads=3, counts=three))
-    assert one == three
-
-
-@KINDS
-def test_the_ways_are_counted(pairs: Pairs, make: Callable[[int], Arrays]) -> None:
+def test_bounds_leave_pairs_whose_surfaces_cut_and_few_others(pairs: Pairs, make: Callable[[int], Arrays]) -> None:
     centers, radii, *solids = make(1000)
-    counts = PairCounts()
-    pairs(centers + 100.0, radii, *solids, counts=counts)
-    assert counts == PairCounts(pairs=1000, early=1000, precise=0)
-    volumes, _, areas = pairs(centers, radii, *solids, counts=counts)
+    assert left_by_bounds((centers + 100.0, radii, *solids)) == (0, 0)
+    volumes, _, areas = pairs(centers, radii, *solids)
     cut = int(((volumes > 0.0) & (areas > 0.0) & (areas < 12.56 * radii**2)).sum())
-    assert counts.pairs == 2000
-    # The bounds leave every pair whose surfaces cut to the lanes, and few others.
-    assert cut <= 2000 - counts.early <= 1.2 * cut
-    assert 0 <= counts.precise <= 0.02 * cut
-
-
-@pytest.mark.processes
-def test_a_forked_process_shares_work_among_threads_of_its_own() -> None:
-    program = (
-        "import multiprocessing, numpy as np\n"
-        "from robot_side.overlap import sphere_sphere, sphere_tetrahedron\n"
-        "def total(_): return float(sphere_tetrahedron(np.zeros((20000, 3)), 1.0, np.eye(4, 3)).sum())\n"
-        "expected = total(None)\n"
-        "pool = multiprocessing.get_context('fork').Pool(1)\n"
-        "assert pool.map_async(total, [0]).get(240.0) == [expected]\n"
-        "pool.terminate()\n"
-        "import atexit\n"
-        "atexit.register(lambda: print('the same' if total(None) == expected else 'another'))\n"
-    )
-    root = ROOT
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=root, capture_output=True, text=True, check=False, timeout=300.0
-    )
-    assert (done.stdout, done.stderr, done.returncode) == ("the same\n", "", 0)
+    left, precise = left_by_bounds((centers, radii, *solids))
+    assert cut <= left <= 1.2 * cut
+    assert 0 <= precise <= 0.02 * cut

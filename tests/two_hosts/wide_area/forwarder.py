@@ -1,7 +1,8 @@
 """Process that emulates a wide-area network: it passes packets between two namespaces with a TUN device each.
 
 It makes the namespaces. When its standard input ends, it deletes them and kills all programs in them, so nothing is
-left even if its parent is killed. For each input line of JSON (`Order`) it prints the counts since the line before.
+left even if its parent is killed. The first input line of JSON (`Order`) starts it; for each further line
+it prints the counts since the line before.
 """
 
 import contextlib
@@ -40,12 +41,12 @@ _IN_A_ROW: Final = 64
 
 
 class Order(msgspec.Struct, frozen=True):
-    """Order to the forwarder. The first starts it; each later one asks for the counts, and may change directions."""
+    """Order to the forwarder, which starts it."""
 
-    ways: dict[Direction, DirectionSettings] | None = None
-    """New settings of directions; those without settings stay as they are"""
+    ways: dict[Direction, DirectionSettings]
+    """Settings of directions; a direction without settings does nothing to packets"""
     control: str | None = None
-    """TCP congestion control of both hosts, obeyed in the first order only; None: the machine's default"""
+    """TCP congestion control of both hosts; None: the machine's default"""
     seed: int = 0
 
 
@@ -107,7 +108,7 @@ def _delete(namespace: str) -> None:
 
 class _Forwarder:
     def __init__(self, order: Order, devices: list[int], *, realtime: bool) -> None:
-        now_s, given = time.monotonic(), order.ways or {}
+        now_s, given = time.monotonic(), order.ways
         self._ways = [Wire(given.get(name, DirectionSettings()), order.seed, name, now_s) for name in _LEAVING]
         self._devices = devices
         self._realtime = realtime
@@ -117,7 +118,7 @@ class _Forwarder:
         self._said_s = now_s
 
     def run(self) -> None:
-        """Forward packets and obey orders until the standard input ends."""
+        """Forward packets, and print counts for each line, until the standard input ends."""
         orders = sys.stdin.fileno()
         while True:
             wait_s = max(0.0, self._due[0][0] - time.monotonic()) if self._due else None
@@ -131,7 +132,7 @@ class _Forwarder:
                 line = sys.stdin.readline()
                 if not line:
                     return
-                _say(self._obey(msgspec.json.decode(line, type=Order)))
+                _say(self._counts())
 
     def _read(self, number: int) -> None:
         for _ in range(_IN_A_ROW):
@@ -153,8 +154,8 @@ class _Forwarder:
             except OSError:
                 self._failed += 1
 
-    def _obey(self, order: Order) -> dict[str, Any]:
-        """Change directions as ordered; return the counts since the last order."""
+    def _counts(self) -> dict[str, Any]:
+        """Return the counts since the last call."""
         now_s = time.monotonic()
         late_ms = 1e3 * np.array(self._late_s or [0.0])
         figures: dict[str, Any] = {
@@ -167,8 +168,6 @@ class _Forwarder:
         for name, way in zip(_LEAVING, self._ways, strict=True):
             figures[name] = way.counts.summary()
             way.counts = Counts()
-            if order.ways and name in order.ways:
-                way.change(order.ways[name], now_s)
         self._said_s, self._late_s, self._failed = now_s, [], 0
         return figures
 

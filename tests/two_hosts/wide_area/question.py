@@ -36,8 +36,6 @@ class WideSweep(Sweep):
     """Duration in milliseconds of bursts in which all packets are lost: a burst every 5 s, in each direction."""
     rate: _Numbers = (0.0,)
     """Rate of the robot's uplink in Mbit/s; 0: unlimited."""
-    falls_to: _Numbers = (0.0,)
-    """Rate of the robot's uplink in Mbit/s in the second half of a run; 0: no change."""
     queue: _Numbers = (200.0,)
     """Longest time, in milliseconds, that a packet waits in the queue before the uplink; others are dropped."""
     control: tuple[str, ...] = ("reno",)
@@ -48,8 +46,6 @@ class WideSweep(Sweep):
     """drives: the scripted person drives; rests: nobody touches the controls."""
     pictures: tuple[bool, ...] = (False,)
     """Whether a page of the console receives both views and the scene."""
-    bulk: tuple[bool, ...] = (False,)
-    """Whether a TCP transfer fills the robot's uplink."""
     observer: tuple[Literal["none", "reads", "stops"], ...] = ("none",)
     """A second operator side. none: there is none. reads: it observes. stops: SIGSTOP after a third of the time."""
     seconds: float = 20.0
@@ -101,8 +97,6 @@ _COLUMNS: Final[Mapping[str, Sequence[str]]] = {
     "packets/s": ("to_operator_packets_s", "to_robot_packets_s"),
     "pictures/s": ("pictures_s",),
     "their age, ms": ("picture_p50_ms", "picture_p95_ms"),
-    "bulk, kbit/s": ("bulk_kbit_s",),
-    "late after fall, s": ("late_after_fall_s",),
     "late, ms": ("late_p99_ms", "late_max_ms"),
 }
 """Columns of the shown table: the names of the figures that each column shows, by the column's title.

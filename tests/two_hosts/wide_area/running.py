@@ -1,18 +1,15 @@
-"""Run a trial: both sides over the wide area for some seconds, if asked with an observer, a page or a bulk transfer."""
+"""Run a trial: both sides over the wide area for some seconds, if asked with an observer or a page."""
 
 import contextlib
 import os
 import signal
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from common.protocol.codec import decode
-from common.recording.entries import Kind, split_text, unpack_block
-from common.recording.reading import open_recording
 from feelahead.both_sides.processes import SideProcess
 from feelahead.both_sides.summary import read_summary
 from feelahead.lab.table import Row
@@ -22,7 +19,6 @@ from tests.two_hosts.wide_area.tunnels import Child, Host, WideArea
 
 _STARTS_S: Final = 120.0
 _LOOKS_S: Final = 0.05
-_LATE_S: Final = 0.1
 _ENDPOINT: Final = f"{ADDRESSES['robot']}:5555"
 _DEVICES: Final = {"drives": "simulated", "rests": "browser"}
 
@@ -34,12 +30,12 @@ def run_trial(trial: Trial, seed: int = 0) -> Row:
         wide = stack.enter_context(WideArea(trial.ways(), trial.control, seed))
         sides = _Sides(stack, wide, trial, folder, seed)
         sides.start()
-        parts = list(sides.watch())
+        total = sides.watch()
         # The robot side first: the operator side's end would be one more stop.
         codes = sides.robot.stop(), sides.operator.stop()
         assert codes == (0, 0), f"the sides ended with codes {codes}"
         robot, operator = (read_summary(folder / f"{host}.json") for host in ("robot", "operator"))
-        return sides.row(_total(parts), robot, operator)
+        return sides.row(total, robot, operator)
 
 
 @dataclass
@@ -55,10 +51,8 @@ class _Sides:
     """Number of the robot side's statuses since the arm was first armed"""
     armed: int = 0
     armed_after_s: float | None = None
-    fell_s: float = 0.0
-    """Time at which the uplink's rate fell, by the clock that all processes share"""
     beside: dict[str, float] = field(default_factory=dict)
-    """Figures of the page and of the bulk transfer"""
+    """Figures of the page"""
 
     def start(self) -> None:
         """Start all processes of the trial; return after the operator side's first status."""
@@ -67,20 +61,13 @@ class _Sides:
         self.robot = self._side("robot", "robot", f"--bind=tcp://{_ENDPOINT}", "--insecure", *cameras)
         self.robot.wait_for("listening", _STARTS_S)
         self.wide.figures()
-        more = [*(["--console"] if trial.pictures else ()), *([f"--record={self._record}"] if trial.falls_to else ())]
-        self.operator = self._operator("operator", *more)
+        self.operator = self._operator("operator", *(["--console"] if trial.pictures else ()))
         # The second operator observes.
         self.observer = self._operator("observer") if trial.observer != "none" else None
         self.page: Child | None = None
-        self.sink: Child | None = None
-        self.source: Child | None = None
         if trial.pictures:
             address = self.operator.wait_for("console", _STARTS_S)["address"]
             self.page = self._child("operator", "page", address)
-        if trial.bulk:
-            self.sink = self._child("operator", "bulk", "receive")
-            self.sink.hear()
-            self.source = self._child("robot", "bulk", "send")
 
     def _side(self, host: Host, name: str, *arguments: str) -> SideProcess:
         kept = (f"--seed={self.seed}", f"--summary={self.folder / name}.json")
@@ -98,27 +85,21 @@ class _Sides:
     def _child(self, host: Host, *words: str) -> Child:
         return self.stack.enter_context(self.wide.run(host, *words))
 
-    def watch(self) -> Iterator[Mapping[str, Any]]:
-        """Wait for the run's time; yield the forwarder's counts until the rate falls, if it does, and until the end."""
+    def watch(self) -> Mapping[str, Any]:
+        """Wait for the run's time; return the forwarder's counts."""
         trial = self.trial
         began_s = time.monotonic()
-        for of_all in (1 / 3, 1 / 2, 1.0):
+        for of_all in (1 / 3, 1.0):
             while (passed_s := time.monotonic() - began_s) < of_all * trial.seconds:
                 time.sleep(_LOOKS_S)
                 self._listen(passed_s)
             if of_all == 1 / 3 and trial.observer == "stops" and self.observer is not None:
                 self.stack.callback(os.kill, self.observer.process_id, signal.SIGCONT)
                 os.kill(self.observer.process_id, signal.SIGSTOP)
-            if of_all == 1 / 2 and trial.falls_to:
-                slower = replace(trial.ways()["to_operator"], rate_bit_s=1e6 * trial.falls_to)
-                self.fell_s = time.monotonic()
-                yield self.wide.figures({"to_operator": slower})
-        yield self.wide.figures()
+        total = self.wide.figures()
         if self.page is not None:
             self.beside |= self.page.last()
-        if self.source is not None and self.sink is not None:
-            self.source.end()
-            self.beside["bulk_kbit_s"] = 8e-3 * self.sink.last()["bytes"] / (time.monotonic() - began_s)
+        return total
 
     def _listen(self, passed_s: float) -> None:
         for side in (self.robot, self.operator, self.observer):
@@ -131,22 +112,6 @@ class _Sides:
                     self.armed += armed
             if side is not None:
                 side.check()
-
-    @property
-    def _record(self) -> Path:
-        return self.folder / "operator.mcap"
-
-    def _late_after_fall_s(self) -> float | None:
-        if not self.trial.falls_to:
-            return None
-        late_s = 0.0
-        for message in open_recording(self._record).messages(("/operator/inputs",)):
-            for entry in unpack_block(message.content).unpacked():
-                if entry.kind == Kind.RECEIVED:
-                    age_s = entry.now_s - decode(split_text(entry.content)[1]).header.sent_s
-                    if age_s > self.trial.delay / 1e3 + _LATE_S:
-                        late_s = max(late_s, entry.now_s - self.fell_s)
-        return late_s
 
     def row(self, total: Mapping[str, Any], robot: Mapping[str, Any], operator: Mapping[str, Any]) -> Row:
         """Return the trial's figures, from both summaries, the statuses and the counts; None for unmeasured ones.
@@ -171,27 +136,6 @@ class _Sides:
             "why": "; ".join(dict.fromkeys(stop["reason"] for stop in robot["stops"])),
             "done": robot["task"]["placing"]["placed"],
             **{name: total["to_operator"][name] + total["to_robot"][name] for name in ("lost", "dropped")},
-            "late_after_fall_s": self._late_after_fall_s(),
             **self.beside,
             **{name: total[name] for name in ("late_p99_ms", "late_max_ms", "realtime")},
         }
-
-
-_ADDED: Final = ("seconds", "packets", "bytes", "lost", "dropped")
-
-
-def _total(parts: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """Sum the counts of all parts of a run. For times take the largest, and for all else the last part's value."""
-    first, *others = parts
-    total = dict(first)
-    for part in others:
-        for name, value in part.items():
-            if isinstance(value, Mapping):
-                total[name] = _total([total[name], value])
-            elif name in _ADDED:
-                total[name] += value
-            elif name.endswith("_ms"):
-                total[name] = max(total[name], value)
-            else:
-                total[name] = value
-    return total

@@ -19,14 +19,6 @@ def test_packets_queue_before_the_rate_and_those_that_would_wait_too_long_are_dr
     assert came == [pytest.approx(0.11), pytest.approx(0.12), pytest.approx(0.13), None, None]
 
 
-def test_bits_that_wait_go_at_the_new_rate() -> None:
-    way = Wire(DirectionSettings(rate_bit_s=_RATE_BIT_S), 0, "to_operator", 0.0)
-    for _ in range(5):
-        way.take(_PACKET_BYTES, 0.0)
-    way.change(DirectionSettings(rate_bit_s=_RATE_BIT_S / 2.0), 0.01)
-    assert way.take(_PACKET_BYTES, 0.01) == pytest.approx(0.01 + 0.08 + 0.02)
-
-
 def test_losses_are_as_many_as_asked_the_same_for_a_seed_and_bursts_take_all() -> None:
     sent_s = [0.01 * number for number in range(20_000)]
     came = arrivals(DirectionSettings(loss=0.01), sent_s)

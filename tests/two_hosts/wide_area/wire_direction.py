@@ -57,13 +57,6 @@ class Wire:
         self._random = random.Random(f"{seed} {direction}")  # noqa: S311  # reproducible, no secret
         self._began_s = self._free_s = began_s
 
-    def change(self, words: DirectionSettings, now_s: float) -> None:
-        """Change the settings from `now_s` on; bits that wait in the queue leave at the new rate."""
-        if self._words.rate_bit_s and words.rate_bit_s:
-            waiting_s = max(0.0, self._free_s - now_s)
-            self._free_s = now_s + waiting_s * self._words.rate_bit_s / words.rate_bit_s
-        self._words = words
-
     def take(self, size_bytes: int, now_s: float) -> float | None:
         """Return when a packet sent at `now_s` arrives, by the same clock; None if it is lost or dropped."""
         words, counts = self._words, self.counts

@@ -7,11 +7,14 @@ import numpy as np
 
 from common.roles import Role
 from robot_side.drivers.mujoco.gripper_measurement import GripperTravel
+from robot_side.drivers.mujoco.model_enums import JointKind
 from robot_side.drivers.mujoco.robot_model import moves_any
 from robot_side.drivers.mujoco.scene import Scene
 
 _NEAR_END: Final = math.radians(2.0)
 _SAME: Final = 0.02
+_OUTSIDE: Final = 1e-3
+"""Least distance from a range, in rad or m, at which a joint starts outside it"""
 _NAMED: Final = 4
 
 
@@ -24,11 +27,13 @@ def joint_findings(scene: Scene, travel: GripperTravel | None) -> list[str]:
     loose = [_name(model, joint) for joint in own if joint not in busy and not _driven(model, joint)]
     at = scene.data.qpos[robot.arm_positions]
     near = (at - robot.lower_rad < _NEAR_END) | (robot.upper_rad - at < _NEAR_END)
-    stuck = [_name(model, int(joint)) for joint in robot.arm_joints[near]]
+    outside = [_name(model, joint) for joint in own if _is_outside(scene, joint)]
+    stuck = [name for joint in robot.arm_joints[near] if (name := _name(model, int(joint))) not in outside]
     dead = _dead(scene)
     lines = (
         (held, "held where they start, as they do not move the tool"),
         (loose, "without an actuator, so that they move freely"),
+        (outside, "start outside their ranges"),
         (stuck, "start at an end of their ranges, and move only one way"),
         (dead, "turn farther than their actuators' ctrlrange lets them: the rest of their ranges is dead"),
     )
@@ -56,7 +61,10 @@ def _dead(scene: Scene) -> list[str]:
 def _grip(scene: Scene, travel: GripperTravel | None) -> list[str]:
     """Return a line if nothing can be gripped, or not the target."""
     if travel is None:
-        return ["no actuator opens and closes fingers beyond the arm's last joint: nothing can be grasped"]
+        why = "no actuator opens and closes fingers beyond the arm's last joint"
+        if scene.robot.gripper_actuators.size:
+            why = "the hand's actuators do not bring its fingers together over the whole of their ctrlrange"
+        return [f"{why}: nothing can be grasped"]
     targets = [thing for thing in scene.objects if scene.roles[thing.name] is Role.TARGET]
     opening_m, closed_m = float(travel.openings_m[0]), float(travel.openings_m[-1])
     for thing in targets[:1]:
@@ -76,6 +84,15 @@ def _grip(scene: Scene, travel: GripperTravel | None) -> list[str]:
 
 def _driven(model: Any, joint: int) -> bool:
     return any(moves_any(model, actuator, np.array([joint])) for actuator in range(model.nu))
+
+
+def _is_outside(scene: Scene, joint: int) -> bool:
+    """Return whether a hinge or slide joint starts outside its range."""
+    model = scene.model
+    if not model.jnt_limited[joint] or model.jnt_type[joint] not in (JointKind.SLIDE, JointKind.HINGE):
+        return False
+    lower, upper = model.jnt_range[joint]
+    return not lower - _OUTSIDE <= scene.data.qpos[model.jnt_qposadr[joint]] <= upper + _OUTSIDE
 
 
 def _joints_at(model: Any, positions: Any) -> list[int]:

@@ -11,7 +11,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.asyncio.server import serve
 from websockets.exceptions import ConnectionClosed
 
-from operator_side.viewing.console.pages import MOST_PAGES, ROUND_ENDS, Pages
+from operator_side.viewing.console.pages import MOST_PAGES, PASSED_ON, ROUND_ENDS, Pages
+from operator_side.viewing.pages.page_messages import PageMessage
 
 TAKEN = '{"taken":true}'
 Opens = Callable[[], contextlib.AbstractAsyncContextManager[ClientConnection]]
@@ -97,16 +98,23 @@ def test_what_hands_and_sliders_say_is_passed_on_with_the_pages_number() -> None
             await desk.until(lambda: len(desk.heard) == 2)
             await second.send('{"play": {"paused": true}}')
             await desk.until(lambda: len(desk.heard) == 3)
-        await desk.until(lambda: len(desk.heard) == 5)
+            await first.send('{"mark": "start"}')
+            await desk.until(lambda: len(desk.heard) == 4)
+        await desk.until(lambda: len(desk.heard) == 6)
 
     heard = run(story).heard
-    assert heard[:3] == [
+    assert heard[:4] == [
         ("s", [1, {"hands": {"keys": ["w"]}}]),
         ("s", [2, {"hands": {"keys": []}, "tune": {"probability": 0.9}}]),
         ("s", [2, {"play": {"paused": True}}]),
+        ("s", [1, {"mark": "start"}]),
     ]
     # The inputs of a closed page are released.
-    assert sorted(page for _, (page, said) in heard[3:] if said is None) == [1, 2]
+    assert sorted(page for _, (page, said) in heard[4:] if said is None) == [1, 2]
+
+
+def test_all_that_a_page_may_say_reaches_the_operator_side() -> None:
+    assert {*PageMessage.__struct_fields__, "play", "again"} == set(PASSED_ON)
 
 
 def test_a_page_that_reports_slow_counts_until_it_is_gone() -> None:

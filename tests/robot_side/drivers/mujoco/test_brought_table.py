@@ -14,7 +14,7 @@ from robot_side.drivers.mujoco.checks.reach import reach_findings
 from robot_side.drivers.mujoco.encoders import Encoder
 from robot_side.drivers.mujoco.gripper_measurement import measure_gripper
 from robot_side.drivers.mujoco.scene import Scene, load_scene
-from tests.helpers.arm_models import planar_arm
+from tests.helpers.arm_models import TENDON_GRIPPER, planar_arm
 
 ASSETS = Path(load_scene.__code__.co_filename).parent / "assets"
 SECOND_ARM = """<body name="second" pos="0 1 0"><joint name="other"/><geom size="0.05"/></body></worldbody>"""
@@ -103,9 +103,21 @@ def test_joints_that_do_not_move_as_expected_are_named(tmp_path: Path) -> None:
     assert line.startswith("joints elbow: turn farther than")
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [('qpos="-0.45168', 'qpos="-9.4', "shoulder_pan"), ("0.0425 0.0425", "5 5", "left_finger, right_finger")],
+)
+def test_joints_that_start_outside_their_ranges_are_named(old: str, new: str, said: str, tmp_path: Path) -> None:
+    lines = joint_lines(load_scene(brought(tmp_path, (old, new)), "tool"))
+    assert lines[0] == f"joints {said}: start outside their ranges"
+    assert not any("at an end" in line for line in lines)
+
+
 def test_a_hand_without_driven_fingers_is_said(tmp_path: Path) -> None:
     bare = planar_arm(tmp_path, gripper_actuators="")
-    assert any("nothing can be grasped" in line for line in joint_lines(load_scene(bare, "tcp")))
+    assert any("no actuator opens and closes" in line for line in joint_lines(load_scene(bare, "tcp")))
+    idle = planar_arm(tmp_path, gripper_actuators=TENDON_GRIPPER.replace("0 255", "0 0.1"))
+    assert any("the hand's actuators do not bring" in line for line in joint_lines(load_scene(idle, "tcp")))
 
 
 def test_fingers_that_do_not_close_on_the_target_are_said(tmp_path: Path) -> None:

@@ -62,10 +62,11 @@ def test_a_servo_leads_by_its_force_and_lags_by_its_damping(tmp_path: Path) -> N
     np.testing.assert_allclose(travel.openings_m[[0, -1]], [0.08, 0.0], atol=1e-3)
 
 
-def test_a_gripper_of_unknown_range_is_named(tmp_path: Path) -> None:
-    unlimited = TENDON_GRIPPER.replace('ctrlrange="0 255"', "")
+@pytest.mark.parametrize(("name", "said"), [('name="hand" ', "'hand'"), ("", "2")])
+def test_a_gripper_of_unknown_range_is_named(name: str, said: str, tmp_path: Path) -> None:
+    unlimited = TENDON_GRIPPER.replace('ctrlrange="0 255"', "").replace('name="hand" ', name)
     with pytest.raises(
-        ConfigurationError, match="'hand' has no ctrlrange; valid: the inputs at which the gripper is open and closed"
+        ConfigurationError, match=f"{said} has no ctrlrange; valid: the inputs at which the gripper is open and closed"
     ):
         measure_gripper(load_scene(planar_arm(tmp_path, gripper_actuators=unlimited), "tcp"))
 

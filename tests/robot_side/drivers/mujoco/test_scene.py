@@ -241,6 +241,10 @@ REFUSED: list[tuple[dict[str, str] | str, str | None, str]] = [
     ({"extra_bottom": KEY.format("nan", "0")}, "tcp", "keyframe 'home' holds NaN or infinity; valid: finite qpos"),
     ({"extra_bottom": KEY.format("0", "inf")}, "tcp", "keyframe 'home' holds NaN or infinity; valid: finite qvel"),
     ({"world": '<geom name="post" size="0.1" pos="nan 0 0"/>'}, "tcp", "post"),
+    ({"world": '<geom name="post" size="0.1" pos="1e99 0 0"/>'}, "tcp", "post"),
+    ({"extra_top": '<option gravity="nan 0 0"/>'}, "tcp", "at its start its joints accelerate without bound"),
+    ({"extra_top": '<option gravity="0 0 -1e30"/>'}, "tcp", "at its start its joints accelerate without bound"),
+    ({"arm_actuators": MUSCLE.replace('name="pull" ', "")}, "tcp", "the actuator 1 of joint 'elbow' is of"),
 ]
 
 

@@ -1,1 +1,0 @@
-"""Tests that compare our emulation of links with the kernel's netem, run in User-Mode Linux: `make test-netem`."""

@@ -1,0 +1,34 @@
+"""Timing the physics of a tick does not change what the robot side does."""
+
+import numpy as np
+import pytest
+
+from common.statistics import microseconds
+from robot_side.core import RobotSide
+from robot_side.parts import build_parts
+from robot_side.settings import RobotSettings
+from robot_side.tick_times import PhysicsTime
+
+
+def test_a_timed_core_sends_what_a_plain_one_does_and_its_physics_are_timed() -> None:
+    physics = PhysicsTime(Ticking(), 0)
+    plain, timed = (build_parts(RobotSettings(), 1, "clock") for _ in range(2))
+    without, with_times = RobotSide(plain), RobotSide(timed, [physics])
+    for turn in range(30):
+        now_s = 1.0 + 1e-3 * turn
+        assert with_times.tick(now_s) == without.tick(now_s)
+    assert with_times.summary() == without.summary()
+    assert np.array_equal(timed.scene.data.qpos, plain.scene.data.qpos)
+    assert physics.took.count == 30
+    assert microseconds(physics.took) == pytest.approx({"p50": 1.0, "p99": 1.0, "max": 1.0})
+
+
+class Ticking:
+    """Stand-in for the clock that advances by a microsecond with each reading."""
+
+    def __init__(self) -> None:
+        self._reads = 0
+
+    def now(self) -> float:
+        self._reads += 1
+        return 1e-6 * self._reads
