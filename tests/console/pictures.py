@@ -29,7 +29,10 @@ _TRIES: Final = 3
 
 
 def main(names: Sequence[str]) -> int:
-    """Make the parts `names`, or all parts. Return 0 if all were made, or if no browser is available; otherwise 1."""
+    """Make the parts `names`, or all parts. Return 0 if all were made, or if no browser is available; 1 if not; 2 for bad names."""
+    if unknown := set(names) - set(PARTS):
+        print(f"{', '.join(sorted(unknown))}: no such part; valid: {', '.join(PARTS)}")
+        return 2
     for name in names or [part for part in PARTS if part != "states"]:
         files, make = PARTS[name]
         paths = [DOCS / file for file in files]
