@@ -29,7 +29,10 @@ _TRIES: Final = 3
 
 
 def main(names: Sequence[str]) -> int:
-    """Make the parts `names`, or all parts. Return 0 if all were made, or if no browser is available; 1 if not; 2 for bad names."""
+    """Make the parts `names`, or all parts; return 1 if one could not be made, 2 for a bad name, else 0.
+
+    Without a browser nothing is made, and 0 returned.
+    """
     if unknown := set(names) - set(PARTS):
         print(f"{', '.join(sorted(unknown))}: no such part; valid: {', '.join(PARTS)}")
         return 2
