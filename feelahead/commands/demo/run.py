@@ -153,11 +153,11 @@ def _watch(
     The run is over when its time is up, Ctrl-C comes, a side ends, or a page asks for another run.
     """
     starting_s, waiting_since_s = time.monotonic(), None
-    said, lifetime = _Said(), Lifetime(_duration_s(settings))
+    said, lifetime = Said(), Lifetime(_duration_s(settings))
     while not stop.is_set:
         now_s = time.monotonic()
         for side in (robot, operator):
-            _take_events(side, said, status, page)
+            take_events(side, said, status, page)
             if not side.running:
                 try:
                     side.check()
@@ -177,7 +177,7 @@ def _watch(
                     return [f"the sides did not find each other within {_LINK_TIMEOUT_S:g} s{asked}"]
             elif now_s - starting_s > _START_TIMEOUT_S:
                 return [f"the sides did not start within {_START_TIMEOUT_S:g} s"]
-        elif (why := lifetime.why_over(said.pages, now_s)) is not None:
+        elif (why := lifetime.why_over(said.pages_since(), now_s)) is not None:
             status.note(why)
             break
         if said.operator is not None:
@@ -194,7 +194,7 @@ def _duration_s(settings: DemoSettings) -> float | None:
 
 
 @dataclass
-class _Said:
+class Said:
     """Reports of both sides until now."""
 
     robot: RobotStatus | None = None
@@ -203,9 +203,16 @@ class _Said:
     """Whether the robot side listens for an operator side"""
     pages: int = 0
     """Number of open pages of the console"""
+    most_pages: int = 0
+    """Greatest number of open pages since the last `pages_since`"""
+
+    def pages_since(self) -> int:
+        """Return the greatest number of open pages since the last call: a page may open and close in between."""
+        most, self.most_pages = self.most_pages, self.pages
+        return most
 
 
-def _take_events(side: SideProcess, said: _Said, status: Status, page: KeptPage | None) -> None:
+def take_events(side: SideProcess, said: Said, status: Status, page: KeptPage | None) -> None:
     """Store in `said` and `page` what `side` has reported since the last call, and show its notes."""
     for event in side.events():
         if event["event"] == "status" and side.name == "robot":
@@ -223,6 +230,7 @@ def _take_events(side: SideProcess, said: _Said, status: Status, page: KeptPage 
             said.listens = True
         elif event["event"] == "pages":
             said.pages = int(event["count"])
+            said.most_pages = max(said.most_pages, said.pages)
         elif event["event"] == "again" and page is not None:
             page.wants_again = True
         else:

@@ -7,6 +7,7 @@ import sys
 import time
 from contextlib import closing
 from pathlib import Path
+from typing import cast
 
 import pytest
 from websockets.exceptions import ConnectionClosed, WebSocketException
@@ -14,8 +15,11 @@ from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 from websockets.typing import Origin
 
+from common.command.status import Status
 from common.sockets.robot import RobotSockets
+from feelahead.both_sides.processes import SideProcess
 from feelahead.commands.demo.page import AFTER_PAGES_S, FIRST_PAGE_S, KeptPage, Lifetime, kept_addresses
+from feelahead.commands.demo.run import Said, take_events
 from tests.operator_side.viewing.terminal.on_terminal import OnTerminal
 
 _LIMIT_S = 60.0
@@ -112,6 +116,18 @@ def read_until(page: Connection, kind: str) -> dict[str, object]:
         if message["kind"] == kind:
             return message
     raise AssertionError(f"no {kind}")
+
+
+def test_a_page_that_opens_and_closes_between_two_looks_has_been_open() -> None:
+    class Side:
+        name = "operator"
+
+        def events(self) -> list[dict[str, object]]:
+            return [{"event": "pages", "count": count} for count in (1, 0)]
+
+    said = Said()
+    take_events(cast(SideProcess, Side()), said, Status("none", "demo"), None)
+    assert [said.pages_since(), said.pages_since()] == [1, 0]
 
 
 @pytest.mark.processes
