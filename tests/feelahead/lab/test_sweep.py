@@ -341,7 +341,10 @@ def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch)
         ("own_syntax.py", "QUESTION =", "invalid syntax"),
     ],
 )
-def test_a_file_that_holds_no_question_is_refused(tmp_path: Path, name: str, code: str, said: str) -> None:
+def test_a_file_that_holds_no_question_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, code: str, said: str
+) -> None:
+    monkeypatch.setattr(sys, "path", [*sys.path])  # else json.py is found by the worker processes of later tests
     (tmp_path / name).write_text(code)
     with pytest.raises(ConfigurationError, match=said):
         try_out([str(tmp_path / name)])
