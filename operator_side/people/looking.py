@@ -46,6 +46,11 @@ class StalledDescent:
     def __init__(self) -> None:
         self._heights: deque[tuple[float, float]] = deque()
         self._sank = False
+        self._pressed_s = -math.inf
+
+    def presses(self, now_s: float) -> None:
+        """Note that the hand presses harder from now on, so that only what is seen of its outcome counts."""
+        self._pressed_s = now_s
 
     def see(self, height_m: float, slowest_m_s: float, look: Glance) -> bool:
         """Take the height; return whether the object stands. A moving object sinks at `slowest_m_s` or faster."""
@@ -55,4 +60,4 @@ class StalledDescent:
         share = (self._heights[0][1] - height_m) / (slowest_m_s * _STANDS_S)
         # A slight sinking before lowering does not count.
         self._sank |= share > 0.5
-        return self._sank and share < 0.2
+        return self._sank and share < 0.2 and look.now_s - self._pressed_s > _STANDS_S + look.lag_s

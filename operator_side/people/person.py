@@ -2,7 +2,8 @@
 
 They see only the screen, `visual_reaction_s` late, and the controller's warning light. They act only through the
 controller: a finger applies a force, and spring and strengths decide how far the trigger yields. So haptics act on this
-person mechanically and at once: a stiff trigger travels less under the same force, and the person never pushes harder.
+person mechanically and at once: a stiff trigger travels less under the same force. The person pushes harder only to set
+an object down, as they want that contact: while a stiff trigger stops the object above the table, in steps, to 2 N.
 They may also believe cues: a trigger that yields less than usual, and rumble. One reaction after such a cue they go on
 gently. One reaction after a pulse that signals that the held object stands, they release the object.
 Sources of the figures: McRuer's crossover model; measured reaction times.
@@ -36,6 +37,8 @@ FULL_STICK_M_S = 0.1
 """Speed that full deflection of a stick commands, as the person has learnt"""
 GENTLY_M_S: Final = 0.025
 """Speed after a cue, and when an object is set down"""
+_PRESSES_M_S: Final = 0.125
+"""Speed that 2 N command with a free trigger: the hardest press when a stiff trigger stops an object above the table"""
 _CARRY_M_S: Final = 0.05
 """Maximum speed with a held object"""
 _PEAK_M_S: Final = 0.2
@@ -95,6 +98,7 @@ class SimulatedOperator:
         self._attempt = 0
         self._depth_error_m = 0.0
         self._gently_along = self._gently_across = self._stands = False
+        self._gently_m_s = GENTLY_M_S
         self._from: Vector3 = (0.0, 0.0, 0.0)
         self._gripped_height_m = 0.0
         self._holding_s = 0.0
@@ -152,6 +156,7 @@ class SimulatedOperator:
         self.phase = phase
         self._since_s = now_s
         self._gently_along = self._gently_across = self._stands = False
+        self._gently_m_s = GENTLY_M_S
         self._moves.forget()
         self._nearing, self._sinking = StalledApproach(now_s), StalledDescent()
 
@@ -258,15 +263,24 @@ class SimulatedOperator:
         self._go((speed * back[0], speed * back[1], speed * back[2]), {Button.CROSS})
 
     def _lowering(self, look: Glance) -> None:
-        """Lower the object until it is felt or seen to stand: gently after a cue and near the expected height."""
+        """Lower the object until it is felt or seen to stand: gently after a cue and near the expected height.
+
+        If it sinks no more, though only a stiff trigger stops it, press that one harder step by step.
+        """
         if self._dropped(look):
             return
         height_m = look.view.tool_position_m[2]
-        if self._sinking.see(height_m, GENTLY_M_S, look) or self._stands:
+        stalled = self._sinking.see(height_m, GENTLY_M_S, look)
+        stiff = self._fingers.resisted_share() > self._settings.noticeable_force
+        if stalled and stiff and not self._stands and self._gently_m_s < _PRESSES_M_S:
+            self._gently_m_s += GENTLY_M_S
+            self._sinking.presses(look.now_s)
+        elif stalled or self._stands:
             self._from = look.view.tool_position_m
             self._enter(Doing.LETTING_GO, look.now_s)
         left_m = height_m - self._gripped_height_m + self._depth_error_m
-        x, y, z = (-min(_CARRY_M_S, max(look.gain * left_m, GENTLY_M_S)) * part for part in look.view.up_in_tool)
+        speed = max(min(_CARRY_M_S, look.gain * left_m), self._gently_m_s)
+        x, y, z = (-speed * part for part in look.view.up_in_tool)
         self._go((x, y, z), {Button.CROSS})
 
     def _letting_go(self, look: Glance) -> None:
@@ -293,7 +307,8 @@ class SimulatedOperator:
 
         The velocity is in the tool's frame, whose y axis points down on the screen.
         """
-        across, along = (GENTLY_M_S if gently else math.inf for gently in (self._gently_across, self._gently_along))
+        across = self._gently_m_s if self._gently_across else math.inf
+        along = self._gently_m_s if self._gently_along else math.inf
         x, y, z = (min(max(v, -most), most) for v, most in zip(velocity_m_s, (across, across, along), strict=True))
         stick = within_unit_circle(x / FULL_STICK_M_S, -y / FULL_STICK_M_S)
         self._fingers.do(z / FULL_TRIGGER_M_S, stick, buttons or set())

@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 import math
+from typing import Any
 
 import pytest
 
@@ -51,8 +52,8 @@ UP_AT_M = 0.41
 """Height of the tool, in metres, at which an object that was gripped at 0.3 m is carried"""
 
 
-def at_height(height_m: float, back_m: float = 0.44, *, holding: bool = True) -> Telemetry:
-    return armed(holding=holding, tool_position_m=(back_m, 0.0, height_m))
+def at_height(height_m: float, back_m: float = 0.44, *, holding: bool = True, **changes: Any) -> Telemetry:
+    return armed(holding=holding, tool_position_m=(back_m, 0.0, height_m), **changes)
 
 
 def carried(settings: PersonSettings = CLEAR_SIGHTED) -> Desk:
@@ -274,6 +275,27 @@ def test_a_person_who_feels_the_contact_pulse_releases_a_reaction_later(trust: f
     if let_go:
         assert 0.15 < let_go[0] < 0.5
         assert seen[-1].left == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("strength", [0, 1, 8])
+def test_from_above_they_press_a_stiff_trigger_harder_in_steps_to_2_n_before_they_let_go(strength: int) -> None:
+    def above(height_m: float) -> Telemetry:
+        return at_height(height_m, 0.5, up_in_tool=(0.0, 0.0, -1.0))
+
+    desk = Desk()
+    desk.arm()
+    desk.until(Doing.LIFTING, armed((0.0, 0.0, GRASP_M), holding=True, up_in_tool=(0.0, 0.0, -1.0)), 3.0)
+    desk.until(Doing.LOWERING, above(UP_AT_M), 3.0)
+    for step in range(120):
+        desk.watch(above(UP_AT_M - 0.001 * step), FRAME_S)
+    desk.resist(feedback(0, strength) if strength else FREE_TRIGGER)
+    begins = len(desk.hands)
+    desk.until(Doing.LETTING_GO, above(UP_AT_M - 0.12), 6.0)
+    pressed = {round(habitual_force_n(k * GENTLY_M_S / FULL_TRIGGER_M_S), 6) for k in (1, 2, 3, 4, 5)}
+    seen = [round(hands.r2_n, 6) for hands in desk.hands[begins:] if hands.phase == Doing.LOWERING]
+    assert seen == sorted(seen)
+    assert set(seen) == (pressed if strength else {min(pressed)})
+    assert max(pressed) == pytest.approx(2.0, abs=0.1)
 
 
 def test_at_the_warning_light_they_rest_their_hands_and_go_on_a_moment_after_it() -> None:
