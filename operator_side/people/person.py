@@ -94,17 +94,13 @@ class SimulatedOperator:
         self._fingers = Fingers(device, calibration or TravelCalibration(), swap_sides=swap_sides)
         self._seen: deque[tuple[float, Telemetry]] = deque()
         self._view: Telemetry | None = None
-        self._since_s: float | None = None
         self._attempt = 0
         self._depth_error_m = 0.0
-        self._gently_along = self._gently_across = self._stands = False
-        self._gently_m_s = GENTLY_M_S
         self._from: Vector3 = (0.0, 0.0, 0.0)
-        self._gripped_height_m = 0.0
-        self._holding_s = 0.0
+        self._gripped_height_m = self._holding_s = 0.0
         self._moves = MoveAndWait()
-        self._nearing, self._sinking = StalledApproach(0.0), StalledDescent()
         self._warned_s = self._marked_s = -math.inf
+        self._enter(Doing.RESTING, math.nan)
 
     @property
     def doing(self) -> Doing:
@@ -114,7 +110,7 @@ class SimulatedOperator:
 
     def tick(self, now_s: float, screen: Telemetry | None, delay_s: float) -> None:
         """See the screen, and operate the controller. delay_s: round trip to which the person has adapted."""
-        if self._since_s is None:
+        if math.isnan(self._since_s):
             self._since_s = now_s
         if screen is not None and (not self._seen or self._seen[-1][1] is not screen):
             self._seen.append((now_s, screen))
@@ -161,7 +157,7 @@ class SimulatedOperator:
         self._nearing, self._sinking = StalledApproach(now_s), StalledDescent()
 
     def _elapsed_s(self, look: Glance) -> float:
-        return look.now_s - (look.now_s if self._since_s is None else self._since_s)
+        return look.now_s - self._since_s
 
     def _resting(self, look: Glance) -> None:
         """Keep all inputs at rest for the second that arming requires."""
