@@ -47,6 +47,7 @@ _SEEN: Final = """() => {
         ages: [...document.querySelectorAll('.view')].map((view) => view.dataset.age),
     };
 }"""
+_DRIVES_OR_LATE: Final = "/You drive|All keys up/.test(document.querySelector('#hands_state')?.textContent)"
 
 
 class OutOfTimeError(Exception):
@@ -85,16 +86,22 @@ class Hand:
         return known
 
     def arm(self) -> None:
-        """Release all, reset a stop, wait for the page's word, and hold Space until it drives."""
-        keyboard = self._page.raw.keyboard
-        self.release()
-        self._held.discard("run")
-        keyboard.up("Space")
-        if self._page.raw.is_visible("#reset"):
-            self._page.raw.click("#reset")
-        self._page.wait_for_text("#hands_state", "Ready", _LOST_S)
-        keyboard.down("Space")
-        self._page.wait_for_text("#hands_state", "You drive", _LOST_S)
+        """Release all, reset a stop, wait for the page's word, and hold Space until the page drives.
+
+        If keys came late meanwhile, the page asks for the same again.
+        """
+        keyboard, drives = self._page.raw.keyboard, False
+        while not drives:
+            if time.monotonic() - self.began_s > MOST_S:
+                raise OutOfTimeError
+            self.release()
+            keyboard.up("Space")
+            if self._page.raw.is_visible("#reset"):
+                self._page.raw.click("#reset")
+            self._page.wait_for_text("#hands_state", "Ready", _LOST_S)
+            keyboard.down("Space")
+            self._page.wait(_DRIVES_OR_LATE, "'You drive' or 'All keys up' in #hands_state", _LOST_S)
+            drives = "You drive" in self._page.ask(_SEEN)["hands"]
         self._seen.clear()
         self._held.add("run")
 
