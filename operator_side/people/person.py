@@ -97,7 +97,7 @@ class SimulatedOperator:
         self._attempt = 0
         self._depth_error_m = 0.0
         self._from: Vector3 = (0.0, 0.0, 0.0)
-        self._gripped_height_m = self._holding_s = 0.0
+        self._gripped_height_m = self._holding_s = self._since_s = 0.0
         self._moves = MoveAndWait()
         self._warned_s = self._marked_s = -math.inf
         self._enter(Doing.RESTING, math.nan)
